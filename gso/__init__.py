@@ -1,0 +1,53 @@
+"""Optimise quad and grid surfaces: make them developable, flatten them, denoise them.
+
+>>> import gso
+>>> mesh = gso.load("examples/panel.obj")                     # doctest: +SKIP
+>>> result = gso.tno.optimize(mesh)                           # doctest: +SKIP
+>>> result.save("panel_developable.obj")                      # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+_NAMES = {
+    "Mesh": "gso.mesh",
+    "load": "gso.io",
+    "save": "gso.io",
+    "as_mesh": "gso.io",
+    "Result": "gso.result",
+    "Status": "gso.status",
+    "Progress": "gso.status",
+    "GSOError": "gso.status",
+    "MeshError": "gso.status",
+    "OptionError": "gso.status",
+    "BackendError": "gso.status",
+    "WeightsError": "gso.status",
+    "DatasetError": "gso.status",
+    "ConvergenceWarning": "gso.status",
+    "Options": "gso.tasks.options",
+    "Fixed": "gso.constraints",
+    "FixedBoundary": "gso.constraints",
+    "Handle": "gso.constraints",
+}
+_MODULES = ("tno", "metrics", "dataset", "plot")
+
+__all__ = [*_NAMES, *_MODULES, "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _NAMES:
+        value = getattr(importlib.import_module(_NAMES[name]), name)
+    elif name in _MODULES:
+        value = importlib.import_module(f"gso.{name}")
+    else:
+        raise AttributeError(f"module 'gso' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,1 @@
+"""Surfaces to train and to compare on."""

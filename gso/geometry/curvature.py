@@ -1,0 +1,59 @@
+"""Discrete Gaussian curvature by the angle defect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from gso.geometry import ops
+from gso.geometry.vector import Vec, cross, dot, norm2, sub
+
+
+def _star(centre: Vec, ring: Sequence[Vec]) -> tuple[Any, Any]:
+    """Sum of angles and sum of doubled triangle areas of a closed star."""
+    edges = [sub(p, centre) for p in ring]
+    angles: Any = 0.0
+    area2: Any = 0.0
+    for a, b in zip(edges, edges[1:] + edges[:1], strict=True):
+        twice = ops.sqrt(norm2(cross(a, b)))
+        angles = angles + ops.atan2(twice, dot(a, b))
+        area2 = area2 + twice
+    return angles, area2
+
+
+def star_defect(centre: Vec, ring: Sequence[Vec]) -> Any:
+    """Angle defect ``2 pi - sum of angles`` of an interior vertex, radians."""
+    return 2.0 * math.pi - _star(centre, ring)[0]
+
+
+def star_area(centre: Vec, ring: Sequence[Vec]) -> Any:
+    """Sum of the full areas of the triangles of a star (three times the barycentric area)."""
+    return 0.5 * _star(centre, ring)[1]
+
+
+def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
+    """Gaussian curvature of a vertex star, 1 / length^2.
+
+    ``K = (2 pi - sum of angles) / (sum of full triangle areas)``, the definition with
+    which the published figures of GSO-Net (Wang et al. 2024, Eq. 1) were computed. With
+    the barycentric area of Meyer et al. 2003 it is three times as large.
+
+    Parameters
+    ----------
+    centre : tuple of 3 numbers
+        The vertex.
+    ring : sequence of tuples of 3 numbers
+        Its neighbours in cyclic order, three or more. A neighbour listed twice in a row
+        adds nothing, so rings of different length can share one padded layout.
+
+    Examples
+    --------
+    The apex of an octahedron: defect ``2 pi - 4 pi/3`` over ``4 * sqrt(3)/2``.
+
+    >>> ring = [(1., 0., 0.), (0., 1., 0.), (-1., 0., 0.), (0., -1., 0.)]
+    >>> round(float(gaussian_curvature((0., 0., 1.), ring)), 6)
+    0.6046
+    """
+    angles, area2 = _star(centre, ring)
+    return (2.0 * math.pi - angles) / (0.5 * area2)

@@ -1,0 +1,47 @@
+"""Square root, atan2 and minimum for whatever numbers come in.
+
+The kind of number is asked of the argument itself, so that neither torch nor casadi
+is imported here: whoever holds such a number has imported its package already.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+
+# Below this a squared length counts as zero. Its root has a finite derivative, so a
+# degenerate element gives zeros and never a NaN.
+TINY = 1e-60
+TINY_SINGLE = 1e-30
+
+
+def _module_of(x: Any) -> Any:
+    """Return the torch or casadi module that `x` belongs to, or None for NumPy."""
+    root = type(x).__module__.partition(".")[0]
+    return sys.modules[root] if root in ("torch", "casadi") else None
+
+
+def sqrt(x: Any) -> Any:
+    """Square root of ``max(x, tiny)``: finite, with a finite derivative, at zero."""
+    mod = _module_of(x)
+    if mod is None:
+        return np.sqrt(np.maximum(x, TINY))
+    if mod.__name__ == "torch":
+        return mod.sqrt(mod.clamp(x, min=TINY if x.dtype == mod.float64 else TINY_SINGLE))
+    return mod.sqrt(mod.fmax(x, TINY))
+
+
+def atan2(y: Any, x: Any) -> Any:
+    """Angle of the vector (x, y), radians."""
+    mod = _module_of(y)
+    return np.arctan2(y, x) if mod is None else mod.atan2(y, x)
+
+
+def minimum(x: Any, y: Any) -> Any:
+    """Smaller of two numbers."""
+    mod = _module_of(x)
+    if mod is None:
+        return np.minimum(x, y)
+    return mod.minimum(x, y) if mod.__name__ == "torch" else mod.fmin(x, y)

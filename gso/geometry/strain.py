@@ -1,0 +1,57 @@
+"""Membrane strain of one triangle mapped from space to the plane.
+
+The map of a triangle is a 2 x 2 matrix F between the plane of the triangle in space and
+the flat image. With ``Q = |((F11 + F22)/2, (F21 - F12)/2)|`` (the part that turns and
+scales) and ``R = |((F11 - F22)/2, (F21 + F12)/2)|`` (the part that shears) its singular
+values are ``Q + R`` and ``Q - R``, the second one negative when the triangle is flipped.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gso.geometry import ops
+from gso.geometry.vector import Vec, cross, dot, norm, norm2, sub
+
+
+def rest_frame(p: Vec, q: Vec, r: Vec) -> tuple[Any, Any, Any]:
+    """Upper triangle ``(m11, m12, m22)`` of the inverse rest matrix of a triangle in space.
+
+    In the frame of its own plane the edges ``q - p`` and ``r - p`` are the columns of
+    ``[[l, u], [0, h]]``; this is the inverse of that matrix. It grows without bound as
+    the triangle's area vanishes: leave such triangles out.
+    """
+    e, f = sub(q, p), sub(r, p)
+    length = norm(e)
+    height = norm(cross(e, f)) / length
+    return 1.0 / length, -dot(e, f) / (length * length * height), 1.0 / height
+
+
+def stretch(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+    """Residuals of the membrane strain of the plane triangle p q r.
+
+    Returns ``(Q - 1, c, d)``, where ``R^2 = c^2 + d^2``; twice the sum of their squares
+    is ``(s1 - 1)^2 + (s2 - 1)^2``, the as-rigid-as-possible energy (Sorkine and Alexa
+    2007) without a singular value decomposition. `c` and `d` are linear in the unknowns.
+    """
+    q_part, c, d = _split(p, q, r, rest)
+    return norm(q_part) - 1.0, c, d
+
+
+def singular_values(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, Any]:
+    """Principal stretches ``(s1, s2)`` of a triangle; ``s2 < 0`` when it is flipped."""
+    q_part, c, d = _split(p, q, r, rest)
+    big, small = norm(q_part), ops.sqrt(norm2((c, d)))
+    return big + small, big - small
+
+
+def _split(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Vec, Any, Any]:
+    m11, m12, m22 = rest
+    e, f = sub(q, p), sub(r, p)
+    f11, f21 = e[0] * m11, e[1] * m11
+    f12, f22 = e[0] * m12 + f[0] * m22, e[1] * m12 + f[1] * m22
+    return (
+        (0.5 * (f11 + f22), 0.5 * (f21 - f12)),
+        0.5 * (f11 - f22),
+        0.5 * (f21 + f12),
+    )

@@ -1,0 +1,46 @@
+"""Vectors as component tuples of length 2 or 3."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gso.geometry import ops
+
+Vec = tuple[Any, ...]
+
+
+def sub(a: Vec, b: Vec) -> Vec:
+    """Difference ``a - b``."""
+    return tuple(p - q for p, q in zip(a, b, strict=True))
+
+
+def dot(a: Vec, b: Vec) -> Any:
+    """Inner product."""
+    total = a[0] * b[0]
+    for p, q in zip(a[1:], b[1:], strict=True):
+        total = total + p * q
+    return total
+
+
+def cross(a: Vec, b: Vec) -> Vec:
+    """Cross product of two vectors in space."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+def norm2(a: Vec) -> Any:
+    """Squared length."""
+    return dot(a, a)
+
+
+def norm(a: Vec) -> Any:
+    """Length; zero vectors have a finite derivative."""
+    return ops.sqrt(norm2(a))
+
+
+def angle(a: Vec, b: Vec) -> Any:
+    """Angle between two vectors in space, radians, by atan2 (acos loses digits)."""
+    return ops.atan2(norm(cross(a, b)), dot(a, b))

@@ -1,0 +1,342 @@
+"""The mesh that everything works on: vertices, faces, and the grid it may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gso import topology
+from gso.status import MeshError
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The user's frame: ``user = centre + scale * internal``.
+
+    Inside, a mesh has its centroid at the origin and its farthest vertex at distance 1.
+    """
+
+    centre: Array
+    scale: float
+
+    def to_unit(self, points: Array) -> Array:
+        """From the user's frame to the unit ball."""
+        return (points - self.centre) / self.scale
+
+    def to_user(self, points: Array) -> Array:
+        """From the unit ball to the user's frame."""
+        return self.centre + self.scale * points
+
+
+class Mesh:
+    """A surface of quads, triangles or both, checked on entry.
+
+    Parameters
+    ----------
+    vertices : array_like, (n, 3)
+        Coordinates in any unit of length.
+    faces : array_like of int, (m, 3) or (m, 4)
+        Vertex indices in cyclic order. In a mixed mesh the rows have four columns and a
+        triangle ends in -1.
+    notes : sequence of str
+        What was changed on the way in, for the user to read.
+
+    Attributes
+    ----------
+    vertices, faces : ndarray
+        Read-only arrays; faces are consistently oriented.
+    grid_index : ndarray of int, (H, W), or None
+        Vertex ids by row and column when the mesh is a grid, whatever its numbering.
+    notes : tuple of str
+        What was repaired: orientation, welded poles, unused vertices.
+
+    Raises
+    ------
+    MeshError
+        Non-finite coordinates, faces out of range, repeated vertices in a face,
+        duplicate faces, edges with three faces, one-sided surfaces, vertices in which
+        two parts merely touch, faces without area. The message names the place.
+
+    Examples
+    --------
+    >>> mesh = Mesh.from_grid(np.random.default_rng(0).random((4, 5, 3)))
+    >>> mesh.faces.shape, mesh.grid.shape
+    ((12, 4), (4, 5, 3))
+    """
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, notes: tuple[str, ...] = ()):
+        points = _checked_vertices(vertices)
+        table, said = _checked_faces(faces, points)
+        self.vertices: Array = points
+        self.faces: Ints = table
+        self.notes: tuple[str, ...] = tuple(notes) + said
+        self.vertices.flags.writeable = False
+        self.faces.flags.writeable = False
+
+    @classmethod
+    def from_grid(cls, points: ArrayLike) -> Mesh:
+        """Mesh of a grid of points (H, W, 3), at least 3 x 3.
+
+        A side collapsed to one point (a pole) is welded: the result is then a general
+        mesh with triangles at the pole, and `notes` says so.
+        """
+        grid = np.array(points, dtype=np.float64)
+        if grid.ndim != 3 or grid.shape[2] != 3:
+            raise MeshError(f"a grid is an array (H, W, 3), not {grid.shape}")
+        height, width = grid.shape[:2]
+        if height < 3 or width < 3:
+            raise MeshError(
+                f"a grid of {height} x {width} points has no interior vertex; give at least 3 x 3"
+            )
+        if not np.isfinite(grid).all():
+            i, j = np.argwhere(~np.isfinite(grid))[0][:2]
+            raise MeshError(f"the coordinates of grid vertex ({i}, {j}) are not finite")
+        faces = topology.grid_faces(height, width)
+        welded = _weld_poles(grid, faces)
+        if welded is not None:
+            return cls(welded[0], welded[1], notes=welded[2])
+        return cls(grid.reshape(-1, 3), faces)
+
+    def replaced(self, vertices: Array, *, notes: tuple[str, ...] = ()) -> Mesh:
+        """The same faces with other vertices (n, 3), connectivity not checked again."""
+        points = _checked_vertices(vertices)
+        if points.shape != self.vertices.shape:
+            raise MeshError(f"{points.shape[0]} vertices given for {len(self.vertices)}")
+        points.flags.writeable = False
+        other = Mesh.__new__(Mesh)
+        other.__dict__.update(
+            {k: v for k, v in self.__dict__.items() if k in _CONNECTIVITY},
+            vertices=points,
+            notes=self.notes + tuple(notes),
+        )
+        return other
+
+    def __repr__(self) -> str:
+        kind = f"grid {self.grid_shape[0]} x {self.grid_shape[1]}" if self.grid_shape else (
+            "triangles" if self.is_triangles else "quads"
+        )
+        return f"Mesh({len(self.vertices)} vertices, {len(self.faces)} faces, {kind})"
+
+    @cached_property
+    def half_edges(self) -> topology.HalfEdges:
+        """Half-edges of the faces."""
+        return topology.half_edges(self.faces, len(self.vertices))
+
+    @cached_property
+    def grid_index(self) -> Ints | None:
+        """Vertex ids by row and column, (H, W), or None."""
+        return topology.recognise_grid(self.half_edges, self.faces)
+
+    @cached_property
+    def triangles(self) -> Ints:
+        """The surface as triangles: quads split alike all over (t, 3)."""
+        if self.grid_index is not None:
+            ids = self.grid_index.ravel()
+            quads = ids[topology.grid_faces(*self.grid_index.shape)]
+            return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        return topology.triangulate(self.faces, self.half_edges)
+
+    @cached_property
+    def stars(self) -> list[tuple[Ints, Ints]]:
+        """Interior vertices and their rings in the triangulation, grouped by length."""
+        return topology.vertex_stars(topology.half_edges(self.triangles, len(self.vertices)))
+
+    @cached_property
+    def edges(self) -> Ints:
+        """Edges of the faces, each once, (e, 2)."""
+        return topology.edges(self.half_edges)
+
+    @cached_property
+    def boundary_loops(self) -> list[Ints]:
+        """Vertex ids of each boundary loop, longest first."""
+        return topology.boundary_loops(self.half_edges)
+
+    @cached_property
+    def components(self) -> Ints:
+        """Component number of each vertex, (n,)."""
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
+        n = len(self.vertices)
+        e = self.edges
+        links = coo_matrix((np.ones(len(e)), (e[:, 0], e[:, 1])), shape=(n, n))
+        return connected_components(links, directed=False)[1].astype(np.int64)
+
+    @property
+    def euler_characteristic(self) -> int:
+        """Vertices - edges + faces, unused vertices not counted."""
+        used = int((self.half_edges.face_count > 0).sum())
+        return used - len(self.edges) + len(self.faces)
+
+    @property
+    def is_disk(self) -> bool:
+        """One component with one boundary loop and no handle."""
+        used = self.half_edges.face_count > 0
+        return (
+            len(self.boundary_loops) == 1
+            and self.euler_characteristic == 1
+            and np.unique(self.components[used]).size == 1
+        )
+
+    @property
+    def is_triangles(self) -> bool:
+        """All faces are triangles."""
+        return self.faces.shape[1] == 3
+
+    @property
+    def grid_shape(self) -> tuple[int, int] | None:
+        """(H, W) of a grid, otherwise None."""
+        if self.grid_index is None:
+            return None
+        return int(self.grid_index.shape[0]), int(self.grid_index.shape[1])
+
+    @property
+    def grid(self) -> Array | None:
+        """The vertices as (H, W, 3) when the mesh is a grid, otherwise None."""
+        return None if self.grid_index is None else self.vertices[self.grid_index]
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal."""
+        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+
+    @cached_property
+    def frame(self) -> Frame:
+        """Centroid and largest distance from it: where the unit ball lies."""
+        centre = self.vertices.mean(axis=0)
+        radius = float(np.sqrt(((self.vertices - centre) ** 2).sum(axis=1).max()))
+        return Frame(centre, radius)
+
+
+_CONNECTIVITY = (
+    "faces",
+    "half_edges",
+    "grid_index",
+    "triangles",
+    "stars",
+    "edges",
+    "boundary_loops",
+    "components",
+)
+
+
+def _checked_vertices(vertices: ArrayLike) -> Array:
+    try:
+        points = np.array(vertices, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise MeshError(f"vertices must be numbers in an array (n, 3): {error}") from None
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise MeshError(f"vertices must be an array (n, 3), not {points.shape}")
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if bad.size:
+        raise MeshError(
+            f"the coordinates of vertex {bad[0]} are not finite ({bad.size} such vertices); "
+            "remove or replace them"
+        )
+    return points
+
+
+def _checked_faces(faces: Any, points: Array) -> tuple[Ints, tuple[str, ...]]:
+    try:
+        given = np.asarray(faces)
+    except ValueError:
+        raise MeshError("faces must be an array (m, 3) or (m, 4); pad triangles with -1") from None
+    if given.ndim != 2 or given.shape[1] not in (3, 4) or given.dtype.kind not in "iuf":
+        raise MeshError(f"faces must be integers in an array (m, 3) or (m, 4), not {given.shape}")
+    table = given.astype(np.int64)
+    if given.dtype.kind == "f" and (table != given).any():
+        raise MeshError(f"face {np.argwhere(table != given)[0][0]} has an index that is no integer")
+    if len(table) == 0:
+        raise MeshError("the mesh has no faces")
+    if table.shape[1] == 4 and (table[:, 3] == -1).all():
+        table = table[:, :3].copy()
+    tri = table[:, 3] == -1 if table.shape[1] == 4 else np.ones(len(table), bool)
+    inside = (table >= 0) & (table < len(points))
+    inside[tri, 3:] = True
+    bad = np.flatnonzero(~inside.all(axis=1))
+    if bad.size:
+        raise MeshError(
+            f"face {bad[0]} = {table[bad[0]].tolist()} points outside the {len(points)} vertices "
+            f"({bad.size} such faces)"
+        )
+    _check_corners(table)
+    table, flipped, components = topology.orient(table, len(points))
+    _check_area(table, points)
+    said = []
+    if flipped:
+        said.append(f"{flipped} faces were reversed to make the orientation consistent")
+    if components > 1:
+        said.append(f"the mesh has {components} components; each is treated on its own")
+    unused = np.ones(len(points), bool)
+    unused[table[table >= 0]] = False
+    if unused.any():
+        said.append(
+            f"{int(unused.sum())} vertices belong to no face and stay as they are "
+            f"(the first is vertex {np.flatnonzero(unused)[0]})"
+        )
+    return table, tuple(said)
+
+
+def _check_corners(table: Ints) -> None:
+    ordered = np.sort(table, axis=1)
+    bad = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
+    if bad.size:
+        raise MeshError(
+            f"face {bad[0]} = {table[bad[0]].tolist()} repeats a vertex ({bad.size} such faces); "
+            "write it with one corner less or delete it"
+        )
+    _, first, count = np.unique(ordered, axis=0, return_index=True, return_counts=True)
+    if (count > 1).any():
+        raise MeshError(
+            f"face {first[count > 1][0]} = {table[first[count > 1][0]].tolist()} is there "
+            f"{count[count > 1][0]} times; delete the duplicates"
+        )
+
+
+def _check_area(table: Ints, points: Array) -> None:
+    """Refuse faces without area, measured by the cross product of two spanning vectors."""
+    p = points - points.mean(axis=0)
+    last = table[:, -1] if table.shape[1] == 3 else np.where(table[:, 3] < 0, table[:, 0], table[:, 3])
+    # Diagonals of a quad, two edges of a triangle.
+    a = p[table[:, 2]] - p[table[:, 0]]
+    b = p[last] - p[table[:, 1]] if table.shape[1] == 4 else p[table[:, 1]] - p[table[:, 0]]
+    size = np.ptp(p, axis=0).max()
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = np.linalg.norm(np.cross(a / size, b / size), axis=1) if size > 0 else np.zeros(1)
+    bad = np.flatnonzero(~(scaled > 1e-14))
+    if bad.size:
+        raise MeshError(
+            f"face {bad[0]} = {table[bad[0]].tolist()} has no area ({bad.size} such faces); "
+            "merge its vertices or delete it"
+        )
+
+
+def _weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]] | None:
+    """Vertices and faces with the sides that are one point welded, or None if none is."""
+    points = grid.reshape(-1, 3)
+    ids = np.arange(len(points)).reshape(grid.shape[:2])
+    sides = {"first row": ids[0], "last row": ids[-1], "first column": ids[:, 0], "last column": ids[:, -1]}
+    size = np.ptp(points, axis=0).max()
+    poles = [n for n, s in sides.items() if np.ptp(points[s], axis=0).max() <= 1e-9 * size]
+    if not poles or size == 0:
+        return None
+    target = np.arange(len(points))
+    for name in poles:
+        target[sides[name]] = target[sides[name][0]]
+    kept, new = np.unique(target, return_inverse=True)
+    table = new[faces]
+    repeat = table == np.roll(table, -1, axis=1)
+    table = table[repeat.sum(axis=1) <= 1]
+    tri = np.flatnonzero((table == np.roll(table, -1, axis=1)).any(axis=1))
+    at = (table[tri] == np.roll(table[tri], -1, axis=1)).argmax(axis=1)
+    table[tri] = np.take_along_axis(table[tri], (at[:, None] + np.arange(4)) % 4, axis=1)
+    table[tri] = np.c_[table[tri][:, 1:], np.full(tri.size, -1)]
+    note = f"the {' and the '.join(poles)} of the grid is one point: welded to a pole"
+    return points[kept], table, (note,)

@@ -1,0 +1,344 @@
+"""The published metrics, exactly as their figures were computed, and the corrected ones.
+
+Each function takes surfaces as a :class:`gso.Mesh` or a grid array (H, W, 3), and flat
+images as (H, W, 2) or (n, 2). Quantities that change with the unit of length
+(``loss_gc``, ``loss_iso_cell``, ``fairness``) are measured on the surface normalised to
+the unit ball; pass `scale`, the length that counts as one, to measure in another frame:
+``scale=1`` takes the coordinates as they are. Meaning, unit and direction of every
+metric stand in :data:`INFO`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import geometry, topology
+from gso.status import MeshError
+
+if TYPE_CHECKING:
+    from gso.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+
+class Info(NamedTuple):
+    """What a metric means: its unit, whether lower is better, one line of text."""
+
+    unit: str
+    lower_is_better: bool
+    text: str
+
+
+INFO: dict[str, Info] = {
+    "loss_gc": Info("1/size^2", True, "mean |K| over interior vertices (published)"),
+    "K_A_meyer": Info("1/size^2", True, "mean |K| with Meyer's barycentric area"),
+    "K_A_r": Info("", False, "share of mean |K| removed (published)"),
+    "d_H": Info("%", True, "mean distance to the nearest input vertex / diagonal (published)"),
+    "distance_mean": Info("%", True, "mean true distance to the surface, both ways / diagonal"),
+    "distance_max": Info("%", True, "largest true distance, both ways / diagonal"),
+    "fairness_ratio": Info("", True, "sum of squared second differences, out / in"),
+    "loss_iso_cell": Info("size", True, "isometry defect of the cells (published)"),
+    "edge_length_error": Info("", True, "mean |l'/l - 1| over edges"),
+    "strain_mean": Info("", True, "mean of the larger principal strain"),
+    "strain_p99": Info("", True, "99th percentile of the larger principal strain"),
+    "flipped_cells": Info("", True, "cells with a corner turned over"),
+    "theta": Info("deg", True, "mean angle between cell normals (published)"),
+    "roughness_ratio": Info("", True, "sum of squared second differences, out / in"),
+}
+
+
+class Strains(NamedTuple):
+    """Larger principal strain |s - 1| pooled over corner triangles."""
+
+    mean: float
+    p99: float
+    values: Array
+
+
+class Distances(NamedTuple):
+    """Distances between two surfaces, in the unit of their coordinates."""
+
+    there_mean: float
+    there_max: float
+    back_mean: float
+    back_max: float
+
+
+def components(points: Array) -> tuple[Array, ...]:
+    """Component tuple of an array (..., d)."""
+    return tuple(points[..., k] for k in range(points.shape[-1]))
+
+
+def _points(surface: Any) -> Array:
+    """Vertices of a mesh or grid as (n, 3)."""
+    points = surface.vertices if hasattr(surface, "vertices") else np.asarray(surface, float)
+    return points.reshape(-1, points.shape[-1])
+
+
+def _grid(surface: Any) -> Array | None:
+    """Grid array of a mesh or grid, or None."""
+    if hasattr(surface, "grid"):
+        return surface.grid
+    points = np.asarray(surface, float)
+    if points.ndim != 3:
+        raise MeshError(f"expected a Mesh or a grid array (H, W, 3), not an array {points.shape}")
+    return points
+
+
+def _mesh(surface: Any) -> Mesh:
+    from gso.mesh import Mesh
+
+    return surface if isinstance(surface, Mesh) else Mesh.from_grid(surface)
+
+
+def unit(surface: Any) -> float:
+    """Largest distance of a vertex from the centroid: the length that counts as one."""
+    points = _points(surface)
+    return float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).max()))
+
+
+def curvature_grid(points: Array) -> Array:
+    """Discrete Gaussian curvature (H-2, W-2) of the interior vertices of a grid, 1/length^2."""
+    p = np.asarray(points, float)
+    centre = p[1:-1, 1:-1]
+    ring = (p[:-2, 1:-1], p[:-2, :-2], p[1:-1, :-2], p[2:, 1:-1], p[2:, 2:], p[1:-1, 2:])
+    return geometry.gaussian_curvature(components(centre), [components(r) for r in ring])
+
+
+def curvature(surface: Any) -> Array:
+    """Discrete Gaussian curvature of every vertex (n,); NaN on the boundary, 1/length^2.
+
+    Closed stars of the triangulation, of any valence; vertices of a grid in the order of
+    the mesh.
+    """
+    mesh = _mesh(surface)
+    out = np.full(len(mesh.vertices), np.nan)
+    for centre, ring in mesh.stars:
+        out[centre] = geometry.gaussian_curvature(
+            components(mesh.vertices[centre]),
+            [components(mesh.vertices[ring[:, k]]) for k in range(ring.shape[1])],
+        )
+    return out
+
+
+def _interior_curvature(surface: Any) -> Array:
+    grid = _grid(surface)
+    values = curvature(surface) if grid is None else curvature_grid(grid).ravel()
+    values = values[~np.isnan(values)]
+    return values if values.size else np.zeros(1)
+
+
+def loss_gc(surface: Any, *, scale: float | None = None) -> float:
+    """Mean absolute Gaussian curvature K_A over interior vertices (Wang et al. 2024, Eq. 1).
+
+    Times `scale` squared: of the surface in the unit ball when `scale` is not given.
+
+    >>> flat = np.zeros((4, 4, 3)); flat[..., :2] = np.mgrid[:4, :4].transpose(1, 2, 0)
+    >>> round(loss_gc(flat), 12)
+    0.0
+    """
+    scale = unit(surface) if scale is None else scale
+    return float(np.abs(_interior_curvature(surface)).mean() * scale**2)
+
+
+def curvature_features(surface: Any, *, scale: float | None = None) -> tuple[float, float, float]:
+    """(K_P, K_N, K_A): means of the positive, negative and absolute curvature (Eq. 1)."""
+    scale = unit(surface) if scale is None else scale
+    k = _interior_curvature(surface) * scale**2
+    return float(np.maximum(k, 0).mean()), float(np.minimum(k, 0).mean()), float(np.abs(k).mean())
+
+
+def K_A_r(before: Any, after: Any) -> float:
+    """Share of mean |K| removed, (K_A(before) - K_A(after)) / K_A(before); 0 for a flat input."""
+    was = loss_gc(before, scale=1.0)
+    return (was - loss_gc(after, scale=1.0)) / was if was > 0 else 0.0
+
+
+def d_H(before: Any, after: Any) -> float:
+    """Published proximity, percent of the input's bounding-box diagonal.
+
+    Mean over *output* vertices of the distance to the nearest *input* vertex: one-sided,
+    and it counts tangential sliding. See :func:`surface_distance` for the true distance.
+    """
+    from scipy.spatial import cKDTree
+
+    source = _points(before)
+    distance, _ = cKDTree(source).query(_points(after))
+    return float(100.0 * distance.mean() / np.linalg.norm(np.ptp(source, axis=0)))
+
+
+def point_to_surface(points: Array, mesh: Mesh) -> Array:
+    """Distance of each point (n, 3) to the triangulated surface, in its unit."""
+    import igl
+
+    squared = igl.point_mesh_squared_distance(
+        np.ascontiguousarray(points, float), np.asarray(mesh.vertices), mesh.triangles
+    )[0]
+    return np.sqrt(np.maximum(squared, 0.0))
+
+
+def surface_distance(before: Any, after: Any) -> Distances:
+    """True point-to-surface distances, output to input ("there") and back."""
+    a, b = _mesh(before), _mesh(after)
+    there = point_to_surface(b.vertices, a)
+    back = point_to_surface(a.vertices, b)
+    return Distances(
+        float(there.mean()), float(there.max()), float(back.mean()), float(back.max())
+    )
+
+
+def fairness(surface: Any, *, scale: float | None = None) -> float:
+    """Sum of squared second differences along the polylines (Jiang et al. 2020).
+
+    Divided by `scale` squared, the unit ball's radius when not given. On a triangle mesh,
+    which has no polylines: over the pairs of triangles at the interior edges, the
+    difference of the two diagonals' midpoints, doubled.
+    """
+    scale = unit(surface) if scale is None else scale
+    p = _grid(surface)
+    if p is not None:
+        rows = geometry.second_difference(
+            components(p[:-2]), components(p[1:-1]), components(p[2:])
+        )
+        cols = geometry.second_difference(
+            components(p[:, :-2]), components(p[:, 1:-1]), components(p[:, 2:])
+        )
+        return float(sum((c**2).sum() for c in (*rows, *cols)) / scale**2)
+    mesh = _mesh(surface)
+    v = mesh.vertices
+    t = topology.polyline_triples(mesh.half_edges, mesh.faces)
+    if len(t):
+        d = geometry.second_difference(*(components(v[t[:, k]]) for k in range(3)))
+        return float(sum((c**2).sum() for c in d) / scale**2)
+    a, b, left, right = topology.hinges(mesh.half_edges).T
+    return float(((v[a] + v[b] - v[left] - v[right]) ** 2).sum() / scale**2)
+
+
+def _flat(surface: Any, flat: Any) -> Array:
+    """Flat image as (n, 2) in the order of the mesh's vertices."""
+    image = np.asarray(flat, float)
+    if image.ndim == 3:
+        index = None if not hasattr(surface, "grid_index") else surface.grid_index
+        out = image.reshape(-1, image.shape[-1])[:, :2]
+        if index is not None:
+            ordered = np.empty_like(out)
+            ordered[index.ravel()] = out
+            return ordered
+        return out
+    return image[:, :2]
+
+
+def _cells(surface: Any) -> NDArray[np.int64]:
+    """Quad faces of a mesh or grid."""
+    if not hasattr(surface, "faces"):
+        return topology.grid_faces(*np.asarray(surface).shape[:2])
+    faces = surface.faces
+    return faces[faces[:, 3] >= 0] if faces.shape[1] == 4 else faces[:0]
+
+
+def _faces(surface: Any) -> NDArray[np.int64]:
+    return surface.faces if hasattr(surface, "faces") else _cells(surface)
+
+
+def isometry_defect(surface: Any, flat: Any, *, scale: float | None = None) -> Array:
+    """Per-cell isometry defect ``||a|-|a'|| + ||b|-|b'|| + |a.b - a'.b'|`` (c,)."""
+    scale = unit(surface) if scale is None else scale
+    cells = _cells(surface)
+    p = _points(surface) / scale
+    q = _flat(surface, flat) / scale
+    a, b = geometry.diagonals(*(components(p[cells[:, k]]) for k in range(4)))
+    a2, b2 = geometry.diagonals(*(components(q[cells[:, k]]) for k in range(4)))
+    return sum(np.abs(x) for x in geometry.isometry_defect(a, b, a2, b2))  # type: ignore[return-value]
+
+
+def loss_iso_cell(surface: Any, flat: Any, *, scale: float | None = None) -> float:
+    """Mean isometry defect of the quad cells, in the unit ball (published, Table 2).
+
+    Blind to a slide of the two checkerboard sub-lattices against each other and to
+    folding: read it together with strain and flips. NaN on a mesh without quads.
+    """
+    defect = isometry_defect(surface, flat, scale=scale)
+    return float(defect.mean()) if defect.size else float("nan")
+
+
+def edge_length_error(surface: Any, flat: Any) -> float:
+    """Mean of |l'/l - 1| over the mesh edges."""
+    mesh = _mesh(surface)
+    a, b = mesh.edges.T
+    q = _flat(surface, flat)
+    before = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
+    after = np.linalg.norm(q[a] - q[b], axis=1)
+    ok = before > 0
+    return float(np.abs(after[ok] / before[ok] - 1.0).mean())
+
+
+def principal_strains(surface: Any, flat: Any) -> Strains:
+    """Larger principal strain max |s - 1| of every corner triangle, pooled.
+
+    Four corner triangles per quad, one per triangle; those without area are left out.
+    """
+    tri = topology.corner_triangles(_faces(surface))
+    p, q = _points(surface), _flat(surface, flat)
+    corners = [p[tri[:, k]] for k in range(3)]
+    area = np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0]), axis=1)
+    keep = area > 1e-12 * area.max()
+    tri = tri[keep]
+    rest = geometry.rest_frame(*(components(p[tri[:, k]]) for k in range(3)))
+    s1, s2 = geometry.singular_values(*(components(q[tri[:, k]]) for k in range(3)), rest)
+    values = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0))
+    return Strains(float(values.mean()), float(np.percentile(values, 99)), values)
+
+
+def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None) -> int:
+    """Number of cells that are turned over in a flat image.
+
+    A grid cell (`flat` is (H, W, 2)) counts when any of its four corner triangles has
+    signed area <= 0; another quad (`flat` is (n, 2), `faces` given) when a triangle of
+    its split along the shorter diagonal has; a triangle when it is itself.
+    """
+    image = np.asarray(flat, float)
+    if faces is None:
+        if image.ndim != 3:
+            raise MeshError("flipped_cells needs faces=... for an image that is no grid (H, W, 2)")
+        cells = topology.grid_faces(*image.shape[:2])
+        area = corner_areas(image.reshape(-1, image.shape[-1])[:, :2], cells)
+        return int((area.reshape(4, -1) <= 0).any(axis=0).sum())
+    image = image.reshape(-1, image.shape[-1])[:, :2]
+    quads = faces[faces[:, 3] >= 0] if faces.shape[1] == 4 else faces[:0]
+    tris = faces[faces[:, 3] < 0, :3] if faces.shape[1] == 4 else faces
+    split = np.linalg.norm(image[quads[:, 0]] - image[quads[:, 2]], axis=1) > np.linalg.norm(
+        image[quads[:, 1]] - image[quads[:, 3]], axis=1
+    )
+    turned = np.where(split[:, None], np.roll(quads, -1, axis=1), quads)
+    halves = [corner_areas(image, turned[:, list(c)]) <= 0 for c in ((0, 1, 2), (0, 2, 3))]
+    return int((halves[0] | halves[1]).sum() + (corner_areas(image, tris) <= 0).sum())
+
+
+def corner_areas(flat: Array, faces: NDArray[np.int64]) -> Array:
+    """Doubled signed areas of the corner triangles of faces in a flat image (n, 2)."""
+    tri = topology.corner_triangles(faces)
+    return geometry.corner_area2(*(components(flat[tri[:, k]]) for k in range(3)))
+
+
+def face_normals(surface: Any) -> Array:
+    """Unit normals (m, 3): diagonals' cross product for quads, zero where there is no area."""
+    faces, p = _faces(surface), _points(surface)
+    corner = [p[faces[:, k]] for k in range(3)]
+    if faces.shape[1] == 4:
+        # A triangle padded with -1 takes its first corner for the fourth.
+        last = p[np.where(faces[:, 3] < 0, faces[:, 0], faces[:, 3])]
+    else:
+        last = corner[0]
+    a, b = geometry.diagonals(*(components(c) for c in (*corner, last)))
+    normal = np.stack(geometry.cross(a, b), axis=1)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+
+
+def normal_angle(clean: Any, denoised: Any) -> float:
+    """Mean angle theta between the cell normals of two surfaces, degrees (Table 3)."""
+    n1, n2 = face_normals(clean), face_normals(denoised)
+    return float(np.degrees(geometry.angle(components(n1), components(n2))).mean())

@@ -1,0 +1,89 @@
+"""How a run ended, how it is going, and what can go wrong.
+
+Every exception that the package raises on purpose is a :class:`GSOError`; its
+message names the vertex, face, file or option and says what to do about it.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+
+
+class GSOError(Exception):
+    """Base class of the package's errors."""
+
+
+class MeshError(GSOError, ValueError):
+    """Input geometry or a mesh file cannot be used."""
+
+
+class OptionError(GSOError, ValueError):
+    """An option, a constraint or a task name is unknown or contradictory."""
+
+
+class BackendError(GSOError, RuntimeError):
+    """A linear-algebra backend is not installed or failed."""
+
+
+class WeightsError(GSOError, ValueError):
+    """A weight file is corrupt, truncated or foreign."""
+
+
+class DatasetError(GSOError, ValueError):
+    """A dataset cannot be read or written."""
+
+
+class ConvergenceWarning(UserWarning):
+    """A result was returned, but the solver stopped for another reason than convergence."""
+
+
+class Status(enum.Enum):
+    """Why a solve ended; the value is the message shown to the user."""
+
+    CONVERGED = "converged: the energy no longer falls"
+    ALREADY_GOOD = "the input already meets the tolerance and comes back untouched"
+    TARGET_REACHED = "the target was reached"
+    TARGET_MISSED = "the target could not be reached; the closest result is returned"
+    MAX_ITERATIONS = "stopped after the largest number of iterations allowed"
+    STALLED = "stopped: no step lowers the energy any further"
+    CANCELLED = "stopped by the callback; the best iterate so far is returned"
+
+    @property
+    def converged(self) -> bool:
+        """Whether the result is as good as the options ask for."""
+        return self in (Status.CONVERGED, Status.ALREADY_GOOD, Status.TARGET_REACHED)
+
+    def __str__(self) -> str:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What the solver tells a callback after each iteration, iterate 0 included.
+
+    Attributes
+    ----------
+    stage : int
+        Index of the stage of a coarse-to-fine solve.
+    stages : int
+        Number of stages.
+    iteration : int
+        Iteration within the stage; 0 is the stage's start.
+    iterations : int
+        Largest number of iterations of the stage.
+    energy : float
+        Objective value (dimensionless).
+    by_term : dict of str to float
+        The objective by term; the values sum to `energy`.
+    step : float
+        Length of the step that was accepted, as a fraction of the full step.
+    """
+
+    stage: int
+    stages: int
+    iteration: int
+    iterations: int
+    energy: float
+    by_term: dict[str, float] = field(default_factory=dict)
+    step: float = 1.0

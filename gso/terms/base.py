@@ -1,0 +1,59 @@
+"""What a term is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Residual = Callable[[Sequence[tuple[Any, ...]], Sequence[Any]], tuple[Any, ...]]
+
+
+def _no_constants() -> Array:
+    return np.empty((0, 0))
+
+
+@dataclass(frozen=True)
+class Term:
+    """Elements of one kind that share a residual.
+
+    Attributes
+    ----------
+    name : str
+        Term name; elements of the same name are reported together.
+    residual : callable
+        ``residual(points, constants) -> tuple``: the residuals of one element from the
+        component tuples of its points (in the order of `stencil`) and its constants.
+    stencil : tuple of (block, indices (e, k))
+        Which rows of which block of coordinates ("surface", "flat", ...) each element
+        uses.
+    constants : ndarray, (c, e)
+        Constants of each element.
+    weights : ndarray, (e,)
+        Weight of each element. Terms that average over the surface use weights that sum
+        to one, so that one set of task weights serves every resolution.
+    linear : bool
+        The residual is affine in the points: its Jacobian is evaluated once.
+    """
+
+    name: str
+    residual: Residual
+    stencil: tuple[tuple[str, Ints], ...]
+    weights: Array
+    constants: Array = field(default_factory=_no_constants)
+    linear: bool = False
+
+    @property
+    def count(self) -> int:
+        """Number of elements."""
+        return len(self.weights)
+
+
+def mean_weights(count: int) -> Array:
+    """Equal weights that sum to one."""
+    return np.full(count, 1.0 / max(count, 1))

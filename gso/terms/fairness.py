@@ -1,0 +1,101 @@
+"""Fairness: second differences along polylines, or across the edges of triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gso import topology
+from gso.mesh import Mesh
+from gso.terms.base import Array, Ints, Term
+
+#: The target turns and moves with the reference, so only the untargeted form is invariant.
+INVARIANT = ("translation",)
+
+
+def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """Linear combination of the points minus a target vector.
+
+    Constants: one coefficient per point (they sum to zero), then the target's components.
+    """
+    k = len(points)
+    coefficients, target = constants[:k], constants[k:]
+    return tuple(
+        sum(c * p[d] for c, p in zip(coefficients, points, strict=True)) - target[d]
+        for d in range(len(points[0]))
+    )
+
+
+def differences(mesh: Mesh) -> tuple[Ints, Array]:
+    """Stencils (e, k) and coefficients (k, e) of the second differences of a mesh.
+
+    On quads ``(1, -2, 1) / h^2`` along polylines, h the mean edge length of the polyline's
+    grid direction (of the whole mesh when it is no grid). Across an edge of a triangle
+    mesh, the combination of its four vertices that vanishes on every affine function,
+    scaled like a second derivative times the edge's share of the area.
+    """
+    v = mesh.vertices
+    if mesh.is_triangles:
+        return _hinge_differences(mesh)
+    if mesh.grid_index is not None:
+        ids = mesh.grid_index
+        rows = np.stack([ids[:-2], ids[1:-1], ids[2:]], axis=-1).reshape(-1, 3)
+        cols = np.stack([ids[:, :-2], ids[:, 1:-1], ids[:, 2:]], axis=-1).reshape(-1, 3)
+        grid = v[ids]
+        h = [np.linalg.norm(np.diff(grid, axis=a), axis=-1).mean() for a in (0, 1)]
+        scale = np.r_[np.full(len(rows), h[0] ** -2), np.full(len(cols), h[1] ** -2)]
+        stencil = np.concatenate([rows, cols])
+    else:
+        stencil = topology.polyline_triples(mesh.half_edges, mesh.faces)
+        a, b = mesh.edges.T
+        h2 = (np.linalg.norm(v[a] - v[b], axis=1) ** 2).mean()
+        scale = np.full(len(stencil), 1.0 / h2)
+    return stencil, np.array([[1.0], [-2.0], [1.0]]) * scale
+
+
+def _hinge_differences(mesh: Mesh) -> tuple[Ints, Array]:
+    stencil = topology.hinges(mesh.half_edges)
+    a, b, c, d = (mesh.vertices[stencil[:, k]] for k in range(4))
+    edge = b - a
+    length2 = np.maximum((edge**2).sum(axis=1), 1e-300)
+    # Unfold the two triangles: positions along the edge and heights over it.
+    along_c = ((c - a) * edge).sum(axis=1) / length2
+    along_d = ((d - a) * edge).sum(axis=1) / length2
+    high_c = np.linalg.norm(c - a - along_c[:, None] * edge, axis=1)
+    high_d = np.linalg.norm(d - a - along_d[:, None] * edge, axis=1)
+    floor = 1e-3 * np.sqrt(length2)
+    high_c, high_d = np.maximum(high_c, floor), np.maximum(high_d, floor)
+    wc, wd = 1.0 / high_c, 1.0 / high_d
+    wb = -(along_c * wc + along_d * wd)
+    wa = -(wc + wd) - wb
+    # The jump of the normal derivative over the distance of the two heights' middles.
+    scale = 2.0 / (high_c + high_d)
+    return stencil, np.stack([wa, wb, wc, wd]) * scale
+
+
+def build(mesh: Mesh, *, block: str = "surface", target: Array | None = None) -> Term:
+    """Fairness of a block; `target` (n, dim) are points whose differences are wanted.
+
+    Weights are 1 / (number of vertices) on quads, so that both directions add up.
+    """
+    stencil, coefficients = differences(mesh)
+    dim = 2 if block == "flat" else 3
+    wanted = np.zeros((dim, len(stencil)))
+    if target is not None:
+        wanted = np.einsum("ke,ekd->de", coefficients, target[stencil])
+    share = len(stencil) / 2 if not mesh.is_triangles else len(stencil)
+    return Term(
+        "fairness",
+        residual,
+        ((block, stencil),),
+        weights=np.full(len(stencil), 1.0 / max(share, 1)),
+        constants=np.concatenate([coefficients, wanted]),
+        linear=True,
+    )
+
+
+def examples(mesh: Mesh) -> list[Term]:
+    """Terms for the conformance tests."""
+    return [build(mesh), build(mesh, block="flat")]

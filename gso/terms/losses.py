@@ -1,0 +1,72 @@
+"""What a residual costs: squared, absolute, or bounded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Loss(Protocol):
+    """Cost of residuals (r, e) of elements; acts on each residual unless said otherwise."""
+
+    def value(self, r: Array) -> Array:
+        """Cost, any shape that sums to the total over its first axis, (., e)."""
+
+    def weights(self, r: Array) -> tuple[Array, Array]:
+        """First derivative, and a curvature >= 0 for the Gauss-Newton matrix, (r, e) each."""
+
+
+@dataclass(frozen=True)
+class Squared:
+    """Half the square."""
+
+    def value(self, r: Array) -> Array:
+        return 0.5 * r * r
+
+    def weights(self, r: Array) -> tuple[Array, Array]:
+        return r, np.ones_like(r)
+
+
+@dataclass(frozen=True)
+class Absolute:
+    """``sqrt(r^2 + eps^2) - eps``, iteratively reweighted.
+
+    The curvature is the weight of the majorising parabola, ``1 / sqrt(r^2 + eps^2)``.
+    """
+
+    eps: float
+
+    def value(self, r: Array) -> Array:
+        return np.sqrt(r * r + self.eps**2) - self.eps
+
+    def weights(self, r: Array) -> tuple[Array, Array]:
+        w = 1.0 / np.sqrt(r * r + self.eps**2)
+        return r * w, w
+
+
+@dataclass(frozen=True)
+class Barrier:
+    """``-log(1 - |r|^2 / limit^2)`` of an element's residual vector: infinite at the limit.
+
+    The curvature leaves the cross terms of the vector out and keeps the radial growth,
+    so the Gauss-Newton matrix stays diagonal and positive.
+    """
+
+    limit: float
+
+    def _slack(self, r: Array) -> Array:
+        return 1.0 - (r * r).sum(axis=0, keepdims=True) / self.limit**2
+
+    def value(self, r: Array) -> Array:
+        slack = self._slack(r)
+        return np.where(slack > 0, -np.log(np.maximum(slack, 1e-300)), np.inf)
+
+    def weights(self, r: Array) -> tuple[Array, Array]:
+        slack = np.maximum(self._slack(r), 1e-12)
+        base = 2.0 / (self.limit**2 * slack)
+        return base * r, base + base * base * r * r

@@ -1,0 +1,58 @@
+"""Closeness to reference points, weaker along the surface than across it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gso.geometry import dot, sub
+from gso.mesh import Mesh
+from gso.terms.base import Array, Term, mean_weights
+
+#: The reference does not move with the surface.
+INVARIANT = ()
+
+
+def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """``t u + (1 - t) (u.n) n`` of the displacement u from the reference point.
+
+    Constants: reference point (3), unit normal n (3), tangential weight t.
+    """
+    u = sub(points[0], tuple(constants[0:3]))
+    n = tuple(constants[3:6])
+    t = constants[6]
+    along = (1.0 - t) * dot(u, n)
+    return tuple(t * a + along * b for a, b in zip(u, n, strict=True))
+
+
+def build(mesh: Mesh, normals: Array, *, tangential: float = 1.0) -> Term:
+    """Proximity of every vertex to where it is in `mesh`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Reference surface.
+    normals : ndarray, (n, 3)
+        Unit normals at its vertices.
+    tangential : float
+        Factor on the tangential part of the displacement.
+    """
+    n = len(mesh.vertices)
+    constants = np.concatenate([mesh.vertices.T, normals.T, np.full((1, n), tangential)])
+    return Term(
+        "proximity",
+        residual,
+        (("surface", np.arange(n)[:, None]),),
+        weights=mean_weights(n),
+        constants=constants,
+        linear=True,
+    )
+
+
+def examples(mesh: Mesh) -> list[Term]:
+    """Terms for the conformance tests."""
+    from gso.variables.normal import vertex_normals
+
+    return [build(mesh, vertex_normals(mesh), tangential=0.5)]

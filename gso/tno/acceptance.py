@@ -1,0 +1,56 @@
+"""How far to go: backtracking until the energy falls enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def armijo(
+    energy: Callable[[Array], float],
+    x: Array,
+    direction: Array,
+    start: float,
+    slope: float,
+    *,
+    longest: float = 1.0,
+    decrease: float = 1e-4,
+    shortest: float = 1e-4,
+) -> tuple[Array, float, float]:
+    """Backtrack from the longest step until the energy falls in proportion to the slope.
+
+    Steps shrink by the minimum of the parabola through the two known values and the
+    slope, kept between a tenth and a half.
+
+    Parameters
+    ----------
+    energy : callable
+        The objective.
+    x, direction : ndarray
+        Where we are and where we go.
+    start, slope : float
+        Energy at x and its derivative along the direction (negative).
+    longest, decrease, shortest : float
+        First step tried, share of the linear decrease asked for, step at which to give up.
+
+    Returns
+    -------
+    x, energy, step
+        The accepted point; the old one with step 0 when there is none.
+    """
+    t = longest
+    while t >= shortest * min(longest, 1.0):
+        candidate = x + t * direction
+        value = energy(candidate)
+        if value <= start + decrease * t * slope:
+            return candidate, value, t
+        if np.isfinite(value):
+            fitted = -slope * t * t / (2.0 * (value - start - slope * t))
+            t = float(np.clip(fitted, 0.1 * t, 0.5 * t))
+        else:
+            t *= 0.3
+    return x, start, 0.0

@@ -1,0 +1,42 @@
+"""Sparse symmetric positive definite solvers: one file per backend, found by name.
+
+A backend module defines ``available()``, ``cost(pattern)`` (seconds of one numeric
+factorisation, roughly: who is fastest) and a class ``Solver(pattern)`` with
+``factor(values)`` and ``solve(rhs)``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from types import ModuleType
+
+from gso.status import BackendError, OptionError
+from gso.tno.linear.base import Pattern, SingularError, one_thread
+
+__all__ = ["Pattern", "SingularError", "backends", "choose", "one_thread"]
+
+_SUPPORT = ("base",)
+
+
+def backends() -> dict[str, ModuleType]:
+    """Every backend module of this folder by name, installed or not."""
+    return {
+        info.name: importlib.import_module(f"{__name__}.{info.name}")
+        for info in pkgutil.iter_modules(__path__)
+        if info.name not in _SUPPORT
+    }
+
+
+def choose(pattern: Pattern, name: str | None = None):
+    """Solver of the named backend, or of the fastest installed one for this pattern."""
+    found = backends()
+    if name is not None:
+        if name not in found:
+            raise OptionError(f"no linear backend {name!r}; there are {', '.join(sorted(found))}")
+        if not found[name].available():
+            raise BackendError(f"backend {name!r} needs a package: pip install {found[name].PACKAGE}")
+        return found[name].Solver(pattern)
+    usable = {k: m for k, m in found.items() if m.available()}
+    best = min(usable, key=lambda k: usable[k].cost(pattern))
+    return usable[best].Solver(pattern)

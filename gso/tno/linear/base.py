@@ -1,0 +1,61 @@
+"""The pattern of a symmetric matrix, and what backends share."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+
+
+class SingularError(ArithmeticError):
+    """The matrix is not positive definite to working precision."""
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Lower triangle of a symmetric matrix, compressed by columns, rows sorted.
+
+    Attributes
+    ----------
+    size : int
+        Number of unknowns.
+    indptr, indices : ndarray
+        CSC arrays; the first entry of every column is its diagonal.
+    """
+
+    size: int
+    indptr: Ints
+    indices: Ints
+
+    @property
+    def nnz(self) -> int:
+        """Entries of the lower triangle."""
+        return len(self.indices)
+
+    @cached_property
+    def columns(self) -> Ints:
+        """Column of every entry."""
+        return np.repeat(np.arange(self.size), np.diff(self.indptr))
+
+    @cached_property
+    def bandwidth(self) -> int:
+        """Largest distance of an entry from the diagonal, in the given order."""
+        return int((self.indices - self.columns).max()) if self.nnz else 0
+
+
+@lru_cache(maxsize=1)
+def _controller() -> Any:
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+def one_thread() -> AbstractContextManager[Any]:
+    """Pin the BLAS to one thread: two on a busy machine make factorisations slower."""
+    return _controller().limit(limits=1, user_api="blas")

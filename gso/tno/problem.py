@@ -1,0 +1,320 @@
+"""The sum of weighted terms over given unknowns: energy, gradient, Gauss-Newton matrix.
+
+The sparsity of the matrix is worked out once; an evaluation only writes numbers into it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.terms.base import Term
+from gso.terms.losses import Loss, Squared
+from gso.tno.codegen import kernel
+from gso.tno.linear.base import Pattern
+from gso.variables import Layout, Variables
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: ``limit(coordinates, direction) -> largest step``: what a step must not cross.
+Limit = Callable[[Array, Array], float]
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """A term, its weight in the objective, and what its residuals cost."""
+
+    term: Term
+    weight: float
+    loss: Loss = Squared()
+
+    @property
+    def quadratic(self) -> bool:
+        """Its part of the energy is a quadratic function of the unknowns."""
+        return self.term.linear and isinstance(self.loss, Squared)
+
+
+class _Elements:
+    """One weighted term on given unknowns: gathers, kernels, pulled-back Jacobian."""
+
+    def __init__(self, item: Weighted, variables: Variables):
+        layout = variables.layout
+        term = item.term
+        columns, shape = [], []
+        for block, index in term.stencil:
+            dim = layout.where(block)[2]
+            shape += [dim] * index.shape[1]
+            columns.append(layout.columns(block, index).reshape(len(index), -1))
+        self.item = item
+        self.gather = np.ascontiguousarray(np.concatenate(columns, axis=1).T)
+        self.constants = term.constants if term.constants.size else np.empty((0, term.count))
+        self.shape = tuple(shape)
+        self.weights = term.weights
+        self._pull, self.columns = _pull_back(self.gather, variables)
+
+    def residual(self, coordinates: Array) -> Array:
+        """Residuals (r, e)."""
+        run = kernel(self.item.term.residual, self.shape, len(self.constants), False)
+        return run(coordinates[self.gather], self.constants)[0]
+
+    def linearise(self, coordinates: Array) -> tuple[Array, Array]:
+        """Residuals (r, e) and Jacobian by the element's unknowns (r, q, e)."""
+        run = kernel(self.item.term.residual, self.shape, len(self.constants), True)
+        value, slope = run(coordinates[self.gather], self.constants)
+        assert slope is not None  # noqa: S101 - the kernel was printed with its Jacobian
+        if self._pull is not None:
+            q = len(self.columns)
+            slope = np.stack([(self._pull @ s.ravel()).reshape(q, -1) for s in slope])
+        return value, slope
+
+    def energy(self, residual: Array) -> float:
+        """Weighted cost."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            total = self.item.weight * float((self.item.loss.value(residual) @ self.weights).sum())
+        return total if np.isfinite(total) else np.inf
+
+
+def _pull_back(gather: Ints, variables: Variables):
+    """Matrix from an element's coordinates to its unknowns, and those unknowns (q, e).
+
+    Rows of unknowns are padded with `variables.size` where an element has fewer.
+    """
+    if variables.basis is None:
+        return None, gather
+    from scipy.sparse import csr_matrix
+
+    k, count = gather.shape
+    part = variables.basis[gather.T.ravel()].tocoo()
+    element = part.row // k
+    key, at = np.unique(element * np.int64(variables.size) + part.col, return_inverse=True)
+    owner, column = key // variables.size, key % variables.size
+    start = np.searchsorted(owner, np.arange(count + 1))
+    place = np.arange(len(key)) - start[owner]
+    q = int(np.diff(start).max()) if len(key) else 1
+    columns = np.full((q, count), variables.size)
+    columns[place, owner] = column
+    pull = csr_matrix(
+        (part.data, (place[at] * count + element, (part.row % k) * count + element)),
+        shape=(q * count, k * count),
+    )
+    return pull, columns
+
+
+@dataclass
+class _Assembly:
+    """Where the entries of the elements' matrices go."""
+
+    pattern: Pattern
+    scatter: list[Ints]
+    quadratic: Ints
+    diagonal: Ints
+
+
+_assemblies: OrderedDict[bytes, _Assembly] = OrderedDict()
+_ASSEMBLIES_KEPT = 24
+_LARGEST_KEPT = 4_000_000
+
+
+class Problem:
+    """Objective over unknowns.
+
+    Parameters
+    ----------
+    items : sequence of Weighted
+        The terms with their weights and losses.
+    variables : Variables
+        The unknowns.
+    limits : sequence of callables
+        Bounds on a step, see :data:`Limit`.
+    """
+
+    def __init__(
+        self, items: Sequence[Weighted], variables: Variables, limits: Sequence[Limit] = ()
+    ):
+        self.variables = variables
+        self.limits = tuple(limits)
+        used = [i for i in items if i.weight > 0 and i.term.count]
+        self._elements = [_Elements(i, variables) for i in used if not i.quadratic]
+        self._quadratic = _Quadratic([_Elements(i, variables) for i in used if i.quadratic], variables)
+        self._assembly = _assemble(
+            variables.size, [e.columns for e in self._elements], self._quadratic.matrix
+        )
+        self._constant = np.zeros(self._assembly.pattern.nnz)
+        self._constant[self._assembly.quadratic] = self._quadratic.matrix.data
+
+    @property
+    def layout(self) -> Layout:
+        """The coordinates."""
+        return self.variables.layout
+
+    @property
+    def pattern(self) -> Pattern:
+        """Pattern of the Gauss-Newton matrix."""
+        return self._assembly.pattern
+
+    @property
+    def diagonal(self) -> Ints:
+        """Positions of the diagonal among the matrix values."""
+        return self._assembly.diagonal
+
+    def with_loss(self, name: str, loss: Loss) -> None:
+        """Change the loss of the terms of one name that are not quadratic."""
+        for element in self._elements:
+            if element.item.term.name == name:
+                element.item = replace(element.item, loss=loss)
+
+    def by_term(self, x: Array) -> dict[str, float]:
+        """Energy by term name; the values sum to :meth:`energy`."""
+        coordinates = self.variables.points(x)
+        out: dict[str, float] = {}
+        for element in self._elements:
+            value = element.energy(element.residual(coordinates))
+            out[element.item.term.name] = out.get(element.item.term.name, 0.0) + value
+        for name, value in self._quadratic.by_term(x).items():
+            out[name] = out.get(name, 0.0) + value
+        return out
+
+    def energy(self, x: Array) -> float:
+        """The objective; infinite where it is not finite."""
+        coordinates = self.variables.points(x)
+        total = self._quadratic.energy(x)
+        for element in self._elements:
+            total += element.energy(element.residual(coordinates))
+        return total if np.isfinite(total) else np.inf
+
+    def linearise(self, x: Array) -> tuple[float, Array, Array]:
+        """Energy, gradient (n,) and values of the Gauss-Newton matrix's lower triangle."""
+        coordinates = self.variables.points(x)
+        n = self.variables.size
+        total, gradient = self._quadratic.energy_and_gradient(x)
+        values = self._constant.copy()
+        for element, scatter in zip(self._elements, self._assembly.scatter, strict=True):
+            residual, slope = element.linearise(coordinates)
+            first, second = element.item.loss.weights(residual)
+            factor = element.item.weight * element.weights
+            total += element.energy(residual)
+            pulled = np.einsum("re,rqe->qe", first * factor, slope, optimize=False)
+            gradient += np.bincount(element.columns.ravel(), pulled.ravel(), n + 1)[:n]
+            products = _products(slope, second * factor)
+            values += np.bincount(scatter, products.ravel(), len(values) + 1)[:-1]
+        return total if np.isfinite(total) else np.inf, gradient, values
+
+    def largest_step(self, x: Array, dx: Array) -> float:
+        """Largest step along dx, at most 1, that crosses no limit."""
+        if not self.limits:
+            return 1.0
+        coordinates, direction = self.variables.points(x), self.variables.direction(dx)
+        return min(1.0, *(limit(coordinates, direction) for limit in self.limits))
+
+
+class _Quadratic:
+    """The quadratic terms together: ``|A x - b|^2 / 2`` with everything constant."""
+
+    def __init__(self, elements: list[_Elements], variables: Variables):
+        from scipy.sparse import csr_matrix, tril
+
+        n = variables.size
+        rows, columns, entries, rhs, self.slices = [], [], [], [], []
+        zero = np.zeros(n)
+        start = variables.points(zero)
+        base = 0
+        for element in elements:
+            residual, slope = element.linearise(start)
+            root = np.sqrt(element.item.weight * element.weights)
+            r, q, count = slope.shape
+            row = base + np.arange(r * count).reshape(r, 1, count)
+            keep = (slope != 0) & (element.columns < n)
+            rows.append(np.broadcast_to(row, slope.shape)[keep])
+            columns.append(np.broadcast_to(element.columns, slope.shape)[keep])
+            entries.append((slope * root)[keep])
+            rhs.append(-(residual * root).ravel())
+            self.slices.append((element.item.term.name, slice(base, base + r * count)))
+            base += r * count
+        join = np.concatenate
+        self.a = csr_matrix(
+            (join(entries), (join(rows), join(columns))) if base else ([], ([], [])),
+            shape=(base, n),
+        )
+        self.b = join(rhs) if base else np.zeros(0)
+        self.at = self.a.T.tocsr()
+        lower = tril((self.at @ self.a).tocsc(), format="csc")
+        lower.sort_indices()
+        self.matrix = lower
+
+    def _residual(self, x: Array) -> Array:
+        return self.a @ x - self.b
+
+    def energy(self, x: Array) -> float:
+        r = self._residual(x)
+        return 0.5 * float(r @ r)
+
+    def energy_and_gradient(self, x: Array) -> tuple[float, Array]:
+        r = self._residual(x)
+        return 0.5 * float(r @ r), self.at @ r
+
+    def by_term(self, x: Array) -> dict[str, float]:
+        r = self._residual(x)
+        out: dict[str, float] = {}
+        for name, part in self.slices:
+            out[name] = out.get(name, 0.0) + 0.5 * float(r[part] @ r[part])
+        return out
+
+
+def _products(slope: Array, weight: Array) -> Array:
+    """Sum over residuals of weight * J_a * J_b for all pairs a <= b, (pairs, e)."""
+    r, q, count = slope.shape
+    out = np.empty((q * (q + 1) // 2, count))
+    weighted = slope * weight[:, None, :]
+    start = 0
+    for a in range(q):
+        part = out[start : start + q - a]
+        np.multiply(weighted[0, a], slope[0, a:], out=part)
+        for k in range(1, r):
+            part += weighted[k, a] * slope[k, a:]
+        start += q - a
+    return out
+
+
+def _assemble(n: int, columns: list[Ints], quadratic) -> _Assembly:
+    """Pattern of the sum of element matrices, a constant matrix and a diagonal; cached."""
+    pairs = sum(c.shape[0] * (c.shape[0] + 1) // 2 * c.shape[1] for c in columns)
+    digest = hashlib.blake2b(str(n).encode())
+    for c in (*columns, quadratic.indptr, quadratic.indices):
+        digest.update(str(c.shape).encode())
+        digest.update(np.ascontiguousarray(c).data)
+    key = digest.digest()
+    if key in _assemblies:
+        _assemblies.move_to_end(key)
+        return _assemblies[key]
+    assembly = _analyse(n, columns, quadratic)
+    if pairs <= _LARGEST_KEPT:
+        _assemblies[key] = assembly
+        while len(_assemblies) > _ASSEMBLIES_KEPT:
+            _assemblies.popitem(last=False)
+    return assembly
+
+
+def _analyse(n: int, columns: list[Ints], quadratic) -> _Assembly:
+    keys = []
+    for c in columns:
+        q = c.shape[0]
+        a, b = np.triu_indices(q)
+        low, high = np.minimum(c[a], c[b]), np.maximum(c[a], c[b])
+        keys.append(np.where(high < n, low * np.int64(n) + high, np.int64(n) * n).ravel())
+    fixed = np.repeat(np.arange(n), np.diff(quadratic.indptr)) * np.int64(n) + quadratic.indices
+    diagonal = np.arange(n) * np.int64(n + 1)
+    every = np.unique(np.concatenate([*(np.unique(k) for k in keys), fixed, diagonal]))
+    every = every[every < np.int64(n) * n]
+    indptr = np.searchsorted(every, np.arange(n + 1) * np.int64(n))
+    return _Assembly(
+        Pattern(n, indptr, every % n),
+        [np.searchsorted(every, k) for k in keys],
+        np.searchsorted(every, fixed),
+        np.searchsorted(every, diagonal),
+    )

@@ -1,0 +1,163 @@
+"""Iterate: linearise, factor, step, until the energy no longer falls."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.status import Progress, Status
+from gso.terms.losses import Absolute
+from gso.tno import linear
+from gso.tno.acceptance import armijo
+from gso.tno.direction import DIRECTIONS
+from gso.tno.problem import Problem
+
+Array = NDArray[np.float64]
+Callback = Callable[[Progress], object]
+
+
+@dataclass
+class Timings:
+    """Seconds by phase, summed over a solve."""
+
+    setup: float = 0.0
+    evaluate: float = 0.0
+    factor: float = 0.0
+    search: float = 0.0
+
+    def as_dict(self) -> dict[str, float]:
+        """Phases by name."""
+        return dict(self.__dict__)
+
+
+@dataclass
+class Solution:
+    """What a stage returns."""
+
+    x: Array
+    energy: float
+    status: Status
+    iterations: int
+    backend: str
+    history: list[Progress] = field(default_factory=list)
+
+
+class Cancelled(Exception):
+    """The callback returned False."""
+
+
+def minimise(
+    problem: Problem,
+    x: Array,
+    *,
+    iterations: int,
+    tolerance: float = 1e-4,
+    eps: Sequence[float] = (),
+    robust: str = "",
+    method: str = "gauss-newton",
+    backend: str | None = None,
+    threads: int = 1,
+    callback: Callback | None = None,
+    stage: tuple[int, int] = (0, 1),
+    timings: Timings | None = None,
+) -> Solution:
+    """Minimise a problem from x; never returns a worse energy than it was given.
+
+    Parameters
+    ----------
+    problem : Problem
+        Objective over unknowns.
+    x : ndarray
+        Start.
+    iterations : int
+        Largest number of iterations.
+    tolerance : float
+        Stop when an iteration at the last `eps` lowers the energy by less than this
+        share of it.
+    eps : sequence of float
+        Smoothing of the absolute value by iteration, for the terms named `robust`; the
+        last one counts from then on, and in the energy that is returned.
+    robust : str
+        Name of the term whose loss follows `eps`.
+    method : {"gauss-newton", "levenberg-marquardt"}
+        Direction.
+    backend : str, optional
+        Linear backend; the fastest installed one when not given.
+    threads : int
+        BLAS threads around factorisations; 0 leaves them alone.
+    callback : callable, optional
+        Called with each :class:`gso.Progress`; returning False stops the solve.
+    stage : (int, int)
+        Index and number of stages, for the callback.
+    timings : Timings, optional
+        Where to add the seconds spent.
+    """
+    from contextlib import nullcontext
+
+    timings = Timings() if timings is None else timings
+    clock = time.perf_counter()
+    solver = linear.choose(problem.pattern, backend)
+    timings.setup += time.perf_counter() - clock
+    direction = DIRECTIONS[method]()
+    schedule = list(eps)
+    history: list[Progress] = []
+
+    def report(iteration: int, energy: float, step: float) -> None:
+        by_term = problem.by_term(x) if callback is not None else {}
+        progress = Progress(stage[0], stage[1], iteration, iterations, energy, by_term, step)
+        history.append(progress)
+        if callback is not None and callback(progress) is False:
+            raise Cancelled
+
+    def smooth(iteration: int) -> bool:
+        """Set the loss of this iteration; whether it is the last one of the schedule."""
+        if schedule:
+            problem.with_loss(robust, Absolute(schedule[min(iteration, len(schedule) - 1)]))
+        return iteration >= len(schedule) - 1
+
+    def final_energy(at: Array) -> float:
+        smooth(len(schedule))
+        return problem.energy(at)
+
+    clock = time.perf_counter()
+    best, best_energy = x, final_energy(x)
+    timings.search += time.perf_counter() - clock
+    status = Status.MAX_ITERATIONS
+    done = 0
+    try:
+        report(0, best_energy, 0.0)
+        with linear.one_thread() if threads == 1 else nullcontext():
+            for k in range(iterations):
+                settled = smooth(k)
+                t0 = time.perf_counter()
+                energy, gradient, values = problem.linearise(x)
+                t1 = time.perf_counter()
+                d = direction.step(solver, values, problem.diagonal, gradient)
+                t2 = time.perf_counter()
+                longest = problem.largest_step(x, d)
+                x, value, step = armijo(
+                    problem.energy, x, d, energy, float(gradient @ d), longest=longest
+                )
+                direction.accepted(step)
+                done = k + 1
+                if settled and value < best_energy:
+                    best, best_energy = x, value
+                timings.evaluate += t1 - t0
+                timings.factor += t2 - t1
+                timings.search += time.perf_counter() - t2
+                report(done, value, step)
+                if settled and energy - value <= tolerance * abs(energy):
+                    status = Status.CONVERGED if step > 0 or energy == 0 else Status.STALLED
+                    break
+    except Cancelled:
+        status = Status.CANCELLED
+    if done <= len(schedule) - 1:
+        value = final_energy(x)
+        if value < best_energy:
+            best, best_energy = x, value
+    smooth(len(schedule))
+    return Solution(best, best_energy, status, done, solver.name, history)

@@ -1,0 +1,16 @@
+"""Kinds of unknowns: one file each."""
+
+from gso.variables.base import Layout, Variables
+from gso.variables.free import free
+from gso.variables.normal import normal_offsets, vertex_normals
+from gso.variables.spline import spline_offsets, spline_surface
+
+__all__ = [
+    "Layout",
+    "Variables",
+    "free",
+    "normal_offsets",
+    "spline_offsets",
+    "spline_surface",
+    "vertex_normals",
+]

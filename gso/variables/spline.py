@@ -1,0 +1,69 @@
+"""Bicubic B-splines on grids: a coarse field of normal offsets, or the surface itself."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gso.variables.base import Array, Layout, Variables
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+
+@lru_cache(maxsize=32)
+def spline_matrix(samples: int, controls: int) -> csr_matrix:
+    """Uniform clamped cubic B-spline basis at equally spaced samples (samples, controls).
+
+    The degree falls below three when there are fewer than four control points.
+    """
+    from scipy.interpolate import BSpline
+
+    degree = min(3, controls - 1)
+    inner = np.linspace(0.0, 1.0, controls - degree + 1)
+    knots = np.r_[np.zeros(degree), inner, np.ones(degree)]
+    return BSpline.design_matrix(np.linspace(0.0, 1.0, samples), knots, degree).tocsr()
+
+
+@lru_cache(maxsize=16)
+def tensor_matrix(shape: tuple[int, int], controls: tuple[int, int]) -> csr_matrix:
+    """Bicubic basis (H W, n m) of a grid, both numbered row by row."""
+    from scipy.sparse import kron
+
+    return kron(
+        spline_matrix(shape[0], controls[0]), spline_matrix(shape[1], controls[1]), format="csr"
+    )
+
+
+def spline_offsets(
+    layout: Layout,
+    points: Array,
+    normals: Array,
+    shape: tuple[int, int],
+    controls: tuple[int, int],
+) -> Variables:
+    """Vertex = point + (coarse bicubic field) * normal; one unknown per control point.
+
+    The vertices of the block "surface" must be numbered row by row.
+    """
+    from scipy.sparse import csr_matrix
+
+    n = len(points)
+    along = csr_matrix(
+        (normals.ravel(), np.repeat(np.arange(n), 3), np.arange(3 * n + 1)), shape=(3 * n, n)
+    )
+    basis = (along @ tensor_matrix(shape, controls)).tocsr()
+    return Variables(layout, basis, layout.pack({"surface": points}), name="spline-offsets")
+
+
+def spline_surface(layout: Layout, shape: tuple[int, int], controls: tuple[int, int]) -> Variables:
+    """The surface is a bicubic B-spline: three unknowns per control point.
+
+    `project` fits a given surface; the misfit is the caller's to report.
+    """
+    from scipy.sparse import identity, kron
+
+    basis = kron(tensor_matrix(shape, controls), identity(3), format="csr")
+    return Variables(layout, basis, np.zeros(layout.size), name="spline-surface")

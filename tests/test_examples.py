@@ -1,0 +1,317 @@
+"""The shapes in examples/: what their sources say about them holds."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+
+
+@pytest.fixture(autouse=True)
+def examples_on_path(monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+
+
+def load(name):
+    if name == "terrain":
+        pytest.importorskip("matplotlib")
+    return importlib.import_module(name)
+
+
+class Connectivity:
+    """Edges, valences and boundary loops of oriented quads."""
+
+    def __init__(self, faces):
+        self.faces = faces
+        sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+        self.directed = Counter(map(tuple, sides.tolist()))
+        self.edges = {tuple(sorted(e)) for e in self.directed}
+        self.boundary = {a: b for a, b in self.directed if (b, a) not in self.directed}
+        self.boundary_sides = sum((b, a) not in self.directed for a, b in self.directed)
+
+    def is_manifold(self):
+        """No directed edge twice, and one boundary edge at most leaves each vertex."""
+        once = max(self.directed.values()) == 1
+        return once and len(self.boundary) == self.boundary_sides
+
+    def loops(self):
+        left, count = dict(self.boundary), 0
+        while left:
+            start, vertex = left.popitem()
+            while vertex != start:
+                vertex = left.pop(vertex)
+            count += 1
+        return count
+
+    def components(self):
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        i, j = np.array(sorted(self.edges)).T
+        size = self.faces.max() + 1
+        return connected_components(coo_array((np.ones(len(i)), (i, j)), (size, size)))[0]
+
+    def inner_valences(self):
+        valence = Counter(v for e in self.edges for v in e)
+        return Counter(n for v, n in valence.items() if v not in self.boundary)
+
+
+def corner_angles(vertices, faces):
+    p = vertices[faces]
+    ahead, behind = np.roll(p, -1, axis=1) - p, np.roll(p, 1, axis=1) - p
+    cosine = np.sum(ahead * behind, axis=-1) / (
+        np.linalg.norm(ahead, axis=-1) * np.linalg.norm(behind, axis=-1)
+    )
+    return np.degrees(np.arccos(cosine))
+
+
+def normals(vertices, faces):
+    p = vertices[faces]
+    return np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+
+
+def rotated(net, turns):
+    """Control points turned about z by quarter turns, as a sorted set of points."""
+    turn = np.linalg.matrix_power(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), turns)
+    points = np.round(net.reshape(-1, 3) @ turn.T, 9) + 0.0
+    return sorted(map(tuple, points.tolist()))
+
+
+def read_obj(path):
+    rows = [line.split() for line in path.read_text().splitlines()]
+    vertices = np.array([r[1:] for r in rows if r[0] == "v"], float)
+    faces = np.array([r[1:] for r in rows if r[0] == "f"], int) - 1
+    return vertices, faces
+
+
+@pytest.mark.parametrize("name", ["_write", "teapot", "terrain", "great_court", "irregular"])
+def test_docstrings_hold(name):
+    flags = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+    assert doctest.testmod(load(name), optionflags=flags).failed == 0
+
+
+def test_teapot_table_is_complete():
+    numbers = np.loadtxt(EXAMPLES / "teapot_patches.csv", delimiter=",", dtype=int)
+    vertices = np.loadtxt(EXAMPLES / "teapot_vertices.csv", delimiter=",")
+    assert vertices.shape == (306, 3)
+    assert numbers.shape == (32, 16)
+    # Newell's knob had a hole of radius 0.002 on top; the printed patches close it.
+    assert set(range(1, 307)) - set(numbers.ravel().tolist()) == {205, 206, 216, 223}
+
+
+@pytest.mark.parametrize("first", [0, 4, 8, 20, 24, 28])
+def test_teapot_parts_have_fourfold_symmetry(first):
+    net = load("teapot").control_net()
+    # All parts but the bottom go round clockwise.
+    sign = 1 if first == 28 else -1
+    for k in range(4):
+        assert rotated(net[first], sign * k) == rotated(net[first + k], 0)
+
+
+@pytest.mark.parametrize("k", [12, 14, 16, 18])
+def test_teapot_handle_and_spout_are_mirror_symmetric(k):
+    net = load("teapot").control_net()
+    np.testing.assert_array_equal(net[k][:, ::-1] * [1, -1, 1], net[k + 1])
+
+
+def test_teapot_patches_join_except_at_the_known_gaps():
+    teapot = load("teapot")
+    edges = {}
+    poles = 0
+    for k in range(32):
+        g = np.round(teapot.patch(k, 5), 9) + 0.0
+        # Each side in the direction that leaves the patch on its left.
+        for side in (g[:, 0], g[-1], g[::-1, -1], g[0, ::-1]):
+            if np.ptp(side, axis=0).max() == 0:
+                poles += 1
+                continue
+            line = tuple(map(tuple, side.tolist()))
+            assert line not in edges, "two patches run along this edge in one direction"
+            edges[line] = k
+    free = Counter(k // 4 for line, k in edges.items() if line[::-1] not in edges)
+    assert poles == 8
+    # Rim to lid on both sides, and both ends of handle and spout.
+    assert free == {0: 4, 6: 4, 3: 4, 4: 4}
+
+
+def test_teapot_surface_has_the_known_size_and_faces_out():
+    teapot = load("teapot")
+    p = teapot.patches(33)
+    assert p.shape == (32, 33, 33, 3)
+    np.testing.assert_allclose(p.min(axis=(0, 1, 2)), [-3, -2, 0], atol=1e-12)
+    np.testing.assert_allclose(p.max(axis=(0, 1, 2)), [3.434, 2, 3.15], atol=5e-4)
+    body = p[4:12]
+    n = np.cross(body[:, 1:, :-1] - body[:, :-1, :-1], body[:, :-1, 1:] - body[:, :-1, :-1])
+    assert np.all(np.sum((n * body[:, :-1, :-1])[..., :2], axis=-1) > 0)
+
+
+def test_teapot_rejects_a_patch_that_does_not_exist():
+    with pytest.raises(ValueError, match="0 to 31"):
+        load("teapot").patch(32)
+
+
+def test_panel_is_the_patch_the_script_makes():
+    teapot = load("teapot")
+    path = EXAMPLES / "panel.obj"
+    vertices, faces = read_obj(path)
+    assert path.stat().st_size < 100_000
+    assert faces.shape == (1024, 4)
+    expected = teapot.patch(teapot.PANEL, 33).reshape(-1, 3)
+    np.testing.assert_allclose(vertices, expected, atol=6e-7)
+    np.testing.assert_array_equal(faces, load("_write").grid_faces(33, 33))
+
+
+def test_terrain_is_in_metres():
+    grid = load("terrain").terrain()
+    assert grid.shape == (344, 403, 3)
+    east, north = grid[0, 1, 0] - grid[0, 0, 0], grid[0, 0, 1] - grid[1, 0, 1]
+    # A nautical mile is a minute of latitude, that is 20 samples; the sphere is 1 % off.
+    assert north == pytest.approx(1852 / 20, rel=0.01)
+    assert east / north == pytest.approx(np.cos(np.radians(36.59)), rel=0.01)
+    assert (grid[..., 2].min(), grid[..., 2].max()) == (236, 1076)
+    np.testing.assert_allclose(grid[-1, 0, :2], 0)
+
+
+def test_terrain_windows_are_cut_from_the_whole():
+    terrain = load("terrain")
+    whole = terrain.terrain()
+    cut = terrain.terrain((10, 60, 100, 180), step=2)
+    np.testing.assert_array_equal(cut, whole[10:60:2, 100:180:2])
+    with pytest.raises(ValueError, match="344 x 403"):
+        terrain.terrain((0, 345, 0, 10))
+
+
+def test_great_court_has_its_heights_on_both_boundaries():
+    g = load("great_court")
+    t = np.linspace(0, 2 * np.pi, 101)
+    np.testing.assert_allclose(g.height(g.A * np.cos(t), g.A * np.sin(t)), g.HEIGHT_CENTRE)
+    x, y = np.linspace(-g.B, g.B, 51), np.linspace(-g.D, g.C, 51)
+    for edge in (g.height(x, g.C), g.height(x, -g.D), g.height(g.B, y), g.height(-g.B, y)):
+        np.testing.assert_allclose(edge, g.HEIGHT_EDGE, rtol=1e-14)
+
+
+def published_height(x, y, a=22.245, b=36.625, c=46.025, d=51.125):
+    """The formula at one point, written in the polar angle and with its divisions."""
+    from math import atan2, cos, exp, hypot, sin
+
+    r, theta = hypot(x, y), atan2(y, x)
+    even, odd, s = 1 + cos(2 * theta), 1 - cos(2 * theta), sin(theta)
+    psi = (1 - x / b) * (1 + x / b) * (1 - y / c) * (1 + y / d)
+    eta = psi / (
+        (1 - a * x / (r * b))
+        * (1 + a * x / (r * b))
+        * (1 - a * y / (r * c))
+        * (1 + a * y / (r * d))
+    )
+    alpha = (r / a - 1) * psi
+    z2 = (1 - 0.5) * (
+        (35 + 10 * psi) * even / 2 + 24 / 2 * (odd / 2 + s) + (7.5 + 12 * psi) * (odd / 2 - s) - 1.6
+    )
+    z2 += -10 / 2 * even + 10 * ((odd / 2 + s) / 2) ** 2 * (1 - 3 * alpha)
+    z2 += 2.5 * ((odd / 2 - s) / 2) ** 2 * (r / a - 1) ** 2
+    beta = (1 - a / r) / sum(hypot(p, q) / (p * q) for p in (b - x, b + x) for q in (c - y, d + y))
+    z3 = 0.5 * (3.5 / 2 * even + 3 / 2 * odd + 0.3 * s) + 1.05 * (
+        exp(-14 * (1 - x / b)) + exp(-14 * (1 + x / b))
+    ) * (exp(-14 * (1 - y / c)) + exp(-14 * (1 + y / d)))
+    return (20.955 - 19.71) * eta + 19.71 + alpha * z2 + beta * z3
+
+
+@pytest.mark.parametrize(
+    "x, y", [(30, 1), (0, 35), (5, -40), (-36, 45.5), (-20, 20), (36.6, -51), (-25, -8)]
+)
+def test_great_court_is_the_published_formula(x, y):
+    assert load("great_court").height(x, y) == pytest.approx(published_height(x, y), rel=1e-13)
+
+
+def test_great_court_mesh_is_a_ring_over_its_plan():
+    g = load("great_court")
+    vertices, faces = g.roof()
+    mesh = Connectivity(faces)
+    assert (mesh.is_manifold(), mesh.components(), mesh.loops()) == (True, 1, 2)
+    assert set(mesh.inner_valences()) == {4}
+    assert np.all(normals(vertices, faces)[:, 2] > 0)
+    np.testing.assert_allclose(vertices.min(axis=0), [-g.B, -g.D, g.HEIGHT_EDGE])
+    np.testing.assert_allclose(vertices.max(axis=0)[:2], [g.B, g.C])
+    # East and west mirror each other.
+    np.testing.assert_allclose(g.quarter("east")[..., 2], g.quarter("west")[:, ::-1, 2], rtol=1e-12)
+
+
+@pytest.mark.parametrize("side", ["south", "east", "north", "west"])
+def test_great_court_quarter_runs_from_circle_to_side(side):
+    g = load("great_court")
+    grid = g.quarter(side, (9, 17))
+    assert grid.shape == (9, 17, 3)
+    np.testing.assert_allclose(np.hypot(grid[0, :, 0], grid[0, :, 1]), g.A)
+    np.testing.assert_allclose(grid[-1, [0, -1], :2], g.SIDES[side])
+    np.testing.assert_allclose(grid[-1, :, 2], g.HEIGHT_EDGE)
+
+
+@pytest.mark.parametrize("name, loops", [("with_hole", 2), ("disk", 1)])
+def test_irregular_mesh(name, loops):
+    vertices, faces = getattr(load("irregular"), name)()
+    mesh = Connectivity(faces)
+    assert 1500 <= len(faces) <= 4000
+    assert np.array_equal(np.unique(faces), np.arange(len(vertices)))
+    assert (mesh.is_manifold(), mesh.components(), mesh.loops()) == (True, 1, loops)
+    assert len(vertices) - len(mesh.edges) + len(faces) == 2 - loops
+    assert {3, 4, 5} <= set(mesh.inner_valences()) <= {3, 4, 5, 6, 7}
+    angles = corner_angles(vertices, faces)
+    assert angles.min() > 25
+    assert angles.max() < 150
+    outward = vertices[faces].mean(axis=1) * [1, 1, 0]
+    assert np.all(np.sum(normals(vertices, faces) * outward, axis=1) > 0)
+
+
+@pytest.mark.parametrize("name", ["with_hole", "disk"])
+def test_irregular_mesh_lies_on_the_teapot(name):
+    teapot = load("teapot")
+    vertices, _ = getattr(load("irregular"), name)()
+    # All four patches are one profile r(u), z(u) times one plane curve, so a vertex is on
+    # the body if its angle gives it the distance from the axis that its height asks for.
+    fine = np.linspace(0, 1, 2001)
+    profile = teapot.point(4, fine, 0.0)
+    radius = np.interp(-vertices[:, 2], -profile[:, 2], profile[:, 0])
+    plane = teapot.point(4, 0.0, fine)[:, :2] / teapot.point(4, 0.0, 0.0)[0]
+    angle = np.arctan2(-plane[:, 1], plane[:, 0])
+    at = np.mod(-np.arctan2(vertices[:, 1], vertices[:, 0]), np.pi / 2)
+    expected = radius * np.interp(at, angle, np.hypot(*plane.T))
+    np.testing.assert_allclose(np.hypot(vertices[:, 0], vertices[:, 1]), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["with_hole", "disk"])
+def test_a_cone_fits_the_irregular_mesh_within_one_percent(name):
+    vertices, _ = getattr(load("irregular"), name)()
+    radius, z = np.hypot(vertices[:, 0], vertices[:, 1]), vertices[:, 2]
+    slope = np.linspace(0, np.pi, 361)[:, None]
+    across = radius * np.cos(slope) + z * np.sin(slope)
+    miss = np.ptp(across, axis=1).min() / 2
+    assert miss < 0.01 * np.linalg.norm(np.ptp(vertices, axis=0))
+
+
+@pytest.mark.parametrize(
+    "name, options, files",
+    [
+        ("teapot", ["-n", "3"], 32),
+        ("terrain", ["--step", "40"], 2),
+        ("great_court", [], 5),
+        ("irregular", [], 2),
+    ],
+)
+def test_scripts_write_their_files(name, options, files, tmp_path, monkeypatch):
+    module = load(name)
+    monkeypatch.setattr(sys, "argv", [name, "-o", str(tmp_path / "out"), *options])
+    module.main()
+    written = sorted((tmp_path / "out").iterdir())
+    assert len(written) == files
+    for path in written:
+        if path.suffix == ".obj":
+            vertices, faces = read_obj(path)
+            assert np.isfinite(vertices).all()
+            assert (faces.min(), faces.max()) == (0, len(vertices) - 1)
