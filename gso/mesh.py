@@ -76,6 +76,7 @@ class Mesh:
         table, said = _checked_faces(faces, points)
         self.vertices: Array = points
         self.faces: Ints = table
+        topology.check_vertices(self.half_edges)
         self.notes: tuple[str, ...] = tuple(notes) + said
         self.vertices.flags.writeable = False
         self.faces.flags.writeable = False
@@ -87,7 +88,7 @@ class Mesh:
         A side collapsed to one point (a pole) is welded: the result is then a general
         mesh with triangles at the pole, and `notes` says so.
         """
-        grid = np.array(points, dtype=np.float64)
+        grid = _numbers(points, "a grid is an array of numbers (H, W, 3)")
         if grid.ndim != 3 or grid.shape[2] != 3:
             raise MeshError(f"a grid is an array (H, W, 3), not {grid.shape}")
         height, width = grid.shape[:2]
@@ -119,9 +120,12 @@ class Mesh:
         return other
 
     def __repr__(self) -> str:
-        kind = f"grid {self.grid_shape[0]} x {self.grid_shape[1]}" if self.grid_shape else (
-            "triangles" if self.is_triangles else "quads"
-        )
+        if self.grid_shape:
+            kind = f"grid {self.grid_shape[0]} x {self.grid_shape[1]}"
+        elif self.is_triangles:
+            kind = "triangles"
+        else:
+            kind = "quads and triangles" if (self.faces < 0).any() else "quads"
         return f"Mesh({len(self.vertices)} vertices, {len(self.faces)} faces, {kind})"
 
     @cached_property
@@ -172,17 +176,15 @@ class Mesh:
     @property
     def euler_characteristic(self) -> int:
         """Vertices - edges + faces, unused vertices not counted."""
-        used = int((self.half_edges.face_count > 0).sum())
-        return used - len(self.edges) + len(self.faces)
+        return int(self._used.sum()) - len(self.edges) + len(self.faces)
 
     @property
     def is_disk(self) -> bool:
         """One component with one boundary loop and no handle."""
-        used = self.half_edges.face_count > 0
         return (
             len(self.boundary_loops) == 1
             and self.euler_characteristic == 1
-            and np.unique(self.components[used]).size == 1
+            and np.unique(self.components[self._used]).size == 1
         )
 
     @property
@@ -204,15 +206,23 @@ class Mesh:
 
     @property
     def diagonal(self) -> float:
-        """Length of the bounding box's diagonal."""
-        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+        """Length of the bounding box's diagonal, unused vertices not counted."""
+        return float(np.linalg.norm(np.ptp(self.vertices[self._used], axis=0)))
 
     @cached_property
     def frame(self) -> Frame:
-        """Centroid and largest distance from it: where the unit ball lies."""
-        centre = self.vertices.mean(axis=0)
-        radius = float(np.sqrt(((self.vertices - centre) ** 2).sum(axis=1).max()))
+        """Centroid and largest distance from it: where the unit ball lies.
+
+        A vertex of no face may lie anywhere and does not count.
+        """
+        points = self.vertices[self._used]
+        centre = points.mean(axis=0)
+        radius = float(np.sqrt(((points - centre) ** 2).sum(axis=1).max()))
         return Frame(centre, radius)
+
+    @property
+    def _used(self) -> NDArray[np.bool_]:
+        return self.half_edges.face_count > 0
 
 
 _CONNECTIVITY = (
@@ -227,11 +237,20 @@ _CONNECTIVITY = (
 )
 
 
-def _checked_vertices(vertices: ArrayLike) -> Array:
+def _numbers(values: ArrayLike, expected: str) -> Array:
+    """A copy as an array of double precision."""
     try:
-        points = np.array(vertices, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise MeshError(f"vertices must be numbers in an array (n, 3): {error}") from None
+        given = np.asarray(values)
+        if given.dtype.kind not in "c":
+            return np.array(given, dtype=np.float64)
+        error: Any = "complex numbers"
+    except (TypeError, ValueError, OverflowError) as caught:
+        error = caught
+    raise MeshError(f"{expected}: {error}")
+
+
+def _checked_vertices(vertices: ArrayLike) -> Array:
+    points = _numbers(vertices, "vertices must be numbers in an array (n, 3)")
     if points.ndim != 2 or points.shape[1] != 3:
         raise MeshError(f"vertices must be an array (n, 3), not {points.shape}")
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
@@ -250,7 +269,8 @@ def _checked_faces(faces: Any, points: Array) -> tuple[Ints, tuple[str, ...]]:
         raise MeshError("faces must be an array (m, 3) or (m, 4); pad triangles with -1") from None
     if given.ndim != 2 or given.shape[1] not in (3, 4) or given.dtype.kind not in "iuf":
         raise MeshError(f"faces must be integers in an array (m, 3) or (m, 4), not {given.shape}")
-    table = given.astype(np.int64)
+    with np.errstate(invalid="ignore"):
+        table = given.astype(np.int64)
     if given.dtype.kind == "f" and (table != given).any():
         raise MeshError(f"face {np.argwhere(table != given)[0][0]} has an index that is no integer")
     if len(table) == 0:
@@ -302,14 +322,26 @@ def _check_corners(table: Ints) -> None:
 
 def _check_area(table: Ints, points: Array) -> None:
     """Refuse faces without area, measured by the cross product of two spanning vectors."""
-    p = points - points.mean(axis=0)
-    last = table[:, -1] if table.shape[1] == 3 else np.where(table[:, 3] < 0, table[:, 0], table[:, 3])
+    mask = np.zeros(len(points), bool)
+    mask[table[table >= 0]] = True
+    used = points[mask]
+    # Squares and products of lengths must stay within double precision everywhere.
+    farthest = np.abs(used).max()
+    size = np.ptp(used, axis=0).max() if farthest < 1e100 else np.inf
+    if not 1e-100 < size < np.inf:
+        raise MeshError(
+            f"the surface is {size:.3g} wide and reaches to {farthest:.3g}: all its vertices are "
+            "one point, or its unit of length needs changing"
+        )
+    p = points - used.mean(axis=0)
+    if table.shape[1] == 3:
+        last = table[:, 2]
+    else:
+        last = np.where(table[:, 3] < 0, table[:, 0], table[:, 3])
     # Diagonals of a quad, two edges of a triangle.
     a = p[table[:, 2]] - p[table[:, 0]]
     b = p[last] - p[table[:, 1]] if table.shape[1] == 4 else p[table[:, 1]] - p[table[:, 0]]
-    size = np.ptp(p, axis=0).max()
-    with np.errstate(over="ignore", invalid="ignore"):
-        scaled = np.linalg.norm(np.cross(a / size, b / size), axis=1) if size > 0 else np.zeros(1)
+    scaled = np.linalg.norm(np.cross(a / size, b / size), axis=1)
     bad = np.flatnonzero(~(scaled > 1e-14))
     if bad.size:
         raise MeshError(
@@ -322,14 +354,20 @@ def _weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]]
     """Vertices and faces with the sides that are one point welded, or None if none is."""
     points = grid.reshape(-1, 3)
     ids = np.arange(len(points)).reshape(grid.shape[:2])
-    sides = {"first row": ids[0], "last row": ids[-1], "first column": ids[:, 0], "last column": ids[:, -1]}
+    sides = {
+        "first row": ids[0],
+        "last row": ids[-1],
+        "first column": ids[:, 0],
+        "last column": ids[:, -1],
+    }
     size = np.ptp(points, axis=0).max()
     poles = [n for n, s in sides.items() if np.ptp(points[s], axis=0).max() <= 1e-9 * size]
     if not poles or size == 0:
         return None
     target = np.arange(len(points))
     for name in poles:
-        target[sides[name]] = target[sides[name][0]]
+        # A corner may have been welded to another side already: take that side along.
+        target[np.isin(target, target[sides[name]])] = target[sides[name]].min()
     kept, new = np.unique(target, return_inverse=True)
     table = new[faces]
     repeat = table == np.roll(table, -1, axis=1)
@@ -338,5 +376,6 @@ def _weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]]
     at = (table[tri] == np.roll(table[tri], -1, axis=1)).argmax(axis=1)
     table[tri] = np.take_along_axis(table[tri], (at[:, None] + np.arange(4)) % 4, axis=1)
     table[tri] = np.c_[table[tri][:, 1:], np.full(tri.size, -1)]
-    note = f"the {' and the '.join(poles)} of the grid is one point: welded to a pole"
+    verb = "is one point" if len(poles) == 1 else "are one point each"
+    note = f"the {' and the '.join(poles)} of the grid {verb}: welded to a pole"
     return points[kept], table, (note,)

@@ -232,6 +232,33 @@ def recognise_grid(he: HalfEdges, faces: Ints) -> Ints | None:
     return ids
 
 
+def check_vertices(he: HalfEdges) -> None:
+    """Refuse a vertex in which fans of faces touch that share no edge there.
+
+    Raises
+    ------
+    MeshError
+        Naming the first such vertex.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    count = he.origin.size
+    turn = he.twin[he.prev]
+    inner = np.flatnonzero(turn >= 0)
+    links = coo_matrix((np.ones(inner.size), (inner, turn[inner])), shape=(count, count))
+    fans, label = connected_components(links, directed=False)
+    if fans == np.count_nonzero(he.face_count):
+        return
+    _, one = np.unique(label, return_index=True)
+    per_vertex = np.bincount(he.origin[one], minlength=he.vertex_count)
+    bad = np.flatnonzero(per_vertex > 1)
+    raise MeshError(
+        f"vertex {bad[0]} joins {per_vertex[bad[0]]} parts of the surface that share no edge there "
+        f"({bad.size} such vertices): give each part its own copy of the vertex"
+    )
+
+
 def triangulate(faces: Ints, he: HalfEdges) -> Ints:
     """Split quads into triangles so that neighbours are split alike.
 
@@ -251,6 +278,14 @@ def triangulate(faces: Ints, he: HalfEdges) -> Ints:
     there = local[he.twin[inner]] % 2 == 1
     # Alike: the diagonals of two neighbours do not meet at an end of the shared edge.
     turn, _ = _tree_parity(len(faces), he.face[inner], he.face[he.twin[inner]], here == there)
+    # Two quads that share two edges could be split along the same line, and so could a quad
+    # and a triangle: those are split the other way.
+    n = he.vertex_count
+    ends = np.where(turn[quad, None], faces[quad][:, [1, 3]], faces[quad][:, [0, 2]])
+    split = edge_keys(ends[:, 0], ends[:, 1], n)
+    _, which, often = np.unique(split, return_inverse=True, return_counts=True)
+    clash = (often[which] > 1) | np.isin(split, edge_keys(he.origin, he.dest, n))
+    turn[quad] ^= clash
     turned = np.where(turn[:, None], np.roll(faces, -1, axis=1), faces)
     tris = np.stack([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]], axis=1)
     tris[~quad, 0] = faces[~quad, :3]
@@ -287,6 +322,12 @@ def vertex_stars(he: HalfEdges) -> list[tuple[Ints, Ints]]:
         Two fans of faces touch in one vertex only.
     """
     interior = np.flatnonzero(~he.boundary_vertex & (he.face_count > 0))
+    if he.face_count[interior].max(initial=0) > RING_SIZES[-1]:
+        at = interior[he.face_count[interior].argmax()]
+        raise MeshError(
+            f"vertex {at} has {he.face_count[at]} triangles, more than {RING_SIZES[-1]}; "
+            "remesh the surface there"
+        )
     start = np.zeros(he.vertex_count, np.int64)
     start[he.origin] = np.arange(he.origin.size)
     valence = he.face_count[interior]
@@ -354,12 +395,25 @@ def boundary_loops(he: HalfEdges) -> list[Ints]:
     rim = np.flatnonzero(he.twin < 0)
     if rim.size == 0:
         return []
-    n = he.vertex_count
-    graph = coo_matrix((np.ones(rim.size), (he.origin[rim], he.dest[rim])), shape=(n, n)).tocsr()
-    _, label = connected_components(graph, directed=False)
-    loops = []
-    for part in np.unique(label[he.origin[rim]]):
-        start = int(he.origin[rim[label[he.origin[rim]] == part]].min())
-        order, _ = depth_first_order(graph, start, directed=True)
-        loops.append(order.astype(np.int64))
+    # The next rim edge is found by turning round the end vertex from face to face, so that
+    # loops which touch in a vertex stay apart.
+    ahead = he.next[rim]
+    while (he.twin[ahead] >= 0).any():
+        ahead = np.where(he.twin[ahead] >= 0, he.next[he.twin[ahead]], ahead)
+    n, after = rim.size, np.searchsorted(rim, ahead)
+    links = coo_matrix((np.ones(n), (np.arange(n), after)), shape=(n, n))
+    _, label = connected_components(links, directed=False)
+    order = np.lexsort((he.origin[rim], label))
+    starts = order[np.unique(label[order], return_index=True)[1]]
+    # One more node, joined to a start of every loop, makes it one walk.
+    links = coo_matrix(
+        (
+            np.ones(n + starts.size),
+            (np.r_[np.arange(n), np.full(starts.size, n)], np.r_[after, starts]),
+        ),
+        shape=(n + 1, n + 1),
+    )
+    walk = depth_first_order(links.tocsr(), n)[0][1:]
+    cuts = np.flatnonzero(np.diff(label[walk])) + 1
+    loops = np.split(he.origin[rim[walk]], cuts)
     return sorted(loops, key=len, reverse=True)

@@ -11,9 +11,9 @@ import importlib
 import pkgutil
 from types import ModuleType
 
-from gso.terms.base import Term
+from gso.terms.base import Limit, Term, Weighted
 
-__all__ = ["Term", "registry"]
+__all__ = ["Limit", "Term", "Weighted", "registry"]
 
 
 def registry() -> dict[str, ModuleType]:

@@ -9,9 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.terms.losses import Loss, Squared
+
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Residual = Callable[[Sequence[tuple[Any, ...]], Sequence[Any]], tuple[Any, ...]]
+
+#: ``limit(coordinates, direction) -> largest step``: what a step must not cross.
+Limit = Callable[[Array, Array], float]
 
 
 def _no_constants() -> Array:
@@ -57,3 +62,17 @@ class Term:
 def mean_weights(count: int) -> Array:
     """Equal weights that sum to one."""
     return np.full(count, 1.0 / max(count, 1))
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """A term, its weight in the objective, and what its residuals cost."""
+
+    term: Term
+    weight: float
+    loss: Loss = Squared()
+
+    @property
+    def quadratic(self) -> bool:
+        """Its part of the energy is a quadratic function of the unknowns."""
+        return self.term.linear and isinstance(self.loss, Squared)

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.terms.base import Term
-from gso.terms.losses import Loss, Squared
+from gso.terms.base import Limit, Weighted
+from gso.terms.losses import Loss
 from gso.tno.codegen import kernel
 from gso.tno.linear.base import Pattern
 from gso.variables import Layout, Variables
@@ -22,22 +22,6 @@ from gso.variables import Layout, Variables
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: ``limit(coordinates, direction) -> largest step``: what a step must not cross.
-Limit = Callable[[Array, Array], float]
-
-
-@dataclass(frozen=True)
-class Weighted:
-    """A term, its weight in the objective, and what its residuals cost."""
-
-    term: Term
-    weight: float
-    loss: Loss = Squared()
-
-    @property
-    def quadratic(self) -> bool:
-        """Its part of the energy is a quadratic function of the unknowns."""
-        return self.term.linear and isinstance(self.loss, Squared)
 
 
 class _Elements:

@@ -1,0 +1,112 @@
+"""NumPy files: grids of points as .npy, vertices and faces as .npz. Nothing is unpickled."""
+
+from __future__ import annotations
+
+import io
+import math
+import struct
+import tokenize
+import zipfile
+import zlib
+from typing import IO, BinaryIO
+
+import numpy as np
+
+from gso.mesh import Mesh
+from gso.status import MeshError
+
+# A stream of deflate cannot grow by more when it is unpacked.
+_DEFLATE_RATIO = 1032
+# What the readers of zip files and of array headers raise on damaged ones.
+_DAMAGE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    tokenize.TokenError,
+    ArithmeticError,
+    EOFError,
+    LookupError,
+    OSError,
+    RuntimeError,
+    SyntaxError,
+    TypeError,
+    ValueError,
+)
+
+
+def read_npy(data: bytes) -> Mesh:
+    """Mesh of a grid of points (H, W, 3) in a .npy file."""
+    return Mesh.from_grid(_array(io.BytesIO(data), len(data)))
+
+
+def write_npy(mesh: Mesh, file: BinaryIO) -> None:
+    """Write a grid's points (H, W, 3), row by row whatever the numbering of its vertices."""
+    if mesh.grid is None:
+        raise MeshError("the mesh is no grid, which is all that .npy holds; use .npz or .obj")
+    np.lib.format.write_array(file, mesh.grid, allow_pickle=False)
+
+
+def read_npz(data: bytes) -> Mesh:
+    """Mesh in a .npz file: `vertices` and `faces` (or V and F), or one grid (H, W, 3)."""
+    arrays: dict[str, np.ndarray] = {}
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = [m for m in archive.infolist() if m.filename.endswith(".npy")]
+            chosen = {m.filename[:-4].lower(): m for m in members}
+            v = next((chosen[k] for k in ("vertices", "v") if k in chosen), None)
+            f = next((chosen[k] for k in ("faces", "f") if k in chosen), None)
+            if v is not None and f is not None:
+                arrays = {"vertices": _member(archive, v), "faces": _member(archive, f)}
+            elif len(members) == 1:
+                arrays = {"grid": _member(archive, members[0])}
+    except MeshError:
+        raise
+    except _DAMAGE as error:
+        raise MeshError(f"is no intact .npz file: {error}; write it again") from None
+    if not arrays:
+        names = ", ".join(sorted(m.filename[:-4] for m in members)) or "nothing"
+        raise MeshError(
+            f"a .npz file holds 'vertices' and 'faces', or one grid (H, W, 3); this one has {names}"
+        )
+    if "grid" in arrays:
+        return Mesh.from_grid(arrays["grid"])
+    return Mesh(arrays["vertices"], arrays["faces"])
+
+
+def write_npz(mesh: Mesh, file: BinaryIO) -> None:
+    """Write `vertices` and `faces`."""
+    np.savez(file, vertices=mesh.vertices, faces=mesh.faces)
+
+
+def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
+    packed = member.compress_type == zipfile.ZIP_DEFLATED
+    if not packed and member.compress_type != zipfile.ZIP_STORED:
+        raise MeshError(f"{member.filename} is packed by a method that NumPy does not write")
+    if member.file_size > member.compress_size * (_DEFLATE_RATIO if packed else 1) + 64:
+        raise MeshError(f"{member.filename} claims an impossible size; the file is damaged")
+    with archive.open(member) as stream:
+        return _array(stream, member.file_size)
+
+
+def _array(stream: IO[bytes], size: int) -> np.ndarray:
+    """One array of numbers from a stream of so many bytes; the header's claim is checked."""
+    try:
+        version = np.lib.format.read_magic(stream)
+        read_header = {
+            (1, 0): np.lib.format.read_array_header_1_0,
+            (2, 0): np.lib.format.read_array_header_2_0,
+        }[version]
+        shape, fortran, dtype = read_header(stream)
+        if dtype.kind not in "fiu":
+            raise MeshError(f"the array holds {dtype}, no plain numbers")
+        wanted = math.prod(shape) * dtype.itemsize
+        if min(shape, default=0) < 0 or wanted > size:
+            raise MeshError(f"the header claims an array {shape}, but the file ends before")
+        raw = stream.read(wanted)
+        if len(raw) < wanted:
+            raise MeshError("the file is cut off; write it again")
+        return np.frombuffer(raw, dtype).reshape(shape, order="F" if fortran else "C")
+    except MeshError:
+        raise
+    except _DAMAGE as error:
+        raise MeshError(f"is no intact array of NumPy: {str(error)[:200]}") from None

@@ -1,0 +1,68 @@
+"""STL, ascii and binary: triangles without connectivity, in single precision."""
+
+from __future__ import annotations
+
+from typing import BinaryIO
+
+import numpy as np
+
+from gso.io.source import doubles, weld
+from gso.io.text import Words
+from gso.mesh import Mesh
+from gso.status import MeshError
+
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_HEAD = 84
+
+
+def read(data: bytes) -> Mesh:
+    """Mesh in an STL file; vertices with equal coordinates become one."""
+    announced = int.from_bytes(data[80:_HEAD], "little") if len(data) >= _HEAD else -1
+    # Binary files may start with "solid" too: their length tells.
+    if announced >= 0 and len(data) == _HEAD + announced * _RECORD.itemsize:
+        corners = doubles(np.frombuffer(data, _RECORD, announced, _HEAD)["corners"])
+    elif data.lstrip()[:5].lower() == b"solid" and b"\0" not in data:
+        corners = _read_text(data)
+    elif len(data) < _HEAD:
+        raise MeshError("the STL file is shorter than its header; it is cut off or no STL file")
+    elif len(data) > _HEAD + announced * _RECORD.itemsize and announced > 0:
+        corners = doubles(np.frombuffer(data, _RECORD, announced, _HEAD)["corners"])
+    else:
+        raise MeshError(
+            f"the STL header announces {announced} triangles, but the file has room for "
+            f"{(len(data) - _HEAD) // _RECORD.itemsize}; it is cut off or no STL file"
+        )
+    if len(corners) == 0:
+        raise MeshError("the STL file has no triangles")
+    points, faces, notes = weld(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    return Mesh(points, faces, notes=notes)
+
+
+def _read_text(data: bytes) -> np.ndarray:
+    words = Words(data.lower())
+    rows = words.rows(b"vertex")
+    begun, ended = words.rows(b"facet").size, words.rows(b"endfacet").size
+    if not words.rows(b"endsolid").size or begun != ended or rows.size != 3 * begun:
+        raise MeshError(
+            f"the STL file has {begun} times 'facet', {ended} times 'endfacet' and {rows.size} "
+            "vertices, or no 'endsolid'; it is cut off"
+        )
+    short = words.count[rows] != 4
+    if short.any():
+        words.fail_row(rows[short.argmax()], "a vertex needs three numbers")
+    numbers = (words.first[rows][:, None] + np.arange(1, 4)).ravel()
+    return words.floats(numbers).reshape(-1, 3, 3)
+
+
+def write(mesh: Mesh, file: BinaryIO) -> None:
+    """Write the triangulated mesh as binary STL, which has single precision."""
+    corners = mesh.vertices[mesh.triangles]
+    if np.abs(corners).max() > np.finfo(np.float32).max:
+        raise MeshError("the coordinates are too large for the single precision of STL")
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    table = np.zeros(len(corners), _RECORD)
+    table["normal"] = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    table["corners"] = corners
+    file.write(b"binary STL".ljust(80, b" ") + len(table).to_bytes(4, "little"))
+    file.write(table.tobytes())

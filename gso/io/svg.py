@@ -1,0 +1,141 @@
+"""Flat patterns as SVG drawings at full size."""
+
+from __future__ import annotations
+
+import io
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gso.io.atomic import check_writable, replacing
+from gso.io.source import Array, Ints
+from gso.mesh import Mesh
+from gso.status import MeshError, OptionError
+
+MILLIMETRES = {
+    "um": 1e-3,
+    "mm": 1.0,
+    "cm": 10.0,
+    "dm": 100.0,
+    "m": 1000.0,
+    "in": 25.4,
+    "ft": 304.8,
+    "yd": 914.4,
+}
+"""Length of each unit that :func:`save_flat` knows, in millimetres."""
+
+# Width of a line on paper, in millimetres; finer on patterns of a few millimetres.
+_LINE = 0.1
+_FINEST = 1 / 500
+
+
+def save_flat(
+    flat: ArrayLike,
+    mesh: Mesh,
+    path: str | PathLike[str],
+    *,
+    unit: str = "mm",
+    mesh_lines: bool = False,
+) -> None:
+    """Write a flat pattern as an SVG drawing at the scale 1:1.
+
+    The pattern lies as seen from above (from positive z, with x to the right and y up),
+    so that faces which are anticlockwise in `flat` are so on paper. The layer `outline`
+    has one closed path per boundary loop, holes included; the layer `mesh` has the inner
+    edges.
+
+    Parameters
+    ----------
+    flat : array_like, (n, 2)
+        Plane coordinates of the mesh's vertices.
+    mesh : Mesh
+        The mesh that was flattened: its faces say what is outline and what is inside.
+    path : str or PathLike
+        A file whose name ends in .svg. It is replaced only when the drawing is complete.
+    unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
+        Unit of the coordinates in `flat`. The drawing itself is in millimetres.
+    mesh_lines : bool
+        Draw the inner edges too.
+
+    Raises
+    ------
+    MeshError
+        `flat` does not fit the mesh or is not finite, the mesh is closed, or the file
+        cannot be written.
+    OptionError
+        Unknown unit.
+
+    Examples
+    --------
+    >>> import tempfile, os
+    >>> y, x = np.mgrid[:3, :4]
+    >>> mesh = Mesh.from_grid(np.stack([x, y, 0 * x], axis=-1))
+    >>> path = os.path.join(tempfile.mkdtemp(), "pattern.svg")
+    >>> save_flat(mesh.vertices[:, :2], mesh, path, unit="cm")
+    """
+    check_writable(path, (".svg",))
+    if unit not in MILLIMETRES:
+        raise OptionError(f"unknown unit {unit!r}; use {', '.join(MILLIMETRES)}")
+    points = np.array(flat, dtype=np.float64)
+    if points.shape != (len(mesh.vertices), 2):
+        raise MeshError(
+            f"the flat pattern is an array {points.shape}, but the mesh needs "
+            f"({len(mesh.vertices)}, 2)"
+        )
+    loops = mesh.boundary_loops
+    if not loops:
+        raise MeshError("a closed surface has no outline; cut it open before flattening")
+    used = np.unique(mesh.faces[mesh.faces >= 0])
+    points *= MILLIMETRES[unit]
+    if not np.isfinite(points[used]).all():
+        raise MeshError("the flat pattern has coordinates that are not finite")
+    text = _drawing(points, used, loops, mesh.edges if mesh_lines else None)
+    with replacing(path) as file:
+        file.write(text.encode("utf-8"))
+
+
+def _drawing(points: Array, used: Ints, loops: list[Ints], edges: Ints | None) -> str:
+    """SVG text; `points` in millimetres with y up."""
+    import svgwrite
+    from svgwrite.extensions import Inkscape
+
+    low, high = points[used].min(axis=0), points[used].max(axis=0)
+    line = min(_LINE, _FINEST * float((high - low).max()))
+    margin = 10 * line
+    width, height = (high - low + 2 * margin).tolist()
+    # SVG counts y downwards: turned round here once, no transform is left in the file.
+    paper = np.stack([points[:, 0] - low[0], high[1] - points[:, 1]], axis=1) + margin
+    drawing = svgwrite.Drawing(
+        size=(f"{width:.9g}mm", f"{height:.9g}mm"),
+        viewBox=f"0 0 {width:.9g} {height:.9g}",
+        debug=False,
+    )
+    layers = Inkscape(drawing)
+
+    def layer(name: str, colour: str) -> Any:
+        group = layers.layer(
+            label=name, id=name, fill="none", stroke=colour, stroke_width=f"{line:.9g}"
+        )
+        return drawing.add(group)
+
+    if edges is not None:
+        rim = np.concatenate([np.stack([p, np.roll(p, -1)], axis=1) for p in loops])
+        n = np.int64(len(points))
+        inner = edges[~np.isin(_keys(edges, n), _keys(rim, n))]
+        lines = paper[inner].reshape(-1, 4)
+        if len(lines):
+            path = ("M%.9g %.9gL%.9g %.9g" * len(lines)) % tuple(lines.ravel().tolist())
+            layer("mesh", "#808080").add(drawing.path(d=path))
+    outline = layer("outline", "#000000")
+    for loop in loops:
+        path = "M" + "L".join(f"{x:.9g} {y:.9g}" for x, y in paper[loop].tolist()) + "Z"
+        outline.add(drawing.path(d=path))
+    text = io.StringIO()
+    drawing.write(text)
+    return text.getvalue()
+
+
+def _keys(edges: Ints, count: np.int64) -> Ints:
+    return edges.min(axis=1) * count + edges.max(axis=1)

@@ -1,0 +1,174 @@
+"""Text files of numbers, read and written in whole arrays."""
+
+from __future__ import annotations
+
+from typing import BinaryIO, NoReturn
+
+import numpy as np
+
+from gso.io.source import Array, Ints
+from gso.status import MeshError
+
+# Larger numbers than this many digits do not fit an integer and are no vertex numbers.
+_DIGITS = 18
+_BLOCK = 1 << 15
+
+
+class Words:
+    """The words of a text, found by comparing bytes, and the rows they stand in.
+
+    Parameters
+    ----------
+    data : bytes
+        ASCII text; bytes of other encodings are part of words and never decoded.
+    comment : bytes, optional
+        The character from which on a line is ignored.
+    joined : bool
+        A backslash at the end of a line continues it on the next one.
+    first_line : int
+        Number of the first line in messages.
+
+    Attributes
+    ----------
+    start, stop : ndarray of int
+        Where each word lies in the text.
+    first, count : ndarray of int
+        Of each row that is not empty: its first word and its number of words.
+    """
+
+    def __init__(
+        self, data: bytes, *, comment: bytes = b"", joined: bool = False, first_line: int = 1
+    ):
+        if b"\0" in data:
+            raise MeshError("this is no text: it has zero bytes; does the suffix fit the file?")
+        if b"\n" not in data:
+            data = data.replace(b"\r", b"\n")
+        data = data.removeprefix(b"\xef\xbb\xbf")
+        self._data = data
+        self._first_line = first_line
+        text = np.frombuffer(data, np.uint8)
+        breaks = np.flatnonzero(text == ord("\n"))
+        if comment and comment in data:
+            text = _blank_comments(text, breaks, ord(comment))
+        if joined and b"\\" in data:
+            text, breaks = _join_lines(text, breaks)
+        self._text = text
+        space = np.concatenate([[True], text <= ord(" "), [True]])
+        self.start: Ints = np.flatnonzero(space[:-1] & ~space[1:])
+        self.stop: Ints = np.flatnonzero(~space[:-1] & space[1:])
+        line = np.searchsorted(breaks, self.start)
+        new = np.ones(line.size, bool)
+        new[1:] = line[1:] != line[:-1]
+        self.first: Ints = np.flatnonzero(new)
+        self.count: Ints = np.diff(self.first, append=line.size)
+
+    def rows(self, keyword: bytes) -> Ints:
+        """Rows whose first word is `keyword`."""
+        start, stop = self.start[self.first], self.stop[self.first]
+        found = np.flatnonzero(stop - start == len(keyword))
+        for k, letter in enumerate(keyword):
+            found = found[self._text[start[found] + k] == letter]
+        return found
+
+    def floats(self, words: Ints) -> Array:
+        """Finite numbers in the given words (ascending)."""
+        edge = np.zeros(self._text.size + 1, np.int8)
+        edge[self.start[words]] = 1
+        edge[self.stop[words]] -= 1
+        inside = np.cumsum(edge[:-1], dtype=np.int8) > 0
+        text = np.where(inside, self._text, np.uint8(ord(" "))).tobytes()
+        tokens = text.split()
+        # Python reads 1_000 as a thousand, no file format does.
+        values = None if b"_" in text else _as_floats(tokens)
+        if values is None or not np.isfinite(values).all():
+            bad = next(k for k, t in enumerate(tokens) if not _is_finite(t))
+            self.fail(words[bad], f"{self.quote(words[bad])} is not a finite number")
+        return values
+
+    def ints(self, words: Ints, *, until: bytes = b"") -> Ints:
+        """Whole numbers in the given words, each read up to the character `until`."""
+        start, stop = self.start[words], self.stop[words]
+        if until:
+            marks = np.flatnonzero(self._text == ord(until))
+            if marks.size:
+                at = np.searchsorted(marks, start)
+                cut = marks[np.minimum(at, marks.size - 1)]
+                stop = np.where((cut >= start) & (cut < stop), cut, stop)
+        sign = self._text[start]
+        start = start + ((sign == ord("-")) | (sign == ord("+")))
+        size = stop - start
+        bad = (size < 1) | (size > _DIGITS)
+        values = np.zeros(words.size, np.int64)
+        for k in range(min(int(size.max(initial=0)), _DIGITS)):
+            inside = k < size
+            digit = self._text[np.minimum(start + k, stop - 1)].astype(np.int64) - ord("0")
+            bad |= inside & ((digit < 0) | (digit > 9))
+            values = np.where(inside, 10 * values + digit, values)
+        if bad.any():
+            word = words[bad.argmax()]
+            self.fail(word, f"{self.quote(word)} is not a whole number of usual size")
+        return np.where(sign == ord("-"), -values, values)
+
+    def raw(self, word: int | np.integer) -> bytes:
+        """A word as it stands in the text."""
+        return self._data[self.start[word] : self.stop[word]]
+
+    def quote(self, word: int | np.integer) -> str:
+        """A word as shown in messages."""
+        text = self.raw(word)
+        return repr(text[:24].decode("ascii", "backslashreplace")) + ("..." if text[24:] else "")
+
+    def fail(self, word: int | np.integer, message: str) -> NoReturn:
+        """Raise a MeshError that names the line of a word."""
+        line = self._first_line + self._data.count(b"\n", 0, int(self.start[word]))
+        raise MeshError(f"line {line}: {message}")
+
+    def fail_row(self, row: int | np.integer, message: str) -> NoReturn:
+        """Raise a MeshError that names the line of a row."""
+        self.fail(self.first[row], message)
+
+
+def write_rows(file: BinaryIO, formats: str | list[str], values: Array | Ints) -> None:
+    """Write numbers by one printf format for all rows, or by one per row.
+
+    With one per row, negative numbers are padding and left out.
+    """
+    for k in range(0, len(values), _BLOCK):
+        block = values[k : k + _BLOCK]
+        if isinstance(formats, str):
+            text = (formats * len(block)) % tuple(block.ravel().tolist())
+        else:
+            text = "".join(formats[k : k + _BLOCK]) % tuple(block[block >= 0].tolist())
+        file.write(text.encode("ascii"))
+
+
+def _blank_comments(text: np.ndarray, breaks: Ints, mark: int) -> np.ndarray:
+    begin = np.flatnonzero(text == mark)
+    end = np.append(breaks, text.size)[np.searchsorted(breaks, begin)]
+    first = np.ones(begin.size, bool)
+    first[1:] = end[1:] != end[:-1]
+    edge = np.zeros(text.size + 1, np.int8)
+    edge[begin[first]] = 1
+    edge[end[first]] -= 1
+    return np.where(np.cumsum(edge[:-1], dtype=np.int8) > 0, np.uint8(ord(" ")), text)
+
+
+def _join_lines(text: np.ndarray, breaks: Ints) -> tuple[np.ndarray, Ints]:
+    padded = np.concatenate([np.zeros(2, np.uint8), text])
+    last = np.where(padded[breaks + 1] == ord("\r"), breaks - 2, breaks - 1)
+    joins = padded[last + 2] == ord("\\")
+    text = text.copy()
+    text[last[joins]] = ord(" ")
+    return text, breaks[~joins]
+
+
+def _as_floats(tokens: list[bytes]) -> Array | None:
+    try:
+        return np.fromiter(map(float, tokens), np.float64, len(tokens))
+    except ValueError:
+        return None
+
+
+def _is_finite(token: bytes) -> bool:
+    values = None if b"_" in token else _as_floats([token])
+    return values is not None and bool(np.isfinite(values).all())

@@ -1,0 +1,69 @@
+"""Settings shared by all tasks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+from gso.status import OptionError
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of the solver; every task adds its own.
+
+    Change some of a preset's fields with :func:`dataclasses.replace`.
+
+    Attributes
+    ----------
+    iterations : int
+        Largest number of iterations of the last stage.
+    tolerance : float
+        Stop when an iteration lowers the energy by less than this share of it.
+    method : {"gauss-newton", "levenberg-marquardt"}
+        Direction of a step.
+    backend : str or None
+        Linear solver: "banded", "superlu", "cholmod", "pardiso"; None takes the fastest
+        installed one for the matrix at hand.
+    threads : int
+        BLAS threads around factorisations; 0 leaves the library's own setting.
+    """
+
+    PRESETS: ClassVar[dict[str, dict[str, Any]]] = {}
+
+    iterations: int = 20
+    tolerance: float = 1e-4
+    method: str = "gauss-newton"
+    backend: str | None = None
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        if self.iterations < 0:
+            raise OptionError(f"iterations is {self.iterations}; it must be 0 or more")
+        if self.method not in ("gauss-newton", "levenberg-marquardt"):
+            raise OptionError(
+                f"method is {self.method!r}; take 'gauss-newton' or 'levenberg-marquardt'"
+            )
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if f.name.startswith("w_") and value is not None and not value >= 0:
+                raise OptionError(f"{f.name} is {value}; a weight must be 0 or more")
+
+    @classmethod
+    def preset(cls, name: str) -> Options:
+        """Settings of a named preset."""
+        if name not in cls.PRESETS:
+            raise OptionError(f"no preset {name!r}; there are {', '.join(cls.PRESETS)}")
+        return cls(**cls.PRESETS[name])
+
+    @classmethod
+    def coerce(cls, given: str | Options | None) -> Options:
+        """Settings from a preset's name, an instance, or None for "balanced"."""
+        if given is None or isinstance(given, str):
+            return cls.preset(given or "balanced")
+        if not isinstance(given, cls):
+            raise OptionError(
+                f"this task takes {cls.__module__}.{cls.__name__} or one of "
+                f"{', '.join(cls.PRESETS)}, not {type(given).__name__}"
+            )
+        return given
