@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -99,11 +99,13 @@ class Mesh:
         if not np.isfinite(grid).all():
             i, j = np.argwhere(~np.isfinite(grid))[0][:2]
             raise MeshError(f"the coordinates of grid vertex ({i}, {j}) are not finite")
-        faces = topology.grid_faces(height, width)
-        welded = _weld_poles(grid, faces)
+        template = _grid_template(height, width)
+        welded = _weld_poles(grid, template.faces)
         if welded is not None:
             return cls(welded[0], welded[1], notes=welded[2])
-        return cls(grid.reshape(-1, 3), faces)
+        points = grid.reshape(-1, 3)
+        _check_area(template.faces, points)
+        return template.replaced(points)
 
     def replaced(self, vertices: Array, *, notes: tuple[str, ...] = ()) -> Mesh:
         """The same faces with other vertices (n, 3), connectivity not checked again."""
@@ -223,6 +225,18 @@ class Mesh:
     @property
     def _used(self) -> NDArray[np.bool_]:
         return self.half_edges.face_count > 0
+
+
+@lru_cache(maxsize=32)
+def _grid_template(height: int, width: int) -> Mesh:
+    """A flat grid with its connectivity worked out, to be shared by grids of that size."""
+    rows, columns = np.mgrid[:height, :width]
+    flat = np.stack([rows, columns, np.zeros_like(rows)], axis=-1).reshape(-1, 3)
+    mesh = Mesh(flat, topology.grid_faces(height, width))
+    mesh.__dict__["grid_index"] = np.arange(height * width).reshape(height, width)
+    for name in _CONNECTIVITY:
+        getattr(mesh, name)
+    return mesh
 
 
 _CONNECTIVITY = (

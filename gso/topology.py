@@ -265,6 +265,11 @@ def triangulate(faces: Ints, he: HalfEdges) -> Ints:
     A grid is split along (i, j)-(i+1, j+1). On other quad meshes the choice spreads from
     the first face over its neighbours: every regular vertex then has six triangles, the
     only valence at which the angle defect converges (Borrelli et al. 2003).
+
+    Raises
+    ------
+    MeshError
+        A quad both of whose diagonals join vertices that are joined already.
     """
     if faces.shape[1] == 3:
         return faces
@@ -278,20 +283,32 @@ def triangulate(faces: Ints, he: HalfEdges) -> Ints:
     there = local[he.twin[inner]] % 2 == 1
     # Alike: the diagonals of two neighbours do not meet at an end of the shared edge.
     turn, _ = _tree_parity(len(faces), he.face[inner], he.face[he.twin[inner]], here == there)
-    # Two quads that share two edges could be split along the same line, and so could a quad
-    # and a triangle: those are split the other way.
-    n = he.vertex_count
-    ends = np.where(turn[quad, None], faces[quad][:, [1, 3]], faces[quad][:, [0, 2]])
-    split = edge_keys(ends[:, 0], ends[:, 1], n)
-    _, which, often = np.unique(split, return_inverse=True, return_counts=True)
-    clash = (often[which] > 1) | np.isin(split, edge_keys(he.origin, he.dest, n))
-    turn[quad] ^= clash
+    # Two faces that share two edges would get triangles on the same three vertices if a line
+    # were split twice or split along an edge: such quads are split the other way.
+    clash = _clashing_splits(faces[quad], turn[quad], he)
+    if clash.any():
+        turn[quad] ^= clash
+        clash = _clashing_splits(faces[quad], turn[quad], he)
+        if clash.any():
+            at = np.flatnonzero(quad)[clash.argmax()]
+            raise MeshError(
+                f"face {at} = {faces[at].tolist()} cannot be split into triangles: its diagonals "
+                "are edges of other faces; subdivide the mesh there"
+            )
     turned = np.where(turn[:, None], np.roll(faces, -1, axis=1), faces)
     tris = np.stack([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]], axis=1)
     tris[~quad, 0] = faces[~quad, :3]
     keep = np.ones((len(faces), 2), bool)
     keep[~quad, 1] = False
     return tris[keep]
+
+
+def _clashing_splits(quads: Ints, turn: NDArray[np.bool_], he: HalfEdges) -> NDArray[np.bool_]:
+    """Which quads' diagonals are edges of the mesh or diagonals of another quad too."""
+    ends = np.where(turn[:, None], quads[:, [1, 3]], quads[:, [0, 2]])
+    split = edge_keys(ends[:, 0], ends[:, 1], he.vertex_count)
+    _, which, often = np.unique(split, return_inverse=True, return_counts=True)
+    return (often[which] > 1) | np.isin(split, edge_keys(he.origin, he.dest, he.vertex_count))
 
 
 def corner_triangles(faces: Ints) -> Ints:
@@ -395,8 +412,8 @@ def boundary_loops(he: HalfEdges) -> list[Ints]:
     rim = np.flatnonzero(he.twin < 0)
     if rim.size == 0:
         return []
-    # The next rim edge is found by turning round the end vertex from face to face, so that
-    # loops which touch in a vertex stay apart.
+    # The next rim edge is found by turning round the end vertex from face to face, so that a
+    # vertex in which two fans touch counts as two.
     ahead = he.next[rim]
     while (he.twin[ahead] >= 0).any():
         ahead = np.where(he.twin[ahead] >= 0, he.next[he.twin[ahead]], ahead)

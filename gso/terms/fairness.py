@@ -31,8 +31,10 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 def differences(mesh: Mesh) -> tuple[Ints, Array]:
     """Stencils (e, k) and coefficients (k, e) of the second differences of a mesh.
 
-    On quads ``(1, -2, 1) / h^2`` along polylines, h the mean edge length of the polyline's
-    grid direction (of the whole mesh when it is no grid). Across an edge of a triangle
+    On quads ``(1, -2, 1) / h^2`` along polylines. On a grid h is the length of a side over
+    its number of cells; sides less than a factor of two apart count as equally long (their
+    geometric mean), which leaves the plain second differences of the published measure.
+    On other meshes h is the mean edge length. Across an edge of a triangle
     mesh, the combination of its four vertices that vanishes on every affine function,
     scaled like a second derivative times the edge's share of the area.
     """
@@ -44,7 +46,7 @@ def differences(mesh: Mesh) -> tuple[Ints, Array]:
         rows = np.stack([ids[:-2], ids[1:-1], ids[2:]], axis=-1).reshape(-1, 3)
         cols = np.stack([ids[:, :-2], ids[:, 1:-1], ids[:, 2:]], axis=-1).reshape(-1, 3)
         grid = v[ids]
-        h = [np.linalg.norm(np.diff(grid, axis=a), axis=-1).mean() for a in (0, 1)]
+        h = _spacing(grid)
         scale = np.r_[np.full(len(rows), h[0] ** -2), np.full(len(cols), h[1] ** -2)]
         stencil = np.concatenate([rows, cols])
     else:
@@ -53,6 +55,16 @@ def differences(mesh: Mesh) -> tuple[Ints, Array]:
         h2 = (np.linalg.norm(v[a] - v[b], axis=1) ** 2).mean()
         scale = np.full(len(stencil), 1.0 / h2)
     return stencil, np.array([[1.0], [-2.0], [1.0]]) * scale
+
+
+def _spacing(grid: Array) -> tuple[float, float]:
+    """Spacing of the samples along both directions of a grid."""
+    side = [np.linalg.norm(np.diff(grid, axis=a), axis=-1).sum(axis=a).mean() for a in (0, 1)]
+    mean = np.sqrt(side[0] * side[1])
+    # Beyond a factor of two, what exceeds it counts.
+    ratio = side[0] / side[1]
+    excess = np.sqrt(ratio / np.clip(ratio, 0.5, 2.0))
+    return mean * excess / (grid.shape[0] - 1), mean / excess / (grid.shape[1] - 1)
 
 
 def _hinge_differences(mesh: Mesh) -> tuple[Ints, Array]:

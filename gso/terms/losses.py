@@ -50,6 +50,27 @@ class Absolute:
 
 
 @dataclass(frozen=True)
+class Distance:
+    """``eps (sqrt(|r|^2 + eps^2) - eps)`` of an element's residual vector.
+
+    Half the square near zero, proportional to the length far away, the same in every
+    direction.
+    """
+
+    eps: float
+
+    def _root(self, r: Array) -> Array:
+        return np.sqrt((r * r).sum(axis=0, keepdims=True) + self.eps**2)
+
+    def value(self, r: Array) -> Array:
+        return self.eps * (self._root(r) - self.eps)
+
+    def weights(self, r: Array) -> tuple[Array, Array]:
+        w = np.broadcast_to(self.eps / self._root(r), r.shape)
+        return r * w, w
+
+
+@dataclass(frozen=True)
 class Barrier:
     """``-log(1 - |r|^2 / limit^2)`` of an element's residual vector: infinite at the limit.
 

@@ -9,6 +9,7 @@ import hashlib
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,11 +127,18 @@ class Problem:
         used = [i for i in items if i.weight > 0 and i.term.count]
         self._elements = [_Elements(i, variables) for i in used if not i.quadratic]
         self._quadratic = _Quadratic([_Elements(i, variables) for i in used if i.quadratic], variables)
-        self._assembly = _assemble(
-            variables.size, [e.columns for e in self._elements], self._quadratic.matrix
+
+    @cached_property
+    def _assembly(self) -> _Assembly:
+        return _assemble(
+            self.variables.size, [e.columns for e in self._elements], self._quadratic.matrix
         )
-        self._constant = np.zeros(self._assembly.pattern.nnz)
-        self._constant[self._assembly.quadratic] = self._quadratic.matrix.data
+
+    @cached_property
+    def _constant(self) -> Array:
+        values = np.zeros(self._assembly.pattern.nnz)
+        values[self._assembly.quadratic] = self._quadratic.matrix.data
+        return values
 
     @property
     def layout(self) -> Layout:

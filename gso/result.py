@@ -1,0 +1,182 @@
+"""What a solve returns."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.mesh import Mesh
+from gso.status import MeshError, Progress, Status
+
+Array = NDArray[np.float64]
+
+_FORMAT = 1
+
+
+@dataclass
+class Result:
+    """Outcome of :func:`gso.tno.optimize`.
+
+    Attributes
+    ----------
+    task, formulation : str
+        What was asked for.
+    design : Mesh
+        The input.
+    mesh : Mesh
+        The optimised surface, vertices in the input's order and unit; for `flatten` the
+        flat image at z = 0.
+    flat : ndarray, (n, 2), or None
+        The flat image of `flatten`, in the input's unit of length.
+    status : Status
+        Why the solve ended; its value is a message.
+    iterations : int
+        Iterations of all stages.
+    energy : dict of str to float
+        Weighted objective by term, dimensionless; the values sum to the objective.
+    history : list of Progress
+        One entry per iteration.
+    seconds : dict of str to float
+        Time by phase.
+    backend, device : str
+        Linear solver of the last stage, and where it ran.
+    warm_start : str
+        What started the solve: "cold" or "x0".
+    notes : tuple of str
+        What was repaired in the input or restricted in the run.
+    details : dict
+        Numbers of the task: weights chosen, noise estimate ...
+    """
+
+    task: str
+    formulation: str
+    design: Mesh
+    mesh: Mesh
+    flat: Array | None
+    status: Status
+    iterations: int = 0
+    energy: dict[str, float] = field(default_factory=dict)
+    history: list[Progress] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)
+    backend: str = ""
+    device: str = "cpu"
+    warm_start: str = "cold"
+    notes: tuple[str, ...] = ()
+    details: dict[str, Any] = field(default_factory=dict)
+    measure: Callable[[Result], dict[str, float]] | None = field(default=None, repr=False)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the status counts as converged."""
+        return self.status.converged
+
+    @property
+    def grid(self) -> Array | None:
+        """The result as (H, W, 3) when the input is a grid, otherwise None."""
+        return self.mesh.grid
+
+    @property
+    def flat_grid(self) -> Array | None:
+        """The flat image as (H, W, 2) when the input is a grid."""
+        if self.flat is None or self.design.grid_index is None:
+            return None
+        return self.flat[self.design.grid_index]
+
+    @cached_property
+    def metrics(self) -> dict[str, float]:
+        """Metrics of the task, computed at first access; see :data:`gso.metrics.INFO`."""
+        return {} if self.measure is None else self.measure(self)
+
+    def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
+        """Write the result.
+
+        ``.npz`` keeps everything and is read back by :meth:`load`; ``.svg`` is the flat
+        image at 1:1, `unit` the unit of the mesh's coordinates; any other suffix of
+        :func:`gso.save` is the surface (the flat image at z = 0 for `flatten`).
+        """
+        from gso import io
+
+        suffix = str(path).lower().rpartition(".")[2]
+        if suffix == "npz":
+            io.write_arrays(path, **self._arrays())
+        elif suffix == "svg":
+            if self.flat is None:
+                raise MeshError(f"{path}: only a flat result can be written as SVG; use task='flatten'")
+            io.save_flat(self.flat, self.design, path, unit=unit)
+        else:
+            io.save(self.mesh, path)
+
+    def _arrays(self) -> dict[str, Any]:
+        record = {
+            "format": _FORMAT,
+            "task": self.task,
+            "formulation": self.formulation,
+            "status": self.status.name,
+            "iterations": self.iterations,
+            "energy": self.energy,
+            "seconds": self.seconds,
+            "backend": self.backend,
+            "device": self.device,
+            "warm_start": self.warm_start,
+            "notes": list(self.notes),
+            "details": self.details,
+            "metrics": self.metrics,
+            "history": [asdict(p) for p in self.history],
+        }
+        arrays = {
+            "record": np.array(json.dumps(record, default=float)),
+            "design": self.design.vertices,
+            "vertices": self.mesh.vertices,
+            "faces": self.design.faces,
+        }
+        if self.flat is not None:
+            arrays["flat"] = self.flat
+        return arrays
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Result:
+        """Read a result written as ``.npz``; nothing is unpickled.
+
+        Raises
+        ------
+        MeshError
+            The file is missing, damaged, or no result.
+        """
+        from gso import io
+
+        data = io.read_arrays(path)
+        try:
+            record = json.loads(str(data["record"]))
+            if record["format"] != _FORMAT:
+                raise MeshError(f"{path} was written by another version (format {record['format']})")
+            design = Mesh(data["design"], data["faces"])
+            result = cls(
+                record["task"],
+                record["formulation"],
+                design,
+                design.replaced(data["vertices"]),
+                data.get("flat"),
+                Status[record["status"]],
+                record["iterations"],
+                record["energy"],
+                [Progress(**p) for p in record["history"]],
+                record["seconds"],
+                record["backend"],
+                record["device"],
+                record["warm_start"],
+                tuple(record["notes"]),
+                record["details"],
+            )
+            result.__dict__["metrics"] = record["metrics"]
+        except (KeyError, TypeError, ValueError) as error:
+            if isinstance(error, MeshError):
+                raise
+            raise MeshError(f"{path} is no result of gso: {error}") from None
+        return result

@@ -1,0 +1,268 @@
+"""Make a surface developable: curvature out, as close and as fair as possible.
+
+The objective, on the design scaled to the unit ball, is
+
+    w_curvature mean |K| + w_fairness / 2 mean |second derivative|^2 + w_proximity mean d
+
+with |K| smoothed by a falling epsilon (the absolute value concentrates bending along few
+lines, which is what lets a surface become developable), and d the displacement from the
+design, tangential parts counted less, its square below `near` and its length beyond.
+Grids are solved coarse to fine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import limits, metrics as measure
+from gso.mesh import Mesh
+from gso.resample import coarser, resample
+from gso.status import OptionError, Status
+from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.options import Options as BaseOptions
+from gso.terms import Weighted, curvature, fairness, position, proximity
+from gso.terms.losses import Absolute, Barrier, Distance
+from gso.variables import Layout, Variables, free, normal_offsets, vertex_normals
+
+Array = NDArray[np.float64]
+
+FORMULATIONS = ("curvature",)
+
+#: Mean |K| and mean squared bending of a typical design, for which weights are quoted.
+TYPICAL_CURVATURE = 0.3
+TYPICAL_BENDING = 5.0
+
+
+@dataclass(frozen=True)
+class Options(BaseOptions):
+    """Settings of the developable task; lengths in units of the design's unit ball.
+
+    Attributes
+    ----------
+    w_curvature : float
+        Weight of mean |K|, for a design whose own mean |K| is typical; it falls slowly
+        with the design's curvature.
+    w_fairness : float
+        Weight of the mean squared second derivative, likewise relative to the design's.
+    w_proximity : float
+        Weight of the displacement.
+    near : float
+        Displacements below it count squared, above it by their length.
+    tangential : float
+        Factor on the tangential part of a displacement.
+    eps : float
+        Smoothing of |K|: curvature well below it counts squared.
+    variables : {"normal", "free"}
+        Unknowns of the last stage: offsets along normals, or free vertices.
+    coarse_iterations : int
+        Iterations on the coarsest grid.
+    coarse_size : int
+        Largest side of the coarsest grid.
+    between_iterations : int
+        Iterations on each grid between the coarsest and the design's own.
+    developable_below : float
+        A design whose mean |K| is below this is developable already and comes back
+        untouched.
+    """
+
+    PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
+        "fast": {"iterations": 3, "coarse_iterations": 8, "coarse_size": 32},
+        "balanced": {"iterations": 8, "coarse_iterations": 12},
+        "accurate": {"iterations": 25, "coarse_iterations": 15, "variables": "free"},
+    }
+
+    w_curvature: float = 1.3e-3
+    w_fairness: float = 1e-5
+    w_proximity: float = 1.0
+    near: float = 0.01
+    tangential: float = 0.7
+    eps: float = 0.01
+    variables: str = "normal"
+    coarse_iterations: int = 12
+    coarse_size: int = 32
+    between_iterations: int = 3
+    developable_below: float = 1e-3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.variables not in ("normal", "free"):
+            raise OptionError(f"variables is {self.variables!r}; take 'normal' or 'free'")
+        if not (self.eps > 0 and self.near > 0):
+            raise OptionError("eps and near must be positive")
+
+
+def plan(request: Request) -> Plan:
+    """Stages of the solve: a coarse grid first, the design's own vertices last."""
+    mesh, options = request.mesh, request.options
+    if not mesh.stars:
+        raise _nothing_inside(mesh)
+    start = mesh.vertices if request.start is None else request.start
+    curved = measure.loss_gc(mesh, scale=1.0)
+    good = curved <= options.developable_below
+    if good and request.start is None and request.constraints.empty:
+        return Plan("surface", mesh.vertices.ravel(), status=Status.ALREADY_GOOD)
+    make = partial(_objective, request, curved, _bending(mesh))
+    stages = _stages(request, mesh, make)
+    climb = request.start is None and request.constraints.empty and mesh.grid_index is not None
+    levels = coarser(mesh, options.coarse_size) if climb else []
+    coarse = [_coarse_stage(request, level, make, first=level is levels[0]) for level in levels]
+    stages = coarse + stages
+    for below, above, stage in zip(levels, [*levels[1:], mesh], stages[1:], strict=False):
+        stage.enter = partial(_carry, below, above, _reach(request))
+    begin = levels[0].vertices if levels else _inside(start, mesh, _reach(request))
+    return Plan("surface", begin.ravel(), stages)
+
+
+def _nothing_inside(mesh: Mesh) -> Exception:
+    from gso.status import MeshError
+
+    return MeshError(
+        f"{mesh!r} has no interior vertex, so no curvature; refine it or give a larger piece"
+    )
+
+
+def _bending(mesh: Mesh) -> float:
+    """Mean squared second derivative of a mesh along its polylines."""
+    stencil, coefficients = fairness.differences(mesh)
+    if len(stencil) == 0:
+        return 0.0
+    second = np.einsum("ke,ekd->ed", coefficients, mesh.vertices[stencil])
+    return float((second**2).sum(axis=1).mean() * 2.0)
+
+
+def _objective(
+    request: Request, curved: float, bending: float, mesh: Mesh, *, reach: float | None
+) -> list[Weighted]:
+    """Terms on the design or on a coarser copy of it."""
+    o = request.options
+    w_curvature = o.w_curvature * request.curvature_weight
+    w_curvature *= (TYPICAL_CURVATURE / max(curved, 1e-3)) ** 0.2
+    w_fairness = o.w_fairness * (TYPICAL_BENDING / (bending + 0.1)) ** 0.5
+    normals = vertex_normals(mesh)
+    near = proximity.build(mesh, normals, tangential=o.tangential)
+    items = [Weighted(t, w_curvature, Absolute(o.eps)) for t in curvature.build(mesh)]
+    items.append(Weighted(fairness.build(mesh), w_fairness))
+    items.append(Weighted(near, o.w_proximity, Distance(o.near)))
+    if reach is not None:
+        whole = proximity.build(mesh, normals, tangential=1.0, name="deviation")
+        items.append(Weighted(whole, BARRIER, Barrier(reach)))
+    c = request.constraints
+    if len(c.soft_ids) and mesh is request.mesh:
+        items.append(
+            Weighted(position.build(c.soft_ids, c.soft_positions, c.soft_weights), 1.0)
+        )
+    return items
+
+
+#: Weight of the barrier that keeps a result within `max_deviation`.
+BARRIER = 2e-6
+
+
+def _reach(request: Request) -> float | None:
+    """Bound on the displacement: a hair inside what was asked for."""
+    return None if request.max_deviation is None else request.max_deviation * (1.0 - 1e-7)
+
+
+def _layout(mesh: Mesh) -> Layout:
+    return Layout((("surface", len(mesh.vertices), 3),))
+
+
+def _unknowns(kind: str, mesh: Mesh, request: Request, coordinates: Array) -> Variables:
+    """Unknowns at the start of a stage; hard constraints are held."""
+    layout = _layout(mesh)
+    if kind == "free":
+        variables = free(layout)
+    else:
+        points = coordinates.reshape(-1, 3)
+        variables = normal_offsets(layout, points, vertex_normals(mesh.replaced(points)))
+    c = request.constraints
+    if len(c.hard_ids) and mesh is request.mesh:
+        columns = layout.columns("surface", c.hard_ids).ravel()
+        variables = variables.fixing(columns, c.hard_positions.ravel())
+    return variables
+
+
+def _stages(request: Request, mesh: Mesh, make: Any) -> list[Stage]:
+    """Stages on the design's own vertices."""
+    o = request.options
+    reach = _reach(request)
+    items = make(mesh, reach=reach)
+    bounds = [] if reach is None else [limits.ball(mesh.vertices, reach, _layout(mesh))]
+    cold = request.start is None and mesh.grid_index is None
+    falling = (10.0 * o.eps, 3.0 * o.eps, o.eps) if cold else (o.eps,)
+
+    def stage(kind: str, iterations: int, eps: tuple[float, ...]) -> Stage:
+        return Stage(
+            kind,
+            _layout(mesh),
+            items,
+            partial(_unknowns, kind, mesh, request),
+            iterations=iterations,
+            tolerance=o.tolerance,
+            eps=eps,
+            robust="curvature",
+            limits=bounds,
+        )
+
+    if cold or not request.constraints.empty:
+        first = stage("free" if not request.constraints.empty else "normal", 15, falling)
+        return [first, stage(o.variables, o.iterations, (o.eps,))]
+    return [stage(o.variables, o.iterations, falling)]
+
+
+def _coarse_stage(request: Request, level: Mesh, make: Any, *, first: bool) -> Stage:
+    """Free vertices on a coarse grid: from far away on the first, to refine on the others."""
+    o = request.options
+    reach = _reach(request)
+    reach = None if reach is None else 0.9 * reach
+    bounds = [] if reach is None else [limits.ball(level.vertices, reach, _layout(level))]
+    return Stage(
+        "x".join(map(str, level.grid_shape or ())),
+        _layout(level),
+        make(level, reach=reach),
+        partial(_unknowns, "free" if first else "normal", level, request),
+        iterations=o.coarse_iterations if first else o.between_iterations,
+        tolerance=1e-3,
+        eps=(10.0 * o.eps, 3.0 * o.eps, o.eps) if first else (o.eps,),
+        robust="curvature",
+        limits=bounds,
+    )
+
+
+def _carry(coarse: Mesh, fine: Mesh, reach: float | None, coordinates: Array) -> Array:
+    """Displacement on a coarse grid, interpolated and added to a finer one."""
+    shift = (coordinates.reshape(-1, 3) - coarse.vertices)[coarse.grid_index]
+    moved = fine.vertices + resample(shift, *fine.grid_shape).reshape(-1, 3)  # type: ignore[misc]
+    return _inside(moved, fine, reach).ravel()
+
+
+def _inside(points: Array, mesh: Mesh, reach: float | None) -> Array:
+    """Points pulled back to where the barrier is finite."""
+    if reach is None:
+        return points
+    u = points - mesh.vertices
+    length = np.linalg.norm(u, axis=1, keepdims=True)
+    return mesh.vertices + u * np.minimum(1.0, 0.97 * reach / np.maximum(length, 1e-300))
+
+
+def metrics(before: Mesh, after: Mesh, scale: float) -> dict[str, float]:
+    """Published and corrected metrics of a developable result (units: gso.metrics.INFO)."""
+    true = measure.surface_distance(before, after)
+    percent = 100.0 / before.diagonal
+    was = measure.fairness(before, scale=scale)
+    return {
+        "loss_gc_before": measure.loss_gc(before, scale=scale),
+        "loss_gc": measure.loss_gc(after, scale=scale),
+        "K_A_meyer": 3.0 * measure.loss_gc(after, scale=scale),
+        "K_A_r": measure.K_A_r(before, after),
+        "d_H": measure.d_H(before, after),
+        "distance_mean": percent * 0.5 * (true.there_mean + true.back_mean),
+        "distance_max": percent * max(true.there_max, true.back_max),
+        "deviation_max": percent * true.there_max,
+        "fairness_ratio": measure.fairness(after, scale=scale) / was if was > 0 else 1.0,
+    }

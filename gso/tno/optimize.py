@@ -1,0 +1,329 @@
+"""From a mesh to a result: normalise, plan, solve the stages, give back in the user's frame."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gso import metrics, tasks
+from gso.constraints import Constraint, compile_constraints
+from gso.mesh import Frame, Mesh
+from gso.result import Result
+from gso.status import ConvergenceWarning, MeshError, OptionError, Progress, Status
+from gso.tasks.base import Plan, Request
+from gso.tno.problem import Problem
+from gso.tno.search import reach_target
+from gso.tno.solver import Callback, Solution, Timings, minimise
+from gso.variables import free
+
+Array = NDArray[np.float64]
+
+
+def optimize(
+    mesh: Any,
+    *,
+    task: str = "developable",
+    formulation: str | None = None,
+    options: Any = None,
+    constraints: Sequence[Constraint] = (),
+    max_deviation: float | None = None,
+    target_curvature: float | None = None,
+    x0: Any = None,
+    callback: Callback | None = None,
+) -> Result:
+    """Make a surface developable, flatten it, or denoise it.
+
+    Parameters
+    ----------
+    mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, or path
+        The design, in any unit of length.
+    task : {"developable", "flatten", "denoise"}
+        What to do.
+    formulation : str, optional
+        Which energy; the task's first when not given.
+    options : str or Options, optional
+        "fast", "balanced" (default), "accurate", or the task's options dataclass.
+    constraints : sequence of Fixed, FixedBoundary, Handle
+        What the result must keep.
+    max_deviation : float, optional
+        `developable` only: no vertex of the result is farther than this from the design,
+        in the mesh's unit; as developable as that allows.
+    target_curvature : float, optional
+        `developable` only: the mean absolute curvature ``loss_gc`` to reach, with the
+        smallest displacement that does.
+    x0 : Mesh or array, optional
+        Where to start: vertices (n, 3) or a grid; (n, 2) or (H, W, 2) for `flatten`.
+        Proximity and lengths stay those of `mesh`.
+    callback : callable, optional
+        Called with a :class:`gso.Progress` after each iteration; returning False stops
+        the solve, and the best iterate so far is returned.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    MeshError
+        The input cannot be used.
+    OptionError
+        An option or constraint is unknown or contradictory.
+
+    Examples
+    --------
+    >>> import numpy as np, gso
+    >>> u, v = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
+    >>> saddle = np.stack([u, v, 0.3 * u * v], axis=-1)
+    >>> result = gso.tno.optimize(saddle)
+    >>> result.metrics["loss_gc"] < 0.5 * result.metrics["loss_gc_before"]
+    True
+
+    References
+    ----------
+    Jiang et al. 2020, Quad-mesh based isometric mappings and developable surfaces.
+    """
+    clock = time.perf_counter()
+    from gso.io import as_mesh
+
+    design = as_mesh(mesh)
+    module = tasks.get(task)
+    formulation = formulation or module.FORMULATIONS[0]
+    if formulation not in module.FORMULATIONS:
+        raise OptionError(
+            f"task {task!r} has no formulation {formulation!r}; "
+            f"there are {', '.join(module.FORMULATIONS)}"
+        )
+    settings = module.Options.coerce(options)
+    _check_questions(task, max_deviation, target_curvature)
+    frame = Canonical(design)
+    request = Request(
+        frame.mesh,
+        settings,
+        formulation,
+        compile_constraints(constraints, design).mapped(frame.frame.to_unit, frame.new_index),
+        start=frame.start(x0, flat=task == "flatten"),
+        max_deviation=None if max_deviation is None else max_deviation / frame.frame.scale,
+    )
+    run = Run(module, callback)
+    if target_curvature is None:
+        outcome = run(request)
+    else:
+        outcome = reach_target(run, request, target_curvature)
+    result = _result(task, formulation, design, frame, outcome, run, module)
+    result.warm_start = "cold" if x0 is None else "x0"
+    result.seconds["total"] = time.perf_counter() - clock
+    if not result.converged and result.status is not Status.MAX_ITERATIONS:
+        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=2)
+    return result
+
+
+def _check_questions(task: str, max_deviation: Any, target_curvature: Any) -> None:
+    for name, value in (("max_deviation", max_deviation), ("target_curvature", target_curvature)):
+        if value is None:
+            continue
+        if task != "developable":
+            raise OptionError(f"{name} belongs to task 'developable', not {task!r}")
+        if not (np.isfinite(value) and value > 0):
+            raise OptionError(f"{name} is {value}; it must be a positive number")
+    if max_deviation is not None and target_curvature is not None:
+        raise OptionError("give max_deviation or target_curvature, not both")
+
+
+class Canonical:
+    """A mesh in the unit ball, grids numbered row by row, and the way back."""
+
+    def __init__(self, design: Mesh):
+        self.frame: Frame = design.frame
+        if not self.frame.scale > 0:
+            raise MeshError("all vertices are at one point")
+        n = len(design.vertices)
+        if design.grid_index is None:
+            self.order = np.arange(n)
+            self.mesh = design.replaced(self.frame.to_unit(design.vertices))
+        else:
+            self.order = design.grid_index.ravel()
+            self.mesh = Mesh.from_grid(self.frame.to_unit(design.grid))  # type: ignore[arg-type]
+        self.new_index = np.empty(n, np.int64)
+        self.new_index[self.order] = np.arange(n)
+
+    def start(self, x0: Any, *, flat: bool) -> Array | None:
+        """Coordinates of a warm start in this numbering and frame."""
+        if x0 is None:
+            return None
+        points = np.asarray(getattr(x0, "vertices", x0), float)
+        ordered = points.ndim == 3
+        points = points.reshape(-1, points.shape[-1])
+        dim = 2 if flat else 3
+        if points.shape != (len(self.order), points.shape[-1]) or points.shape[1] < dim:
+            raise MeshError(f"x0 has shape {np.shape(x0)}; {len(self.order)} points are needed")
+        if not np.isfinite(points).all():
+            raise MeshError("x0 has coordinates that are not finite")
+        points = points if ordered else points[self.order]
+        return points[:, :2] / self.frame.scale if flat else self.frame.to_unit(points)
+
+    def back(self, values: Array) -> Array:
+        """Rows in this numbering, put in the user's."""
+        return values[self.new_index]
+
+
+@dataclass
+class Outcome:
+    """Coordinates that a run ended with, and how."""
+
+    block: str
+    points: Array
+    status: Status
+    energy: dict[str, float] = field(default_factory=dict)
+    iterations: int = 0
+    backend: str = ""
+    notes: tuple[str, ...] = ()
+    details: dict[str, Any] = field(default_factory=dict)
+
+
+class Run:
+    """Solves requests of one task, keeping history and time across several of them."""
+
+    def __init__(self, module: ModuleType, callback: Callback | None):
+        self.module = module
+        self.callback = callback
+        self.history: list[Progress] = []
+        self.timings = Timings()
+        self.iterations = 0
+
+    def __call__(self, request: Request) -> Outcome:
+        """Plan and solve the stages."""
+        clock = time.perf_counter()
+        plan: Plan = self.module.plan(request)
+        self.timings.setup += time.perf_counter() - clock
+        dim = 2 if plan.block == "flat" else 3
+        coordinates, solution = plan.start, None
+        for number, stage in enumerate(plan.stages):
+            clock = time.perf_counter()
+            coordinates = stage.enter(coordinates)
+            variables = stage.variables(coordinates)
+            problem = Problem(stage.items, variables, stage.limits)
+            x = variables.project(coordinates)
+            self.timings.setup += time.perf_counter() - clock
+            solution = self._solve(request, plan, number, problem, x)
+            coordinates = variables.points(solution.x)
+            if solution.status is Status.CANCELLED:
+                coordinates = self._finish(plan, number, coordinates)
+                break
+        if solution is None:
+            return Outcome(
+                plan.block,
+                coordinates.reshape(-1, dim),
+                plan.status or Status.CONVERGED,
+                {"objective": 0.0},
+                notes=tuple(plan.notes),
+                details=plan.details,
+            )
+        coordinates, energy = self._guard(request, plan, coordinates)
+        return Outcome(
+            plan.block,
+            coordinates.reshape(-1, dim),
+            solution.status,
+            energy,
+            self.iterations,
+            solution.backend,
+            tuple(plan.notes),
+            plan.details,
+        )
+
+    def _solve(
+        self, request: Request, plan: Plan, number: int, problem: Problem, x: Array
+    ) -> Solution:
+        stage, options = plan.stages[number], request.options
+        solution = minimise(
+            problem,
+            x,
+            iterations=stage.iterations,
+            tolerance=stage.tolerance,
+            eps=stage.eps,
+            robust=stage.robust,
+            method=options.method,
+            backend=options.backend,
+            threads=options.threads,
+            callback=self.callback,
+            stage=(number, len(plan.stages)),
+            timings=self.timings,
+        )
+        self.iterations += solution.iterations
+        self.history += solution.history
+        return solution
+
+    @staticmethod
+    def _finish(plan: Plan, number: int, coordinates: Array) -> Array:
+        """Carry a cancelled solve to the last stage's coordinates."""
+        for stage in plan.stages[number + 1 :]:
+            coordinates = stage.enter(coordinates)
+        return coordinates
+
+    @staticmethod
+    def _guard(request: Request, plan: Plan, coordinates: Array) -> tuple[Array, dict[str, float]]:
+        """The result, unless the start has less of the final objective."""
+        stage = plan.stages[-1]
+        problem = Problem(stage.items, free(stage.layout))
+        given = request.start if request.start is not None else request.mesh.vertices
+        feasible = plan.block == "surface" and request.constraints.empty
+        energy = problem.by_term(coordinates)
+        if feasible and not sum(energy.values()) <= problem.energy(given.ravel()):
+            return given.ravel(), problem.by_term(given.ravel())
+        return coordinates, energy
+
+
+def _result(
+    task: str,
+    formulation: str,
+    design: Mesh,
+    frame: Canonical,
+    outcome: Outcome,
+    run: Run,
+    module: ModuleType,
+) -> Result:
+    points = frame.back(outcome.points)
+    untouched = outcome.status is Status.ALREADY_GOOD
+    flat = None
+    if outcome.block == "flat":
+        flat = points * frame.frame.scale
+        mesh = design.replaced(np.c_[flat, np.zeros(len(flat))])
+        measure = partial(_flat_metrics, module)
+    else:
+        mesh = design if untouched else design.replaced(frame.frame.to_user(points))
+        measure = partial(_surface_metrics, module)
+    seconds = run.timings.as_dict()
+    return Result(
+        task=task,
+        formulation=formulation,
+        design=design,
+        mesh=mesh,
+        flat=flat,
+        status=outcome.status,
+        iterations=run.iterations,
+        energy=outcome.energy,
+        history=run.history,
+        seconds=seconds,
+        backend=outcome.backend,
+        notes=design.notes + outcome.notes,
+        details=outcome.details,
+        measure=measure,
+    )
+
+
+def _surface_metrics(module: ModuleType, result: Result) -> dict[str, float]:
+    return module.metrics(result.design, result.mesh, metrics.unit(result.design))
+
+
+def _flat_metrics(module: ModuleType, result: Result) -> dict[str, float]:
+    return module.metrics(result.design, result.flat)
+
+
+__all__ = ["Canonical", "Outcome", "Run", "optimize", "replace"]
