@@ -11,7 +11,6 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-__version__ = "0.1.0"
 
 _NAMES = {
     "Mesh": "gso.mesh",
@@ -33,14 +32,25 @@ _NAMES = {
     "FixedBoundary": "gso.constraints",
     "Handle": "gso.constraints",
 }
-_MODULES = ("tno", "metrics", "dataset", "plot")
+_OPTIONS = {
+    "DevelopableOptions": "gso.tasks.developable",
+    "FlattenOptions": "gso.tasks.flatten",
+    "DenoiseOptions": "gso.tasks.denoise",
+}
+_MODULES = ("tno", "metrics", "io", "dataset", "plot")
 
-__all__ = [*_NAMES, *_MODULES, "__version__"]
+__all__ = [*_NAMES, *_OPTIONS, *_MODULES, "__version__"]
 
 
 def __getattr__(name: str) -> Any:
     if name in _NAMES:
         value = getattr(importlib.import_module(_NAMES[name]), name)
+    elif name in _OPTIONS:
+        value = importlib.import_module(_OPTIONS[name]).Options
+    elif name == "__version__":
+        from importlib.metadata import version
+
+        value = version("gso")
     elif name in _MODULES:
         value = importlib.import_module(f"gso.{name}")
     else:

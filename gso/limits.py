@@ -9,6 +9,7 @@ from gso.terms import Limit
 from gso.variables import Layout
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 #: Share of the way to a bound that a step may go.
 SAFETY = 0.9
@@ -45,3 +46,49 @@ def ball(points: Array, radius: float, layout: Layout) -> Limit:
         return float(min(1.0, SAFETY * root.min()))
 
     return limit
+
+
+def orientation(triangles: Ints, layout: Layout) -> Limit:
+    """Keep triangles of the block "flat" from collapsing or turning over.
+
+    Along a step the signed area of a triangle is a parabola in the step length; the step
+    ends at :data:`SAFETY` of its smallest positive root over all triangles (Smith and
+    Schaefer 2015, Bijective parameterization with free boundaries, section 3.3).
+    Triangles that are turned over already are let go.
+
+    Parameters
+    ----------
+    triangles : ndarray of int, (t, 3)
+        Corners, anticlockwise where the image is the right way up.
+    layout : Layout
+        The coordinates.
+    """
+    start, count, _ = layout.where("flat")
+    part = slice(start, start + 2 * count)
+    corners = np.ascontiguousarray(triangles.T)
+
+    def limit(coordinates: Array, direction: Array) -> float:
+        e, f = _edges(coordinates[part], corners)
+        de, df = _edges(direction[part], corners)
+        c = _cross(e, f)
+        b = _cross(e, df) + _cross(de, f)
+        a = _cross(de, df)
+        # 2c / (sqrt(b^2 - 4ac) - b) is the smallest positive root, or there is none.
+        with np.errstate(invalid="ignore"):
+            steepness = np.sqrt(b * b - 4.0 * a * c) - b
+        falling = (steepness > 0) & (c > 0)
+        if not falling.any():
+            return 1.0
+        return float(min(1.0, SAFETY * (2.0 * c[falling] / steepness[falling]).min()))
+
+    return limit
+
+
+def _edges(flat: Array, corners: Ints) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    x, y = np.ascontiguousarray(flat.reshape(-1, 2).T)
+    px, py = x[corners[0]], y[corners[0]]
+    return (x[corners[1]] - px, y[corners[1]] - py), (x[corners[2]] - px, y[corners[2]] - py)
+
+
+def _cross(a: tuple[Array, Array], b: tuple[Array, Array]) -> Array:
+    return a[0] * b[1] - a[1] * b[0]

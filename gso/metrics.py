@@ -34,11 +34,15 @@ class Info(NamedTuple):
 
 INFO: dict[str, Info] = {
     "loss_gc": Info("1/size^2", True, "mean |K| over interior vertices (published)"),
+    "loss_gc_before": Info("1/size^2", True, "mean |K| of the input"),
     "K_A_meyer": Info("1/size^2", True, "mean |K| with Meyer's barycentric area"),
     "K_A_r": Info("", False, "share of mean |K| removed (published)"),
     "d_H": Info("%", True, "mean distance to the nearest input vertex / diagonal (published)"),
     "distance_mean": Info("%", True, "mean true distance to the surface, both ways / diagonal"),
     "distance_max": Info("%", True, "largest true distance, both ways / diagonal"),
+    "deviation_max": Info("%", True, "largest true distance of a result vertex / diagonal"),
+    "displacement_rms": Info("%", True, "root mean square vertex displacement / diagonal"),
+    "displacement_max": Info("%", True, "largest vertex displacement / diagonal"),
     "fairness_ratio": Info("", True, "sum of squared second differences, out / in"),
     "loss_iso_cell": Info("size", True, "isometry defect of the cells (published)"),
     "edge_length_error": Info("", True, "mean |l'/l - 1| over edges"),

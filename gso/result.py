@@ -105,7 +105,8 @@ class Result:
 
         suffix = str(path).lower().rpartition(".")[2]
         if suffix == "npz":
-            io.write_arrays(path, **self._arrays())
+            with io.replacing(path) as file:
+                np.savez(file, **self._arrays())
         elif suffix == "svg":
             if self.flat is None:
                 raise MeshError(f"{path}: only a flat result can be written as SVG; use task='flatten'")
@@ -131,7 +132,7 @@ class Result:
             "history": [asdict(p) for p in self.history],
         }
         arrays = {
-            "record": np.array(json.dumps(record, default=float)),
+            "record": np.frombuffer(json.dumps(record, default=float).encode(), np.uint8),
             "design": self.design.vertices,
             "vertices": self.mesh.vertices,
             "faces": self.design.faces,
@@ -149,11 +150,15 @@ class Result:
         MeshError
             The file is missing, damaged, or no result.
         """
-        from gso import io
+        from gso.io.arrays import read_arrays
+        from gso.io.source import read_bytes
 
-        data = io.read_arrays(path)
         try:
-            record = json.loads(str(data["record"]))
+            data = read_arrays(read_bytes(path))
+        except MeshError as error:
+            raise MeshError(f"{path}: {error}") from None
+        try:
+            record = json.loads(data["record"].tobytes())
             if record["format"] != _FORMAT:
                 raise MeshError(f"{path} was written by another version (format {record['format']})")
             design = Mesh(data["design"], data["faces"])

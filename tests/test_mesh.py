@@ -43,7 +43,8 @@ def problems(faces):
         return "edge"
     for vertex in {v for f in faces for v in f}:
         # Link of the vertex: one path or one cycle, or two fans touch in it.
-        around = [(f[f.index(vertex) - 1], f[(f.index(vertex) + 1) % len(f)]) for f in faces if vertex in f]
+        at = [(f, f.index(vertex)) for f in faces if vertex in f]
+        around = [(f[k - 1], f[(k + 1) % len(f)]) for f, k in at]
         reached, todo = set(), [around[0][0]]
         while todo:
             here = todo.pop()
@@ -132,7 +133,7 @@ def test_replaced_vertices_keep_the_connectivity():
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
 def test_the_frame_takes_the_farthest_vertex_to_the_unit_sphere(unit):
-    mesh = Mesh.from_grid(unit * (points(4, 5) + [1e3, -2e3, 5e2]))
+    mesh = Mesh.from_grid(unit * (points(4, 5) + np.array([1e3, -2e3, 5e2])))
     inside = mesh.frame.to_unit(mesh.vertices)
     assert np.linalg.norm(inside, axis=1).max() == pytest.approx(1.0)
     assert np.abs(inside.mean(axis=0)).max() < 1e-12
@@ -142,7 +143,9 @@ def test_the_frame_takes_the_farthest_vertex_to_the_unit_sphere(unit):
 def test_vertices_of_no_face_are_noted_and_do_not_move_the_frame():
     plain = Mesh.from_grid(points(3, 4))
     mesh = Mesh(np.r_[plain.vertices, [[1e9, 0, 0]]], plain.faces)
-    assert mesh.notes == ("1 vertices belong to no face and stay as they are (the first is vertex 12)",)
+    assert mesh.notes == (
+        "1 vertices belong to no face and stay as they are (the first is vertex 12)",
+    )
     assert mesh.frame.scale == plain.frame.scale and mesh.diagonal == plain.diagonal
     assert mesh.is_disk and mesh.grid is None
     check(mesh)
@@ -159,7 +162,7 @@ def test_inconsistent_orientation_is_repaired_and_noted():
 
 def test_components_are_noted():
     plain = Mesh.from_grid(points(3, 4))
-    vertices = np.r_[plain.vertices, plain.vertices + [9, 0, 0]]
+    vertices = np.r_[plain.vertices, plain.vertices + np.array([9, 0, 0])]
     mesh = Mesh(vertices, np.r_[plain.faces, plain.faces + 12])
     assert mesh.notes == ("the mesh has 2 components; each is treated on its own",)
     assert len(set(mesh.components[:12])) == len(set(mesh.components[12:])) == 1
@@ -273,6 +276,14 @@ def test_any_few_faces_are_consistent_or_refused(faces):
     vertices = np.c_[np.cos(angle), np.sin(angle), angle**2 / 9]
     try:
         mesh = Mesh(vertices, padded(faces))
+        mesh.triangles  # noqa: B018
     except MeshError:
         return
     check(mesh)
+
+
+def test_a_quad_that_cannot_be_split_is_named():
+    faces = [[1, 5, 4, 2], [4, 3, 1], [1, 3, 2], [0, 3, 5, 4], [4, 2, 5, 3]]
+    mesh = Mesh(np.random.default_rng(0).random((6, 3)), padded(faces))
+    with pytest.raises(MeshError, match="cannot be split into triangles"):
+        mesh.triangles  # noqa: B018

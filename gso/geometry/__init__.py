@@ -9,7 +9,7 @@ solver residual, a training loss and a metric cannot drift apart.
 from gso.geometry.cells import corner_area2, diagonals, isometry_defect
 from gso.geometry.curvature import gaussian_curvature, star_area, star_defect
 from gso.geometry.differences import second_difference
-from gso.geometry.strain import rest_frame, singular_values, stretch
+from gso.geometry.strain import rest_frame, singular_values, stretch, turn_and_shear
 from gso.geometry.vector import angle, cross, dot, norm, norm2, sub
 
 __all__ = [
@@ -29,4 +29,5 @@ __all__ = [
     "star_defect",
     "stretch",
     "sub",
+    "turn_and_shear",
 ]

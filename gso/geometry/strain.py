@@ -34,18 +34,24 @@ def stretch(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, An
     is ``(s1 - 1)^2 + (s2 - 1)^2``, the as-rigid-as-possible energy (Sorkine and Alexa
     2007) without a singular value decomposition. `c` and `d` are linear in the unknowns.
     """
-    q_part, c, d = _split(p, q, r, rest)
+    q_part, c, d = turn_and_shear(p, q, r, rest)
     return norm(q_part) - 1.0, c, d
 
 
 def singular_values(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, Any]:
     """Principal stretches ``(s1, s2)`` of a triangle; ``s2 < 0`` when it is flipped."""
-    q_part, c, d = _split(p, q, r, rest)
+    q_part, c, d = turn_and_shear(p, q, r, rest)
     big, small = norm(q_part), ops.sqrt(norm2((c, d)))
     return big + small, big - small
 
 
-def _split(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Vec, Any, Any]:
+def turn_and_shear(
+    p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]
+) -> tuple[Vec, Any, Any]:
+    """Parts ``((q1, q2), c, d)`` of a triangle's map, all linear in the unknowns.
+
+    ``Q = |(q1, q2)|`` turns and scales, ``R = |(c, d)|`` shears.
+    """
     m11, m12, m22 = rest
     e, f = sub(q, p), sub(r, p)
     f11, f21 = e[0] * m11, e[1] * m11

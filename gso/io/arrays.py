@@ -48,29 +48,30 @@ def write_npy(mesh: Mesh, file: BinaryIO) -> None:
 
 def read_npz(data: bytes) -> Mesh:
     """Mesh in a .npz file: `vertices` and `faces` (or V and F), or one grid (H, W, 3)."""
-    arrays: dict[str, np.ndarray] = {}
+    members = read_arrays(data)
+    chosen = {name.lower(): array for name, array in members.items()}
+    v = next((chosen[k] for k in ("vertices", "v") if k in chosen), None)
+    f = next((chosen[k] for k in ("faces", "f") if k in chosen), None)
+    if v is not None and f is not None:
+        return Mesh(v, f)
+    if len(members) != 1:
+        names = ", ".join(sorted(members)) or "nothing"
+        raise MeshError(
+            f"a .npz file holds 'vertices' and 'faces', or one grid (H, W, 3); this one has {names}"
+        )
+    return Mesh.from_grid(next(iter(members.values())))
+
+
+def read_arrays(data: bytes) -> dict[str, np.ndarray]:
+    """All arrays of a .npz file by name."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = [m for m in archive.infolist() if m.filename.endswith(".npy")]
-            chosen = {m.filename[:-4].lower(): m for m in members}
-            v = next((chosen[k] for k in ("vertices", "v") if k in chosen), None)
-            f = next((chosen[k] for k in ("faces", "f") if k in chosen), None)
-            if v is not None and f is not None:
-                arrays = {"vertices": _member(archive, v), "faces": _member(archive, f)}
-            elif len(members) == 1:
-                arrays = {"grid": _member(archive, members[0])}
+            return {m.filename[:-4]: _member(archive, m) for m in members}
     except MeshError:
         raise
     except _DAMAGE as error:
         raise MeshError(f"is no intact .npz file: {error}; write it again") from None
-    if not arrays:
-        names = ", ".join(sorted(m.filename[:-4] for m in members)) or "nothing"
-        raise MeshError(
-            f"a .npz file holds 'vertices' and 'faces', or one grid (H, W, 3); this one has {names}"
-        )
-    if "grid" in arrays:
-        return Mesh.from_grid(arrays["grid"])
-    return Mesh(arrays["vertices"], arrays["faces"])
 
 
 def write_npz(mesh: Mesh, file: BinaryIO) -> None:

@@ -32,8 +32,12 @@ def read(data: bytes) -> Mesh:
     total = 0
     try:
         with np.errstate(all="ignore"):
-            scene: Any = trimesh.load_scene(
-                io.BytesIO(data), file_type="glb", process=False, skip_materials=True
+            scene: Any = trimesh.load(
+                io.BytesIO(data),
+                file_type="glb",
+                force="scene",
+                process=False,
+                skip_materials=True,
             )
         for node in scene.graph.nodes_geometry:
             transform, name = scene.graph[node]

@@ -28,7 +28,7 @@ def read(data: bytes) -> Mesh:
         raise MeshError("there is no face (a line 'f a b c d') in it; export the mesh's faces")
     points = _vertices(words, v)
     corners, count = _polygons(words, v, f)
-    faces, notes = face_table(corners, count)
+    faces, notes = face_table(corners, count, points)
     return Mesh(points, faces, notes=notes)
 
 

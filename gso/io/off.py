@@ -50,7 +50,7 @@ def read(data: bytes) -> Mesh:
     if outside.any():
         at = int(outside.argmax())
         words.fail(corner[at], f"a face refers to vertex {index[at]}, the last one is {n - 1}")
-    faces, notes = face_table(index, size)
+    faces, notes = face_table(index, size, points)
     return Mesh(points, faces, notes=notes)
 
 

@@ -74,7 +74,14 @@ def read(data: bytes) -> Mesh:
     if (count < 3).any():
         at = int((count < 3).argmax())
         raise MeshError(f"face {at} has {count[at]} corners; delete it")
-    faces, notes = face_table(corners, count)
+    outside = (corners < 0) | (corners >= len(points))
+    if outside.any():
+        face = np.searchsorted(np.cumsum(count), outside.argmax(), side="right")
+        raise MeshError(
+            f"face {face} refers to vertex {corners[outside.argmax()]}, the last one is "
+            f"{len(points) - 1}"
+        )
+    faces, notes = face_table(corners, count, points)
     return Mesh(points, faces, notes=notes)
 
 

@@ -13,6 +13,9 @@ from gso.status import MeshError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# Polygons larger than this are tried from their first corners only: the work is quadratic.
+_MOST_APEXES = 64
+
 
 def read_bytes(path: str | PathLike[str]) -> bytes:
     """Content of a regular file; whatever is wrong with it is a MeshError.
@@ -49,7 +52,7 @@ def ranges(first: Ints, count: Ints) -> Ints:
     return np.repeat(first - before, count) + np.arange(int(count.sum()))
 
 
-def face_table(corners: Ints, count: Ints) -> tuple[Ints, tuple[str, ...]]:
+def face_table(corners: Ints, count: Ints, points: Array) -> tuple[Ints, tuple[str, ...]]:
     """Faces (m, 3) or (m, 4) from polygons, and what was done to them.
 
     Parameters
@@ -58,28 +61,36 @@ def face_table(corners: Ints, count: Ints) -> tuple[Ints, tuple[str, ...]]:
         Vertex indices, polygon after polygon.
     count : ndarray of int, (p,)
         Corners of each polygon, at least three. Polygons with five and more are cut into
-        triangles that share their first corner, in place.
+        triangles that share a corner, in place.
+    points : ndarray, (n, 3)
+        The vertices: of all corners that may be shared, the one is taken with which the
+        smallest triangle is largest, so that corners in line make no empty triangle.
 
     Examples
     --------
-    >>> face_table(np.arange(8), np.array([3, 5]))[0]
-    array([[0, 1, 2],
-           [3, 4, 5],
-           [3, 5, 6],
-           [3, 6, 7]])
+    >>> points = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]])
+    >>> face_table(np.array([0, 1, 2, 3, 4]), np.array([5]), points)[0]
+    array([[1, 2, 3],
+           [1, 3, 4],
+           [1, 4, 0]])
     """
     corners = corners.astype(np.int64, copy=False)
     first = np.cumsum(count) - count
     many = count > 4
+    apex = np.zeros_like(count)
+    for size in np.unique(count[many]):
+        same = np.flatnonzero(count == size)
+        apex[same] = _fan_apex(points[corners[first[same][:, None] + np.arange(size)]])
     pieces = np.where(many, count - 2, 1)
     polygon = np.repeat(np.arange(count.size), pieces)
     piece = ranges(np.zeros_like(pieces), pieces)
     size = np.where(many, 3, count)[polygon]
     table = np.full((polygon.size, int(size.max(initial=3))), -1, np.int64)
-    table[:, 0] = corners[first[polygon]]
-    for k in range(1, table.shape[1]):
+    for k in range(table.shape[1]):
         inside = k < size
-        table[inside, k] = corners[first[polygon[inside]] + piece[inside] + k]
+        p = polygon[inside]
+        turn = apex[p] + (piece[inside] + k if k else 0)
+        table[inside, k] = corners[first[p] + turn % count[p]]
     if not many.any():
         return table, ()
     note = (
@@ -87,6 +98,22 @@ def face_table(corners: Ints, count: Ints) -> tuple[Ints, tuple[str, ...]]:
         f"(the first is face {int(many.argmax())})"
     )
     return table, (note,)
+
+
+def _fan_apex(rings: Array) -> Ints:
+    """The corner of each polygon (n, k, 3) from which its triangles come out best."""
+    with np.errstate(all="ignore"):
+        p = rings - rings.mean(axis=1, keepdims=True)
+        normal = np.cross(p, np.roll(p, -1, axis=1)).sum(axis=1, keepdims=True)
+        best = np.full(len(p), -np.inf)
+        apex = np.zeros(len(p), np.int64)
+        for k in range(min(p.shape[1], _MOST_APEXES)):
+            q = np.roll(p, -k, axis=1)
+            area = np.cross(q[:, 1:-1] - q[:, :1], q[:, 2:] - q[:, :1])
+            smallest = (area * normal).sum(axis=2).min(axis=1)
+            better = smallest > best
+            best[better], apex[better] = smallest[better], k
+    return apex
 
 
 def weld(points: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]]:

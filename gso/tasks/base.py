@@ -48,6 +48,8 @@ class Stage:
         Name of that term.
     limits : sequence of Limit
         What a step must not cross.
+    bounds : callable, optional
+        Smallest and largest value of every unknown, from the coordinates at its start.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Stage:
     eps: Sequence[float] = ()
     robust: str = ""
     limits: Sequence[Limit] = ()
+    bounds: Callable[[Array], tuple[Array, Array]] | None = None
 
 
 @dataclass

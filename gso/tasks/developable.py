@@ -12,21 +12,22 @@ Grids are solved coarse to fine.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gso import limits, metrics as measure
+from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.resample import coarser, resample
+from gso.smoothing import smooth_grid
 from gso.status import OptionError, Status
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, curvature, fairness, position, proximity
-from gso.terms.losses import Absolute, Barrier, Distance
+from gso.terms.losses import Absolute, Distance
 from gso.variables import Layout, Variables, free, normal_offsets, vertex_normals
 
 Array = NDArray[np.float64]
@@ -96,9 +97,18 @@ class Options(BaseOptions):
             raise OptionError("eps and near must be positive")
 
 
+#: Curvature at which half of the design's own bending counts as wanted.
+FLAT_CURVATURE = 0.02
+#: A design is a developable surface with noise on it when smoothing leaves at most this
+#: much of its curvature; it then moves by at most so many standard deviations.
+NOISE_ONLY = 0.1
+NOISE_REACH = 2.8
+
+
 def plan(request: Request) -> Plan:
     """Stages of the solve: a coarse grid first, the design's own vertices last."""
     mesh, options = request.mesh, request.options
+    notes: list[str] = []
     if not mesh.stars:
         raise _nothing_inside(mesh)
     start = mesh.vertices if request.start is None else request.start
@@ -106,7 +116,13 @@ def plan(request: Request) -> Plan:
     good = curved <= options.developable_below
     if good and request.start is None and request.constraints.empty:
         return Plan("surface", mesh.vertices.ravel(), status=Status.ALREADY_GOOD)
-    make = partial(_objective, request, curved, _bending(mesh))
+    smooth, sigma = _smoothed(mesh)
+    left = measure.loss_gc(smooth, scale=1.0)
+    if request.constraints.empty and left <= min(NOISE_ONLY * curved, FLAT_CURVATURE):
+        reach = min(NOISE_REACH * sigma, request.max_deviation or np.inf)
+        request = replace(request, max_deviation=reach)
+        notes.append("the design is developable but for noise: it moves no further than that")
+    make = partial(_objective, request, curved, _bending(mesh), smooth)
     stages = _stages(request, mesh, make)
     climb = request.start is None and request.constraints.empty and mesh.grid_index is not None
     levels = coarser(mesh, options.coarse_size) if climb else []
@@ -115,7 +131,30 @@ def plan(request: Request) -> Plan:
     for below, above, stage in zip(levels, [*levels[1:], mesh], stages[1:], strict=False):
         stage.enter = partial(_carry, below, above, _reach(request))
     begin = levels[0].vertices if levels else _inside(start, mesh, _reach(request))
-    return Plan("surface", begin.ravel(), stages)
+    return Plan("surface", begin.ravel(), stages, notes=notes)
+
+
+def _smoothed(mesh: Mesh) -> tuple[Mesh, float]:
+    """The design without noise, and the noise's standard deviation; grids only."""
+    if mesh.grid is None:
+        return mesh, 0.0
+    smoothed = smooth_grid(mesh.grid)
+    return mesh.replaced(smoothed.points.reshape(-1, 3)), smoothed.sigma
+
+
+def _own_bending(mesh: Mesh) -> Array:
+    """How much of its own bending each vertex of a (smooth) design should keep, (n,).
+
+    Nearly all where the design is developable already, so that fairness does not pull
+    its border in; none where it is curved.
+    """
+    k = measure.curvature(mesh)
+    grid = mesh.grid_index
+    if grid is not None:
+        inner = grid[1:-1, 1:-1]
+        k[grid] = np.pad(k[inner], 1, mode="edge")
+    k = np.where(np.isnan(k), np.inf, k)
+    return 1.0 / (1.0 + (k / FLAT_CURVATURE) ** 2)
 
 
 def _nothing_inside(mesh: Mesh) -> Exception:
@@ -136,31 +175,31 @@ def _bending(mesh: Mesh) -> float:
 
 
 def _objective(
-    request: Request, curved: float, bending: float, mesh: Mesh, *, reach: float | None
+    request: Request, curved: float, bending: float, smooth: Mesh, mesh: Mesh
 ) -> list[Weighted]:
     """Terms on the design or on a coarser copy of it."""
     o = request.options
     w_curvature = o.w_curvature * request.curvature_weight
     w_curvature *= (TYPICAL_CURVATURE / max(curved, 1e-3)) ** 0.2
     w_fairness = o.w_fairness * (TYPICAL_BENDING / (bending + 0.1)) ** 0.5
+    w_proximity = o.w_proximity
+    if request.max_deviation is not None:
+        # The bound keeps the result close; the terms may ask for more.
+        w_curvature, w_fairness, w_proximity = 3 * w_curvature, 2 * w_fairness, 0.3 * w_proximity
     normals = vertex_normals(mesh)
     near = proximity.build(mesh, normals, tangential=o.tangential)
     items = [Weighted(t, w_curvature, Absolute(o.eps)) for t in curvature.build(mesh)]
-    items.append(Weighted(fairness.build(mesh), w_fairness))
-    items.append(Weighted(near, o.w_proximity, Distance(o.near)))
-    if reach is not None:
-        whole = proximity.build(mesh, normals, tangential=1.0, name="deviation")
-        items.append(Weighted(whole, BARRIER, Barrier(reach)))
+    if mesh is not request.mesh:
+        smooth = mesh.replaced(resample(smooth.grid, *mesh.grid_shape).reshape(-1, 3))
+    fair = fairness.build(mesh, reference=smooth.vertices, share=_own_bending(smooth))
+    items.append(Weighted(fair, w_fairness))
+    items.append(Weighted(near, w_proximity, Distance(o.near)))
     c = request.constraints
     if len(c.soft_ids) and mesh is request.mesh:
         items.append(
             Weighted(position.build(c.soft_ids, c.soft_positions, c.soft_weights), 1.0)
         )
     return items
-
-
-#: Weight of the barrier that keeps a result within `max_deviation`.
-BARRIER = 2e-6
 
 
 def _reach(request: Request) -> float | None:
@@ -190,9 +229,7 @@ def _unknowns(kind: str, mesh: Mesh, request: Request, coordinates: Array) -> Va
 def _stages(request: Request, mesh: Mesh, make: Any) -> list[Stage]:
     """Stages on the design's own vertices."""
     o = request.options
-    reach = _reach(request)
-    items = make(mesh, reach=reach)
-    bounds = [] if reach is None else [limits.ball(mesh.vertices, reach, _layout(mesh))]
+    items = make(mesh)
     cold = request.start is None and mesh.grid_index is None
     falling = (10.0 * o.eps, 3.0 * o.eps, o.eps) if cold else (o.eps,)
 
@@ -206,9 +243,12 @@ def _stages(request: Request, mesh: Mesh, make: Any) -> list[Stage]:
             tolerance=o.tolerance,
             eps=eps,
             robust="curvature",
-            limits=bounds,
+            bounds=_bounds(mesh, _reach(request)),
         )
 
+    if request.max_deviation is not None:
+        # Only offsets along normals have bounds; normals are renewed half-way.
+        return [stage("normal", o.iterations, e) for e in (falling, (o.eps,))]
     if cold or not request.constraints.empty:
         first = stage("free" if not request.constraints.empty else "normal", 15, falling)
         return [first, stage(o.variables, o.iterations, (o.eps,))]
@@ -218,19 +258,17 @@ def _stages(request: Request, mesh: Mesh, make: Any) -> list[Stage]:
 def _coarse_stage(request: Request, level: Mesh, make: Any, *, first: bool) -> Stage:
     """Free vertices on a coarse grid: from far away on the first, to refine on the others."""
     o = request.options
-    reach = _reach(request)
-    reach = None if reach is None else 0.9 * reach
-    bounds = [] if reach is None else [limits.ball(level.vertices, reach, _layout(level))]
+    bounded = request.max_deviation is not None
     return Stage(
         "x".join(map(str, level.grid_shape or ())),
         _layout(level),
-        make(level, reach=reach),
-        partial(_unknowns, "free" if first else "normal", level, request),
+        make(level),
+        partial(_unknowns, "free" if first and not bounded else "normal", level, request),
         iterations=o.coarse_iterations if first else o.between_iterations,
         tolerance=1e-3,
         eps=(10.0 * o.eps, 3.0 * o.eps, o.eps) if first else (o.eps,),
         robust="curvature",
-        limits=bounds,
+        bounds=_bounds(level, _reach(request)),
     )
 
 
@@ -241,13 +279,27 @@ def _carry(coarse: Mesh, fine: Mesh, reach: float | None, coordinates: Array) ->
     return _inside(moved, fine, reach).ravel()
 
 
+def _bounds(mesh: Mesh, reach: float | None) -> Any:
+    """Bounds on offsets along normals that keep every vertex within reach of its own place."""
+    return None if reach is None else partial(_offset_bounds, mesh, reach)
+
+
+def _offset_bounds(mesh: Mesh, reach: float, coordinates: Array) -> tuple[Array, Array]:
+    points = coordinates.reshape(-1, 3)
+    n = vertex_normals(mesh.replaced(points))
+    u = points - mesh.vertices
+    along = (u * n).sum(axis=1)
+    root = np.sqrt(np.maximum(along**2 - (u * u).sum(axis=1) + reach**2, 0.0))
+    return np.minimum(-along - root, 0.0), np.maximum(-along + root, 0.0)
+
+
 def _inside(points: Array, mesh: Mesh, reach: float | None) -> Array:
-    """Points pulled back to where the barrier is finite."""
+    """Points pulled back to within reach of where they belong."""
     if reach is None:
         return points
     u = points - mesh.vertices
     length = np.linalg.norm(u, axis=1, keepdims=True)
-    return mesh.vertices + u * np.minimum(1.0, 0.97 * reach / np.maximum(length, 1e-300))
+    return mesh.vertices + u * np.minimum(1.0, reach / np.maximum(length, 1e-300))
 
 
 def metrics(before: Mesh, after: Mesh, scale: float) -> dict[str, float]:

@@ -44,6 +44,12 @@ class Term:
         to one, so that one set of task weights serves every resolution.
     linear : bool
         The residual is affine in the points: its Jacobian is evaluated once.
+    vectors : callable, optional
+        ``vectors(points, constants)`` returns, for the first residuals in their order, the
+        plane vector (u, v) whose length minus a constant the residual is. Turning such a
+        vector does not change the residual to first order, so Gauss-Newton sees no
+        stiffness there and overshoots; with the vectors it keeps the second derivative
+        of the length wherever the loss pulls (projected Newton).
     """
 
     name: str
@@ -52,6 +58,7 @@ class Term:
     weights: Array
     constants: Array = field(default_factory=_no_constants)
     linear: bool = False
+    vectors: Residual | None = None
 
     @property
     def count(self) -> int:

@@ -87,22 +87,41 @@ def _hinge_differences(mesh: Mesh) -> tuple[Ints, Array]:
     return stencil, np.stack([wa, wb, wc, wd]) * scale
 
 
-def build(mesh: Mesh, *, block: str = "surface", target: Array | None = None) -> Term:
-    """Fairness of a block; `target` (n, dim) are points whose differences are wanted.
+def build(
+    mesh: Mesh,
+    *,
+    block: str = "surface",
+    reference: Array | None = None,
+    share: Array | None = None,
+) -> Term:
+    """Fairness of a block, measured on the connectivity and spacing of `mesh`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The surface.
+    block : {"surface", "flat"}
+        Whose points are meant.
+    reference : ndarray, (n, dim), optional
+        Points whose own second differences are wanted instead of none.
+    share : ndarray, (n,), optional
+        How much of them at every vertex, 0 to 1; all of them when not given.
 
     Weights are 1 / (number of vertices) on quads, so that both directions add up.
     """
     stencil, coefficients = differences(mesh)
     dim = 2 if block == "flat" else 3
     wanted = np.zeros((dim, len(stencil)))
-    if target is not None:
-        wanted = np.einsum("ke,ekd->de", coefficients, target[stencil])
-    share = len(stencil) / 2 if not mesh.is_triangles else len(stencil)
+    if reference is not None:
+        wanted = np.einsum("ke,ekd->de", coefficients, reference[stencil])
+        if share is not None:
+            wanted *= share[stencil].mean(axis=1)
+    count = len(stencil) if mesh.is_triangles else len(stencil) / 2
     return Term(
         "fairness",
         residual,
         ((block, stencil),),
-        weights=np.full(len(stencil), 1.0 / max(share, 1)),
+        weights=np.full(len(stencil), 1.0 / max(count, 1)),
         constants=np.concatenate([coefficients, wanted]),
         linear=True,
     )

@@ -68,26 +68,3 @@ class Distance:
     def weights(self, r: Array) -> tuple[Array, Array]:
         w = np.broadcast_to(self.eps / self._root(r), r.shape)
         return r * w, w
-
-
-@dataclass(frozen=True)
-class Barrier:
-    """``-log(1 - |r|^2 / limit^2)`` of an element's residual vector: infinite at the limit.
-
-    The curvature leaves the cross terms of the vector out and keeps the radial growth,
-    so the Gauss-Newton matrix stays diagonal and positive.
-    """
-
-    limit: float
-
-    def _slack(self, r: Array) -> Array:
-        return 1.0 - (r * r).sum(axis=0, keepdims=True) / self.limit**2
-
-    def value(self, r: Array) -> Array:
-        slack = self._slack(r)
-        return np.where(slack > 0, -np.log(np.maximum(slack, 1e-300)), np.inf)
-
-    def weights(self, r: Array) -> tuple[Array, Array]:
-        slack = np.maximum(self._slack(r), 1e-12)
-        base = 2.0 / (self.limit**2 * slack)
-        return base * r, base + base * base * r * r

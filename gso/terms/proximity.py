@@ -27,9 +27,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
     return tuple(t * a + along * b for a, b in zip(u, n, strict=True))
 
 
-def build(
-    mesh: Mesh, normals: Array, *, tangential: float = 1.0, name: str = "proximity"
-) -> Term:
+def build(mesh: Mesh, normals: Array, *, tangential: float = 1.0) -> Term:
     """Proximity of every vertex to where it is in `mesh`.
 
     Parameters
@@ -40,13 +38,11 @@ def build(
         Unit normals at its vertices.
     tangential : float
         Factor on the tangential part of the displacement.
-    name : str
-        Name under which its energy is reported.
     """
     n = len(mesh.vertices)
     constants = np.concatenate([mesh.vertices.T, normals.T, np.full((1, n), tangential)])
     return Term(
-        name,
+        "proximity",
         residual,
         (("surface", np.arange(n)[:, None]),),
         weights=mean_weights(n),

@@ -1,8 +1,9 @@
-"""Membrane strain of the flat image: the part that scales, and the part that shears."""
+"""Membrane strain of the flat image, corner triangle by corner triangle."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,74 +16,161 @@ from gso.terms.base import Array, Ints, Term
 INVARIANT = ("translation", "rotation")
 
 _CORNERS = ((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2))
+_ROOT2 = 2.0**0.5
+#: Corners flatter than this (doubled area over the sum of its squared sides) hold no frame.
+_FLAT_CORNER = 1e-6
 
 
-def _stretches(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> list[Any]:
-    corners = _CORNERS if len(points) == 4 else ((0, 1, 2),)
+def _corners(size: int) -> tuple[tuple[int, int, int], ...]:
+    return _CORNERS if size == 4 else ((0, 1, 2),)
+
+
+def _maps(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> list[Any]:
     return [
-        geometry.stretch(*(points[k] for k in corner), tuple(constants[3 * c : 3 * c + 3]))
-        for c, corner in enumerate(corners)
+        geometry.turn_and_shear(
+            *(points[k] for k in corner), tuple(constants[3 * n : 3 * n + 3])
+        )
+        for n, corner in enumerate(_corners(len(points)))
     ]
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``sqrt(2) (Q - 1)`` of each corner triangle of a face.
+    """``sqrt(2) (Q - 1)`` of each corner triangle of a face, then all c, then all d.
 
-    Constants: the three numbers of :func:`gso.geometry.rest_frame` per corner triangle.
+    Half the sum of squares of a corner's three numbers is
+    ``((s1 - 1)^2 + (s2 - 1)^2) / 2``. Constants: the three numbers of
+    :func:`gso.geometry.rest_frame` per corner triangle.
     """
-    return tuple(2.0**0.5 * s[0] for s in _stretches(points, constants))
+    maps = _maps(points, constants)
+    return (
+        *(_ROOT2 * (geometry.norm(turn) - 1.0) for turn, _, _ in maps),
+        *(_ROOT2 * c for _, c, _ in maps),
+        *(_ROOT2 * d for _, _, d in maps),
+    )
 
 
-def shear(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``sqrt(2) (c, d)`` of each corner triangle: linear in the unknowns."""
-    return tuple(2.0**0.5 * x for s in _stretches(points, constants) for x in s[1:])
+def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """The plane vectors whose lengths are ``sqrt(2) Q``."""
+    return tuple((_ROOT2 * q[0], _ROOT2 * q[1]) for q, _, _ in _maps(points, constants))
 
 
-def face_groups(mesh: Mesh) -> list[Ints]:
-    """The quads and the triangles of a mesh, whichever there are."""
+@dataclass(frozen=True)
+class Spread:
+    """Cost of a corner's strain s: between its size and its square, steeper for peaks.
+
+    ``level^2 (2/p) u^p + peak (2/q) u^q`` with ``u = s / level``: a power `p` below two lowers
+    the mean strain, the second one keeps the largest strains down.
+
+    Attributes
+    ----------
+    level : float
+        Strain at which the cost passes from the first power to the second: the typical
+        strain of the surface.
+    p, q : float
+        Powers of small and of large strains.
+    peak : float
+        Weight of the second power.
+    eps : float
+        Smoothing of the first power, relative to `level`.
+    """
+
+    level: float
+    p: float = 1.6
+    q: float = 4.0
+    peak: float = 0.1
+    eps: float = 0.1
+
+    def _squares(self, r: Array) -> tuple[Array, Array]:
+        parts = r.reshape(3, -1, r.shape[1])
+        return parts, 0.5 / self.level**2 * np.einsum("kce,kce->ce", parts, parts)
+
+    def value(self, r: Array) -> Array:
+        """Cost of each corner."""
+        y = self._squares(r)[1]
+        e = self.eps**2
+        low = 2.0 / self.p * ((y + e) ** (0.5 * self.p) - e ** (0.5 * self.p))
+        return self.level**2 * (low + 2.0 * self.peak / self.q * y ** (0.5 * self.q))
+
+    def weights(self, r: Array) -> tuple[Array, Array]:
+        """Derivative, and the curvature without its negative part and its cross terms."""
+        parts, y = self._squares(r)
+        low = (y + self.eps**2) ** (0.5 * self.p - 1.0)
+        high = self.peak * y ** (0.5 * self.q - 1.0)
+        first = low + high
+        growth = (0.5 * self.q - 1.0) * self.peak * y ** (0.5 * self.q - 2.0) / self.level**2
+        if self.p < 2.0:
+            growth = growth + (0.5 * self.p - 1.0) * low / (y + self.eps**2) / self.level**2
+        second = first + np.maximum(growth, 0.0) * parts**2
+        return (first * parts).reshape(r.shape), second.reshape(r.shape)
+
+
+def pieces(mesh: Mesh) -> list[Ints]:
+    """Faces by kind, (e, 4) and (e, 3): what carries strain.
+
+    A quad with a corner of no area or one that points inwards is split there into two
+    triangles; triangles without area are left out.
+    """
     faces = mesh.faces
     if faces.shape[1] == 3:
-        return [faces]
-    quad = faces[:, 3] >= 0
-    return [f for f in (faces[quad], faces[~quad, :3]) if len(f)]
+        quads, triangles = faces[:0], faces
+    else:
+        quads, triangles = faces[faces[:, 3] >= 0], faces[faces[:, 3] < 0, :3]
+    if len(quads):
+        share = corner_shares(mesh.vertices, quads)
+        worst = share.argmin(axis=0)
+        bad = share.min(axis=0) <= _FLAT_CORNER
+        turned = np.take_along_axis(quads[bad], (worst[bad, None] + np.arange(4)) % 4, axis=1)
+        quads = quads[~bad]
+        triangles = np.concatenate([triangles, turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
+    if len(triangles):
+        area, edges = _corner(mesh.vertices, triangles, (0, 1, 2))
+        triangles = triangles[np.linalg.norm(area, axis=1) > _FLAT_CORNER * edges]
+    return [f for f in (quads, triangles) if len(f)]
+
+
+def _corner(vertices: Array, faces: Ints, corner: tuple[int, int, int]) -> tuple[Array, Array]:
+    """Doubled area vectors (e, 3) of a corner, and the sum of its squared sides."""
+    p, q, r = (vertices[faces[:, k]] for k in corner)
+    return np.cross(q - p, r - p), ((q - p) ** 2).sum(axis=1) + ((r - p) ** 2).sum(axis=1)
+
+
+def corner_shares(vertices: Array, quads: Ints) -> Array:
+    """Doubled area of each corner of quads (4, e), along the face's normal, over its sides."""
+    p = vertices[quads]
+    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    corners = [_corner(vertices, quads, c) for c in _CORNERS]
+    return np.stack([(area * normal).sum(axis=1) / edges for area, edges in corners])
 
 
 def rest_constants(vertices: Array, faces: Ints) -> Array:
-    """Rest frames of the corner triangles of faces, (12 or 3, e).
-
-    A corner without area (three corners of a quad in a line) gets zeros: it exerts no
-    force.
-    """
-    corners = _CORNERS if faces.shape[1] == 4 else ((0, 1, 2),)
-    rows = []
-    for corner in corners:
-        p, q, r = (tuple(vertices[faces[:, k]].T) for k in corner)
-        area = geometry.norm(geometry.cross(geometry.sub(q, p), geometry.sub(r, p)))
-        edge = geometry.norm2(geometry.sub(q, p)) + geometry.norm2(geometry.sub(r, p))
-        keep = area > 1e-6 * edge
-        rows += [np.where(keep, x, 0.0) for x in geometry.rest_frame(p, q, r)]
-    return np.stack(rows)
+    """Rest frames of the corner triangles of faces, (12 or 3, e)."""
+    points = [tuple(np.ascontiguousarray(vertices[faces[:, k]].T)) for k in range(faces.shape[1])]
+    rows = [
+        geometry.rest_frame(*(points[k] for k in corner)) for corner in _corners(faces.shape[1])
+    ]
+    return np.stack([x for frame in rows for x in frame])
 
 
 def build(mesh: Mesh) -> list[Term]:
-    """Scaling and shearing strain of all corner triangles; weights average over triangles.
+    """Strain of all corner triangles; weights average over triangles.
 
-    Together half the weighted sum of squares is the mean of
-    ``((s1 - 1)^2 + (s2 - 1)^2) / 2``, the as-rigid-as-possible energy of Liu et al. 2008
-    with equal weights.
+    With squared loss the energy is the mean of ``((s1 - 1)^2 + (s2 - 1)^2) / 2``, the
+    as-rigid-as-possible energy of Liu et al. 2008 with equal weights.
     """
-    groups = face_groups(mesh)
-    count = sum(len(f) * (4 if f.shape[1] == 4 else 1) for f in groups)
-    terms = []
-    for faces in groups:
-        common = {
-            "stencil": (("flat", faces),),
-            "weights": np.full(len(faces), 1.0 / count),
-            "constants": rest_constants(mesh.vertices, faces),
-        }
-        terms.append(Term("stretch", residual, **common))
-        terms.append(Term("shear", shear, **common, linear=True))
-    return terms
+    groups = pieces(mesh)
+    count = sum(len(_corners(f.shape[1])) * len(f) for f in groups)
+    return [
+        Term(
+            "strain",
+            residual,
+            (("flat", faces),),
+            weights=np.full(len(faces), 1.0 / count),
+            constants=rest_constants(mesh.vertices, faces),
+            vectors=vectors,
+        )
+        for faces in groups
+    ]
 
 
 def examples(mesh: Mesh) -> list[Term]:

@@ -15,13 +15,17 @@ def armijo(
     x: Array,
     direction: Array,
     start: float,
-    slope: float,
+    gradient: Array,
     *,
+    project: Callable[[Array], Array] | None = None,
     longest: float = 1.0,
     decrease: float = 1e-4,
     shortest: float = 1e-4,
 ) -> tuple[Array, float, float]:
     """Backtrack from the longest step until the energy falls in proportion to the slope.
+
+    With bounds, trial points are projected onto them (Bertsekas 1982) and the slope is
+    that of the projected step.
 
     Steps shrink by the minimum of the parabola through the two known values and the
     slope, kept between a tenth and a half.
@@ -32,8 +36,10 @@ def armijo(
         The objective.
     x, direction : ndarray
         Where we are and where we go.
-    start, slope : float
-        Energy at x and its derivative along the direction (negative).
+    start, gradient : float, ndarray
+        Energy and its gradient at x.
+    project : callable, optional
+        Onto the bounds of the unknowns.
     longest, decrease, shortest : float
         First step tried, share of the linear decrease asked for, step at which to give up.
 
@@ -45,11 +51,14 @@ def armijo(
     t = longest
     while t >= shortest * min(longest, 1.0):
         candidate = x + t * direction
+        if project is not None:
+            candidate = project(candidate)
+        slope = float(gradient @ (candidate - x))
         value = energy(candidate)
-        if value <= start + decrease * t * slope:
+        if value <= start + decrease * slope:
             return candidate, value, t
         if np.isfinite(value):
-            fitted = -slope * t * t / (2.0 * (value - start - slope * t))
+            fitted = -slope * t / max(2.0 * (value - start - slope), 1e-300)
             t = float(np.clip(fitted, 0.1 * t, 0.5 * t))
         else:
             t *= 0.3

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.geometry.ops import TINY
 from gso.status import BackendError
 from gso.terms.base import Residual
 
@@ -21,6 +22,17 @@ Array = NDArray[np.float64]
 
 #: Elements per block: a kernel's work arrays then fit the second-level cache.
 BLOCK = 1024
+
+
+def _points(x: Any, shape: tuple[int, ...]) -> list[tuple[Any, ...]]:
+    ends = np.cumsum(shape)
+    return [
+        tuple(x[k] for k in range(end - dim, end)) for dim, end in zip(shape, ends, strict=True)
+    ]
+
+
+def _numbers(c: Any, count: int) -> list[Any]:
+    return [c[k] for k in range(count)]
 
 
 @lru_cache(maxsize=128)
@@ -42,28 +54,43 @@ def casadi_function(residual: Residual, shape: tuple[int, ...], constants: int, 
 
     x = ca.SX.sym("x", sum(shape))
     c = ca.SX.sym("c", constants)
-    ends = np.cumsum(shape)
-    points = [
-        tuple(x[k] for k in range(end - dim, end)) for dim, end in zip(shape, ends, strict=True)
-    ]
-    value = ca.vertcat(*residual(points, [c[k] for k in range(constants)]))
+    value = ca.vertcat(*residual(_points(x, shape), _numbers(c, constants)))
     outputs = [value]
     if jacobian:
         outputs.append(ca.vec(ca.densify(ca.jacobian(value, x)).T))
     return ca.Function("element", [x, c], outputs, {"cse": True})
 
 
+@lru_cache(maxsize=32)
+def casadi_turning(vectors: Residual, shape: tuple[int, ...], constants: int):
+    """CasADi function of one element: lengths of its plane vectors, and rows h.
+
+    The second derivative of the length of a vector (u, v) that is linear in the
+    coordinates is the rank-one matrix ``h h^T``, ``h = (u dv - v du) / length^(3/2)``.
+    """
+    import casadi as ca
+
+    x = ca.SX.sym("x", sum(shape))
+    c = ca.SX.sym("c", constants)
+    pairs = ca.vertcat(
+        *(ca.horzcat(*pair) for pair in vectors(_points(x, shape), _numbers(c, constants)))
+    )
+    u, v = pairs[:, 0], pairs[:, 1]
+    length = ca.sqrt(ca.fmax(u * u + v * v, TINY))
+    turn = ca.diag(u) @ ca.jacobian(v, x) - ca.diag(v) @ ca.jacobian(u, x)
+    rows = ca.diag(1.0 / (length * ca.sqrt(length))) @ turn
+    return ca.Function("turning", [x, c], [length, ca.vec(ca.densify(rows).T)], {"cse": True})
+
+
 class Kernel:
     """Evaluates residuals, and optionally their Jacobian, on arrays of elements.
 
-    Parameters are those of :func:`casadi_function`. Call with coordinates (k, e) and
-    constants (c, e); returns residuals (r, e) and Jacobian (r, k, e) or None.
+    Made from a function of :func:`casadi_function` or :func:`casadi_turning`. Call with
+    coordinates (k, e) and constants (c, e); returns residuals (r, e) and Jacobian
+    (r, k, e) or None.
     """
 
-    def __init__(
-        self, residual: Residual, shape: tuple[int, ...], constants: int, *, jacobian: bool
-    ):
-        function = casadi_function(residual, shape, constants, jacobian)
+    def __init__(self, function: Any, shape: tuple[int, ...], *, jacobian: bool):
         self.rows = int(function.size1_out(0))
         self.columns = sum(shape)
         self.jacobian = jacobian
@@ -88,7 +115,14 @@ class Kernel:
 @lru_cache(maxsize=128)
 def kernel(residual: Residual, shape: tuple[int, ...], constants: int, jacobian: bool) -> Kernel:
     """Kernel of a residual, printed at first use and kept."""
-    return Kernel(residual, shape, constants, jacobian=jacobian)
+    function = casadi_function(residual, shape, constants, jacobian)
+    return Kernel(function, shape, jacobian=jacobian)
+
+
+@lru_cache(maxsize=32)
+def turning(vectors: Residual, shape: tuple[int, ...], constants: int) -> Kernel:
+    """Kernel of the stiffness against turning, see :attr:`gso.terms.Term.vectors`."""
+    return Kernel(casadi_turning(vectors, shape, constants), shape, jacobian=True)
 
 
 def _print(function: Any) -> tuple[str, int]:

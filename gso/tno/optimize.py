@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from types import ModuleType
 from typing import Any
@@ -20,7 +20,7 @@ from gso.result import Result
 from gso.status import ConvergenceWarning, MeshError, OptionError, Progress, Status
 from gso.tasks.base import Plan, Request
 from gso.tno.problem import Problem
-from gso.tno.search import reach_target
+from gso.tno.search import reach_target, stay_within
 from gso.tno.solver import Callback, Solution, Timings, minimise
 from gso.variables import free
 
@@ -110,13 +110,14 @@ def optimize(
         formulation,
         compile_constraints(constraints, design).mapped(frame.frame.to_unit, frame.new_index),
         start=frame.start(x0, flat=task == "flatten"),
-        max_deviation=None if max_deviation is None else max_deviation / frame.frame.scale,
     )
     run = Run(module, callback)
-    if target_curvature is None:
-        outcome = run(request)
-    else:
+    if max_deviation is not None:
+        outcome = stay_within(run, request, max_deviation / frame.frame.scale)
+    elif target_curvature is not None:
         outcome = reach_target(run, request, target_curvature)
+    else:
+        outcome = run(request)
     result = _result(task, formulation, design, frame, outcome, run, module)
     result.warm_start = "cold" if x0 is None else "x0"
     result.seconds["total"] = time.perf_counter() - clock
@@ -211,8 +212,9 @@ class Run:
             variables = stage.variables(coordinates)
             problem = Problem(stage.items, variables, stage.limits)
             x = variables.project(coordinates)
+            bounds = None if stage.bounds is None else stage.bounds(coordinates)
             self.timings.setup += time.perf_counter() - clock
-            solution = self._solve(request, plan, number, problem, x)
+            solution = self._solve(request, plan, number, problem, x, bounds)
             coordinates = variables.points(solution.x)
             if solution.status is Status.CANCELLED:
                 coordinates = self._finish(plan, number, coordinates)
@@ -239,7 +241,13 @@ class Run:
         )
 
     def _solve(
-        self, request: Request, plan: Plan, number: int, problem: Problem, x: Array
+        self,
+        request: Request,
+        plan: Plan,
+        number: int,
+        problem: Problem,
+        x: Array,
+        bounds: tuple[Array, Array] | None,
     ) -> Solution:
         stage, options = plan.stages[number], request.options
         solution = minimise(
@@ -249,6 +257,7 @@ class Run:
             tolerance=stage.tolerance,
             eps=stage.eps,
             robust=stage.robust,
+            bounds=bounds,
             method=options.method,
             backend=options.backend,
             threads=options.threads,
@@ -326,4 +335,4 @@ def _flat_metrics(module: ModuleType, result: Result) -> dict[str, float]:
     return module.metrics(result.design, result.flat)
 
 
-__all__ = ["Canonical", "Outcome", "Run", "optimize", "replace"]
+__all__ = ["Canonical", "Outcome", "Run", "optimize"]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gso.terms.base import Limit, Weighted
 from gso.terms.losses import Loss
-from gso.tno.codegen import kernel
+from gso.tno.codegen import kernel, turning
 from gso.tno.linear.base import Pattern
 from gso.variables import Layout, Variables
 
@@ -52,11 +52,22 @@ class _Elements:
         """Residuals (r, e) and Jacobian by the element's unknowns (r, q, e)."""
         run = kernel(self.item.term.residual, self.shape, len(self.constants), True)
         value, slope = run(coordinates[self.gather], self.constants)
+        return value, self._pulled(slope)
+
+    def turning(self, coordinates: Array) -> Array | None:
+        """Rows (t, q, e) whose squares are the second derivatives of the first residuals."""
+        vectors = self.item.term.vectors
+        if vectors is None:
+            return None
+        run = turning(vectors, self.shape, len(self.constants))
+        return self._pulled(run(coordinates[self.gather], self.constants)[1])
+
+    def _pulled(self, slope: Array | None) -> Array:
         assert slope is not None  # noqa: S101 - the kernel was printed with its Jacobian
-        if self._pull is not None:
-            q = len(self.columns)
-            slope = np.stack([(self._pull @ s.ravel()).reshape(q, -1) for s in slope])
-        return value, slope
+        if self._pull is None:
+            return slope
+        q = len(self.columns)
+        return np.stack([(self._pull @ s.ravel()).reshape(q, -1) for s in slope])
 
     def energy(self, residual: Array) -> float:
         """Weighted cost."""
@@ -194,6 +205,9 @@ class Problem:
             pulled = np.einsum("re,rqe->qe", first * factor, slope, optimize=False)
             gradient += np.bincount(element.columns.ravel(), pulled.ravel(), n + 1)[:n]
             products = _products(slope, second * factor)
+            turn = element.turning(coordinates)
+            if turn is not None:
+                products += _products(turn, np.maximum(first[: len(turn)], 0.0) * factor)
             values += np.bincount(scatter, products.ravel(), len(values) + 1)[:-1]
         return total if np.isfinite(total) else np.inf, gradient, values
 

@@ -1,4 +1,4 @@
-"""The smallest curvature weight that reaches a target."""
+"""The two questions of the developable task: how close, and how developable."""
 
 from __future__ import annotations
 
@@ -16,6 +16,27 @@ from gso.tasks.base import Request
 _SOLVES = 10
 _CLOSE = 0.03
 _RANGE = (1e-2, 1e5)
+_ITERATIONS = 25
+_COARSE_ITERATIONS = 15
+
+
+def stay_within(run: Callable[[Request], Any], request: Request, bound: float) -> Any:
+    """The more developable of two solves: one with the bound, one without that meets it."""
+    bounded = run(replace(request, max_deviation=bound))
+    if bounded.status in (Status.ALREADY_GOOD, Status.CANCELLED):
+        return bounded
+    free = run(request)
+    if free.status is Status.CANCELLED:
+        return bounded
+    distance = metrics.point_to_surface(free.points, request.mesh)
+    if distance.max() > bound or _curvature(request, free) >= _curvature(request, bounded):
+        return bounded
+    return free
+
+
+def _curvature(request: Request, outcome: Any) -> float:
+    """``loss_gc`` of an outcome, in the frame of the request."""
+    return metrics.loss_gc(request.mesh.replaced(outcome.points), scale=1.0)
 
 
 def reach_target(run: Callable[[Request], Any], request: Request, target: float) -> Any:
@@ -23,28 +44,40 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
 
     Mean |K| falls steadily with the weight, so the smallest displacement that meets the
     target belongs to the smallest weight that does: a secant search on their logarithms,
-    every solve started from the one before.
+    every solve started from the last one above the target.
     """
     if metrics.loss_gc(request.mesh, scale=1.0) <= target and request.constraints.empty:
         request = replace(request, options=replace(request.options, developable_below=target))
         return run(request)
+    given = request.options
+    options = replace(
+        given,
+        variables="free",
+        iterations=max(given.iterations, _ITERATIONS),
+        coarse_iterations=max(given.coarse_iterations, _COARSE_ITERATIONS),
+    )
+    request = replace(request, options=options)
     weight, low, high = 1.0, 0.0, np.inf
     value_low = value_high = np.nan
     best = last = None
+    distance = np.inf
     for _ in range(_SOLVES):
         last = run(replace(request, curvature_weight=weight))
-        moved = request.mesh.replaced(last.points)
-        value = metrics.loss_gc(moved, scale=1.0)
+        value = _curvature(request, last)
         if value <= target:
-            best, high, value_high = last, weight, value
+            high, value_high = weight, value
+            moved = float(np.linalg.norm(last.points - request.mesh.vertices, axis=1).mean())
+            if moved < distance:
+                best, distance = last, moved
             if value >= (1.0 - _CLOSE) * target:
                 break
         else:
             low, value_low = weight, value
+            # Curvature that is gone comes back slowly: go on from the side that has more.
+            request = replace(request, start=last.points)
         if last.status is Status.CANCELLED or not _RANGE[0] < weight < _RANGE[1]:
             break
         weight = _next(weight, value, target, low, high, value_low, value_high)
-        request = replace(request, start=last.points)
     chosen = last if best is None else best
     chosen.status = Status.TARGET_MISSED if best is None else Status.TARGET_REACHED
     chosen.details = {**chosen.details, "curvature_weight": weight}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,7 @@ def minimise(
     tolerance: float = 1e-4,
     eps: Sequence[float] = (),
     robust: str = "",
+    bounds: tuple[Array, Array] | None = None,
     method: str = "gauss-newton",
     backend: str | None = None,
     threads: int = 1,
@@ -83,6 +85,8 @@ def minimise(
         last one counts from then on, and in the energy that is returned.
     robust : str
         Name of the term whose loss follows `eps`.
+    bounds : (ndarray, ndarray), optional
+        Smallest and largest value of every unknown; x must respect them.
     method : {"gauss-newton", "levenberg-marquardt"}
         Direction.
     backend : str, optional
@@ -123,6 +127,7 @@ def minimise(
         smooth(len(schedule))
         return problem.energy(at)
 
+    project = None if bounds is None else partial(np.clip, a_min=bounds[0], a_max=bounds[1])
     clock = time.perf_counter()
     best, best_energy = x, final_energy(x)
     timings.search += time.perf_counter() - clock
@@ -136,11 +141,15 @@ def minimise(
                 t0 = time.perf_counter()
                 energy, gradient, values = problem.linearise(x)
                 t1 = time.perf_counter()
+                if bounds is not None:
+                    held = _held(x, gradient, bounds)
+                    gradient = np.where(held, 0.0, gradient)
+                    values[problem.diagonal[held]] += _STIFF * values[problem.diagonal].max()
                 d = direction.step(solver, values, problem.diagonal, gradient)
                 t2 = time.perf_counter()
                 longest = problem.largest_step(x, d)
                 x, value, step = armijo(
-                    problem.energy, x, d, energy, float(gradient @ d), longest=longest
+                    problem.energy, x, d, energy, gradient, project=project, longest=longest
                 )
                 direction.accepted(step)
                 done = k + 1
@@ -161,3 +170,14 @@ def minimise(
             best, best_energy = x, value
     smooth(len(schedule))
     return Solution(best, best_energy, status, done, solver.name, history)
+
+
+#: Stiffness, relative to the matrix, that keeps an unknown at its bound.
+_STIFF = 1e6
+
+
+def _held(x: Array, gradient: Array, bounds: tuple[Array, Array]) -> NDArray[np.bool_]:
+    """Unknowns at a bound that the gradient pushes against."""
+    low, high = bounds
+    margin = 1e-6 * (high - low)
+    return ((x <= low + margin) & (gradient > 0)) | ((x >= high - margin) & (gradient < 0))

@@ -1,0 +1,110 @@
+"""As-rigid-as-possible relaxation: cheap steps with one constant scalar matrix."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import geometry
+from gso.limits import orientation
+from gso.variables import Layout
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Relaxed(NamedTuple):
+    """A plane image and its root-mean-square strain."""
+
+    flat: Array
+    level: float
+
+
+class _Gradients:
+    """Derivatives of functions on the triangles of a surface, as a complex matrix.
+
+    With z = x + iy the image of the vertices, ``m @ z`` is twice the part of each
+    triangle's map that turns and scales (see :mod:`gso.geometry.strain`), and
+    ``conj(m) @ z`` twice the part that shears.
+    """
+
+    def __init__(self, vertices: Array, triangles: Ints):
+        from scipy.sparse import csr_matrix
+
+        p, q, r = (tuple(vertices[triangles[:, k]].T) for k in range(3))
+        m11, m12, m22 = geometry.rest_frame(p, q, r)
+        to_q, to_r = m11 - 1j * m12, -1j * m22
+        count = len(triangles)
+        self.matrix = csr_matrix(
+            (
+                np.stack([-to_q - to_r, to_q, to_r], axis=1).ravel(),
+                triangles.ravel(),
+                3 * np.arange(count + 1),
+            ),
+            shape=(count, len(vertices)),
+        )
+
+    def energy(self, z: Array) -> float:
+        """Mean of ``((s1 - 1)^2 + (s2 - 1)^2) / 2``."""
+        turn, shear = 0.5 * (self.matrix @ z), 0.5 * (self.matrix.conj() @ z)
+        return float(((np.abs(turn) - 1.0) ** 2 + np.abs(shear) ** 2).mean())
+
+
+def strain_energy(vertices: Array, triangles: Ints, flat: Array) -> float:
+    """Mean of ``((s1 - 1)^2 + (s2 - 1)^2) / 2`` over triangles mapped to the plane."""
+    return _Gradients(vertices, triangles).energy(flat @ np.array([1.0, 1j]))
+
+
+def relax(
+    vertices: Array, triangles: Ints, flat: Array, *, iterations: int, tolerance: float = 1e-3
+) -> Relaxed:
+    """Lower the as-rigid-as-possible energy of a plane image by local and global steps.
+
+    Each triangle takes the rotation closest to its map; then one linear system, the
+    same in every step, finds the image that follows the rotations best (Sorkine and
+    Alexa 2007; Liu et al. 2008, section 4). Triangles weigh alike. A step stops short of
+    turning a triangle over, which keeps the energy falling: it is convex along the way.
+
+    Parameters
+    ----------
+    vertices, triangles : ndarray, (n, 3)
+        The surface; triangles need an area. Vertices of no triangle stay where they are.
+    flat : ndarray, (n, 2)
+        The image to start from.
+    iterations, tolerance : int, float
+        Most steps, and the relative fall of the energy at which to stop.
+    """
+    from scipy.sparse import identity
+    from scipy.sparse.linalg import splu
+
+    gradients = _Gradients(vertices, triangles)
+    m = gradients.matrix
+    adjoint = m.conj().T.tocsr()
+    laplacian = (adjoint @ m).real.tocsc()
+    # One unknown per component is free to move; a trace of damping holds it.
+    damping = 1e-9 * laplacian.diagonal().max()
+    factor = splu(
+        (laplacian + damping * identity(len(vertices))).tocsc(),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+    limit = orientation(triangles, Layout((("flat", len(vertices), 2),)))
+    z = np.ascontiguousarray(flat) @ np.array([1.0, 1j])
+    energy = gradients.energy(z)
+    for _ in range(iterations):
+        turn = m @ z
+        rotation = turn / np.maximum(np.abs(turn), 1e-300)
+        pull = adjoint @ (rotation - 0.5 * turn) - laplacian @ z + adjoint @ (0.5 * turn)
+        step = factor.solve(np.stack([pull.real, pull.imag], axis=1))
+        z = z + limit(_pairs(z), step.ravel()) * (step @ np.array([1.0, 1j]))
+        before, energy = energy, gradients.energy(z)
+        if before - energy <= tolerance * before:
+            break
+    return Relaxed(_pairs(z).reshape(-1, 2), float(np.sqrt(energy)))
+
+
+def _pairs(z: Array) -> Array:
+    return np.ascontiguousarray(z).view(np.float64)

@@ -1,0 +1,181 @@
+"""Pictures of surfaces and results, drawn by Matplotlib without a display.
+
+>>> import tempfile, os
+>>> import gso
+>>> y, x = np.mgrid[:9., :9.]
+>>> mesh = gso.Mesh.from_grid(np.stack([x, y, x * y / 20], axis=-1))
+>>> path = os.path.join(tempfile.mkdtemp(), "saddle.png")
+>>> figure = plot_surface(mesh, "curvature", path=path)
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gso import metrics
+from gso.io import as_mesh
+from gso.mesh import Mesh
+from gso.plot.draw import GRAZING, SUFFIXES, Panel, draw, write
+from gso.plot.heat import curvatures, distance, numbers, strain
+from gso.plot.view import View
+from gso.result import Result
+from gso.status import GSOError, OptionError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["COLOURS", "SUFFIXES", "plot_result", "plot_surface", "require"]
+
+COLOURS = ("curvature", "distance", "strain", "none")
+"""Names that :func:`plot_surface` takes for its values."""
+
+
+def require() -> None:
+    """Refuse to plot when Matplotlib is not installed.
+
+    Raises
+    ------
+    GSOError
+        Saying how to install it.
+    """
+    if find_spec("matplotlib") is None:
+        raise GSOError('plots need Matplotlib: pip install "gso[plot]"')
+
+
+def plot_surface(
+    mesh: Any,
+    values: str | ArrayLike = "none",
+    *,
+    path: str | PathLike[str] | None = None,
+    title: str = "",
+    label: str = "",
+    before: Any = None,
+) -> Figure:
+    """Draw a surface, coloured by a quantity.
+
+    Parameters
+    ----------
+    mesh : Mesh, or anything that :func:`gso.as_mesh` takes
+        The surface.
+    values : {"none", "curvature", "distance", "strain"} or array_like
+        What the colours show: the absolute Gaussian curvature times the squared size, the
+        distance to `before` in percent of its diagonal, the larger principal strain of
+        the map from `before` to this flat pattern, or your own numbers per vertex (n,) or
+        per face (m,).
+    path : str or PathLike, optional
+        A .png, .pdf or .svg file to write.
+    title, label : str
+        Text over the surface, and at the colour bar of your own numbers.
+    before : Mesh, optional
+        A surface to draw beside it, from the same side and in the same scale of colours.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    GSOError
+        Matplotlib is not installed.
+    OptionError
+        The values do not fit the mesh, or the name needs `before`.
+    MeshError
+        The surface cannot be used, or the file cannot be written.
+    """
+    require()
+    surface = as_mesh(mesh)
+    first = None if before is None else as_mesh(before)
+    meshes = [surface] if first is None else [first, surface]
+    if isinstance(values, str):
+        panels = _named(values, meshes)
+    else:
+        panels = _plain(meshes)
+        panels[-1].heat = numbers(surface, np.asarray(values, float), label)
+    panels[-1].title = title or panels[-1].title
+    return write(draw(panels), path)
+
+
+def _plain(meshes: list[Mesh]) -> list[Panel]:
+    view = View.of(meshes[0])
+    panels = [Panel(view.project(m.vertices), m.faces) for m in meshes]
+    if len(panels) > 1:
+        panels[0].title, panels[1].title = "before", "after"
+    return panels
+
+
+def _named(name: str, meshes: list[Mesh]) -> list[Panel]:
+    if name not in COLOURS:
+        raise OptionError(f"no colour {name!r}; there are {', '.join(COLOURS)}")
+    if name in ("distance", "strain") and len(meshes) < 2:
+        raise OptionError(f"the colour {name!r} needs the surface before")
+    panels = _plain(meshes)
+    if name == "curvature":
+        for panel, heat in zip(panels, curvatures(meshes), strict=True):
+            panel.heat = heat
+    elif name == "distance":
+        panels[1].heat = distance(*meshes)
+        panels[1].title = "distance: " + panels[1].heat.summary
+    elif name == "strain":
+        return _flattened(meshes[0], meshes[1].vertices[:, :2])
+    return panels
+
+
+def _flattened(design: Mesh, flat: np.ndarray) -> list[Panel]:
+    """A surface and its flat pattern, which is turned like the picture of the surface."""
+    heat = strain(design, flat)
+    surface = _plain([design])[0]
+    surface.title, surface.heat = "surface", heat
+    z, w = (p[:, 0] + 1j * p[:, 1] for p in (flat - flat.mean(axis=0), surface.points))
+    turned = z * np.exp(1j * np.angle((np.conj(z) * (w - w.mean())).sum()))
+    points = np.stack([turned.real, turned.imag, np.zeros(len(z))], axis=1)
+    pattern = Panel(points / design.frame.scale, design.faces, shaded=False, heat=heat)
+    pattern.title = "flat pattern: strain " + heat.summary
+    return [surface, pattern]
+
+
+def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figure:
+    """Draw a result beside its design.
+
+    `developable`: the curvature before and after in one scale, and the distance between
+    the two. `flatten`: the strain on the surface and on the flat pattern. `denoise`: both
+    surfaces in a light that grazes them, and the distance between the two.
+
+    Parameters
+    ----------
+    result : Result
+        Of :func:`gso.tno.optimize`.
+    path : str or PathLike, optional
+        A .png, .pdf or .svg file to write.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    GSOError
+        Matplotlib is not installed.
+    MeshError
+        The file cannot be written.
+    """
+    require()
+    design, mesh = result.design, result.mesh
+    if result.flat is not None:
+        return write(draw(_flattened(design, result.flat)), path)
+    before, after, apart = panels = _plain([design, mesh, mesh])
+    apart.heat = distance(design, mesh)
+    apart.title = "distance: " + apart.heat.summary
+    if result.task == "denoise":
+        before.title, after.title = "input", "denoised"
+        before.light = after.light = GRAZING
+    else:
+        size = metrics.unit(design)
+        before.heat, after.heat = curvatures([design, mesh])
+        before.title = f"input: mean |K| {metrics.loss_gc(design, scale=size):.2g}"
+        after.title = f"result: mean |K| {metrics.loss_gc(mesh, scale=size):.2g}"
+    return write(draw(panels), path)

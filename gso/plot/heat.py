@@ -1,0 +1,137 @@
+"""Quantities that colour the faces of a picture, and what the colours mean."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import geometry, metrics, topology
+from gso.mesh import Mesh
+from gso.status import OptionError
+
+Array = NDArray[np.float64]
+
+#: Percentile at which scales end: single spikes would leave all else pale.
+_TOP = 98
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Range of a colour bar, its text, and the name of a Matplotlib colour map."""
+
+    label: str
+    colours: str
+    low: float
+    high: float
+    extend: str = "neither"
+
+
+@dataclass(frozen=True)
+class Heat:
+    """One number per face (m,), NaN where there is none; panels may share a scale."""
+
+    values: Array
+    scale: Scale
+    summary: str = ""
+
+
+def per_face(mesh: Mesh, values: Array) -> Array:
+    """Numbers per face (m,) from numbers per vertex (n,): the mean of the corners that have one.
+
+    Numbers per face are taken as they are.
+
+    Raises
+    ------
+    OptionError
+        Neither as many as vertices nor as many as faces.
+    """
+    if values.shape == (len(mesh.vertices),):
+        corners = np.where(mesh.faces >= 0, values[mesh.faces], np.nan)
+        known = ~np.isnan(corners)
+        total, count = np.where(known, corners, 0.0).sum(axis=1), known.sum(axis=1)
+        return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+    if values.shape == (len(mesh.faces),):
+        return values
+    raise OptionError(
+        f"values is an array {values.shape}; give one number per vertex "
+        f"({len(mesh.vertices)},) or per face ({len(mesh.faces)},)"
+    )
+
+
+def _rising(values: Sequence[Array], label: str, colours: str) -> Scale:
+    """Scale from zero over several panels."""
+    every = np.concatenate(values)
+    every = every[np.isfinite(every)]
+    high = max(float(np.percentile(every, _TOP)) if every.size else 1.0, 1e-6)
+    extend = "max" if every.max(initial=0.0) > high else "neither"
+    return Scale(label, colours, 0.0, high, extend)
+
+
+def curvatures(meshes: Sequence[Mesh]) -> list[Heat]:
+    """Absolute Gaussian curvature times the squared size of the first mesh, in one scale."""
+    size = metrics.unit(meshes[0])
+    values = [per_face(m, np.abs(metrics.curvature(m)) * size**2) for m in meshes]
+    scale = _rising(values, "|K| · size²", "OrRd")
+    return [Heat(v, scale) for v in values]
+
+
+def distance(before: Mesh, after: Mesh) -> Heat:
+    """Distance of a surface to the one before, percent of that one's diagonal."""
+    percent = 100.0 / before.diagonal * metrics.point_to_surface(after.vertices, before)
+    values = per_face(after, percent)
+    summary = f"mean {percent.mean():.2g} %, largest {percent.max():.2g} %"
+    return Heat(values, _rising([values], "distance (% of the diagonal)", "GnBu"), summary)
+
+
+def strain(design: Mesh, flat: Array) -> Heat:
+    """Larger principal strain of each face, percent: the largest of its corner triangles.
+
+    Parameters
+    ----------
+    design : Mesh
+        The surface.
+    flat : ndarray, (n, 2)
+        Its flat pattern.
+    """
+    if flat.shape != (len(design.vertices), 2):
+        raise OptionError(
+            f"the flat pattern has {len(flat)} vertices and the surface {len(design.vertices)}; "
+            "strain needs a pattern of this very surface"
+        )
+    values = np.full(len(design.faces), np.nan)
+    triangle = design.faces[:, 2:].min(axis=1) < 0 if not design.is_triangles else None
+    groups = [slice(None)] if triangle is None else [triangle, ~triangle]
+    for group in groups:
+        faces = design.faces[group]
+        faces = faces if (faces >= 0).all() else faces[:, :3]
+        if len(faces):
+            values[group] = 100.0 * _face_strain(design.vertices, flat, faces)
+    known = values[np.isfinite(values)]
+    summary = f"mean {known.mean():.2g} %, largest {known.max():.2g} %" if known.size else ""
+    return Heat(values, _rising([values], "principal strain (%)", "PuRd"), summary)
+
+
+def _face_strain(vertices: Array, flat: Array, faces: NDArray[np.int64]) -> Array:
+    corners = topology.corner_triangles(faces)
+    rest, image = (
+        [metrics.components(points[corners[:, k]]) for k in range(3)] for points in (vertices, flat)
+    )
+    with np.errstate(all="ignore"):
+        s1, s2 = geometry.singular_values(
+            image[0], image[1], image[2], geometry.rest_frame(rest[0], rest[1], rest[2])
+        )
+        worst = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0)).reshape(-1, len(faces))
+    # A corner without area has no strain; it comes out as a number without bound.
+    worst[~(worst < 1e6)] = np.nan
+    return np.where(np.isnan(worst).all(axis=0), np.nan, np.fmax.reduce(worst, axis=0))
+
+
+def numbers(mesh: Mesh, values: Array, label: str) -> Heat:
+    """Numbers of the user's own, in a scale from their smallest to their largest."""
+    shown = per_face(mesh, values)
+    known = shown[np.isfinite(shown)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    return Heat(shown, Scale(label, "OrRd", low, high if high > low else low + 1.0))

@@ -1,0 +1,75 @@
+"""From which side a surface is drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.mesh import Frame, Mesh
+
+Array = NDArray[np.float64]
+
+#: Angles about the upright axis and over the horizon, degrees.
+_TURN, _TILT = 25.0, 48.0
+
+
+@dataclass(frozen=True)
+class View:
+    """An orthographic view: `axes` has the columns right, up and towards the viewer."""
+
+    frame: Frame
+    axes: Array
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> View:
+        """A view in which the surface shows its face.
+
+        A flat surface is seen from right above. Others are seen from the side that their
+        mean normal points to, turned and tilted; z is up in the picture, unless they lie
+        like a landscape: those are seen from above along their longest axis.
+        """
+        points, triangles = mesh.frame.to_unit(mesh.vertices), mesh.triangles
+        a, b, c = (points[triangles[:, k]] for k in range(3))
+        normals = np.cross(b - a, c - a)
+        used = points[np.unique(triangles)]
+        _, extent, axes = np.linalg.svd(used - used.mean(axis=0), full_matrices=False)
+        total = normals.sum(axis=0)
+        if np.linalg.norm(total) < 0.1 * np.linalg.norm(normals, axis=1).sum():
+            total = axes[2]
+        normal = total / np.linalg.norm(total)
+        flat = extent[2] < 1e-6 * extent[0]
+        if flat or abs(normal[2]) > 0.8:
+            normal = normal if normal[2] >= 0 else -normal
+            right = _right(normal, axes[0])
+            if flat:
+                return cls(mesh.frame, np.stack([right, np.cross(normal, right), normal], axis=1))
+            return cls(mesh.frame, _tilted(normal, np.cross(right, normal), np.radians(_TILT)))
+        up = np.array([0.0, 0.0, 1.0])
+        toward = normal - normal[2] * up
+        toward /= np.linalg.norm(toward)
+        return cls(mesh.frame, _tilted(up, toward, np.arcsin(normal[2]) + np.radians(20.0)))
+
+    def project(self, points: Array) -> Array:
+        """Points (n, 3) as right, up and towards the viewer, in units of the frame."""
+        return self.frame.to_unit(points) @ self.axes
+
+
+def _right(normal: Array, longest: Array) -> Array:
+    """Right in the picture of a surface seen from above: x if possible, else its longest axis."""
+    level = np.hypot(normal[0], normal[1]) < 1e-6
+    along = np.array([1.0, 0.0, 0.0]) if level else longest
+    along = along - (along @ normal) * normal
+    along /= np.linalg.norm(along)
+    return along if along[np.abs(along).argmax()] > 0 else -along
+
+
+def _tilted(up: Array, toward: Array, tilt: float) -> Array:
+    """Axes of a viewer who stands in the direction `toward`, a bit aside, and looks down."""
+    turn = np.radians(_TURN)
+    side = np.cross(up, toward)
+    eye = np.cos(tilt) * (np.cos(turn) * toward + np.sin(turn) * side) + np.sin(tilt) * up
+    right = np.cross(up, eye)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(eye, right), eye], axis=1)

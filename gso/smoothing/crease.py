@@ -1,0 +1,198 @@
+"""Remove noise from grids with creases: folded paper, roofs, mitred sheets.
+
+The squared penalties of :mod:`gso.smoothing.grid` round creases off and ripple beside
+them. Here each second difference may be split into a *kink* z, which is charged by its
+length, and a *bend* w, which is charged only for changing along its grid line: the
+second-order relative of total generalised variation (Bredies, Kunisch and Pock 2010),
+
+    1/2 |x - p|^2 + weight sigma sum |z| + c/2 sum |diff w|^2,     diff2 x = z + w,
+
+with z and w vectors in space. Kinks come out sparse, so that pieces between creases are
+smooth, or flat where c is infinite. Reweighting (Candes, Wakin and Boyd 2008) stops the
+charge from flattening the creases that remain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.smoothing.base import Smoothed, checked_options, to_unit
+from gso.smoothing.grid import estimate
+
+Array = NDArray[np.float64]
+
+ORDERS = (2, 3)
+DEFAULT_WEIGHT = 3.0
+# Charge for changes of the bend, relative to the penalty parameter of the splitting, at
+# 64 samples; inf has no bend at all. The best one is chosen by Stein's risk estimate.
+STIFFNESS = (np.inf, 1e5, 1e4, 1e3, 1e2, 1e1)
+ITERATIONS = 100
+REWEIGHTED_AT = (30, 50, 70)
+# In units of the noise: kinks smaller than this are charged almost in full, half the
+# charge of a kink of this length, and the step by which the splitting shrinks them.
+KINK = 0.3
+STEP = 0.5
+PROBE = 0.1
+
+
+def smooth_creased_grid(
+    points: Array, *, order: int | None = None, weight: float | None = None
+) -> Smoothed:
+    """Smooth a noisy grid and keep its creases.
+
+    Parameters
+    ----------
+    points : ndarray, (H, W, 3)
+        Noisy surface, finite, from 3 x 3 up.
+    order : {2, 3}, optional
+        2: pieces between creases are flat; 3: they are smooth. By default the data
+        decide.
+    weight : float, optional
+        Charge for a kink in units of the noise, 3 by default.
+
+    Returns
+    -------
+    Smoothed
+        `sigma` is that of :func:`gso.smoothing.grid.smooth_grid`; `dof` is estimated with
+        a random probe.
+
+    Notes
+    -----
+    Solved by alternating directions (Boyd et al. 2011): the linear step is diagonal in
+    the eigenvectors of two small matrices. The stiffness minimises Stein's unbiased
+    estimate of the risk (1981), its divergence probed as by Ramani, Blu and Unser (2008).
+
+    Examples
+    --------
+    >>> u, v = np.meshgrid(np.linspace(-1, 1, 33), np.linspace(-1, 1, 33), indexing="ij")
+    >>> roof = np.stack([u, v, np.abs(u)], axis=-1)
+    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(roof.shape)
+    >>> error = smooth_creased_grid(roof + noise).points - roof
+    >>> bool(np.abs(error).max() < 0.01)
+    True
+    """
+    checked_options(order, ORDERS, weight, "l1")
+    charge = DEFAULT_WEIGHT if weight is None else float(weight)
+    unit, frame = to_unit(points)
+    sigma = float(np.sqrt(estimate(unit, 2, frame.rounding, None)[0].variance))
+    if charge == 0 or sigma < 10 * frame.rounding:
+        spent = float(unit[..., 0].size)
+        return Smoothed(points.copy(), order or 2, charge, frame.scale * sigma, spent)
+    data = np.moveaxis(unit, 2, 0) / sigma
+    probe = np.random.default_rng(0).choice([-1.0, 1.0], data.shape)
+    pair = np.stack([data, data + PROBE * probe])
+    state: State | None = None
+    trials = []
+    for stiffness in _stiffnesses(order, max(unit.shape[:2])):
+        (smooth, probed), state = _split(pair, charge, stiffness, state)
+        dof = float(((probed - smooth) * probe).sum()) / PROBE
+        risk = float(((smooth - data) ** 2).sum()) + 2 * dof
+        trials.append((risk, stiffness, dof, smooth))
+    _, stiffness, dof, smooth = min(trials, key=lambda trial: trial[0])
+    return Smoothed(
+        points=frame.to_user(np.moveaxis(smooth, 0, 2) * sigma),
+        order=2 if np.isinf(stiffness) else 3,
+        weight=charge,
+        sigma=frame.scale * sigma,
+        dof=dof / 3,
+    )
+
+
+def _stiffnesses(order: int | None, n: int) -> list[float]:
+    """Candidates; on finer grids the same bend changes less from sample to sample."""
+    if order == 2:
+        return [np.inf]
+    finer = max(1.0, n / 64) ** 4
+    return [s * finer for s in STIFFNESS if order is None or np.isfinite(s)]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Second differences along one axis, the best bend eliminated.
+
+    Attributes
+    ----------
+    resist : ndarray, (n - 2, n - 2)
+        What remains of a second difference after the best bend is taken off.
+    spread : ndarray, (n, n - 2)
+        Transposed second difference of that remainder.
+    values, vectors : ndarray
+        Eigendecomposition of the penalty on the n samples.
+    """
+
+    resist: Array
+    spread: Array
+    values: Array
+    vectors: Array
+
+
+@lru_cache(maxsize=32)
+def _axis(n: int, stiffness: float) -> Axis:
+    second = np.diff(np.eye(n), 2, axis=0)
+    resist = np.eye(n - 2)
+    if np.isfinite(stiffness):
+        change = np.diff(np.eye(n - 2), axis=0)
+        resist = resist - np.linalg.inv(np.eye(n - 2) + stiffness * change.T @ change)
+    values, vectors = np.linalg.eigh(second.T @ resist @ second)
+    return Axis(resist, second.T @ resist, np.maximum(values, 0.0), vectors)
+
+
+@dataclass(frozen=True)
+class State:
+    """Kinks, scaled multipliers and charges along rows and columns."""
+
+    kink_u: Array
+    kink_v: Array
+    dual_u: Array
+    dual_v: Array
+    charge_u: Array | float = 1.0
+    charge_v: Array | float = 1.0
+
+
+def _split(
+    data: Array, charge: float, stiffness: float, start: State | None
+) -> tuple[Array, State]:
+    """Minimise for a batch (b, 3, H, W) in units of the noise."""
+    height, width = data.shape[2:]
+    along_u, along_v = _axis(height, stiffness), _axis(width, stiffness)
+    rho = charge / STEP
+    keep = 1 / (1 + rho * (along_u.values[:, None] + along_v.values))
+    if start is None:
+        zero_u, zero_v = np.zeros_like(data[:, :, 2:]), np.zeros_like(data[..., 2:])
+        state = State(zero_u, zero_v, zero_u, zero_v)
+    else:
+        state = replace(start, charge_u=1.0, charge_v=1.0)
+    smooth = data
+    for iteration in range(ITERATIONS):
+        if iteration in REWEIGHTED_AT:
+            state = replace(
+                state,
+                charge_u=KINK / (KINK + _length(state.kink_u)),
+                charge_v=KINK / (KINK + _length(state.kink_v)),
+            )
+        aim_u, aim_v = state.kink_u - state.dual_u, state.kink_v - state.dual_v
+        pull = data + rho * (along_u.spread @ aim_u + aim_v @ along_v.spread.T)
+        inner = along_u.vectors.T @ pull @ along_v.vectors
+        smooth = along_u.vectors @ (keep * inner) @ along_v.vectors.T
+        bent_u = smooth[:, :, 2:] - 2 * smooth[:, :, 1:-1] + smooth[:, :, :-2]
+        bent_v = smooth[..., 2:] - 2 * smooth[..., 1:-1] + smooth[..., :-2]
+        wish_u = aim_u + along_u.resist @ (bent_u - aim_u) + state.dual_u
+        wish_v = aim_v + (bent_v - aim_v) @ along_v.resist + state.dual_v
+        dual_u, dual_v = _clip(wish_u, STEP * state.charge_u), _clip(wish_v, STEP * state.charge_v)
+        state = replace(
+            state, kink_u=wish_u - dual_u, kink_v=wish_v - dual_v, dual_u=dual_u, dual_v=dual_v
+        )
+    return smooth, state
+
+
+def _length(vectors: Array) -> Array:
+    return np.sqrt((vectors**2).sum(axis=1, keepdims=True))
+
+
+def _clip(vectors: Array, radius: Array | float) -> Array:
+    """Vectors (b, 3, ...) shortened to a radius."""
+    return vectors * np.minimum(1.0, radius / np.maximum(_length(vectors), 1e-300))

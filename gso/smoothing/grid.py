@@ -1,0 +1,213 @@
+"""Remove noise from grids, the amount of smoothing read off the noisy data alone."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gso.smoothing.base import Smoothed, checked_options, checked_points, to_unit
+from gso.smoothing.spectrum import Law, Spectrum, bins, shrinkage
+from gso.status import MeshError
+
+Array = NDArray[np.float64]
+
+ORDERS = (2, 3, 4, 5, 6, 7, 8)
+TRIED = (8, 4, 2)
+DEFAULT_ORDER = 4
+# Coefficients of x, y and z share parameters, so the likelihood overstates its evidence.
+TEMPERATURE = 4.0
+
+
+def smooth_grid(
+    points: ArrayLike,
+    *,
+    order: int | None = None,
+    weight: float | None = None,
+    norm: str = "l2",
+) -> Smoothed:
+    """Smooth a noisy grid.
+
+    With `weight`, the result minimises the penalised least squares of Whittaker (1923),
+    Eilers (2003) and Garcia (2010) with free ends,
+
+        mean |x - points|^2 + weight (mean |d^k x / du^k|^2 + mean |d^k x / dv^k|^2),
+
+    k = `order` and both parameters on [0, 1]; polynomials of degree below k in each
+    parameter come back unchanged. It has a closed form in the eigenvectors of the
+    one-dimensional penalties.
+
+    Without `weight`, each mode of the same eigenvectors keeps the share of it that is
+    signal, estimated as :mod:`gso.smoothing.spectrum` says. Orders 8, 4 and 2 are tried
+    and their results averaged by likelihood: high orders suit analytic surfaces, low
+    ones rough surfaces.
+
+    Parameters
+    ----------
+    points : array_like, (H, W, 3)
+        Noisy surface in any unit of length and any position, from 3 x 3 up; the noise is
+        taken to be independent and equally strong in every coordinate.
+    order : int, optional
+        2 to 8; lowered to H - 1 and W - 1 on smaller grids. For ``norm="l1"``, 2 for
+        pieces that are flat or 3 for pieces that are smooth.
+    weight : float, optional
+        Amount of smoothing, dimensionless. For ``norm="l1"`` see
+        :func:`gso.smoothing.crease.smooth_creased_grid`.
+    norm : {"l2", "l1"}
+        "l1" keeps creases.
+
+    Returns
+    -------
+    Smoothed
+        Without `weight`, its `order` and `weight` are those of the plain smoother that
+        spends as many degrees of freedom, of the likeliest order or the next below that
+        can.
+
+    Raises
+    ------
+    MeshError
+        Not an (H, W, 3) array of finite numbers with at least 3 rows and columns.
+    OptionError
+        An order, weight or norm that does not exist.
+
+    Examples
+    --------
+    >>> u, v = np.meshgrid(np.linspace(0, 1, 40), np.linspace(0, 1, 30), indexing="ij")
+    >>> clean = np.stack([u, v, u * u - v * u], axis=-1)
+    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(clean.shape)
+    >>> result = smooth_grid(clean + noise)
+    >>> bool(abs(result.sigma - 0.01) < 0.0005)
+    True
+    >>> bool(np.abs(result.points - clean).max() < 0.01)
+    True
+    """
+    array = checked_points(points, 3)
+    height, width = array.shape[:2]
+    if min(height, width) < 3:
+        raise MeshError(f"the grid is {height} x {width}: smoothing needs at least 3 x 3 vertices")
+    if norm == "l1":
+        from gso.smoothing.crease import smooth_creased_grid
+
+        return smooth_creased_grid(array, order=order, weight=weight)
+    checked_options(order, ORDERS, weight, norm)
+    if weight is not None:
+        return _whittaker(array, order or DEFAULT_ORDER, weight)
+    return _blind(array, TRIED if order is None else (order,))
+
+
+@lru_cache(maxsize=32)
+def modes(n: int, order: int) -> tuple[Array, Array]:
+    """Eigenvectors and eigenvalues of the free-ended difference penalty on n samples.
+
+    Parameters
+    ----------
+    n, order : int
+        Samples, and order of the differences; lowered to n - 1.
+
+    Returns
+    -------
+    vectors : ndarray, (n, n)
+        Columns from smooth to rough; the first `order` are polynomials.
+    values : ndarray, (n,)
+        Eigenvalues of D^T D with D the difference quotients for samples on [0, 1]; zero
+        for the polynomials.
+
+    Notes
+    -----
+    Read-only, cached. Singular vectors of D, rather than eigenvectors of D^T D, keep
+    the digits of the smoothest modes.
+    """
+    order = min(order, n - 1)
+    difference = np.diff(np.eye(n), order, axis=0)
+    _, singular, rows = np.linalg.svd(difference)
+    legendre = np.polynomial.legendre.legvander(np.linspace(-1, 1, n), order - 1)
+    vectors = np.hstack([np.linalg.qr(legendre)[0], rows[: n - order][::-1].T])
+    quotients = singular[::-1] * float(n - 1) ** order
+    values = np.concatenate([np.zeros(order), quotients**2])
+    vectors.flags.writeable = values.flags.writeable = False
+    return vectors, values
+
+
+def estimate(unit: Array, order: int, rounding: float, start: Array | None) -> tuple[Law, Array]:
+    """Law of the spectrum of a centred grid in the modes of one order, and coefficients."""
+    coefficients = _analyse(unit, order)
+    energy = (coefficients**2).sum(axis=0)
+    return Spectrum(energy, floor=rounding**2).fit(start), coefficients
+
+
+def _blind(array: Array, orders: tuple[int, ...]) -> Smoothed:
+    unit, frame = to_unit(array)
+    height, width = unit.shape[:2]
+    laws, results, kept = [], [], []
+    start = None
+    for order in orders:
+        law, coefficients = estimate(unit, order, frame.rounding, start)
+        start = law.parameters
+        share = shrinkage(law, height, width)
+        laws.append(law)
+        kept.append(share)
+        results.append(_synthesise(coefficients * share, order))
+    score = np.array([law.score for law in laws])
+    belief = np.exp((score.min() - score) / (2 * TEMPERATURE))
+    belief /= belief.sum()
+    smooth = sum(b * r for b, r in zip(belief, results, strict=True))
+    best = int(score.argmin())
+    dof = float(sum(b * k.sum() for b, k in zip(belief, kept, strict=True)))
+    order, weight = _plain_equivalent(height, width, orders[best], dof)
+    return Smoothed(
+        points=frame.to_user(smooth),
+        order=order,
+        weight=weight,
+        sigma=frame.scale * float(np.sqrt(laws[best].variance)),
+        dof=dof,
+    )
+
+
+def _whittaker(array: Array, order: int, weight: float) -> Smoothed:
+    unit, frame = to_unit(array)
+    height, width = unit.shape[:2]
+    penalty = modes(height, order)[1][:, None] + modes(width, order)[1]
+    share = 1 / (1 + weight * penalty)
+    coefficients = _analyse(unit, order)
+    left = 3 * (1 - share).sum()
+    removed = (((1 - share) * coefficients) ** 2).sum()
+    return Smoothed(
+        points=frame.to_user(_synthesise(coefficients * share, order)),
+        order=order,
+        weight=float(weight),
+        sigma=frame.scale * float(np.sqrt(removed / left)) if left > 0 else 0.0,
+        dof=float(share.sum()),
+    )
+
+
+def _analyse(unit: Array, order: int) -> Array:
+    """Coefficients (3, H, W) of a grid (H, W, 3)."""
+    height, width = unit.shape[:2]
+    return modes(height, order)[0].T @ np.moveaxis(unit, 2, 0) @ modes(width, order)[0]
+
+
+def _synthesise(coefficients: Array, order: int) -> Array:
+    """Grid (H, W, 3) of coefficients (3, H, W)."""
+    _, height, width = coefficients.shape
+    planes = modes(height, order)[0] @ coefficients @ modes(width, order)[0].T
+    return np.moveaxis(planes, 0, 2)
+
+
+def _plain_equivalent(height: int, width: int, order: int, dof: float) -> tuple[int, float]:
+    """Order and weight with which the plain smoother has a given trace.
+
+    The order falls until its polynomials leave room for the trace, to 2 at the lowest.
+    """
+    while order > 2 and min(order, height - 1) * min(order, width - 1) >= dof:
+        order -= 1
+    (_, ni, ci), (_, nj, cj) = bins(height), bins(width)
+    count = ni[:, None] * nj
+    penalty = modes(height, order)[1][ci.astype(int)][:, None]
+    penalty = penalty + modes(width, order)[1][cj.astype(int)]
+    low, high = -100.0, 30.0
+    for _ in range(36):
+        middle = (low + high) / 2
+        trace = (count / (1 + np.exp(middle) * penalty)).sum()
+        low, high = (middle, high) if trace > dof else (low, middle)
+    return order, float(np.exp((low + high) / 2))
