@@ -48,6 +48,8 @@ INFO: dict[str, Info] = {
     "edge_length_error": Info("", True, "mean |l'/l - 1| over edges"),
     "strain_mean": Info("", True, "mean of the larger principal strain"),
     "strain_p99": Info("", True, "99th percentile of the larger principal strain"),
+    "strain_max": Info("", True, "largest principal strain"),
+    "area_error": Info("", True, "mean |A'/A - 1| over corner triangles"),
     "flipped_cells": Info("", True, "cells with a corner turned over"),
     "theta": Info("deg", True, "mean angle between cell normals (published)"),
     "roughness_ratio": Info("", True, "sum of squared second differences, out / in"),
@@ -294,6 +296,17 @@ def principal_strains(surface: Any, flat: Any) -> Strains:
     s1, s2 = geometry.singular_values(*(components(q[tri[:, k]]) for k in range(3)), rest)
     values = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0))
     return Strains(float(values.mean()), float(np.percentile(values, 99)), values)
+
+
+def area_error(surface: Any, flat: Any) -> float:
+    """Mean of |A'/A - 1| over the corner triangles, those without area left out."""
+    tri = topology.corner_triangles(_faces(surface))
+    p = _points(surface)
+    corners = [p[tri[:, k]] for k in range(3)]
+    before = np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0]), axis=1)
+    after = corner_areas(_flat(surface, flat), tri)
+    keep = before > 1e-12 * before.max()
+    return float(np.abs(after[keep] / before[keep] - 1.0).mean())
 
 
 def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None) -> int:

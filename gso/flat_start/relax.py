@@ -97,7 +97,7 @@ def relax(
     for _ in range(iterations):
         turn = m @ z
         rotation = turn / np.maximum(np.abs(turn), 1e-300)
-        pull = adjoint @ (rotation - 0.5 * turn) - laplacian @ z + adjoint @ (0.5 * turn)
+        pull = adjoint @ rotation - laplacian @ z
         step = factor.solve(np.stack([pull.real, pull.imag], axis=1))
         z = z + limit(_pairs(z), step.ravel()) * (step @ np.array([1.0, 1j]))
         before, energy = energy, gradients.energy(z)

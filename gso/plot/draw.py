@@ -116,7 +116,7 @@ def _paint(ax: Any, panel: Panel) -> ScalarMappable | None:
     colours = colours[order]
     few = len(corners) <= _LINES
     faces = PolyCollection(
-        panel.points[corners[order], :2],
+        list(panel.points[corners[order], :2]),
         facecolors=colours,
         edgecolors=0.72 * colours if few else colours,
         linewidths=0.35,

@@ -14,8 +14,8 @@ from gso.status import OptionError
 
 Array = NDArray[np.float64]
 
-#: Percentile at which scales end: single spikes would leave all else pale.
-_TOP = 98
+#: Percentile at which scales of curvature and strain end: spikes would leave all else pale.
+_TOP = 98.0
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,11 @@ def per_face(mesh: Mesh, values: Array) -> Array:
     )
 
 
-def _rising(values: Sequence[Array], label: str, colours: str) -> Scale:
-    """Scale from zero over several panels."""
+def _rising(values: Sequence[Array], label: str, colours: str, top: float = _TOP) -> Scale:
+    """Scale over several panels, from zero to a percentile."""
     every = np.concatenate(values)
     every = every[np.isfinite(every)]
-    high = max(float(np.percentile(every, _TOP)) if every.size else 1.0, 1e-6)
+    high = max(float(np.percentile(every, top)) if every.size else 1.0, 1e-6)
     extend = "max" if every.max(initial=0.0) > high else "neither"
     return Scale(label, colours, 0.0, high, extend)
 
@@ -83,7 +83,8 @@ def distance(before: Mesh, after: Mesh) -> Heat:
     percent = 100.0 / before.diagonal * metrics.point_to_surface(after.vertices, before)
     values = per_face(after, percent)
     summary = f"mean {percent.mean():.2g} %, largest {percent.max():.2g} %"
-    return Heat(values, _rising([values], "distance (% of the diagonal)", "GnBu"), summary)
+    scale = _rising([values], "distance (% of the diagonal)", "GnBu", top=100.0)
+    return Heat(values, scale, summary)
 
 
 def strain(design: Mesh, flat: Array) -> Heat:

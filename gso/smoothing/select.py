@@ -22,6 +22,7 @@ STEPS = 15
 PROBES = 3
 ROUNDS = 6
 REACH = 1.5  # decades on each side of the shift in which the quadrature is trusted
+BAND_LIMIT = 1e10  # multiplications of a banded factorisation: below a second
 NEAR = 1.2  # an optimum within so many decades is final
 
 
@@ -146,15 +147,45 @@ def unbiased_risk(variance: float) -> Criterion:
 
 
 def factor(penalty: Any, weight: float) -> Callable[[Array], Array]:
-    """Solver of (I + weight K) x = y."""
+    """Solver of (I + weight K) x = y for columns y, (n, c).
+
+    In the order of Cuthill and McKee (1969) a mesh of some thousand vertices is a narrow
+    band, which LAPACK factors several times faster than a sparse factorisation does.
+
+    >>> from scipy.sparse import identity
+    >>> factor(identity(3), 1.0)(np.ones((3, 1))).ravel()
+    array([0.5, 0.5, 0.5])
+    """
+    from scipy.linalg import cho_solve_banded, cholesky_banded
     from scipy.sparse import identity
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
     from scipy.sparse.linalg import splu
 
-    matrix = (identity(penalty.shape[0]) + weight * penalty).tocsc()
-    lu = splu(
-        matrix,
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
-    return lu.solve
+    count = penalty.shape[0]
+    matrix = (identity(count) + weight * penalty).tocsc()
+    order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
+    place = np.empty(count, np.int64)
+    place[order] = np.arange(count)
+    entries = matrix.tocoo()
+    row, column = place[entries.row], place[entries.col]
+    below = row >= column
+    row, column = row[below], column[below]
+    width = int((row - column).max())
+    if count * width**2 > BAND_LIMIT:
+        lu = splu(
+            matrix,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+        return lu.solve
+    band = np.zeros((width + 1, count))
+    band[row - column, column] = entries.data[below]
+    lower = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+
+    def solve(right: Array) -> Array:
+        out = np.empty_like(right)
+        out[order] = cho_solve_banded((lower, True), right[order], check_finite=False)
+        return out
+
+    return solve

@@ -114,6 +114,9 @@ class Plan:
         What the user should know.
     details : dict
         Numbers the task wants in the result.
+    finish : callable
+        What is done to the coordinates after the last stage without changing the
+        objective: a flat image is put in its place.
     """
 
     block: str
@@ -122,6 +125,7 @@ class Plan:
     status: Status | None = None
     notes: list[str] = field(default_factory=list)
     details: dict[str, Any] = field(default_factory=dict)
+    finish: Callable[[Array], Array] = same
 
 
 __all__ = ["Options", "Plan", "Request", "Stage", "same"]

@@ -229,6 +229,7 @@ class Run:
                 details=plan.details,
             )
         coordinates, energy = self._guard(request, plan, coordinates)
+        coordinates = plan.finish(coordinates)
         return Outcome(
             plan.block,
             coordinates.reshape(-1, dim),

@@ -10,6 +10,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -223,7 +224,7 @@ class _Quadratic:
     """The quadratic terms together: ``|A x - b|^2 / 2`` with everything constant."""
 
     def __init__(self, elements: list[_Elements], variables: Variables):
-        from scipy.sparse import csr_matrix, tril
+        from scipy.sparse import csr_matrix
 
         n = variables.size
         rows, columns, entries, rhs, self.slices = [], [], [], [], []
@@ -249,9 +250,15 @@ class _Quadratic:
         )
         self.b = join(rhs) if base else np.zeros(0)
         self.at = self.a.T.tocsr()
+
+    @cached_property
+    def matrix(self) -> Any:
+        """Lower triangle of ``A^T A``, CSC with sorted rows."""
+        from scipy.sparse import tril
+
         lower = tril((self.at @ self.a).tocsc(), format="csc")
         lower.sort_indices()
-        self.matrix = lower
+        return lower
 
     def _residual(self, x: Array) -> Array:
         return self.a @ x - self.b

@@ -1,0 +1,59 @@
+"""The command line: ``gso optimize``, ``gso metrics``, ``gso info``, ``gso plot``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from gso.cli.inspect import info, metrics, plot
+from gso.cli.optimize import optimize
+from gso.status import GSOError
+
+__all__ = ["main"]
+
+#: What a shell reports for a program that was ended by Ctrl-C.
+INTERRUPTED = 130
+
+
+class _Commands(click.Group):
+    """Commands whose errors are one line and an exit code, never a traceback."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except GSOError as error:
+            click.echo(f"gso: error: {' '.join(str(error).split())}", err=True)
+            ctx.exit(1)
+        except MemoryError:
+            click.echo("gso: error: not enough memory; give a coarser mesh", err=True)
+            ctx.exit(1)
+        except KeyboardInterrupt:
+            click.echo("gso: interrupted", err=True)
+            ctx.exit(INTERRUPTED)
+
+
+def _version(ctx: click.Context, option: click.Parameter, asked: bool) -> None:
+    """Print the version; reading it takes longer than the rest of this module."""
+    if asked:
+        import gso
+
+        click.echo(f"gso {gso.__version__}")
+        ctx.exit()
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_version,
+    help="Print the version.",
+)
+def main() -> None:
+    """Make quad and grid surfaces developable, flatten them, denoise them."""
+
+
+for _command in (optimize, metrics, info, plot):
+    main.add_command(_command)

@@ -1,0 +1,125 @@
+"""``gso optimize`` on many files: in parallel, one line each, failures reported and survived."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gso.cli import progress, report
+from gso.status import GSOError, MeshError, OptionError
+
+if TYPE_CHECKING:
+    from gso.cli.optimize import Job
+
+
+def many(
+    job: Job,
+    files: tuple[str, ...],
+    folder: str,
+    *,
+    suffix: str | None,
+    plots: str | None,
+    table: str | None,
+    workers: int | None,
+) -> bool:
+    """Optimise files into a folder; whether all results are usable."""
+    from gso import tno
+
+    outs = _outputs(files, folder, suffix)
+    pictures = [None if plots is None else str(Path(plots, f"{Path(o).stem}.png")) for o in outs]
+    for path in filter(None, (folder, plots)):
+        _make_folder(path)
+    for out, picture in zip(outs, pictures, strict=True):
+        job.check(out, picture)
+    if workers is None:
+        workers = min(os.cpu_count() or 1, len(files))
+    records: dict[int, dict[str, Any]] = {}
+    with progress.files(len(files)) as bar, _workers_end_with_us():
+        for item in tno.optimize_many(files, workers=workers, **job.keywords):
+            file, out = files[item.index], outs[item.index]
+            try:
+                if item.result is None:
+                    raise MeshError(item.error or "failed")
+                job.write(item.result, out, pictures[item.index])
+                done = report.record(file, out, item.result)
+                if not job.quiet:
+                    bar.write(report.line(done), file=sys.stdout)
+            except GSOError as error:
+                done = {"input": file, "usable": False, "error": str(error)}
+                bar.write(f"gso: error: {_named(file, str(error))}", file=sys.stderr)
+            records[item.index] = done
+            bar.update(1)
+    if table is not None:
+        report.write_json(table, [records[k] for k in sorted(records)])
+    good = sum(bool(r["usable"]) for r in records.values())
+    if not job.quiet:
+        click.echo(f"{good} of {len(files)} results usable")
+    return good == len(files)
+
+
+def _outputs(files: tuple[str, ...], folder: str, suffix: str | None) -> list[str]:
+    """Output of each input: its name in the folder.
+
+    Raises
+    ------
+    OptionError
+        Two inputs would be written to one file, or an output would replace an input.
+    """
+    if suffix is not None and not suffix.startswith("."):
+        suffix = f".{suffix}"
+    outs = [
+        str(Path(folder, Path(f).name if suffix is None else f"{Path(f).stem}{suffix}"))
+        for f in files
+    ]
+    owner: dict[str, str] = {}
+    inputs = {os.path.realpath(f): f for f in files}
+    for file, out in zip(files, outs, strict=True):
+        place = os.path.realpath(out)
+        if place in owner:
+            raise OptionError(f"{owner[place]} and {file} would both be written to {out}")
+        if place in inputs:
+            raise OptionError(f"{out} would replace an input; give another folder for -o")
+        owner[place] = file
+    return outs
+
+
+def _make_folder(path: str) -> None:
+    try:
+        os.makedirs(path, exist_ok=True)
+    except OSError as error:
+        raise MeshError(f"{path}: cannot be made a folder: {error.strerror or error}") from None
+
+
+def _named(file: str, message: str) -> str:
+    """The message in one line, with the file's name at its beginning."""
+    message = " ".join(message.split())
+    return message if message.startswith(file) else f"{file}: {message}"
+
+
+@contextmanager
+def _workers_end_with_us() -> Iterator[None]:
+    """On Ctrl-C end the worker processes at once instead of waiting for their results."""
+    import multiprocessing
+    import signal
+    import threading
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(signum: int, frame: Any) -> None:
+        for child in multiprocessing.active_children():
+            child.terminate()
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

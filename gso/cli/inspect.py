@@ -1,0 +1,173 @@
+"""``gso metrics``, ``gso info`` and ``gso plot``: look at surfaces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gso.status import GSOError
+
+if TYPE_CHECKING:
+    from gso.mesh import Mesh
+
+
+@click.command(short_help="Compare two surfaces.")
+@click.argument("before", type=click.Path())
+@click.argument("after", type=click.Path())
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def metrics(before: str, after: str, as_json: bool) -> None:
+    """Measure the surface AFTER against the surface BEFORE.
+
+    When AFTER is flat (one z everywhere) and has the faces of BEFORE, it is measured as
+    its flat pattern too.
+    """
+    import json
+
+    from gso import io
+    from gso.cli import report
+
+    design, result = io.load(before), io.load(after)
+    values, notes = _compare(design, result)
+    if as_json:
+        record = {"before": before, "after": after, "metrics": values, "notes": notes}
+        click.echo(json.dumps(record, indent=2, ensure_ascii=False))
+        return
+    click.echo("\n".join(report.table(values)))
+    for note in notes:
+        click.echo(f"note: {note}")
+
+
+def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[str]]:
+    """Metrics of the tasks that fit a pair of surfaces, and what was left out."""
+    import math
+
+    import numpy as np
+
+    from gso import metrics as measure
+    from gso import tasks
+
+    size = measure.unit(before)
+    values = dict(tasks.get("developable").metrics(before, after, size))
+    notes = []
+    same = np.array_equal(before.faces, after.faces)
+    flat = np.ptp(after.vertices[:, 2]) <= 1e-9 * after.diagonal
+    if same and not flat:
+        values["theta"] = measure.normal_angle(before, after)
+    if same and flat:
+        values |= tasks.get("flatten").metrics(before, after.vertices[:, :2])
+        notes.append("AFTER is flat: measured as the flat pattern of BEFORE too")
+    elif flat:
+        notes.append("AFTER is flat, but its faces are not those of BEFORE: strains left out")
+    return {k: v if math.isfinite(v) else None for k, v in values.items()}, notes
+
+
+@click.command(short_help="Say what a mesh file holds.")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path())
+def info(files: tuple[str, ...]) -> None:
+    """Say what mesh files hold: size, connectivity, curvature.
+
+    A file that cannot be read is reported; the exit code is then 1.
+    """
+    from gso import io
+    from gso.cli import report
+
+    failed = False
+    for number, file in enumerate(files):
+        try:
+            rows = _facts(io.load(file))
+        except GSOError as error:
+            click.echo(f"gso: error: {' '.join(str(error).split())}", err=True)
+            failed = True
+            continue
+        if number:
+            click.echo()
+        click.echo(file)
+        click.echo("\n".join(f"  {line}" for line in report.columns(rows)))
+    if failed:
+        click.get_current_context().exit(1)
+
+
+def _facts(mesh: Mesh) -> list[tuple[str, str]]:
+    """Names and values of what is known about a mesh."""
+    import numpy as np
+
+    from gso import metrics as measure
+
+    used = mesh.half_edges.face_count > 0
+    points = mesh.vertices[used]
+    a, b = mesh.edges.T
+    length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
+    loops = [str(len(loop)) for loop in mesh.boundary_loops]
+    rows = [
+        ("kind", _kind(mesh)),
+        ("vertices", str(len(mesh.vertices))),
+        ("faces", str(len(mesh.faces))),
+        ("edges", str(len(mesh.edges))),
+        ("components", str(np.unique(mesh.components[used]).size)),
+        ("boundary loops", f"{len(loops)}" + (f" ({', '.join(loops)} vertices)" if loops else "")),
+        ("Euler characteristic", str(mesh.euler_characteristic)),
+        ("bounding box", " x ".join(f"{side:.6g}" for side in np.ptp(points, axis=0))),
+        ("from, to", " ".join(map(_point, (points.min(axis=0), points.max(axis=0))))),
+        ("diagonal", f"{mesh.diagonal:.6g}"),
+        ("size", f"{mesh.frame.scale:.6g} (farthest vertex from the centroid)"),
+        ("edge length", f"{length.min():.4g} to {length.max():.4g}, mean {length.mean():.4g}"),
+    ]
+    if mesh.stars:
+        positive, negative, absolute = measure.curvature_features(mesh)
+        rows += [
+            ("loss_gc", f"{absolute:.4g} 1/size^2 (mean |K|)"),
+            ("K_P, K_N", f"{positive:.4g}, {negative:.4g} 1/size^2 (mean K > 0, mean K < 0)"),
+        ]
+    else:
+        rows.append(("loss_gc", "- (no interior vertex)"))
+    return rows + [("note", note) for note in mesh.notes]
+
+
+def _kind(mesh: Mesh) -> str:
+    if mesh.grid_shape is not None:
+        return f"grid {mesh.grid_shape[0]} x {mesh.grid_shape[1]}"
+    if mesh.is_triangles:
+        return "triangles"
+    return "quads and triangles" if (mesh.faces < 0).any() else "quads"
+
+
+def _point(point: Any) -> str:
+    return f"({', '.join(f'{c:.6g}' for c in point)})"
+
+
+@click.command(short_help="Draw a surface or a result.")
+@click.argument("file", type=click.Path())
+@click.option(
+    "-o", "--output", "out", metavar="PNG", required=True, type=click.Path(), help="Picture."
+)
+@click.option("--before", metavar="FILE", type=click.Path(), help="Surface to draw beside it.")
+@click.option(
+    "--color",
+    "colour",
+    type=click.Choice(["curvature", "distance", "strain", "none"]),
+    help="What the colours show: curvature unless said otherwise; distance to, and strain of "
+    "the map from, the surface before.",
+)
+def plot(file: str, out: str, before: str | None, colour: str | None) -> None:
+    """Draw the surface FILE as a picture (.png, .pdf, .svg).
+
+    A full result (.npz of gso optimize) is drawn beside its design, unless --before or
+    --color ask for something else.
+    """
+    from gso import io
+    from gso import plot as pictures
+    from gso.result import Result
+
+    pictures.require()
+    io.check_writable(out, pictures.SUFFIXES)
+    if before is None and colour is None and file.lower().endswith(".npz"):
+        try:
+            result = Result.load(file)
+        except GSOError:
+            pass  # a mesh in an .npz file, or what load() says about it
+        else:
+            pictures.plot_result(result, out)
+            return
+    first = None if before is None else io.load(before)
+    pictures.plot_surface(io.load(file), colour or "curvature", before=first, path=out)

@@ -1,0 +1,228 @@
+"""``gso optimize``: one file, or many at once."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gso import tasks
+from gso.status import MeshError, OptionError
+
+if TYPE_CHECKING:
+    from gso.mesh import Mesh
+    from gso.result import Result
+
+#: Units of :func:`gso.io.save_flat`.
+UNITS = ("um", "mm", "cm", "dm", "m", "in", "ft", "yd")
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to do with every input.
+
+    Attributes
+    ----------
+    keywords : dict
+        For :func:`gso.tno.optimize`.
+    unit : str
+        Unit of the coordinates, for drawings.
+    quiet : bool
+        Print nothing but errors.
+    """
+
+    keywords: dict[str, Any] = field(default_factory=dict)
+    unit: str = "mm"
+    quiet: bool = False
+
+    def check(self, out: str, plot: str | None = None) -> None:
+        """Refuse outputs that cannot be written, before anything is computed."""
+        from gso import io
+
+        if out.lower().endswith(".svg"):
+            if self.keywords["task"] != "flatten":
+                raise OptionError(f"{out}: only a flat pattern is drawn as SVG; use --task flatten")
+            io.check_writable(out)
+        else:
+            io.check_writable(out, io.SUFFIXES)
+        if plot is not None:
+            from gso import plot as pictures
+
+            pictures.require()
+            io.check_writable(plot, pictures.SUFFIXES)
+
+    def write(self, result: Result, out: str, plot: str | None = None) -> None:
+        """Write a result and its picture."""
+        result.save(out, unit=self.unit)
+        if plot is not None:
+            from gso.plot import plot_result
+
+            plot_result(result, plot)
+
+
+@click.command(short_help="Make surfaces developable, flatten or denoise them.")
+@click.argument("files", metavar="IN...", nargs=-1, required=True, type=click.Path())
+@click.option(
+    "-o",
+    "--output",
+    "out",
+    metavar="OUT",
+    required=True,
+    type=click.Path(),
+    help="File to write; a folder when there are several inputs. The suffix says the format: "
+    ".npz is the full result, .svg the flat pattern at 1:1.",
+)
+@click.option(
+    "--task",
+    type=click.Choice(tasks.names()),
+    default="developable",
+    show_default=True,
+    help="What to do.",
+)
+@click.option("--formulation", metavar="NAME", help="Which energy; the task's own by default.")
+@click.option(
+    "--options",
+    "preset",
+    type=click.Choice(["fast", "balanced", "accurate"]),
+    default="balanced",
+    show_default=True,
+    help="How much work to do.",
+)
+@click.option(
+    "--max-deviation",
+    metavar="L",
+    type=float,
+    help="developable: largest distance from the input, in its unit of length.",
+)
+@click.option(
+    "--target-curvature",
+    metavar="K",
+    type=float,
+    help="developable: mean |K| (loss_gc) to reach with the smallest displacement.",
+)
+@click.option("--fix-boundary", is_flag=True, help="Keep the boundary where it is.")
+@click.option("--backend", metavar="NAME", help="Linear solver; the fastest installed by default.")
+@click.option("--workers", metavar="N", type=click.IntRange(0), help="Processes for many inputs.")
+@click.option(
+    "--suffix", metavar=".EXT", help="Format of many outputs; that of each input by default."
+)
+@click.option(
+    "--plot",
+    metavar="PNG",
+    type=click.Path(),
+    help="Picture to draw (.png, .pdf, .svg); a folder when there are several inputs.",
+)
+@click.option(
+    "--metrics", "table", metavar="JSON", type=click.Path(), help="File for status and metrics."
+)
+@click.option(
+    "--unit",
+    type=click.Choice(UNITS),
+    default="mm",
+    show_default=True,
+    help="Unit of the coordinates, for .svg.",
+)
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+def optimize(files: tuple[str, ...], out: str, **given: Any) -> None:
+    """Optimise the surface IN and write it to OUT.
+
+    Several inputs are worked on in parallel; OUT is then a folder. The exit code is 0 only
+    when every result is usable: it was computed, reached its target if it had one, and has
+    no cell turned over.
+    """
+    job = Job(_keywords(given), given["unit"], given["quiet"])
+    if given["table"] is not None:
+        from gso.io import check_writable
+
+        check_writable(given["table"])
+    if len(files) > 1 or os.path.isdir(out) or out.endswith(("/", os.sep)):
+        from gso.cli.batch import many
+
+        good = many(
+            job,
+            files,
+            out,
+            suffix=given["suffix"],
+            plots=given["plot"],
+            table=given["table"],
+            workers=given["workers"],
+        )
+    else:
+        if given["suffix"] is not None:
+            raise OptionError("--suffix is for many inputs; name the format in -o")
+        good = _single(job, files[0], out, given["plot"], given["table"])
+    click.get_current_context().exit(0 if good else 1)
+
+
+def _keywords(given: dict[str, Any]) -> dict[str, Any]:
+    """Keywords of :func:`gso.tno.optimize`, checked as far as that needs no mesh."""
+    task, formulation = given["task"], given["formulation"]
+    module = tasks.get(task)
+    if formulation is not None and formulation not in module.FORMULATIONS:
+        raise OptionError(
+            f"task {task!r} has no formulation {formulation!r}; "
+            f"there are {', '.join(module.FORMULATIONS)}"
+        )
+    settings = module.Options.preset(given["preset"])
+    if given["backend"] is not None:
+        _check_backend(given["backend"])
+        settings = replace(settings, backend=given["backend"])
+    keywords = {"task": task, "formulation": formulation, "options": settings}
+    for name in ("max_deviation", "target_curvature"):
+        if given[name] is not None:
+            if task != "developable":
+                raise OptionError(f"--{name.replace('_', '-')} is for --task developable only")
+            keywords[name] = given[name]
+    if given["fix_boundary"]:
+        from gso.constraints import FixedBoundary
+
+        keywords["constraints"] = [FixedBoundary()]
+    return keywords
+
+
+def _check_backend(name: str) -> None:
+    """Refuse a linear solver that is unknown or not installed: try it on one equation."""
+    import numpy as np
+
+    from gso.tno import linear
+
+    linear.choose(linear.Pattern(1, np.array([0, 1]), np.array([0])), name)
+
+
+def _single(job: Job, file: str, out: str, plot: str | None, table: str | None) -> bool:
+    """Optimise one surface; whether the result is usable."""
+    from gso import io
+    from gso.cli import report
+    from gso.cli.progress import iterations
+
+    job.check(out, plot)
+    mesh = io.load(file)
+    _check_grid(mesh, out)
+    with iterations() as callback:
+        result = _solve(mesh, job.keywords, callback)
+    job.write(result, out, plot)
+    record = report.record(file, out, result)
+    if table is not None:
+        report.write_json(table, record)
+    if not job.quiet:
+        click.echo(report.text(record))
+    return bool(record["usable"])
+
+
+def _check_grid(mesh: Mesh, out: str) -> None:
+    if out.lower().endswith(".npy") and mesh.grid_shape is None:
+        raise MeshError(f"{out}: the mesh is no grid, which is all that .npy holds; use .npz")
+
+
+def _solve(mesh: Mesh, keywords: dict[str, Any], callback: Any) -> Result:
+    """Optimise; the table says what the warning would."""
+    import warnings
+
+    from gso.status import ConvergenceWarning
+    from gso.tno import optimize as solve
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        return solve(mesh, callback=callback, **keywords)

@@ -1,0 +1,64 @@
+"""Progress bars: on the error stream, when a person watches and it takes a while."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from gso.status import Progress
+
+#: Seconds before a bar appears.
+PATIENCE = 1.0
+
+
+def watched() -> bool:
+    """Whether a person sees the error stream."""
+    return sys.stderr is not None and sys.stderr.isatty()
+
+
+@contextmanager
+def iterations() -> Iterator[Callable[[Progress], None] | None]:
+    """A callback that shows the iterations of a solve, or None when nobody watches."""
+    if not watched():
+        yield None
+        return
+    start = time.monotonic()
+    bars: list[Any] = []
+
+    def show(progress: Progress) -> None:
+        if time.monotonic() - start < PATIENCE:
+            return
+        if not bars:
+            from tqdm import tqdm
+
+            bars.append(tqdm(leave=False, unit="it", file=sys.stderr))
+        bar = bars[0]
+        bar.total, bar.n = progress.iterations, progress.iteration
+        bar.set_description(f"stage {progress.stage + 1}/{progress.stages}", refresh=False)
+        bar.set_postfix_str(f"energy {progress.energy:.4g}", refresh=False)
+        bar.refresh()
+
+    try:
+        yield show
+    finally:
+        for bar in bars:
+            bar.close()
+
+
+@contextmanager
+def files(count: int) -> Iterator[Any]:
+    """A bar over files, with `update(n)` and `write(line, file=...)`."""
+    from tqdm import tqdm
+
+    with tqdm(
+        total=count,
+        delay=PATIENCE,
+        disable=not watched(),
+        leave=False,
+        unit="file",
+        file=sys.stderr,
+    ) as bar:
+        yield bar

@@ -1,0 +1,116 @@
+"""What is printed about results and surfaces: tables for people, JSON for programs."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gso.metrics import INFO
+from gso.status import Status
+
+if TYPE_CHECKING:
+    from gso.result import Result
+
+
+def usable(result: Result) -> bool:
+    """Whether a result can be worked with: complete, on target, nothing turned over."""
+    points = result.mesh.vertices if result.flat is None else result.flat
+    return bool(
+        result.status not in (Status.CANCELLED, Status.TARGET_MISSED)
+        and np.isfinite(points).all()
+        and not result.metrics.get("flipped_cells", 0)
+    )
+
+
+def record(file: str, out: str, result: Result) -> dict[str, Any]:
+    """A result without its geometry."""
+    return {
+        "input": file,
+        "output": out,
+        "task": result.task,
+        "formulation": result.formulation,
+        "status": result.status.name,
+        "message": str(result.status),
+        "usable": usable(result),
+        "iterations": result.iterations,
+        "seconds": result.seconds.get("total", 0.0),
+        "backend": result.backend,
+        "notes": list(result.notes),
+        "details": {k: v for k, v in result.details.items() if isinstance(v, (int, float, str))},
+        "metrics": {name: _number(value) for name, value in result.metrics.items()},
+    }
+
+
+def text(record: Mapping[str, Any]) -> str:
+    """A record as a table of metrics, the status, and the notes."""
+    lines = [f"{record['input']} -> {record['output']}", ""]
+    lines += table(record["metrics"])
+    lines += ["", f"{record['task']}: {record['message']}"]
+    spent = f"{record['iterations']} iterations, {record['seconds']:.2f} s"
+    lines.append(spent + (f", {record['backend']}" if record["backend"] else ""))
+    if record["details"]:
+        lines.append(", ".join(f"{k} {_short(v)}" for k, v in record["details"].items()))
+    lines += [f"note: {note}" for note in record["notes"]]
+    if not record["usable"]:
+        lines.append("this result is not usable as it is")
+    return "\n".join(lines)
+
+
+def line(record: Mapping[str, Any]) -> str:
+    """A record in one line."""
+    values = record["metrics"]
+    shown = []
+    # A task's first metric says most about its results.
+    for name in [name.removesuffix("_before") for name in values][:1]:
+        was = f"{_short(values[f'{name}_before'])} -> " if f"{name}_before" in values else ""
+        shown.append(f"{name} {was}{_short(values[name])}")
+    shown += [] if record["usable"] else ["not usable"]
+    return "; ".join([f"{record['input']} -> {record['output']}", *shown, record["message"]])
+
+
+def table(metrics: Mapping[str, Any]) -> list[str]:
+    """Lines of name, value and unit."""
+    rows = [(name, _short(value), unit(name)) for name, value in metrics.items()]
+    return columns(rows)
+
+
+def columns(rows: Iterable[tuple[str, ...]]) -> list[str]:
+    """Lines of cells, left-aligned in columns."""
+    rows = list(rows)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def unit(name: str) -> str:
+    """Unit of a metric."""
+    info = INFO.get(name) or INFO.get(name.removesuffix("_before"))
+    return info.unit if info else ""
+
+
+def write_json(path: str, content: Any) -> None:
+    """Write JSON to a file."""
+    from gso.io import replacing
+
+    with replacing(path) as file:
+        file.write(json.dumps(content, indent=2, ensure_ascii=False).encode() + b"\n")
+
+
+def _number(value: Any) -> float | int | None:
+    """JSON knows neither NaN nor infinity."""
+    number = float(value)
+    if not math.isfinite(number):
+        return None
+    return int(value) if isinstance(value, (int, np.integer)) else number
+
+
+def _short(value: Any) -> str:
+    if value is None:
+        return "-"
+    return value if isinstance(value, str) else f"{value:.4g}"

@@ -1,0 +1,154 @@
+"""Plane images of disk-like meshes in which no face is turned over."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.flat_start.relax import strain_energy
+from gso.mesh import Mesh
+from gso.status import MeshError
+from gso.topology import corner_triangles
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def embed(mesh: Mesh, triangles: Ints) -> Array:
+    """Plane image (n, 2) of one component with a boundary and without handles.
+
+    Three maps are tried: least-squares conformal (Levy et al. 2002), harmonic to a circle
+    (Eck et al. 1995), and Tutte's, whose faces are convex; holes do not hinder them. Of
+    those that turn no triangle over, the one with the least strain is taken: Tutte's is
+    the one that always exists. All are scaled to the area of the surface.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        One component; all of its vertices belong to a face.
+    triangles : ndarray of int, (t, 3)
+        Triangles that carry strain and must not be turned over.
+
+    Raises
+    ------
+    MeshError
+        The surface is closed or has handles.
+    """
+    check(mesh)
+    outer = max(mesh.boundary_loops, key=lambda loop: _perimeter(mesh.vertices[loop]))
+    images = [_conformal(mesh, outer), _harmonic(mesh, outer), _tutte(mesh, outer)]
+    rated = []
+    for image in images:
+        if image is None or not np.isfinite(image).all():
+            continue
+        scaled = _scaled(mesh, image)
+        flipped = int((_areas(scaled, triangles) <= 0).sum())
+        rated.append((flipped, strain_energy(mesh.vertices, triangles, scaled), scaled))
+    return min(rated, key=lambda r: r[:2])[2]
+
+
+def check(mesh: Mesh) -> None:
+    """Refuse what cannot be laid out in the plane without a cut."""
+    where = f"the part with vertex {int(mesh.faces[0, 0])}"
+    loops = len(mesh.boundary_loops)
+    if loops == 0:
+        raise MeshError(
+            f"{where} is closed: it has no boundary to lay it out by; cut it open along edges "
+            "(duplicate their vertices), or delete a face"
+        )
+    handles = (2 - loops - mesh.euler_characteristic) // 2
+    if handles > 0:
+        raise MeshError(
+            f"{where} has {handles} handle{'s' if handles > 1 else ''} (Euler characteristic "
+            f"{mesh.euler_characteristic}, {loops} boundary loop{'s' if loops > 1 else ''}), which "
+            "do not unroll into the plane; cut it open along edges into disks"
+        )
+
+
+def _perimeter(points: Array) -> float:
+    return float(np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).sum())
+
+
+def _areas(flat: Array, triangles: Ints) -> Array:
+    """Doubled signed areas."""
+    a, b = (flat[triangles[:, k]] - flat[triangles[:, 0]] for k in (1, 2))
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def _scaled(mesh: Mesh, image: Array) -> Array:
+    """The image with the area of the surface and its centroid at the origin."""
+    v, t = mesh.vertices, mesh.triangles
+    space = np.linalg.norm(np.cross(v[t[:, 1]] - v[t[:, 0]], v[t[:, 2]] - v[t[:, 0]]), axis=1)
+    plane = np.abs(_areas(image, t)).sum()
+    return (image - image.mean(axis=0)) * np.sqrt(space.sum() / max(plane, 1e-300))
+
+
+def _circle(points: Array) -> Array:
+    """Points on the unit circle, apart by the lengths of a loop's edges."""
+    length = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    angle = 2.0 * np.pi * np.r_[0.0, np.cumsum(length)[:-1]] / length.sum()
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def _conformal(mesh: Mesh, loop: Ints) -> Array | None:
+    """Least-squares conformal map, held at two far vertices of the boundary."""
+    import igl
+
+    points = mesh.vertices[loop]
+    far = int(np.linalg.norm(points - points[0], axis=1).argmax())
+    held = np.array([loop[0], loop[far]], np.int64)
+    span = float(np.linalg.norm(points[far] - points[0]))
+    at = np.array([[0.0, 0.0], [span, 0.0]])
+    try:
+        return igl.lscm(mesh.vertices.copy(), mesh.triangles.copy(), held, at)[0]
+    except RuntimeError:
+        return None
+
+
+def _harmonic(mesh: Mesh, loop: Ints) -> Array | None:
+    """Harmonic map with cotangent weights, the loop on a circle."""
+    import igl
+
+    circle = _circle(mesh.vertices[loop])
+    try:
+        return igl.harmonic(mesh.vertices.copy(), mesh.triangles.copy(), loop.copy(), circle, 1)
+    except RuntimeError:
+        return None
+
+
+def _tutte(mesh: Mesh, loop: Ints) -> Array:
+    """Every inner vertex in the mean of its neighbours, the loop on a circle (Tutte 1963).
+
+    Other loops are filled with a vertex in their middle. On a 3-connected mesh the faces
+    come out convex.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.linalg import splu
+
+    n = len(mesh.vertices)
+    a, b = mesh.edges.T
+    holes = [h for h in mesh.boundary_loops if h is not loop]
+    for number, hole in enumerate(holes):
+        a, b = np.r_[a, hole], np.r_[b, np.full(len(hole), n + number)]
+    size = n + len(holes)
+    links = coo_matrix((np.ones(len(a)), (a, b)), shape=(size, size)).tocsr()
+    links = links + links.T
+    image = np.zeros((size, 2))
+    image[loop] = _circle(mesh.vertices[loop])
+    inner = np.setdiff1d(np.arange(size), loop)
+    if inner.size == 0:
+        return image[:n]
+    from scipy.sparse import diags
+
+    rows = links[inner]
+    matrix = diags(np.asarray(rows.sum(axis=1)).ravel()) - rows[:, inner]
+    image[inner] = splu(
+        matrix.tocsc(),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    ).solve(rows @ image)
+    return image[:n]
+
+
+__all__ = ["check", "corner_triangles", "embed"]
