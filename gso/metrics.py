@@ -241,8 +241,7 @@ def _cells(surface: Any) -> NDArray[np.int64]:
     """Quad faces of a mesh or grid."""
     if not hasattr(surface, "faces"):
         return topology.grid_faces(*np.asarray(surface).shape[:2])
-    faces = surface.faces
-    return faces[faces[:, 3] >= 0] if faces.shape[1] == 4 else faces[:0]
+    return topology.by_size(surface.faces)[0]
 
 
 def _faces(surface: Any) -> NDArray[np.int64]:
@@ -324,8 +323,7 @@ def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None) -> int:
         area = corner_areas(image.reshape(-1, image.shape[-1])[:, :2], cells)
         return int((area.reshape(4, -1) <= 0).any(axis=0).sum())
     image = image.reshape(-1, image.shape[-1])[:, :2]
-    quads = faces[faces[:, 3] >= 0] if faces.shape[1] == 4 else faces[:0]
-    tris = faces[faces[:, 3] < 0, :3] if faces.shape[1] == 4 else faces
+    quads, tris = topology.by_size(faces)
     split = np.linalg.norm(image[quads[:, 0]] - image[quads[:, 2]], axis=1) > np.linalg.norm(
         image[quads[:, 1]] - image[quads[:, 3]], axis=1
     )

@@ -11,6 +11,9 @@ from gso.mesh import Mesh
 
 Array = NDArray[np.float64]
 
+#: No side of a coarser grid has fewer vertices.
+SMALLEST = 12
+
 
 @lru_cache(maxsize=64)
 def _matrix(source: int, target: int) -> Array:
@@ -34,16 +37,15 @@ def resample(values: Array, height: int, width: int) -> Array:
 def coarser(mesh: Mesh, largest: int) -> list[Mesh]:
     """Copies of a grid of half the resolution, a quarter ..., coarsest first.
 
-    Sides longer than `largest` are halved until none is; empty for a grid that small.
+    Sides are halved until the longer one is at most `largest`, but once at least, and
+    never below :data:`SMALLEST`; empty for a grid that is as small as that.
     """
-    shape = mesh.grid_shape
-    grid = mesh.grid
+    shape, grid = mesh.grid_shape, mesh.grid
     levels: list[Mesh] = []
-    while shape is not None and grid is not None and max(shape) > largest:
-        shape = (_half(shape[0], largest), _half(shape[1], largest))
+    while shape is not None and grid is not None:
+        halved = tuple(max((side + 1) // 2, min(side, SMALLEST)) for side in shape)
+        if halved == shape or (levels and max(shape) <= largest):
+            break
+        shape = (halved[0], halved[1])
         levels.append(Mesh.from_grid(resample(grid, *shape)))
     return levels[::-1]
-
-
-def _half(side: int, largest: int) -> int:
-    return side if side <= largest // 2 else (side + 1) // 2

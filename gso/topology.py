@@ -259,6 +259,14 @@ def check_vertices(he: HalfEdges) -> None:
     )
 
 
+def by_size(faces: Ints) -> tuple[Ints, Ints]:
+    """The quads (q, 4) and the triangles (t, 3) among faces."""
+    if faces.shape[1] == 3:
+        return np.empty((0, 4), np.int64), faces
+    quad = faces[:, 3] >= 0
+    return faces[quad], faces[~quad, :3]
+
+
 def triangulate(faces: Ints, he: HalfEdges) -> Ints:
     """Split quads into triangles so that neighbours are split alike.
 

@@ -1,5 +1,6 @@
-"""Run the command line without its entry point: ``python -m gso.cli``."""
+"""The command line without its entry point: ``python -m gso.cli``."""
 
 from gso.cli import main
 
-main(prog_name="gso")
+if __name__ == "__main__":
+    main(prog_name="gso")

@@ -39,8 +39,9 @@ def many(
         job.check(out, picture)
     if workers is None:
         workers = min(os.cpu_count() or 1, len(files))
+        workers = workers if workers > 1 else 0  # a single process is this one
     records: dict[int, dict[str, Any]] = {}
-    with progress.files(len(files)) as bar, _workers_end_with_us():
+    with progress.files(len(files)) as bar, _workers_end_with_us(), report.status_only():
         for item in tno.optimize_many(files, workers=workers, **job.keywords):
             file, out = files[item.index], outs[item.index]
             try:

@@ -56,7 +56,10 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
         values["theta"] = measure.normal_angle(before, after)
     if same and flat:
         values |= tasks.get("flatten").metrics(before, after.vertices[:, :2])
-        notes.append("AFTER is flat: measured as the flat pattern of BEFORE too")
+        notes.append(
+            "AFTER is flat: measured as the flat pattern of BEFORE too; how far it lies from "
+            "BEFORE means nothing then"
+        )
     elif flat:
         notes.append("AFTER is flat, but its faces are not those of BEFORE: strains left out")
     return {k: v if math.isfinite(v) else None for k, v in values.items()}, notes

@@ -196,12 +196,13 @@ def _single(job: Job, file: str, out: str, plot: str | None, table: str | None) 
     from gso import io
     from gso.cli import report
     from gso.cli.progress import iterations
+    from gso.tno import optimize as solve
 
     job.check(out, plot)
     mesh = io.load(file)
     _check_grid(mesh, out)
-    with iterations() as callback:
-        result = _solve(mesh, job.keywords, callback)
+    with iterations() as callback, report.status_only():
+        result = solve(mesh, callback=callback, **job.keywords)
     job.write(result, out, plot)
     record = report.record(file, out, result)
     if table is not None:
@@ -214,15 +215,3 @@ def _single(job: Job, file: str, out: str, plot: str | None, table: str | None) 
 def _check_grid(mesh: Mesh, out: str) -> None:
     if out.lower().endswith(".npy") and mesh.grid_shape is None:
         raise MeshError(f"{out}: the mesh is no grid, which is all that .npy holds; use .npz")
-
-
-def _solve(mesh: Mesh, keywords: dict[str, Any], callback: Any) -> Result:
-    """Optimise; the table says what the warning would."""
-    import warnings
-
-    from gso.status import ConvergenceWarning
-    from gso.tno import optimize as solve
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        return solve(mesh, callback=callback, **keywords)

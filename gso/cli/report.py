@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gso.metrics import INFO
-from gso.status import Status
+from gso.status import ConvergenceWarning, Status
 
 if TYPE_CHECKING:
     from gso.result import Result
+
+
+@contextmanager
+def status_only() -> Iterator[None]:
+    """No warning where the status, which is printed, says the same."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        yield
 
 
 def usable(result: Result) -> bool:

@@ -19,7 +19,6 @@ from gso.io import check_writable, replacing
 from gso.plot.heat import Heat, Scale
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
@@ -31,14 +30,16 @@ SUFFIXES = (".png", ".pdf", ".svg")
 LIGHT = np.array([-0.40, 0.45, 0.80])
 """Where the light comes from: right, up, towards the viewer."""
 
-GRAZING = np.array([-0.85, 0.45, 0.28])
+GRAZING = np.array([-0.70, 0.50, 0.50])
 """Light along the surface, which shows every bump."""
 
 _PLAIN = (0.60, 0.71, 0.82)
 _UNKNOWN = (0.80, 0.80, 0.80)
 
-#: Inches of a panel; faces up to which the mesh lines leave something between them.
-_WIDTH, _BAR = 4.0, 1.0
+#: Inches of a panel's width, of the room for the bars, and for the titles.
+_WIDTH, _BAR, _TITLE = 4.0, 0.85, 0.35
+
+#: Faces up to which mesh lines leave something between them.
 _LINES = 2500
 
 
@@ -81,32 +82,42 @@ def draw(panels: Sequence[Panel]) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    sizes = [np.ptp(p.points[np.unique(p.corners), :2], axis=0) for p in panels]
-    tallest = max(size[1] / size[0] for size in sizes)
-    height = _WIDTH * float(np.clip(tallest, 0.35, 1.3)) + _BAR
-    figure = Figure(figsize=(_WIDTH * len(panels), height), dpi=120, layout="constrained")
+    # One window for all, so that lengths compare and titles stand in a row.
+    span = 1.06 * np.max([np.ptp(_seen(p), axis=0) for p in panels], axis=0)
+    tall = _WIDTH * float(np.clip(span[1] / span[0], 0.3, 1.3))
+    below = _BAR if any(p.heat for p in panels) else 0.0
+    width, height = _WIDTH * len(panels), below + tall + _TITLE
+    figure = Figure(figsize=(width, height), dpi=120)
     FigureCanvasAgg(figure)
-    axes = figure.subplots(1, len(panels), squeeze=False)[0]
-    bars: dict[Scale, tuple[ScalarMappable, list[Axes]]] = {}
-    for ax, panel in zip(axes, panels, strict=True):
-        mappable = _paint(ax, panel)
+    bars: dict[Scale, tuple[ScalarMappable, list[int]]] = {}
+    for k, panel in enumerate(panels):
+        place = (k * _WIDTH / width, below / height, _WIDTH / width, tall / height)
+        mappable = _paint(figure.add_axes(place), panel, span)
         if panel.heat is not None and mappable is not None:
-            bars.setdefault(panel.heat.scale, (mappable, []))[1].append(ax)
+            bars.setdefault(panel.heat.scale, (mappable, []))[1].append(k)
     for scale, (mappable, owners) in bars.items():
+        middle = (float(np.mean(owners)) + 0.5) * _WIDTH
+        place = (
+            (middle - 0.35 * _WIDTH) / width,
+            0.6 / height,
+            0.7 * _WIDTH / width,
+            0.12 / height,
+        )
         figure.colorbar(
             mappable,
-            ax=owners,
-            location="bottom",
+            cax=figure.add_axes(place),
+            orientation="horizontal",
             label=scale.label,
             extend=scale.extend,
-            shrink=0.7 / len(owners),
-            aspect=28,
-            pad=0.02,
         )
     return figure
 
 
-def _paint(ax: Any, panel: Panel) -> ScalarMappable | None:
+def _seen(panel: Panel) -> Array:
+    return panel.points[np.unique(panel.corners), :2]
+
+
+def _paint(ax: Any, panel: Panel, span: Array) -> ScalarMappable | None:
     """Paint the faces; what a colour bar is made from."""
     from matplotlib.collections import PolyCollection
 
@@ -123,11 +134,10 @@ def _paint(ax: Any, panel: Panel) -> ScalarMappable | None:
         rasterized=not few,
     )
     ax.add_collection(faces)
-    used = panel.points[np.unique(corners), :2]
-    low, high = used.min(axis=0), used.max(axis=0)
-    margin = 0.03 * (high - low).max()
-    ax.set_xlim(low[0] - margin, high[0] + margin)
-    ax.set_ylim(low[1] - margin, high[1] + margin)
+    seen = _seen(panel)
+    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    ax.set_xlim(middle[0] - span[0] / 2, middle[0] + span[0] / 2)
+    ax.set_ylim(middle[1] - span[1] / 2, middle[1] + span[1] / 2)
     ax.set_aspect("equal")
     ax.set_title(panel.title, fontsize=11)
     ax.axis("off")
@@ -149,7 +159,7 @@ def _colours(panel: Panel) -> tuple[Array, ScalarMappable | None]:
         colours = mappable.to_rgba(np.where(known, panel.heat.values, scale.low))[:, :3]
         colours[~known] = _UNKNOWN
     if panel.shaded:
-        colours = colours * _shading(panel, ambient=0.30 if mappable is None else 0.62)[:, None]
+        colours = colours * _shading(panel, ambient=0.34 if mappable is None else 0.62)[:, None]
     return np.clip(colours, 0.0, 1.0), mappable
 
 

@@ -110,24 +110,22 @@ def strain(design: Mesh, flat: Array) -> Heat:
         faces = faces if (faces >= 0).all() else faces[:, :3]
         if len(faces):
             values[group] = 100.0 * _face_strain(design.vertices, flat, faces)
-    known = values[np.isfinite(values)]
-    summary = f"mean {known.mean():.2g} %, largest {known.max():.2g} %" if known.size else ""
+    pooled = metrics.principal_strains(design, flat)
+    summary = f"mean {100 * pooled.mean:.2g} %, largest {100 * pooled.values.max():.2g} %"
     return Heat(values, _rising([values], "principal strain (%)", "PuRd"), summary)
 
 
 def _face_strain(vertices: Array, flat: Array, faces: NDArray[np.int64]) -> Array:
     corners = topology.corner_triangles(faces)
-    rest, image = (
-        [metrics.components(points[corners[:, k]]) for k in range(3)] for points in (vertices, flat)
-    )
-    with np.errstate(all="ignore"):
-        s1, s2 = geometry.singular_values(
-            image[0], image[1], image[2], geometry.rest_frame(rest[0], rest[1], rest[2])
-        )
-        worst = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0)).reshape(-1, len(faces))
-    # A corner without area has no strain; it comes out as a number without bound.
-    worst[~(worst < 1e6)] = np.nan
-    return np.where(np.isnan(worst).all(axis=0), np.nan, np.fmax.reduce(worst, axis=0))
+    p, q, r = (vertices[corners[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(q - p, r - p), axis=1)
+    rest = geometry.rest_frame(*(metrics.components(c) for c in (p, q, r)))
+    image = [metrics.components(flat[corners[:, k]]) for k in range(3)]
+    s1, s2 = geometry.singular_values(image[0], image[1], image[2], rest)
+    strains = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0))
+    # As in the metric, a corner without area has no strain.
+    strains[area <= 1e-12 * area.max()] = np.nan
+    return np.fmax.reduce(strains.reshape(-1, len(faces)), axis=0)
 
 
 def numbers(mesh: Mesh, values: Array, label: str) -> Heat:

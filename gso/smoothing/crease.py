@@ -30,8 +30,8 @@ DEFAULT_WEIGHT = 3.0
 # Charge for changes of the bend, relative to the penalty parameter of the splitting, at
 # 64 samples; inf has no bend at all. The best one is chosen by Stein's risk estimate.
 STIFFNESS = (np.inf, 1e5, 1e4, 1e3, 1e2, 1e1)
-ITERATIONS = 100
-REWEIGHTED_AT = (30, 50, 70)
+ITERATIONS = 60
+REWEIGHTED_AT = (20, 30, 40)
 # In units of the noise: kinks smaller than this are charged almost in full, half the
 # charge of a kink of this length, and the step by which the splitting shrinks them.
 KINK = 0.3
@@ -82,7 +82,8 @@ def smooth_creased_grid(
     if charge == 0 or sigma < 10 * frame.rounding:
         spent = float(unit[..., 0].size)
         return Smoothed(points.copy(), order or 2, charge, frame.scale * sigma, spent)
-    data = np.moveaxis(unit, 2, 0) / sigma
+    turn = _attached_frame(unit)
+    data = np.moveaxis(unit @ turn, 2, 0) / sigma
     probe = np.random.default_rng(0).choice([-1.0, 1.0], data.shape)
     pair = np.stack([data, data + PROBE * probe])
     state: State | None = None
@@ -94,12 +95,22 @@ def smooth_creased_grid(
         trials.append((risk, stiffness, dof, smooth))
     _, stiffness, dof, smooth = min(trials, key=lambda trial: trial[0])
     return Smoothed(
-        points=frame.to_user(np.moveaxis(smooth, 0, 2) * sigma),
+        points=frame.to_user(sigma * np.moveaxis(smooth, 0, 2) @ turn.T),
         order=2 if np.isinf(stiffness) else 3,
         weight=charge,
         sigma=frame.scale * sigma,
         dof=dof / 3,
     )
+
+
+def _attached_frame(unit: Array) -> Array:
+    """Axes (3, 3) that turn with the grid, so that the random probe does, too."""
+    height, width = unit.shape[:2]
+    along_u = np.linspace(-1, 1, height) @ unit.sum(axis=1)
+    along_v = np.linspace(-1, 1, width) @ unit.sum(axis=0)
+    left, _, right = np.linalg.svd(np.stack([along_u, along_v], axis=1), full_matrices=False)
+    tangents = left @ right
+    return np.column_stack([tangents, np.cross(*tangents.T)])
 
 
 def _stiffnesses(order: int | None, n: int) -> list[float]:

@@ -116,13 +116,13 @@ def modes(n: int, order: int) -> tuple[Array, Array]:
     Notes
     -----
     Read-only, cached. Singular vectors of D, rather than eigenvectors of D^T D, keep
-    the digits of the smoothest modes.
+    digits of the smoothest modes; orthogonalisation frees them of polynomials.
     """
     order = min(order, n - 1)
     difference = np.diff(np.eye(n), order, axis=0)
     _, singular, rows = np.linalg.svd(difference)
     legendre = np.polynomial.legendre.legvander(np.linspace(-1, 1, n), order - 1)
-    vectors = np.hstack([np.linalg.qr(legendre)[0], rows[: n - order][::-1].T])
+    vectors = np.linalg.qr(np.hstack([legendre, rows[: n - order][::-1].T]))[0]
     quotients = singular[::-1] * float(n - 1) ** order
     values = np.concatenate([np.zeros(order), quotients**2])
     vectors.flags.writeable = values.flags.writeable = False

@@ -21,6 +21,9 @@ from gso.status import MeshError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# Around a pole with hundreds of faces so many vertices are enough for a fit.
+LARGEST = 64
+
 
 def checked_faces(faces: Any, count: int) -> Ints:
     """Faces as integers (m, 3) or (m, 4), a missing fourth corner as -1.
@@ -47,13 +50,13 @@ def checked_faces(faces: Any, count: int) -> Ints:
 
 def neighbours(faces: Ints, count: int) -> Any:
     """Sparse (n, n) pattern of ones: vertices that share a face, each with itself."""
-    from scipy.sparse import csr_matrix
+    from scipy.sparse import csr_matrix, identity
 
     real = faces >= 0
     face = np.broadcast_to(np.arange(len(faces))[:, None], faces.shape)[real]
     shape = (count, len(faces))
     incidence = csr_matrix((np.ones(face.size), (faces[real], face)), shape=shape)
-    return _pattern(incidence @ incidence.T)
+    return _pattern(incidence @ incidence.T + identity(count))
 
 
 def boundary_edges(faces: Ints, count: int) -> Ints:
@@ -99,7 +102,7 @@ class Rings:
 
 
 def rings(near: Any, size: int) -> Rings:
-    """Vertices within `size` faces of each vertex."""
+    """Vertices within `size` faces of each vertex; of very many, a regular sample."""
     reach = near
     for _ in range(size - 1):
         reach = _pattern(reach @ near)
@@ -107,9 +110,12 @@ def rings(near: Any, size: int) -> Rings:
     length = np.diff(reach.indptr)
     row = np.repeat(np.arange(len(length)), length)
     column = np.arange(row.size) - reach.indptr[row]
-    index = np.zeros((len(length), length.max()), np.int64)
+    share = np.minimum(1.0, LARGEST / length)[row]
+    taken = np.floor((column + 1) * share) > np.floor(column * share)
+    row, column = row[taken], np.floor(column * share)[taken].astype(np.int64)
+    index = np.zeros((len(length), min(LARGEST, length.max())), np.int64)
     real = np.zeros(index.shape, bool)
-    index[row, column], real[row, column] = reach.indices, True
+    index[row, column], real[row, column] = reach.indices[taken], True
     return Rings(index, real)
 
 

@@ -63,9 +63,10 @@ class Options(BaseOptions):
     coarse_iterations : int
         Iterations on the coarsest grid.
     coarse_size : int
-        Largest side of the coarsest grid.
+        Largest side of the coarsest grid; a grid that small is halved once.
     between_iterations : int
-        Iterations on each grid between the coarsest and the design's own.
+        Iterations on each grid between the coarsest and the design's own, in normal
+        offsets; free vertices take `iterations`, halved from grid to grid.
     developable_below : float
         A design whose mean |K| is below this is developable already and comes back
         untouched.
@@ -78,10 +79,11 @@ class Options(BaseOptions):
             "w_curvature": 1.8e-3,
             "w_fairness": 1.3e-5,
         },
-        "balanced": {"iterations": 8, "coarse_iterations": 12},
+        "balanced": {},
         "accurate": {"iterations": 25, "coarse_iterations": 15, "variables": "free"},
     }
 
+    iterations: int = 8
     w_curvature: float = 1.3e-3
     w_fairness: float = 1e-5
     w_proximity: float = 1.0
@@ -91,7 +93,7 @@ class Options(BaseOptions):
     variables: str = "normal"
     coarse_iterations: int = 12
     coarse_size: int = 32
-    between_iterations: int = 3
+    between_iterations: int = 6
     developable_below: float = 1e-3
 
     def __post_init__(self) -> None:
@@ -128,11 +130,10 @@ def plan(request: Request) -> Plan:
         request = replace(request, max_deviation=reach)
         notes.append("the design is developable but for noise: it moves no further than that")
     make = partial(_objective, request, curved, _bending(mesh), smooth)
-    stages = _stages(request, mesh, make)
     climb = request.start is None and request.constraints.empty and mesh.grid_index is not None
     levels = coarser(mesh, options.coarse_size) if climb else []
-    coarse = [_coarse_stage(request, level, make, first=level is levels[0]) for level in levels]
-    stages = coarse + stages
+    stages = [_coarse_stage(request, level, make, k) for k, level in enumerate(levels)]
+    stages += _stages(request, mesh, make, len(levels))
     for below, above, stage in zip(levels, [*levels[1:], mesh], stages[1:], strict=False):
         stage.enter = partial(_carry, below, above, _reach(request))
     begin = levels[0].vertices if levels else _inside(start, mesh, _reach(request))
@@ -231,7 +232,7 @@ def _unknowns(kind: str, mesh: Mesh, request: Request, coordinates: Array) -> Va
     return variables
 
 
-def _stages(request: Request, mesh: Mesh, make: Any) -> list[Stage]:
+def _stages(request: Request, mesh: Mesh, make: Any, coarser_grids: int) -> list[Stage]:
     """Stages on the design's own vertices."""
     o = request.options
     items = make(mesh)
@@ -257,19 +258,39 @@ def _stages(request: Request, mesh: Mesh, make: Any) -> list[Stage]:
     if cold or not request.constraints.empty:
         first = stage("free" if not request.constraints.empty else "normal", 15, falling)
         return [first, stage(o.variables, o.iterations, (o.eps,))]
-    return [stage(o.variables, o.iterations, falling)]
+    small = max(mesh.grid_shape or (0,)) <= o.coarse_size
+    return [stage(o.variables, _iterations(o, coarser_grids, small=small), falling)]
 
 
-def _coarse_stage(request: Request, level: Mesh, make: Any, *, first: bool) -> Stage:
-    """Free vertices on a coarse grid: from far away on the first, to refine on the others."""
+def _iterations(options: Options, coarser_grids: int, *, small: bool = False) -> int:
+    """Iterations on a grid with so many coarser ones before it.
+
+    A small grid costs little, and the one before it was very coarse: it takes two more.
+    Free vertices are costly on very fine grids: from the third refinement on, each takes
+    half the iterations of the one before.
+    """
+    if options.variables == "normal":
+        return options.iterations + (2 if small else 0)
+    return max(options.iterations >> max(coarser_grids - 2, 0), min(options.iterations, 5))
+
+
+def _coarse_stage(request: Request, level: Mesh, make: Any, number: int) -> Stage:
+    """A coarse grid: free vertices on the first; the last stage's unknowns on the others."""
     o = request.options
-    bounded = request.max_deviation is not None
+    first = number == 0
+    if o.variables == "normal":
+        between = o.between_iterations
+    else:
+        between = _iterations(o, number)
+    kind = "free" if first else o.variables
+    if request.max_deviation is not None:
+        kind = "normal"
     return Stage(
         "x".join(map(str, level.grid_shape or ())),
         _layout(level),
         make(level),
-        partial(_unknowns, "free" if first and not bounded else "normal", level, request),
-        iterations=o.coarse_iterations if first else o.between_iterations,
+        partial(_unknowns, kind, level, request),
+        iterations=o.coarse_iterations if first else between,
         tolerance=1e-3,
         eps=(10.0 * o.eps, 3.0 * o.eps, o.eps) if first else (o.eps,),
         robust="curvature",

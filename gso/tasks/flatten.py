@@ -8,7 +8,7 @@ triangle over. Grids are solved coarse to fine.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
@@ -20,9 +20,9 @@ from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.resample import coarser, resample
 from gso.status import OptionError
-from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.base import Plan, Request, Stage, same
 from gso.tasks.options import Options as BaseOptions
-from gso.terms import Weighted, fairness, isometry, stretch
+from gso.terms import Weighted, collapse, fairness, isometry, stretch
 from gso.terms.losses import Absolute, Loss, Squared
 from gso.topology import corner_triangles
 from gso.variables import Layout, Variables, free
@@ -35,6 +35,9 @@ FORMULATIONS = ("strain", "lengths")
 #: Strain below which a surface counts as developable: nothing is gained by telling
 #: smaller strains apart.
 _SMALLEST_LEVEL = 1e-7
+_W = 3e-3
+#: Relative fall of the energy at which a stage that only prepares another one stops.
+_NEARLY = 1e-2
 #: Root-mean-square strain above which the user is told to cut the surface.
 _FAR_FROM_FLAT = 0.15
 
@@ -65,17 +68,17 @@ class Options(BaseOptions):
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
         "fast": {"iterations": 1, "tolerance": 1e-3},
-        "balanced": {"iterations": 8},
+        "balanced": {},
         "accurate": {"iterations": 60, "tolerance": 1e-8},
     }
 
-    iterations: int = 8
-    tolerance: float = 1e-3
+    iterations: int = 40
+    tolerance: float = 5e-3
     norm: str = "mixed"
     w_fairness: float | None = None
-    eps: float = 1e-3
-    coarse_size: int = 20
-    relax_iterations: int = 30
+    eps: float = 3e-4
+    coarse_size: int = 40
+    relax_iterations: int = 100
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -166,7 +169,7 @@ def _start(mesh: Mesh, parts: list[Ints], options: Options) -> flat_start.Relaxe
                 local[carrying[local[carrying[:, 0]] >= 0]],
             )
     return flat_start.relax(
-        mesh.vertices, carrying, flat, iterations=options.relax_iterations, tolerance=1e-2
+        mesh.vertices, carrying, flat, iterations=options.relax_iterations, tolerance=1e-3
     )
 
 
@@ -183,63 +186,71 @@ def _given(request: Request, notes: list[str]) -> Array | None:
 
 
 def _stages(request: Request, levels: list[Mesh], level: float, *, warm: bool) -> list[Stage]:
-    options, last = request.options, len(levels) - 1
-    stages = [
-        _strain_stage(
-            options,
-            mesh,
-            _cost("mixed" if options.norm == "l1" else options.norm, level, options),
-            iterations=10 if n == 0 else (options.iterations if n == last else 3),
-        )
-        for n, mesh in enumerate(levels)
-    ]
-    for below, above, stage in zip(levels, levels[1:], stages[1:], strict=False):
+    """Coarse to fine; the last stage is on the mesh itself."""
+    options = request.options
+    strain = [_strain_stage(options, m, level, first=m is levels[0]) for m in levels]
+    for below, above, stage in zip(levels, levels[1:], strain[1:], strict=False):
         stage.enter = partial(_refined, below, above)
+    last = strain[-1]
     if request.formulation == "lengths":
-        lengths = _length_stage(options, levels[-1])
-        return [lengths] if warm else [*stages, lengths]
-    return stages
+        # The lengths need an image that is nearly right, not one that is exact.
+        last.tolerance = _NEARLY
+        last = _length_stage(options, levels[-1])
+        strain.append(last)
+    elif options.norm == "l1":
+        last.tolerance = _NEARLY
+        last = replace(last, items=_strain_items(options, levels[-1], level, "l1"), enter=same)
+        strain.append(last)
+    last.iterations, last.tolerance = options.iterations, options.tolerance
+    return [last] if warm else strain
 
 
-def _strain_stage(options: Options, mesh: Mesh, loss: Loss, *, iterations: int) -> Stage:
-    items = [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
-    return _stage("strain", options, mesh, items, options.w_fairness or 0.0, iterations)
+def _strain_stage(options: Options, mesh: Mesh, level: float, *, first: bool) -> Stage:
+    norm = "mixed" if options.norm == "l1" else options.norm
+    items = _strain_items(options, mesh, level, norm)
+    return _stage("strain", mesh, items, iterations=12 if first else 6, tolerance=_NEARLY)
 
 
-def _cost(norm: str, level: float, options: Options) -> Loss:
-    if norm == "l2":
-        return Squared()
+def _strain_items(options: Options, mesh: Mesh, level: float, norm: str) -> list[Weighted]:
+    loss: Loss = Squared()
     if norm == "l1":
-        return stretch.Spread(level, p=1.0, peak=0.0, eps=options.eps)
-    return stretch.Spread(level)
+        loss = stretch.Spread(level, p=1.0, peak=0.0, eps=options.eps)
+    elif norm == "mixed":
+        loss = stretch.Spread(level)
+    return [Weighted(t, 1.0, loss) for t in stretch.build(mesh)] + _smooth(
+        mesh, options.w_fairness or 0.0
+    )
 
 
 def _length_stage(options: Options, mesh: Mesh) -> Stage:
     terms = isometry.build(mesh)
-    weight = 1e-6 if options.w_fairness is None else options.w_fairness
-    return _stage(
-        "lengths",
-        options,
-        mesh,
-        [Weighted(t, 1.0) for t in terms],
-        weight,
-        options.iterations,
-    )
+    smooth = _smooth(mesh, 1e-6 if options.w_fairness is None else options.w_fairness)
+    smooth += [Weighted(t, _W) for t in collapse.build(mesh)]
+    if options.norm == "l2":
+        return _stage("lengths", mesh, [*(Weighted(t, 1.0) for t in terms), *smooth])
+    size = isometry.typical_length(mesh)
+    eps = options.eps * size
+    items = [Weighted(t, size, Absolute(eps)) for t in terms]
+    stage = _stage("lengths", mesh, [*items, *smooth])
+    stage.eps, stage.robust = (10.0 * eps, eps), "isometry"
+    return stage
+
+
+def _smooth(mesh: Mesh, weight: float) -> list[Weighted]:
+    return [Weighted(fairness.build(mesh, block="flat"), weight)] if weight > 0 else []
 
 
 def _stage(
-    name: str, options: Options, mesh: Mesh, items: list[Weighted], weight: float, iterations: int
+    name: str, mesh: Mesh, items: list[Weighted], *, iterations: int = 0, tolerance: float = 0.0
 ) -> Stage:
     layout = _layout(mesh)
-    if weight > 0:
-        items.append(Weighted(fairness.build(mesh, block="flat"), weight))
     return Stage(
         name,
         layout,
         items,
         partial(_unknowns, layout),
         iterations=iterations,
-        tolerance=options.tolerance,
+        tolerance=tolerance,
         limits=[limits.orientation(_upward(mesh), layout)],
     )
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from gso import geometry
+from gso import geometry, topology
 from gso.mesh import Mesh
-from gso.terms.base import Array, Term
+from gso.terms.base import Array, Ints, Term
 
 #: Turning or moving the flat image changes no length.
 INVARIANT = ("translation", "rotation")
@@ -39,26 +39,44 @@ def _vectors(points: Sequence[tuple[Any, ...]]) -> list[Any]:
     return [geometry.sub(points[k - 1], points[k]) for k in range(3)]
 
 
+def typical_length(mesh: Mesh) -> float:
+    """Root mean square of the lengths that are compared: diagonals, sides of triangles."""
+    quads, triangles = topology.by_size(mesh.faces)
+    ends = [quads[:, c] for c in ((0, 2), (1, 3))]
+    ends += [triangles[:, c] for c in ((0, 1), (1, 2), (2, 0))]
+    a, b = (mesh.vertices[k] for k in np.concatenate(ends).T)
+    return float(np.sqrt(((a - b) ** 2).sum(axis=1).mean()))
+
+
 def build(mesh: Mesh) -> list[Term]:
     """Isometry defect of every cell of a mesh.
 
-    Weights are one over the number of cells and their mean squared diagonal (twice the
-    mean squared side of triangles), so that the energy of a given strain is the same at
-    every resolution.
+    Weights are one over the number of cells and :func:`typical_length` squared, so that the
+    energy of a given strain is the same at every resolution.
     """
-    faces = mesh.faces
-    quad = faces[:, 3] >= 0 if faces.shape[1] == 4 else np.zeros(len(faces), bool)
-    groups = [f for f in (faces[quad], faces[~quad, :3]) if len(f)]
-    constants = [_rest(mesh.vertices[f]) for f in groups]
-    square = sum(float((c[:2] ** 2).mean(axis=0).sum()) * _PER[len(c)] for c in constants)
+    weight = 1.0 / (len(mesh.faces) * typical_length(mesh) ** 2)
     return [
         Term(
             "isometry",
             residual,
             (("flat", f),),
-            weights=np.full(len(f), 1.0 / square),
-            constants=c,
+            weights=np.full(len(f), weight),
+            constants=_rest(mesh.vertices, f),
             vectors=vectors,
         )
-        for f, c in zip(groups, constants, strict=True)
+        for f in topology.by_size(mesh.faces)
+        if len(f)
     ]
+
+
+def _rest(vertices: Array, faces: Ints) -> Array:
+    points = [tuple(vertices[faces[:, k]].T) for k in range(faces.shape[1])]
+    rows = [geometry.norm(v) for v in _vectors(points)]
+    if len(points) == 4:
+        rows.append(geometry.dot(*geometry.diagonals(*points)))
+    return np.stack(rows)
+
+
+def examples(mesh: Mesh) -> list[Term]:
+    """Terms for the conformance tests."""
+    return build(mesh)

@@ -21,7 +21,8 @@ _ROOT2 = 2.0**0.5
 _FLAT_CORNER = 1e-6
 
 
-def _corners(size: int) -> tuple[tuple[int, int, int], ...]:
+def corners_of(size: int) -> tuple[tuple[int, int, int], ...]:
+    """Corner triangles (corner, next, previous) of a face with 3 or 4 corners."""
     return _CORNERS if size == 4 else ((0, 1, 2),)
 
 
@@ -30,7 +31,7 @@ def _maps(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> list[A
         geometry.turn_and_shear(
             *(points[k] for k in corner), tuple(constants[3 * n : 3 * n + 3])
         )
-        for n, corner in enumerate(_corners(len(points)))
+        for n, corner in enumerate(corners_of(len(points)))
     ]
 
 
@@ -75,9 +76,9 @@ class Spread:
     """
 
     level: float
-    p: float = 1.6
+    p: float = 1.2
     q: float = 4.0
-    peak: float = 0.1
+    peak: float = 0.16
     eps: float = 0.1
 
     def _squares(self, r: Array) -> tuple[Array, Array]:
@@ -110,11 +111,7 @@ def pieces(mesh: Mesh) -> list[Ints]:
     A quad with a corner of no area or one that points inwards is split there into two
     triangles; triangles without area are left out.
     """
-    faces = mesh.faces
-    if faces.shape[1] == 3:
-        quads, triangles = faces[:0], faces
-    else:
-        quads, triangles = faces[faces[:, 3] >= 0], faces[faces[:, 3] < 0, :3]
+    quads, triangles = topology.by_size(mesh.faces)
     if len(quads):
         share = corner_shares(mesh.vertices, quads)
         worst = share.argmin(axis=0)
@@ -147,7 +144,7 @@ def rest_constants(vertices: Array, faces: Ints) -> Array:
     """Rest frames of the corner triangles of faces, (12 or 3, e)."""
     points = [tuple(np.ascontiguousarray(vertices[faces[:, k]].T)) for k in range(faces.shape[1])]
     rows = [
-        geometry.rest_frame(*(points[k] for k in corner)) for corner in _corners(faces.shape[1])
+        geometry.rest_frame(*(points[k] for k in corner)) for corner in corners_of(faces.shape[1])
     ]
     return np.stack([x for frame in rows for x in frame])
 
@@ -159,7 +156,7 @@ def build(mesh: Mesh) -> list[Term]:
     as-rigid-as-possible energy of Liu et al. 2008 with equal weights.
     """
     groups = pieces(mesh)
-    count = sum(len(_corners(f.shape[1])) * len(f) for f in groups)
+    count = sum(len(corners_of(f.shape[1])) * len(f) for f in groups)
     return [
         Term(
             "strain",

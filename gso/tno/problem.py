@@ -313,21 +313,47 @@ def _assemble(n: int, columns: list[Ints], quadratic) -> _Assembly:
     return assembly
 
 
-def _analyse(n: int, columns: list[Ints], quadratic) -> _Assembly:
-    keys = []
+def _analyse(n: int, columns: list[Ints], quadratic: Any) -> _Assembly:
+    """Work out where every product of two unknowns of an element goes."""
+    lows, highs = [], []
     for c in columns:
-        q = c.shape[0]
-        a, b = np.triu_indices(q)
-        low, high = np.minimum(c[a], c[b]), np.maximum(c[a], c[b])
-        keys.append(np.where(high < n, low * np.int64(n) + high, np.int64(n) * n).ravel())
-    fixed = np.repeat(np.arange(n), np.diff(quadratic.indptr)) * np.int64(n) + quadratic.indices
-    diagonal = np.arange(n) * np.int64(n + 1)
-    every = np.unique(np.concatenate([*(np.unique(k) for k in keys), fixed, diagonal]))
-    every = every[every < np.int64(n) * n]
-    indptr = np.searchsorted(every, np.arange(n + 1) * np.int64(n))
-    return _Assembly(
-        Pattern(n, indptr, every % n),
-        [np.searchsorted(every, k) for k in keys],
-        np.searchsorted(every, fixed),
-        np.searchsorted(every, diagonal),
-    )
+        a, b = np.triu_indices(c.shape[0])
+        low, high = np.minimum(c[a], c[b]).ravel(), np.maximum(c[a], c[b]).ravel()
+        # Padding (index n) is written to an entry past the end.
+        lows.append(np.where(high < n, low, n))
+        highs.append(np.where(high < n, high, n))
+    lows.append(np.repeat(np.arange(n), np.diff(quadratic.indptr)))
+    highs.append(quadratic.indices.astype(np.int64))
+    lows.append(np.arange(n))
+    highs.append(np.arange(n))
+    splits = np.cumsum([len(x) for x in lows])[:-1]
+    place, column, row = _places(np.concatenate(lows), np.concatenate(highs), n)
+    keep = column < n
+    indptr = np.searchsorted(column[keep], np.arange(n + 1))
+    *scatter, fixed, diagonal = np.split(place, splits)
+    return _Assembly(Pattern(n, indptr, row[keep]), scatter, fixed, diagonal)
+
+
+#: Largest table of columns times diagonals that is worked out without sorting.
+_LARGEST_TABLE = 200_000_000
+
+
+def _places(column: Ints, row: Ints, n: int) -> tuple[Ints, Ints, Ints]:
+    """Rank of every (column, row) among the distinct ones, and those, by column then row.
+
+    Where the matrix has few diagonals (grids), by marking them in a table; else by sorting.
+    """
+    distance = row - column
+    used = np.bincount(distance) > 0
+    count = int(used.sum())
+    if (n + 1) * count > _LARGEST_TABLE:
+        every, place = np.unique(column * np.int64(n + 1) + row, return_inverse=True)
+        return place, every // (n + 1), every % (n + 1)
+    slot = np.cumsum(used) - 1
+    at = column * count + slot[distance]
+    mark = np.zeros((n + 1) * count, bool)
+    mark[at] = True
+    found = np.flatnonzero(mark)
+    rank = np.cumsum(mark, dtype=np.int32)
+    columns = found // count
+    return rank[at].astype(np.int64) - 1, columns, columns + np.flatnonzero(used)[found % count]

@@ -1,0 +1,50 @@
+"""Draw the pictures of the documentation: ``python docs/pictures.py`` from the repository's root.
+
+They are those of ``gso optimize --plot``, reduced to a palette of 256 colours, a third of
+the size.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+import gso
+from gso.plot import plot_result
+
+ROOT = Path(__file__).resolve().parents[1]
+IMAGES = ROOT / "docs" / "images"
+
+
+def main() -> None:
+    """Draw every picture."""
+    panel = gso.load(ROOT / "examples" / "panel.obj")
+    developable = gso.tno.optimize(panel)
+    draw("developable", developable)
+    draw("flatten", gso.tno.optimize(developable.mesh, task="flatten"))
+    noise = np.random.default_rng(0).standard_normal(panel.vertices.shape)
+    noisy = panel.replaced(panel.vertices + 0.005 * panel.frame.scale * noise)
+    draw("denoise", gso.tno.optimize(noisy, task="denoise"))
+
+
+def draw(name: str, result: gso.Result) -> None:
+    """Write the picture of a result."""
+    figure = plot_result(result)
+    figure.set_dpi(100)
+    figure.canvas.draw()
+    pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]  # type: ignore[attr-defined]
+    image = Image.fromarray(np.ascontiguousarray(pixels))
+    palette = image.quantize(256, kmeans=3)
+    IMAGES.mkdir(exist_ok=True)
+    reduced = image.quantize(256, palette=palette)
+    white = reduced.getpixel((0, 0))
+    colours = reduced.getpalette()
+    colours[3 * white : 3 * white + 3] = [255, 255, 255]
+    reduced.putpalette(colours)
+    reduced.save(IMAGES / f"{name}.png", optimize=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,103 @@
+"""Write the tables of README.rst: ``python docs/tables.py`` from the repository's root.
+
+They are made from the docstrings and values in the code. Each stands between the comments
+``.. begin NAME`` and ``.. end NAME``; what is between them is replaced.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+from gso import Options, metrics, tasks
+
+README = Path(__file__).resolve().parents[1] / "README.rst"
+
+
+def tables() -> dict[str, str]:
+    """Every table by name."""
+    found = {"metrics": metric_table(), "options": option_table(Options, shared={})}
+    shared = {f.name: f.default for f in fields(Options)}
+    for task in tasks.names():
+        found[f"options-{task}"] = option_table(tasks.get(task).Options, shared=shared)
+    return found
+
+
+def metric_table() -> str:
+    """Metrics, their units, which way is better, and what they mean."""
+    better = {True: "lower", False: "higher"}
+    rows = [
+        (f"``{name}``", info.unit or "1", better[info.lower_is_better], prose(info.text))
+        for name, info in metrics.INFO.items()
+    ]
+    return list_table(("Metric", "Unit", "Better", "Meaning"), rows, (22, 12, 10, 56))
+
+
+def option_table(options: type[Options], shared: Mapping[str, object]) -> str:
+    """Settings of a task, their defaults, and what they mean; presets that change them."""
+    said = descriptions(options)
+    rows = []
+    for f in fields(options):
+        if f.default is MISSING or shared.get(f.name, MISSING) == f.default:
+            continue
+        rows.append((f"``{f.name}``", f"``{f.default!r}``".replace("'", '"'), prose(said[f.name])))
+    parts = [list_table(("Setting", "Default", "Meaning"), rows, (22, 14, 64))]
+    presets = []
+    for name, changes in options.PRESETS.items():
+        values = ", ".join(f"``{k}={v!r}``".replace("'", '"') for k, v in changes.items())
+        presets.append(f"``{name}``: {values or 'the defaults'}")
+    if presets:
+        parts.append("Presets: " + "; ".join(presets) + ".")
+    return "\n\n".join(parts)
+
+
+def descriptions(options: type) -> dict[str, str]:
+    """Texts of the attributes in the docstrings of a class and its bases."""
+    found: dict[str, str] = {}
+    for cls in reversed(options.__mro__):
+        text = inspect.getdoc(cls) if cls.__dict__.get("__doc__") else None
+        if not text or "Attributes\n---" not in text:
+            continue
+        section = text.split("Attributes\n----------\n")[1]
+        for match in re.finditer(r"^(\w[\w, ]*) : .*\n((?: +.*\n?|\n)+)", section + "\n", re.M):
+            for name in match[1].split(", "):
+                found[name] = " ".join(match[2].split())
+    return found
+
+
+def prose(text: str) -> str:
+    """Text of a docstring for a README: bars are no substitutions, names are literals."""
+    literal = re.sub(r"(?<!`)`([^`]+)`(?!`)", r"``\1``", text)
+    return "".join(
+        part if part.startswith("``") else part.replace("|", r"\|")
+        for part in re.split(r"(``[^`]+``)", literal)
+    )
+
+
+def list_table(head: Iterable[str], rows: Iterable[Iterable[str]], widths: Iterable[int]) -> str:
+    """Return a table in reStructuredText."""
+    width = " ".join(map(str, widths))
+    lines = [".. list-table::", "   :header-rows: 1", f"   :widths: {width}", ""]
+    for row in (tuple(head), *rows):
+        for k, cell in enumerate(row):
+            lines.append(f"   {'* -' if k == 0 else '  -'} {cell}")
+    return "\n".join(lines)
+
+
+def replaced(text: str) -> str:
+    """The README's text with the tables as they should be."""
+    for name, table in tables().items():
+        pattern = rf"(\.\. begin {name}\n).*?(\.\. end {name}\n)"
+        text, count = re.subn(
+            pattern, lambda m, t=table: f"{m[1]}\n{t}\n\n{m[2]}", text, flags=re.S
+        )
+        if count != 1:
+            raise SystemExit(f"README.rst: {count} places for the table {name!r}, expected one")
+    return text
+
+
+if __name__ == "__main__":
+    README.write_text(replaced(README.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,0 +1,482 @@
+"""The command line: what it writes, what it says, how it ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import gso
+from gso.cli import main, optimize, progress, report
+
+PANEL = Path(__file__).resolve().parents[1] / "examples" / "panel.obj"
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    """Run a command in an empty folder; whatever goes wrong must be said in one line."""
+    monkeypatch.chdir(tmp_path)
+
+    def invoke(*arguments):
+        done = CliRunner().invoke(main, [str(a) for a in arguments], prog_name="gso")
+        assert done.exception is None or isinstance(done.exception, SystemExit), done.exc_info
+        return done
+
+    return invoke
+
+
+def refused(done, *words):
+    """Assert an error of one line with these words, and nothing else."""
+    assert done.exit_code == 1
+    lines = done.stderr.splitlines()
+    assert len(lines) == 1
+    assert lines[0].startswith("gso: error: ")
+    for word in words:
+        assert word in lines[0]
+    return True
+
+
+def bump(size=9, height=0.3):
+    y, x = np.mgrid[:size, :size] / (size - 1)
+    return np.stack([x, y, height * np.sin(np.pi * x) * np.sin(np.pi * y)], axis=-1)
+
+
+@pytest.fixture
+def small(tmp_path):
+    """A small surface in a file."""
+    path = tmp_path / "small.obj"
+    gso.save(bump(), path)
+    return path
+
+
+@pytest.fixture
+def never(monkeypatch):
+    """Fail when a solve begins."""
+
+    def begin(*args, **keywords):
+        raise AssertionError("the solve began")
+
+    monkeypatch.setattr("gso.tno.optimize", begin)
+    monkeypatch.setattr("gso.tno.optimize_many", begin)
+
+
+def test_optimises_one_file(run):
+    done = run("optimize", PANEL, "-o", "out.obj", "--metrics", "out.json")
+    assert done.exit_code == 0
+    result, design = gso.load("out.obj"), gso.load(PANEL)
+    assert np.array_equal(result.faces, design.faces)
+    record = json.loads(Path("out.json").read_text())
+    assert record["usable"] is True
+    assert record["metrics"]["loss_gc"] < 0.2 * record["metrics"]["loss_gc_before"]
+    size = gso.metrics.unit(design)
+    assert np.isclose(gso.metrics.loss_gc(result, scale=size), record["metrics"]["loss_gc"])
+    for name in record["metrics"]:
+        assert name in done.stdout
+    assert record["message"] in done.stdout
+    assert "1/size^2" in done.stdout
+    assert done.stderr == ""
+
+
+def test_quiet_says_nothing(run, small):
+    done = run("optimize", small, "-o", "out.obj", "-q")
+    assert (done.exit_code, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_notes_are_printed(run):
+    grid = bump()
+    grid[0] = grid[0, 0]
+    np.save("pole.npy", grid)
+    done = run("optimize", "pole.npy", "-o", "out.obj")
+    assert "note: the first row of the grid is one point" in done.stdout
+
+
+def test_full_result_is_read_back(run, small):
+    assert run("optimize", small, "-o", "out.npz").exit_code == 0
+    result = gso.Result.load("out.npz")
+    assert result.task == "developable"
+    assert result.metrics["loss_gc"] < result.metrics["loss_gc_before"]
+    assert np.allclose(result.design.vertices, gso.load(small).vertices)
+
+
+def test_options_reach_the_solver(run, small, monkeypatch):
+    seen = {}
+
+    def solve(mesh, **keywords):
+        seen.update(keywords)
+        raise gso.GSOError("enough")
+
+    monkeypatch.setattr("gso.tno.optimize", solve)
+    done = run(
+        *("optimize", small, "-o", "out.obj", "--options", "accurate", "--backend", "superlu"),
+        *("--max-deviation", 0.1, "--fix-boundary"),
+    )
+    assert refused(done, "enough")
+    preset = gso.DevelopableOptions.preset("accurate")
+    assert seen["options"].iterations == preset.iterations
+    assert seen["options"].backend == "superlu"
+    assert seen["max_deviation"] == 0.1
+    assert isinstance(seen["constraints"][0], gso.FixedBoundary)
+
+
+def test_boundary_is_kept(run, small):
+    assert run("optimize", small, "-o", "out.npz", "--fix-boundary").exit_code == 0
+    before, after = gso.load(small), gso.load("out.npz")
+    rim = before.half_edges.boundary_vertex
+    assert np.allclose(before.vertices[rim], after.vertices[rim])
+    assert not np.allclose(before.vertices[~rim], after.vertices[~rim])
+
+
+def test_missed_target_is_no_success(run, small):
+    done = run("optimize", small, "-o", "out.obj", "--target-curvature", 1e-12)
+    assert done.exit_code == 1
+    assert "not usable" in done.stdout
+    assert done.stderr == ""
+    assert os.path.exists("out.obj")
+    done = run("optimize", small, "-o", "out/", "--target-curvature", 1e-12, "--workers", 0)
+    assert done.exit_code == 1
+    assert "not usable" in done.stdout
+    assert done.stderr == ""
+
+
+def test_flattens_to_a_drawing(run, small):
+    done = run("optimize", small, "-o", "out.svg", "--task", "flatten", "--unit", "cm")
+    assert done.exit_code == 0
+    assert "strain_max" in done.stdout
+    text = Path("out.svg").read_text()
+    width = float(text.split('width="')[1].split("mm")[0])
+    assert 10.0 < width < 15.0  # a bump of one unit, in centimetres
+
+
+def test_turned_cells_are_no_success(run, small, monkeypatch):
+    from gso.tno import optimize as solve
+
+    def fold(mesh, **keywords):
+        result = solve(mesh, **keywords)
+        result.__dict__["metrics"] = {**result.metrics, "flipped_cells": 3}
+        return result
+
+    monkeypatch.setattr("gso.tno.optimize", fold)
+    assert run("optimize", small, "-o", "out.obj", "--task", "flatten").exit_code == 1
+
+
+def test_denoises(run):
+    rng = np.random.default_rng(0)
+    np.save("noisy.npy", bump(17) + 0.003 * rng.standard_normal((17, 17, 3)))
+    done = run("optimize", "noisy.npy", "-o", "out.npy", "--task", "denoise", "--metrics", "m.json")
+    assert done.exit_code == 0
+    assert json.loads(Path("m.json").read_text())["metrics"]["roughness_ratio"] < 0.5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["-o", "no/such/out.obj"], ["no/such", "create it"]),
+        (["-o", "out.doc"], [".doc", ".obj"]),
+        (["-o", "out.svg"], ["--task flatten"]),
+        (["-o", "out.obj", "--plot", "out.jpg"], [".jpg", ".png"]),
+        (["-o", "out.obj", "--metrics", "no/such/out.json"], ["no/such"]),
+        (["-o", "out.obj", "--backend", "abacus"], ["abacus", "superlu"]),
+        (["-o", "out.obj", "--formulation", "magic"], ["magic", "curvature"]),
+        (["-o", "out.obj", "--suffix", ".ply"], ["--suffix"]),
+        (["-o", "out.obj", "--task", "flatten", "--max-deviation", "1"], ["--max-deviation"]),
+        (["-o", "out.obj", "--task", "denoise", "--target-curvature", "1"], ["--target-curv"]),
+    ],
+)
+def test_mistakes_are_found_before_the_solve(run, small, never, arguments, words):
+    assert refused(run("optimize", small, *arguments), *words)
+
+
+def test_grid_format_needs_a_grid(run, never):
+    gso.save(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), "tri.obj")
+    assert refused(run("optimize", "tri.obj", "-o", "out.npy"), "no grid")
+
+
+def test_plot_without_matplotlib_is_found_before_the_solve(run, small, never, monkeypatch):
+    monkeypatch.setattr("gso.plot.find_spec", lambda name: None)
+    done = run("optimize", small, "-o", "out.obj", "--plot", "out.png")
+    assert refused(done, 'pip install "gso[plot]"')
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, ["in.obj", "no such file"]),
+        ("", ["in.obj", "empty"]),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", ["in.obj", "vertex 9"]),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", ["interior vertex"]),
+        ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", ["in.obj"]),
+    ],
+)
+def test_bad_input_keeps_the_old_output(run, content, words):
+    if content is not None:
+        Path("in.obj").write_text(content)
+    Path("out.obj").write_text("precious")
+    assert refused(run("optimize", "in.obj", "-o", "out.obj"), *words)
+    assert Path("out.obj").read_text() == "precious"
+
+
+def test_negative_deviation_is_refused(run, small):
+    assert refused(run("optimize", small, "-o", "o.obj", "--max-deviation", -1), "positive")
+
+
+def test_usage_errors_are_clicks(run, small):
+    assert run("optimize", small).exit_code == 2
+    assert run("optimize", small, "-o", "o.obj", "--task", "cook").exit_code == 2
+
+
+def test_interrupted_run_leaves_nothing(run, small, monkeypatch):
+    def stop(*args, **keywords):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gso.tno.optimize", stop)
+    done = run("optimize", small, "-o", "out.obj", "--metrics", "out.json")
+    assert done.exit_code == 130
+    assert os.listdir() == ["small.obj"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_ctrl_c(tmp_path):
+    pipe = tmp_path / "in.obj"
+    os.mkfifo(pipe)
+    command = [sys.executable, "-m", "gso.cli", "optimize", pipe, "-o", tmp_path / "out.obj"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    with open(pipe, "w") as writer:  # opens when the other side reads
+        writer.write("v 0 0 0\n")
+        writer.flush()
+        process.send_signal(signal.SIGINT)
+        error = process.communicate(timeout=30)[1]
+    assert process.returncode == 130
+    assert error == "gso: interrupted\n"
+    assert os.listdir(tmp_path) == ["in.obj"]
+
+
+def test_many_files(run, small):
+    gso.save(bump(11), "other.ply")
+    Path("broken.obj").write_text("f 1 2 3\n")
+    done = run(
+        *("optimize", small, "broken.obj", "other.ply", "gone.obj", "-o", "out"),
+        *("--workers", 0, "--metrics", "all.json", "--plot", "pictures"),
+    )
+    assert done.exit_code == 1
+    assert sorted(os.listdir("out")) == ["other.ply", "small.obj"]
+    assert sorted(os.listdir("pictures")) == ["other.png", "small.png"]
+    lines = done.stdout.splitlines()
+    assert len(lines) == 3
+    assert lines[-1] == "2 of 4 results usable"
+    errors = done.stderr.splitlines()
+    assert [line.split(":")[2].strip() for line in errors] == ["broken.obj", "gone.obj"]
+    records = json.loads(Path("all.json").read_text())
+    assert [r["usable"] for r in records] == [True, False, True, False]
+    assert "error" in records[1]
+
+
+def test_many_files_in_processes(run, small):
+    gso.save(bump(11), "other.obj")
+    done = run("optimize", small, "other.obj", "gone.obj", "-o", "out", "--workers", 2)
+    assert sorted(os.listdir("out")) == ["other.obj", "small.obj"], done.stderr
+    assert done.exit_code == 1
+    assert done.stderr.splitlines() == [
+        "gso: error: gone.obj: there is no such file; check the name and the folder"
+    ]
+
+
+def test_many_files_to_another_format(run, small):
+    gso.save(bump(11), "other.ply")
+    done = run(
+        *("optimize", small, "other.ply", "-o", "out", "--suffix", "svg", "--task", "flatten"),
+        *("--workers", 0, "-q"),
+    )
+    assert (done.exit_code, done.stdout) == (0, "")
+    assert sorted(os.listdir("out")) == ["other.svg", "small.svg"]
+
+
+def test_one_file_into_a_folder(run, small):
+    assert run("optimize", small, "-o", "out/", "--workers", 0).exit_code == 0
+    assert os.listdir("out") == ["small.obj"]
+
+
+def test_outputs_that_clash_are_refused(run, small, never, tmp_path):
+    (tmp_path / "copy").mkdir()
+    (tmp_path / "copy" / "small.obj").write_bytes(small.read_bytes())
+    done = run("optimize", "small.obj", "copy/small.obj", "-o", "out")
+    assert refused(done, "small.obj and copy/small.obj")
+    gso.save(bump(), "other.obj")
+    done = run("optimize", "small.obj", "other.obj", "-o", ".")
+    assert refused(done, "would replace an input")
+    Path("file").write_text("")
+    assert refused(run("optimize", "small.obj", "other.obj", "-o", "file"), "folder")
+
+
+def test_a_result_that_cannot_be_written_is_reported(run, small, monkeypatch):
+    gso.save(bump(11), "other.obj")
+    save = gso.Result.save
+
+    def fail(self, path, **keywords):
+        if "small" in str(path):
+            raise gso.MeshError(f"{path}: the disk is full")
+        save(self, path, **keywords)
+
+    monkeypatch.setattr(gso.Result, "save", fail)
+    done = run("optimize", small, "other.obj", "-o", "out", "--workers", 0)
+    assert done.exit_code == 1
+    assert "the disk is full" in done.stderr
+    assert os.listdir("out") == ["other.obj"]
+
+
+def test_progress_is_shown_to_a_person(run, small, monkeypatch):
+    monkeypatch.setattr(progress, "watched", lambda: True)
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    assert "stage 1/" in run("optimize", small, "-o", "out.obj").stderr
+    assert "file" in run("optimize", small, "-o", "out/", "--workers", 0).stderr
+
+
+def test_short_runs_show_no_progress(run, small, monkeypatch):
+    monkeypatch.setattr(progress, "watched", lambda: True)
+    monkeypatch.setattr(progress, "PATIENCE", 1e9)
+    assert run("optimize", small, "-o", "out.obj").stderr == ""
+
+
+def test_metrics_are_those_of_the_result(run, small):
+    run("optimize", small, "-o", "out.npz", "--metrics", "out.json")
+    done = run("metrics", small, "out.npz", "--json")
+    values = json.loads(done.stdout)["metrics"]
+    for name, value in json.loads(Path("out.json").read_text())["metrics"].items():
+        assert np.isclose(values[name], value, atol=1e-12), name
+    assert "theta" in values
+    table = run("metrics", small, "out.npz").stdout
+    assert len(table.splitlines()) == len(values)
+
+
+def test_metrics_of_a_flat_pattern(run, small):
+    run("optimize", small, "-o", "out.ply", "--task", "flatten", "--metrics", "out.json")
+    done = run("metrics", small, "out.ply", "--json")
+    record = json.loads(done.stdout)
+    for name, value in json.loads(Path("out.json").read_text())["metrics"].items():
+        assert np.isclose(record["metrics"][name], value, atol=1e-12), name
+    assert "flat pattern" in record["notes"][0]
+
+
+def test_metrics_of_another_flat_mesh(run, small):
+    y, x = np.mgrid[:4.0, :4.0]
+    gso.save(np.stack([x, y, 0 * x], axis=-1), "plane.obj")
+    done = run("metrics", small, "plane.obj", "--json")
+    record = json.loads(done.stdout)
+    assert "strain_max" not in record["metrics"]
+    assert "faces" in record["notes"][0]
+
+
+def test_info(run, small):
+    gso.save(([[0, 0, 0], [1, 0, 0], [0, 2, 0], [5, 5, 5]], [[0, 1, 2]]), "tri.obj")
+    done = run("info", small, "tri.obj", "gone.obj")
+    assert done.exit_code == 1
+    assert "gone.obj: there is no such file" in done.stderr
+    first, second = done.stdout.split("\n\n")
+    facts = dict(line.strip().split("  ", 1) for line in first.splitlines()[1:] if "  " in line)
+    facts = {k: v.strip() for k, v in facts.items()}
+    assert facts["kind"] == "grid 9 x 9"
+    assert facts["vertices"] == "81"
+    assert facts["faces"] == "64"
+    assert facts["boundary loops"] == "1 (32 vertices)"
+    assert facts["bounding box"] == "1 x 1 x 0.3"
+    assert facts["loss_gc"].startswith(f"{gso.metrics.loss_gc(bump()):.4g}")
+    assert "no interior vertex" in second
+    assert "bounding box          1 x 2 x 0" in second
+    assert "1 vertices belong to no face" in second
+
+
+@pytest.mark.parametrize(
+    ("mesh", "kind"),
+    [
+        (([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]], [[0, 1, 2, 3], [1, 4, 2, -1]]),
+         "quads and triangles"),
+        (([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), "triangles"),
+    ],
+)  # fmt: skip
+def test_info_kind(run, mesh, kind):
+    gso.save(mesh, "mesh.obj")
+    assert kind in run("info", "mesh.obj").stdout
+
+
+@pytest.mark.parametrize("colour", [None, "curvature", "distance", "none"])
+def test_plot(run, small, colour):
+    gso.save(bump(height=0.2), "after.obj")
+    chosen = [] if colour is None else ["--color", colour]
+    assert run("plot", "after.obj", "-o", "a.png", "--before", small, *chosen).exit_code == 0
+    assert Path("a.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_plot_of_results(run, small):
+    for task in ("developable", "flatten"):
+        run("optimize", small, "-o", f"{task}.npz", "--task", task)
+        assert run("plot", f"{task}.npz", "-o", f"{task}.png").exit_code == 0
+        assert os.path.getsize(f"{task}.png") > 1000
+    done = run("plot", "flatten.npz", "-o", "s.png", "--before", small, "--color", "strain")
+    assert done.exit_code == 0
+    gso.save(bump(), "mesh.npz")
+    assert run("plot", "mesh.npz", "-o", "mesh.png").exit_code == 0
+
+
+def test_plot_mistakes(run, small):
+    assert refused(run("plot", small, "-o", "a.png", "--color", "distance"), "before")
+    assert refused(run("plot", small, "-o", "a.jpg"), ".jpg")
+    assert refused(run("plot", "gone.obj", "-o", "a.png"), "gone.obj")
+
+
+def test_version_and_help(run, monkeypatch):
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "1.2.3")
+    monkeypatch.delitem(gso.__dict__, "__version__", raising=False)
+    assert run("--version").stdout == "gso 1.2.3\n"
+    for command in ("optimize", "metrics", "info", "plot"):
+        assert command in run("--help").stdout
+        assert run(command, "--help").exit_code == 0
+
+
+def test_units_are_those_of_drawings():
+    from gso.io.svg import MILLIMETRES
+
+    unit = next(option for option in optimize.params if option.name == "unit")
+    assert set(unit.type.choices) == set(MILLIMETRES)
+
+
+def test_numbers_in_json():
+    assert report._number(float("nan")) is None
+    assert report._number(np.int64(3)) == 3
+    assert report._number(np.float64(0.5)) == 0.5
+
+
+def test_cold_start_is_quick(tmp_path):
+    """Processor time, which other work on the machine does not change much."""
+    resource = pytest.importorskip("resource")
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [sys.executable, "-m", "gso.cli", "optimize", PANEL, "-o", tmp_path / "out.obj", "-q"]
+    subprocess.run(command, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"})
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 2.0
+
+
+def test_help_imports_next_to_nothing():
+    code = (
+        "import sys; from gso.cli import main\n"
+        "heavy = {'numpy', 'scipy', 'casadi', 'igl', 'matplotlib', 'trimesh', 'torch', 'tqdm'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_optimising_imports_what_it_needs(tmp_path):
+    code = (
+        "import sys; from gso.cli import main\n"
+        f"main(['optimize', {str(PANEL)!r}, '-o', {str(tmp_path / 'o.obj')!r}, '-q'],"
+        " standalone_mode=False)\n"
+        "print(sorted({'matplotlib', 'trimesh', 'torch', 'tqdm'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,135 @@
+"""The README and the pages of docs/: their code runs, their tables and pictures are up to date."""
+
+from __future__ import annotations
+
+import glob
+import importlib
+import re
+import shlex
+import shutil
+import textwrap
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import gso
+from gso.cli import main
+
+ROOT = Path(__file__).resolve().parents[1]
+README = ROOT / "README.rst"
+PAGES = [README, *sorted((ROOT / "docs").glob("*.rst"))]
+
+
+def blocks(page, language):
+    """Code blocks of a language, in order."""
+    found = re.findall(
+        rf"^( *)\.\. code-block:: {language}\n\n((?:\1 +.*\n|\n)+)", page.read_text(), re.M
+    )
+    return [textwrap.dedent(body).strip() for _, body in found]
+
+
+def commands(page):
+    """Command lines after a dollar sign."""
+    lines = "\n".join(blocks(page, "console")).splitlines()
+    return [line.removeprefix("$ ") for line in lines if line.startswith("$ ")]
+
+
+@pytest.fixture
+def workshop(tmp_path, monkeypatch):
+    """A folder with the files that the README speaks of."""
+    (tmp_path / "panels").mkdir()
+    (tmp_path / "examples").mkdir()
+    panel = ROOT / "examples" / "panel.obj"
+    for target in ("examples/panel.obj", "panel.obj", "panels/a.obj"):
+        shutil.copy(panel, tmp_path / target)
+    mesh = gso.load(panel)
+    noise = np.random.default_rng(0).normal(scale=0.005, size=mesh.vertices.shape)
+    gso.save(mesh.replaced(mesh.vertices + noise), tmp_path / "scan.obj")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_python_blocks_run(page, workshop):
+    scope = {}
+    for number, code in enumerate(blocks(page, "python")):
+        exec(compile(code, f"{page.name}, block {number}", "exec"), scope)
+    if page == README:
+        assert Path("panel_developable.obj").exists()
+        assert Path("panel_pattern.svg").exists()
+        assert scope["held"].metrics["deviation_max"] <= 1.0 / scope["mesh"].diagonal * (1 + 1e-6)
+        assert scope["aimed"].metrics["loss_gc"] <= 0.02
+        assert scope["solution"].energy < 1e-5
+
+
+def test_commands_run(workshop):
+    lines = [line for line in commands(README) if line.startswith("gso ")]
+    assert len(lines) > 5
+    pytest.importorskip("matplotlib")
+    for line in lines:
+        words = shlex.split(line)[1:]
+        words = [path for word in words for path in (sorted(glob.glob(word)) or [word])]
+        done = CliRunner().invoke(main, words, prog_name="gso")
+        assert done.exit_code == 0, (line, done.output)
+        if "-o" in words and not words[words.index("-o") + 1].endswith("/"):
+            assert Path(words[words.index("-o") + 1]).stat().st_size > 0
+    assert Path("out/a.ply").exists()
+
+
+def test_every_option_of_a_command_in_the_readme_exists():
+    named = set(re.findall(r"--[a-z][a-z-]+", "\n".join(commands(README))))
+    known = {name for c in main.commands.values() for p in c.params for name in p.opts}
+    assert named <= known
+
+
+def test_commands_of_the_continuous_integration():
+    text = README.read_text()
+    for name, expected in {
+        "main-job": [
+            'pip install -c constraints.txt ".[plot]"',
+            "gso optimize examples/panel.obj -o panel_developable.obj --plot panel_developable.png",
+        ],
+        "tests": ['pip install -c constraints.txt -e ".[test]"', "pytest"],
+    }.items():
+        body = re.search(rf"\.\. ci: {name}\n\n\.\. code-block:: console\n\n((?:   .*\n)+)", text)
+        assert body is not None
+        lines = [line.strip().removeprefix("$ ") for line in body[1].splitlines()]
+        assert lines == expected
+
+
+def test_tables_are_up_to_date(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    text = README.read_text()
+    assert importlib.import_module("tables").replaced(text) == text, "run python docs/tables.py"
+
+
+def test_tables_name_every_metric_and_setting():
+    text = README.read_text()
+    for name in gso.metrics.INFO:
+        assert f"* - ``{name}``\n" in text
+    for options in (gso.DevelopableOptions, gso.FlattenOptions, gso.DenoiseOptions):
+        for name in (field.name for field in fields(options)):
+            assert f"* - ``{name}``\n" in text
+
+
+def test_formulations_are_named():
+    from gso import tasks
+
+    text = README.read_text()
+    for task in tasks.names():
+        names = ", ".join(f"``{name}``" for name in tasks.get(task).FORMULATIONS)
+        assert f"   * - ``{task}``\n     - {names}\n" in text
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_pictures_and_files_exist(page):
+    text = page.read_text()
+    for name in re.findall(r"^\.\. image:: (\S+)", text, re.M):
+        picture = page.parent / name
+        assert picture.stat().st_size < 150_000
+        assert picture.read_bytes().startswith(b"\x89PNG")
+    for name in re.findall(r"``((?:gso|docs|bench|examples)/[\w/.]+)``", text):
+        assert (ROOT / name).exists(), name
