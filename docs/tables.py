@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -50,7 +51,7 @@ def option_table(options: type[Options], shared: Mapping[str, object]) -> str:
         values = ", ".join(f"``{k}={v!r}``".replace("'", '"') for k, v in changes.items())
         presets.append(f"``{name}``: {values or 'the defaults'}")
     if presets:
-        parts.append("Presets: " + "; ".join(presets) + ".")
+        parts.append("\n".join(wrapped("Presets: " + "; ".join(presets) + ".")))
     return "\n\n".join(parts)
 
 
@@ -77,13 +78,25 @@ def prose(text: str) -> str:
     )
 
 
+def wrapped(text: str, first: str = "", then: str = "") -> list[str]:
+    """Lines of at most a hundred signs."""
+    return textwrap.wrap(
+        text,
+        100,
+        initial_indent=first,
+        subsequent_indent=then,
+        break_on_hyphens=False,
+        break_long_words=False,
+    )
+
+
 def list_table(head: Iterable[str], rows: Iterable[Iterable[str]], widths: Iterable[int]) -> str:
     """Return a table in reStructuredText."""
     width = " ".join(map(str, widths))
     lines = [".. list-table::", "   :header-rows: 1", f"   :widths: {width}", ""]
     for row in (tuple(head), *rows):
         for k, cell in enumerate(row):
-            lines.append(f"   {'* -' if k == 0 else '  -'} {cell}")
+            lines += wrapped(f"{'* -' if k == 0 else '  -'} {cell}", "   ", "       ")
     return "\n".join(lines)
 
 

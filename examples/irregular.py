@@ -58,6 +58,25 @@ def disk() -> tuple[Points, Faces]:
     return _on_teapot(*_subdivide(points, faces, corners))
 
 
+def disk_with_hole() -> tuple[Points, Faces]:
+    """Cut a hole into :func:`disk`: the faces round its middle vertex, three rings deep.
+
+    Returns
+    -------
+    vertices : ndarray, (n, 3)
+    faces : ndarray, (m, 4)
+        Anticlockwise seen from outside; two boundary loops.
+    """
+    points, faces = disk()
+    inside = np.zeros(len(points), bool)
+    inside[np.linalg.norm(points - points.mean(axis=0), axis=1).argmin()] = True
+    for _ in range(3):
+        cut = inside[faces].any(axis=1)
+        inside[faces[cut]] = True
+    used, number = np.unique(faces[~cut], return_inverse=True)
+    return points[used], number.reshape(-1, 4)
+
+
 def _strip_of_triangles(counts: tuple[int, ...], start: float, stop: float) -> tuple[Points, Faces]:
     """Triangulate rows of segments on the unit cylinder, row 0 at z = 0, the last at z = 1."""
     angles = [np.linspace(start, stop, n + 1) for n in counts]
@@ -178,7 +197,7 @@ def _on_teapot(points: Points, faces: Faces) -> tuple[Points, Faces]:
 
 
 def main() -> None:
-    """Write both meshes as OBJ quads."""
+    """Write the meshes as OBJ quads."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     default = Path(__file__).resolve().parent / "out" / "irregular"
     parser.add_argument("-o", "--out", type=Path, default=default)
@@ -186,6 +205,7 @@ def main() -> None:
     title = "Upper body of the Utah teapot (Newell 1975), irregular quads"
     write_obj(args.out / "with_hole.obj", *with_hole(), title)
     write_obj(args.out / "disk.obj", *disk(), title)
+    write_obj(args.out / "disk_with_hole.obj", *disk_with_hole(), title)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -70,7 +69,6 @@ class Result:
     warm_start: str = "cold"
     notes: tuple[str, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
-    measure: Callable[[Result], dict[str, float]] | None = field(default=None, repr=False)
 
     @property
     def converged(self) -> bool:
@@ -92,7 +90,12 @@ class Result:
     @cached_property
     def metrics(self) -> dict[str, float]:
         """Metrics of the task, computed at first access; see :data:`gso.metrics.INFO`."""
-        return {} if self.measure is None else self.measure(self)
+        from gso import metrics, tasks
+
+        module = tasks.get(self.task)
+        if self.flat is not None:
+            return module.metrics(self.design, self.flat)
+        return module.metrics(self.design, self.mesh, metrics.unit(self.design))
 
     def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
         """Write the result.

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 import gso
-from gso.cli import main, optimize, progress, report
+from gso.cli import main, progress, report
 
 PANEL = Path(__file__).resolve().parents[1] / "examples" / "panel.obj"
 
@@ -438,11 +438,16 @@ def test_version_and_help(run, monkeypatch):
         assert run(command, "--help").exit_code == 0
 
 
-def test_units_are_those_of_drawings():
+def test_choices_are_those_of_the_library():
     from gso.io.svg import MILLIMETRES
 
-    unit = next(option for option in optimize.params if option.name == "unit")
-    assert set(unit.type.choices) == set(MILLIMETRES)
+    def choices(command, name):
+        return set(next(o for o in main.commands[command].params if o.name == name).type.choices)
+
+    assert choices("optimize", "unit") == set(MILLIMETRES)
+    assert choices("plot", "colour") == set(gso.plot.COLOURS)
+    for options in (gso.DevelopableOptions, gso.FlattenOptions, gso.DenoiseOptions):
+        assert choices("optimize", "preset") <= set(options.PRESETS)
 
 
 def test_numbers_in_json():

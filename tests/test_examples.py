@@ -253,7 +253,7 @@ def test_great_court_quarter_runs_from_circle_to_side(side):
     np.testing.assert_allclose(grid[-1, :, 2], g.HEIGHT_EDGE)
 
 
-@pytest.mark.parametrize("name, loops", [("with_hole", 2), ("disk", 1)])
+@pytest.mark.parametrize("name, loops", [("with_hole", 2), ("disk", 1), ("disk_with_hole", 2)])
 def test_irregular_mesh(name, loops):
     vertices, faces = getattr(load("irregular"), name)()
     mesh = Connectivity(faces)
@@ -301,7 +301,7 @@ def test_a_cone_fits_the_irregular_mesh_within_one_percent(name):
         ("teapot", ["-n", "3"], 32),
         ("terrain", ["--step", "40"], 2),
         ("great_court", [], 5),
-        ("irregular", [], 2),
+        ("irregular", [], 3),
     ],
 )
 def test_scripts_write_their_files(name, options, files, tmp_path, monkeypatch):

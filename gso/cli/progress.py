@@ -10,7 +10,7 @@ from typing import Any
 
 from gso.status import Progress
 
-#: Seconds before a bar appears.
+#: Seconds before the bar of a single solve appears.
 PATIENCE = 1.0
 
 
@@ -31,15 +31,17 @@ def iterations() -> Iterator[Callable[[Progress], None] | None]:
     def show(progress: Progress) -> None:
         if time.monotonic() - start < PATIENCE:
             return
+        stage = f"stage {progress.stage + 1}/{progress.stages}"
         if not bars:
             from tqdm import tqdm
 
-            bars.append(tqdm(leave=False, unit="it", file=sys.stderr))
+            line = "{desc}: {percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
+            total = progress.iterations
+            bars.append(tqdm(desc=stage, total=total, bar_format=line, leave=False))
         bar = bars[0]
         bar.total, bar.n = progress.iterations, progress.iteration
-        bar.set_description(f"stage {progress.stage + 1}/{progress.stages}", refresh=False)
-        bar.set_postfix_str(f"energy {progress.energy:.4g}", refresh=False)
-        bar.refresh()
+        bar.set_description_str(stage, refresh=False)
+        bar.set_postfix_str(f"energy {progress.energy:.4g}")
 
     try:
         yield show
@@ -53,12 +55,5 @@ def files(count: int) -> Iterator[Any]:
     """A bar over files, with `update(n)` and `write(line, file=...)`."""
     from tqdm import tqdm
 
-    with tqdm(
-        total=count,
-        delay=PATIENCE,
-        disable=not watched(),
-        leave=False,
-        unit="file",
-        file=sys.stderr,
-    ) as bar:
+    with tqdm(total=count, disable=not watched(), leave=False, unit="file") as bar:
         yield bar

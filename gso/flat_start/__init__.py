@@ -1,8 +1,18 @@
 """Plane images of a surface to start from, and where the finished image is put."""
 
-from gso.flat_start.embed import embed
+from gso.flat_start.embed import embed, parts
 from gso.flat_start.grid import rectangle
 from gso.flat_start.place import beside, closest_motion, upright
-from gso.flat_start.relax import Relaxed, relax
+from gso.flat_start.relax import Relaxed, relax, strain_level
 
-__all__ = ["Relaxed", "beside", "closest_motion", "embed", "rectangle", "relax", "upright"]
+__all__ = [
+    "Relaxed",
+    "beside",
+    "closest_motion",
+    "embed",
+    "parts",
+    "rectangle",
+    "relax",
+    "strain_level",
+    "upright",
+]

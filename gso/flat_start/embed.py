@@ -5,17 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.flat_start.relax import strain_energy
+from gso.flat_start.relax import strain_level
 from gso.mesh import Mesh
 from gso.status import MeshError
-from gso.topology import corner_triangles
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
 def embed(mesh: Mesh, triangles: Ints) -> Array:
-    """Plane image (n, 2) of one component with a boundary and without handles.
+    """Plane image (n, 2) of a mesh, components over each other.
 
     Three maps are tried: least-squares conformal (Levy et al. 2002), harmonic to a circle
     (Eck et al. 1995), and Tutte's, whose faces are convex; holes do not hinder them. Of
@@ -25,16 +24,38 @@ def embed(mesh: Mesh, triangles: Ints) -> Array:
     Parameters
     ----------
     mesh : Mesh
-        One component; all of its vertices belong to a face.
+        Components with a boundary and without handles.
     triangles : ndarray of int, (t, 3)
         Triangles that carry strain and must not be turned over.
+
+    Returns
+    -------
+    ndarray, (n, 2)
+        Centred at the origin; vertices of no face are there.
 
     Raises
     ------
     MeshError
-        The surface is closed or has handles.
+        A component is closed or has handles.
     """
-    check(mesh)
+    flat = np.zeros((len(mesh.vertices), 2))
+    for ids in parts(mesh):
+        local = np.full(len(mesh.vertices), -1)
+        local[ids] = np.arange(len(ids))
+        faces = mesh.faces[local[mesh.faces[:, 0]] >= 0]
+        part = Mesh(mesh.vertices[ids], np.where(faces < 0, -1, local[faces]))
+        flat[ids] = _embed(part, local[triangles[local[triangles[:, 0]] >= 0]], int(ids[0]))
+    return flat
+
+
+def parts(mesh: Mesh) -> list[Ints]:
+    """Vertices of each component; those of no face are left out."""
+    labels, used = mesh.components, mesh.half_edges.face_count > 0
+    return [np.flatnonzero(labels == k) for k in np.unique(labels[used])]
+
+
+def _embed(mesh: Mesh, triangles: Ints, name: int) -> Array:
+    _check(mesh, name)
     outer = max(mesh.boundary_loops, key=lambda loop: _perimeter(mesh.vertices[loop]))
     images = [_conformal(mesh, outer), _harmonic(mesh, outer), _tutte(mesh, outer)]
     rated = []
@@ -43,13 +64,13 @@ def embed(mesh: Mesh, triangles: Ints) -> Array:
             continue
         scaled = _scaled(mesh, image)
         flipped = int((_areas(scaled, triangles) <= 0).sum())
-        rated.append((flipped, strain_energy(mesh.vertices, triangles, scaled), scaled))
+        rated.append((flipped, strain_level(mesh.vertices, triangles, scaled), scaled))
     return min(rated, key=lambda r: r[:2])[2]
 
 
-def check(mesh: Mesh) -> None:
+def _check(mesh: Mesh, name: int) -> None:
     """Refuse what cannot be laid out in the plane without a cut."""
-    where = f"the part with vertex {int(mesh.faces[0, 0])}"
+    where = f"the part with vertex {name}"
     loops = len(mesh.boundary_loops)
     if loops == 0:
         raise MeshError(
@@ -149,6 +170,3 @@ def _tutte(mesh: Mesh, loop: Ints) -> Array:
         options={"SymmetricMode": True},
     ).solve(rows @ image)
     return image[:n]
-
-
-__all__ = ["check", "corner_triangles", "embed"]

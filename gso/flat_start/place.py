@@ -44,10 +44,10 @@ def upright(flat: Array) -> Array:
     total = (np.abs(z) ** 2).sum()
     # Principal variances are (total +- |spread|) / 2.
     oblong = total + abs(spread) > _OBLONG * (total - abs(spread))
-    axis = np.sqrt(spread) if oblong else forward
+    axis = complex(np.sqrt(spread) if oblong else forward)
     if oblong and (axis.conjugate() * forward).real < 0:
         axis = -axis
-    return _turned(p, np.conj(axis))
+    return _turned(p, axis.conjugate())
 
 
 def beside(parts: list[Array]) -> list[Array]:

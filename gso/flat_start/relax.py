@@ -52,13 +52,19 @@ class _Gradients:
         return float(((np.abs(turn) - 1.0) ** 2 + np.abs(shear) ** 2).mean())
 
 
-def strain_energy(vertices: Array, triangles: Ints, flat: Array) -> float:
-    """Mean of ``((s1 - 1)^2 + (s2 - 1)^2) / 2`` over triangles mapped to the plane."""
-    return _Gradients(vertices, triangles).energy(flat @ np.array([1.0, 1j]))
+def strain_level(vertices: Array, triangles: Ints, flat: Array) -> float:
+    """Root-mean-square strain of triangles mapped to the plane: of both principal ones."""
+    return _Gradients(vertices, triangles).energy(flat @ np.array([1.0, 1j])) ** 0.5
 
 
 def relax(
-    vertices: Array, triangles: Ints, flat: Array, *, iterations: int, tolerance: float = 1e-3
+    vertices: Array,
+    triangles: Ints,
+    flat: Array,
+    *,
+    upward: Ints | None = None,
+    iterations: int = 100,
+    tolerance: float = 1e-3,
 ) -> Relaxed:
     """Lower the as-rigid-as-possible energy of a plane image by local and global steps.
 
@@ -73,6 +79,8 @@ def relax(
         The surface; triangles need an area. Vertices of no triangle stay where they are.
     flat : ndarray, (n, 2)
         The image to start from.
+    upward : ndarray of int, (u, 3), optional
+        Triangles that must not turn over, when they are others.
     iterations, tolerance : int, float
         Most steps, and the relative fall of the energy at which to stop.
     """
@@ -91,7 +99,8 @@ def relax(
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
-    limit = orientation(triangles, Layout((("flat", len(vertices), 2),)))
+    kept = triangles if upward is None else upward
+    limit = orientation(kept, Layout((("flat", len(vertices), 2),)))
     z = np.ascontiguousarray(flat) @ np.array([1.0, 1j])
     energy = gradients.energy(z)
     for _ in range(iterations):

@@ -44,4 +44,6 @@ def minimum(x: Any, y: Any) -> Any:
     mod = _module_of(x)
     if mod is None:
         return np.minimum(x, y)
-    return mod.minimum(x, y) if mod.__name__ == "torch" else mod.fmin(x, y)
+    if mod.__name__ != "torch":
+        return mod.fmin(x, y)
+    return mod.minimum(x, y) if _module_of(y) is mod else mod.clamp(x, max=y)

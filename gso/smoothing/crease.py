@@ -32,8 +32,8 @@ DEFAULT_WEIGHT = 3.0
 STIFFNESS = (np.inf, 1e5, 1e4, 1e3, 1e2, 1e1)
 ITERATIONS = 60
 REWEIGHTED_AT = (20, 30, 40)
-# In units of the noise: kinks smaller than this are charged almost in full, half the
-# charge of a kink of this length, and the step by which the splitting shrinks them.
+# Lengths in units of the noise: a kink that is charged half after reweighting, the most
+# by which one iteration shrinks a kink, and the size of the random probe.
 KINK = 0.3
 STEP = 0.5
 PROBE = 0.1

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 ORDERS = (2, 3, 4)
 # Caution of the cross-validation that chooses the first, coarse smoothing.
 CAUTION = 1.2
+# Noise below this share of the size is rounding.
+NOTHING = 1e-12
 # Lower quartile of a standard normal variable.
 QUARTILE = -0.6745
 # The noise is at most so many times that of planes through single rings: mostly flat,
@@ -46,14 +48,15 @@ def smooth_mesh(
 
     The result minimises
 
-        mean |x - vertices|^2 + weight sum_p area_p |residual_p(x)|^2 / radius_p^(2 order)
+        mean |x - vertices|^2 + weight sum_p share_p |residual_p(x)|^2 / radius_p^(2 order)
 
     over patches p of neighbouring vertices, where the residual is what a polynomial of
     degree below `order` over the plane of the patch leaves
-    (:mod:`gso.smoothing.patches`). The planes come from the mesh smoothed before: first
-    by an umbrella operator whose weight minimises a generalised cross-validation, then
-    twice by this penalty. The noise is read off the patches, and the weight minimises
-    Mallows' unbiased risk estimate (:mod:`gso.smoothing.select`).
+    (:mod:`gso.smoothing.patches`), shares are shares of area, and the unit of length is
+    the root-mean-square distance from the centroid. The planes come from a mesh smoothed
+    before: by an umbrella operator whose weight minimises a generalised cross-validation,
+    then with planes on single rings. The noise is read off the patches, and the weight
+    minimises Mallows' unbiased risk estimate (:mod:`gso.smoothing.select`).
 
     Parameters
     ----------
@@ -88,10 +91,10 @@ def smooth_mesh(
     >>> from scipy.spatial import Delaunay
     >>> rng = np.random.default_rng(0)
     >>> plane = rng.uniform(size=(400, 2))
-    >>> clean = np.column_stack([plane, plane[:, 0] * plane[:, 1]])
-    >>> noisy = clean + 0.01 * rng.standard_normal(clean.shape)
-    >>> result = smooth_mesh(noisy, Delaunay(plane).simplices)
-    >>> bool(np.abs(result.points - clean)[:, 2].std() < 0.003)
+    >>> saddle = np.column_stack([plane, plane[:, 0] * plane[:, 1]])
+    >>> noisy = saddle + 0.01 * rng.standard_normal(saddle.shape)
+    >>> x, y, z = smooth_mesh(noisy, Delaunay(plane).simplices).points.T
+    >>> bool((z - x * y).std() < 0.003)
     True
     """
     points = checked_points(vertices, 2)
@@ -139,10 +142,15 @@ def _creased(
         local = residuals(pilot, patches, order)
         sigma = min(sigma, noise(unit, local))
         rough = local.heights(pilot)
-        limit = tolerance * np.median(rough[local.freedom > 0]) + 1e-12
-        done = _solve(local.penalty(1 / (1 + (rough / limit) ** 2)), unit, start, sigma, weight)
+        limit = tolerance * (_typical(rough[local.freedom > 0]) + NOTHING)
+        trust = 1 / (1 + (rough / limit) ** 2)
+        done = _solve(local.penalty(trust), unit, start, sigma, weight)
         pilot, start = done.points, done.weight
     return done, order, sigma
+
+
+def _typical(values: Array) -> float:
+    return float(np.median(values)) if values.size else 0.0
 
 
 def _patches(near: Any, order: int) -> Rings:
@@ -150,6 +158,8 @@ def _patches(near: Any, order: int) -> Rings:
 
 
 def _solve(penalty: Any, unit: Array, start: float, sigma: float, weight: float | None) -> Choice:
+    if weight is None and sigma < NOTHING:
+        return Choice(unit, 0.0, float(len(unit)))
     if weight is None:
         return best_weight(penalty, unit, start, unbiased_risk(sigma**2))
     solve = factor(penalty, weight)
@@ -162,8 +172,8 @@ def noise(points: Array, local: Residuals) -> float:
     """Standard deviation of the noise per coordinate, robust against creases.
 
     Residuals along the normals of the patches, each of which estimates the variance;
-    creases spoil few of them, so the median is taken, divided by that of a chi-squared
-    variable (Wilson and Hilferty 1931).
+    creases and curvature only ever add to it, so the lower quartile is taken, each value
+    divided by that of a chi-squared variable (Wilson and Hilferty 1931).
     """
     enough = local.freedom >= 3
     if not enough.any():

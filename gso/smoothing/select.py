@@ -159,7 +159,7 @@ def factor(penalty: Any, weight: float) -> Callable[[Array], Array]:
     >>> factor(identity(3), 1.0)(np.ones((3, 1))).ravel()
     array([0.5, 0.5, 0.5])
     """
-    from scipy.linalg import cho_solve_banded, cholesky_banded
+    from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
     from scipy.sparse import identity
     from scipy.sparse.csgraph import reverse_cuthill_mckee
     from scipy.sparse.linalg import splu
@@ -167,28 +167,27 @@ def factor(penalty: Any, weight: float) -> Callable[[Array], Array]:
     count = penalty.shape[0]
     matrix = (identity(count) + weight * penalty).tocsc()
     order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
-    place = np.empty(count, np.int64)
-    place[order] = np.arange(count)
+    place = np.argsort(order)
     entries = matrix.tocoo()
     row, column = place[entries.row], place[entries.col]
     below = row >= column
     row, column = row[below], column[below]
     width = int((row - column).max())
-    if width > BAND:
-        lu = splu(
-            matrix,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-        return lu.solve
-    band = np.zeros((width + 1, count))
-    band[row - column, column] = entries.data[below]
-    lower = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+    if width <= BAND:
+        band = np.zeros((width + 1, count))
+        band[row - column, column] = entries.data[below]
+        try:
+            lower = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+        except LinAlgError:
+            pass  # rounding has made it indefinite, which the other factorisation survives
+        else:
 
-    def solve(right: Array) -> Array:
-        out = np.empty_like(right)
-        out[order] = cho_solve_banded((lower, True), right[order], check_finite=False)
-        return out
+            def solve(right: Array) -> Array:
+                out = np.empty_like(right)
+                out[order] = cho_solve_banded((lower, True), right[order], check_finite=False)
+                return out
 
-    return solve
+            return solve
+    options = {"SymmetricMode": True}
+    lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    return lu.solve

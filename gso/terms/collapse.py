@@ -16,6 +16,9 @@ from gso.terms.stretch import corners_of, pieces
 #: Turning or moving the flat image changes no area.
 INVARIANT = ("translation", "rotation")
 
+#: The residual has no bound: a step limit keeps the areas positive.
+UNBOUNDED = True
+
 #: Share of its area in space below which a triangle resists.
 SQUEEZED = 0.2
 

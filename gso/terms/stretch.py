@@ -27,12 +27,12 @@ def corners_of(size: int) -> tuple[tuple[int, int, int], ...]:
 
 
 def _maps(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> list[Any]:
-    return [
-        geometry.turn_and_shear(
-            *(points[k] for k in corner), tuple(constants[3 * n : 3 * n + 3])
-        )
-        for n, corner in enumerate(corners_of(len(points)))
-    ]
+    out = []
+    for n, corner in enumerate(corners_of(len(points))):
+        p, q, r = (points[k] for k in corner)
+        m11, m12, m22 = constants[3 * n : 3 * n + 3]
+        out.append(geometry.turn_and_shear(p, q, r, (m11, m12, m22)))
+    return out
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
@@ -57,16 +57,17 @@ def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tupl
 
 @dataclass(frozen=True)
 class Spread:
-    """Cost of a corner's strain s: between its size and its square, steeper for peaks.
+    """Cost of a corner's strain s: its size, and steeply more for peaks.
 
-    ``level^2 (2/p) u^p + peak (2/q) u^q`` with ``u = s / level``: a power `p` below two lowers
-    the mean strain, the second one keeps the largest strains down.
+    ``level^2 ((2/p) u^p + peak (2/q) u^q)`` with ``u = s / level``: a power `p` below two
+    lowers the mean strain, the second one keeps the largest strains down. Measured
+    against the square alone on random surfaces, mean, 99th percentile and maximum fall.
 
     Attributes
     ----------
     level : float
-        Strain at which the cost passes from the first power to the second: the typical
-        strain of the surface.
+        Typical strain of the surface. With the weight of the peaks as it stands, the
+        second power takes over at twice that.
     p, q : float
         Powers of small and of large strains.
     peak : float
@@ -76,9 +77,9 @@ class Spread:
     """
 
     level: float
-    p: float = 1.2
-    q: float = 4.0
-    peak: float = 0.16
+    p: float = 1.0
+    q: float = 8.0
+    peak: float = 0.006
     eps: float = 0.1
 
     def _squares(self, r: Array) -> tuple[Array, Array]:

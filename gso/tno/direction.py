@@ -20,7 +20,10 @@ class GaussNewton:
         self.damping = damping
 
     def step(self, solver, values: Array, diagonal: Array, gradient: Array) -> Array:
-        """Solve ``(H + damping max(diag H) I) d = -gradient``.
+        """Solve ``(H + damping mean(diag H) I) d = -gradient``.
+
+        The mean of the diagonal is the trace, which does not change when the surface is
+        turned: neither do the steps.
 
         Parameters
         ----------
@@ -32,10 +35,10 @@ class GaussNewton:
             Gradient of the objective.
         """
         damping = self.damping
-        largest = float(values[diagonal].max(initial=1e-300))
+        typical = max(float(values[diagonal].mean()), 1e-300)
         added = 0.0
         while True:
-            values[diagonal] += (damping - added) * largest
+            values[diagonal] += (damping - added) * typical
             added = damping
             try:
                 solver.factor(values)
@@ -46,7 +49,7 @@ class GaussNewton:
                 pass
             damping = max(10.0 * damping, 1e-12)
             if damping > _HOPELESS:
-                return -gradient / largest
+                return -gradient / float(values[diagonal].max())
 
     def accepted(self, step: float) -> None:
         """Take note of how much of the step was used."""

@@ -6,14 +6,13 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gso import metrics, tasks
+from gso import tasks
 from gso.constraints import Constraint, compile_constraints
 from gso.mesh import Frame, Mesh
 from gso.result import Result
@@ -118,7 +117,7 @@ def optimize(
         outcome = reach_target(run, request, target_curvature)
     else:
         outcome = run(request)
-    result = _result(task, formulation, design, frame, outcome, run, module)
+    result = _result(task, formulation, design, frame, outcome, run)
     result.warm_start = "cold" if x0 is None else "x0"
     result.seconds["total"] = time.perf_counter() - clock
     if not result.converged and result.status is not Status.MAX_ITERATIONS:
@@ -297,7 +296,6 @@ def _result(
     frame: Canonical,
     outcome: Outcome,
     run: Run,
-    module: ModuleType,
 ) -> Result:
     points = frame.back(outcome.points)
     untouched = outcome.status is Status.ALREADY_GOOD
@@ -305,10 +303,8 @@ def _result(
     if outcome.block == "flat":
         flat = points * frame.frame.scale
         mesh = design.replaced(np.c_[flat, np.zeros(len(flat))])
-        measure = partial(_flat_metrics, module)
     else:
         mesh = design if untouched else design.replaced(frame.frame.to_user(points))
-        measure = partial(_surface_metrics, module)
     seconds = run.timings.as_dict()
     return Result(
         task=task,
@@ -324,16 +320,7 @@ def _result(
         backend=outcome.backend,
         notes=design.notes + outcome.notes,
         details=outcome.details,
-        measure=measure,
     )
-
-
-def _surface_metrics(module: ModuleType, result: Result) -> dict[str, float]:
-    return module.metrics(result.design, result.mesh, metrics.unit(result.design))
-
-
-def _flat_metrics(module: ModuleType, result: Result) -> dict[str, float]:
-    return module.metrics(result.design, result.flat)
 
 
 __all__ = ["Canonical", "Outcome", "Run", "optimize"]

@@ -1,0 +1,44 @@
+"""Relative change of the edges' lengths in the flat image."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gso import geometry
+from gso.mesh import Mesh
+from gso.terms.base import Term, mean_weights
+
+#: Turning or moving the flat image changes no length.
+INVARIANT = ("translation", "rotation")
+
+
+def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """``l' / l - 1``. Constants: 1 / l."""
+    return (geometry.norm(vectors(points, constants)[0]) - 1.0,)
+
+
+def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """The edge in units of its length in space."""
+    return (tuple(x * constants[0] for x in geometry.sub(points[1], points[0])),)
+
+
+def build(mesh: Mesh) -> Term:
+    """Change of every edge of the faces, averaged over edges."""
+    a, b = mesh.edges.T
+    length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
+    return Term(
+        "edges",
+        residual,
+        (("flat", mesh.edges),),
+        weights=mean_weights(len(length)),
+        constants=1.0 / length[None],
+        vectors=vectors,
+    )
+
+
+def examples(mesh: Mesh) -> list[Term]:
+    """Terms for the conformance tests."""
+    return [build(mesh)]

@@ -1,0 +1,242 @@
+"""The developable task: truths, bounds, targets, invariance, constraints, every kind of mesh."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import gso
+from gso import metrics
+from gso.mesh import Mesh
+from gso.tasks.developable import Options
+from tests.conftest import cylinder, saddle, shuffled, sphere_cap
+
+PRESETS = tuple(Options.PRESETS)
+
+
+def moved(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(after - before, axis=-1)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_curvature_falls_and_the_surface_stays_close(surfaces, preset):
+    for points in surfaces:
+        result = gso.tno.optimize(points, options=preset)
+        m = result.metrics
+        assert m["K_A_r"] > 0.7
+        assert m["d_H"] < 1.0
+        assert m["fairness_ratio"] < 2.0
+        assert sum(result.energy.values()) > 0
+        assert result.grid.shape == points.shape
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("turn", [0.0, 0.4])
+def test_developable_input_comes_back_untouched(preset, turn):
+    points = cylinder(33, turn)
+    result = gso.tno.optimize(points, options=preset)
+    assert result.status is gso.Status.ALREADY_GOOD
+    assert result.iterations == 0
+    np.testing.assert_array_equal(result.grid, points)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("turn", [0.0, 0.4])
+def test_a_noisy_cylinder_loses_curvature_within_three_times_the_noise(preset, turn):
+    clean = cylinder(40, turn)
+    noise = 1e-3 * metrics.unit(clean)
+    noisy = clean + noise * np.random.default_rng(0).standard_normal(clean.shape)
+    result = gso.tno.optimize(noisy, options=preset)
+    assert result.metrics["K_A_r"] > 0.9
+    assert moved(noisy, result.grid).max() <= 3.0 * noise
+
+
+def test_the_preset_that_costs_more_is_more_developable(surfaces):
+    left = [
+        np.mean([gso.tno.optimize(p, options=o).metrics["loss_gc"] for p in surfaces])
+        for o in ("balanced", "accurate")
+    ]
+    assert left[1] < left[0]
+
+
+def test_same_shape_in_any_unit_turned_and_moved(surfaces):
+    points = surfaces[0]
+    reference = gso.tno.optimize(points).grid
+    turn = Rotation.from_rotvec([0.3, -0.8, 0.5]).as_matrix()
+    for scale, shift in ((1000.0, 0.0), (1e-9, 0.0), (1e3, 0.0), (1.0, 1e5), (1e3, 1e8)):
+        result = gso.tno.optimize(scale * (points @ turn.T) + shift)
+        back = (result.grid - shift) / scale @ turn
+        assert np.abs(back - reference).max() < 1e-5
+
+
+def test_rows_and_columns_can_change_places():
+    points = saddle(24, 40)
+    a = gso.tno.optimize(points).grid
+    b = gso.tno.optimize(points.swapaxes(0, 1)).grid.swapaxes(0, 1)
+    # The diagonals of the cells stay where they were, so the two meet exactly.
+    assert np.abs(a - b).max() < 1e-6
+
+
+def test_any_numbering_gives_the_same_surface(surfaces):
+    mesh = Mesh.from_grid(surfaces[1])
+    mixed = shuffled(mesh)
+    result = gso.tno.optimize(mixed)
+    assert mixed.grid_shape is not None
+    assert result.metrics["K_A_r"] == pytest.approx(
+        gso.tno.optimize(mesh).metrics["K_A_r"], abs=0.05
+    )
+
+
+@pytest.mark.parametrize("share", [0.0025, 0.01])
+def test_max_deviation_is_kept(surfaces, share):
+    for points in surfaces[:2]:
+        mesh = Mesh.from_grid(points)
+        bound = share * mesh.diagonal
+        result = gso.tno.optimize(mesh, max_deviation=bound)
+        assert metrics.point_to_surface(result.mesh.vertices, mesh).max() <= bound * (1 + 1e-6)
+        assert result.metrics["K_A_r"] > 0.05
+
+
+def test_a_larger_budget_leaves_less_curvature(surfaces):
+    mesh = Mesh.from_grid(surfaces[0])
+    left = [
+        gso.tno.optimize(mesh, max_deviation=s * mesh.diagonal).metrics["loss_gc"]
+        for s in (0.0025, 0.005, 0.01)
+    ]
+    assert left[0] > left[1] > left[2]
+
+
+def test_target_curvature_is_met_with_less_displacement(surfaces):
+    for points in surfaces[:2]:
+        result = gso.tno.optimize(points, target_curvature=0.05)
+        assert result.status is gso.Status.TARGET_REACHED
+        assert result.metrics["loss_gc"] <= 0.05
+        accurate = gso.tno.optimize(points, options="accurate")
+        if accurate.metrics["loss_gc"] <= 0.05:
+            assert result.metrics["d_H"] <= accurate.metrics["d_H"]
+
+
+def test_a_target_already_met_changes_nothing():
+    points = saddle(16, strength=0.05)
+    result = gso.tno.optimize(points, target_curvature=1.0)
+    np.testing.assert_array_equal(result.grid, points)
+
+
+def test_fixed_vertices_and_boundary_do_not_move(surfaces):
+    mesh = Mesh.from_grid(surfaces[0])
+    result = gso.tno.optimize(mesh, constraints=[gso.FixedBoundary(), gso.Fixed([500])])
+    held = np.r_[np.flatnonzero(mesh.half_edges.boundary_vertex), 500]
+    np.testing.assert_allclose(result.mesh.vertices[held], mesh.vertices[held], atol=1e-12)
+    assert result.metrics["K_A_r"] > 0.1
+
+
+def test_handles_move_vertices(surfaces):
+    mesh = Mesh.from_grid(surfaces[0])
+    goal = mesh.vertices[[0]] + [0.0, 0.0, 0.05]
+    hard = gso.tno.optimize(mesh, constraints=[gso.Handle([0], goal)])
+    np.testing.assert_allclose(hard.mesh.vertices[0], goal[0], atol=1e-12)
+    soft = gso.tno.optimize(mesh, constraints=[gso.Handle([0], goal, weight=10.0)])
+    assert 0 < np.linalg.norm(soft.mesh.vertices[0] - goal[0]) < 0.05
+
+
+def test_contradicting_constraints_are_named(surfaces):
+    mesh = Mesh.from_grid(surfaces[0])
+    with pytest.raises(gso.OptionError, match=r"constraint 0 \(Fixed\).*constraint 1.*vertex 3"):
+        gso.tno.optimize(
+            mesh, constraints=[gso.Fixed([3]), gso.Handle([3], mesh.vertices[[3]] + 1)]
+        )
+    with pytest.raises(gso.OptionError, match="vertex 99999"):
+        gso.tno.optimize(mesh, constraints=[gso.Fixed([99999])])
+    with pytest.raises(gso.OptionError, match="positions"):
+        gso.tno.optimize(mesh, constraints=[gso.Handle([1, 2], [[0.0, 0.0, 0.0]])])
+
+
+def test_a_warm_start_from_the_result_stays_at_least_as_good(surfaces):
+    points = surfaces[0]
+    cold = gso.tno.optimize(points, options="accurate")
+    warm = gso.tno.optimize(points, options="accurate", x0=cold.mesh)
+    assert warm.warm_start == "x0"
+    assert sum(warm.energy.values()) <= sum(cold.energy.values()) * (1 + 1e-9)
+
+
+def test_irregular_and_triangle_meshes():
+    grid = Mesh.from_grid(sphere_cap(21, radius=1.0))
+    triangles = Mesh(grid.vertices, grid.triangles)
+    holed = Mesh(grid.vertices, np.delete(grid.faces, [150, 151, 170, 171], axis=0))
+    for mesh in (triangles, holed):
+        result = gso.tno.optimize(mesh)
+        assert result.grid is None
+        assert result.metrics["K_A_r"] > 0.5
+        assert result.metrics["d_H"] < 2.0
+
+
+def test_a_closed_surface_is_finite_and_no_worse():
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    result = gso.tno.optimize(ball, options=replace(Options.preset("fast"), iterations=3))
+    assert np.isfinite(result.mesh.vertices).all()
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (3, 9), (4, 5), (13, 3), (12, 50)])
+def test_small_and_oblong_grids(shape):
+    result = gso.tno.optimize(saddle(*shape))
+    assert result.metrics["loss_gc"] < result.metrics["loss_gc_before"]
+
+
+def test_options_are_checked():
+    with pytest.raises(gso.OptionError, match="w_fairness is -1"):
+        Options(w_fairness=-1)
+    with pytest.raises(gso.OptionError, match="variables"):
+        Options(variables="pink")
+    with pytest.raises(gso.OptionError, match="no preset 'slow'.*balanced"):
+        gso.tno.optimize(saddle(), options="slow")
+    with pytest.raises(gso.OptionError, match="formulation"):
+        gso.tno.optimize(saddle(), formulation="magic")
+    with pytest.raises(gso.OptionError, match="no task"):
+        gso.tno.optimize(saddle(), task="bake")
+    with pytest.raises(gso.OptionError, match="max_deviation is -1"):
+        gso.tno.optimize(saddle(), max_deviation=-1)
+    with pytest.raises(gso.OptionError, match="not both"):
+        gso.tno.optimize(saddle(), max_deviation=1, target_curvature=1)
+    with pytest.raises(gso.OptionError, match="belongs to"):
+        gso.tno.optimize(saddle(), task="denoise", max_deviation=1)
+    with pytest.raises(gso.OptionError, match="takes"):
+        gso.tno.optimize(saddle(), options=gso.DenoiseOptions())
+    with pytest.raises(gso.MeshError, match="x0"):
+        gso.tno.optimize(saddle(), x0=np.zeros((3, 3)))
+
+
+def test_a_callback_can_cancel(surfaces):
+    seen = []
+
+    def stop(progress):
+        seen.append(progress)
+        return len(seen) < 4
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        result = gso.tno.optimize(surfaces[0], callback=stop)
+    assert result.status is gso.Status.CANCELLED
+    assert np.isfinite(result.grid).all()
+    assert any(issubclass(w.category, gso.ConvergenceWarning) for w in caught)
+
+
+@pytest.mark.slow
+def test_one_set_of_weights_serves_three_resolutions():
+    from gso.dataset import bezier
+
+    figures = []
+    for size in (32, 64, 128):
+        rows = []
+        for surface in bezier.generate(5, seed=77):
+            points = surface.sample(size)
+            m = gso.tno.optimize(points).metrics
+            rows.append((m["loss_gc"], m["d_H"]))
+        figures.append(np.mean(rows, axis=0))
+    spread = np.max(figures, axis=0) / np.min(figures, axis=0)
+    assert (spread < 1.25).all()
