@@ -43,7 +43,9 @@ PURE = "pure SciPy"
 def reference() -> tuple[list[np.ndarray], list[np.ndarray]]:
     """The 24 surfaces and their unit noise."""
     data = np.load(ROOT / "bench" / "data" / "bench24.npz")
-    return [s.astype(float) for s in data["surfaces"]], [n.astype(float) for n in data["unit_noise"]]
+    return [s.astype(float) for s in data["surfaces"]], [
+        n.astype(float) for n in data["unit_noise"]
+    ]
 
 
 def progress(items: Any, text: str) -> Any:
@@ -80,7 +82,13 @@ def table(title: str, columns: list[str], rows: list[list[Any]]) -> None:
     widths = [max(len(row[k]) for row in text) for k in range(len(columns))]
     print(f"\n{title}")
     for number, row in enumerate(text):
-        print("  " + "  ".join(c.rjust(w) if k else c.ljust(w) for k, (c, w) in enumerate(zip(row, widths, strict=True))))
+        print(
+            "  "
+            + "  ".join(
+                c.rjust(w) if k else c.ljust(w)
+                for k, (c, w) in enumerate(zip(row, widths, strict=True))
+            )
+        )
         if number == 0:
             print("  " + "  ".join("-" * w for w in widths))
     sys.stdout.flush()
@@ -111,13 +119,15 @@ def developable() -> dict[str, Any]:
         with without_extras() if preset == PURE else tempfile.TemporaryDirectory():
             gso.tno.optimize(surfaces[0], options=options)
             for points in progress(surfaces, preset):
-                result, spent = timed(lambda p=points: gso.tno.optimize(p, options=options))
+                result, spent = timed(lambda p=points, o=options: gso.tno.optimize(p, options=o))
                 figures.append(quality(points, result.grid))
                 seconds.append(spent)
                 backend = result.backend
         name = f"balanced, {PURE}" if preset == PURE else preset
         mean = np.mean(figures, axis=0)
-        rows.append([name, *mean, np.median(seconds), np.max(seconds), backend, floors.get(preset, "")])
+        rows.append(
+            [name, *mean, np.median(seconds), np.max(seconds), backend, floors.get(preset, "")]
+        )
         out[name] = [*map(float, mean), float(np.median(seconds))]
     table(
         "Developable, 24 surfaces, mean input loss_gc "
@@ -183,7 +193,10 @@ def flatten() -> dict[str, Any]:
         mean, median = np.mean(figures, axis=0), np.median(figures, axis=0)
         total = np.sum(figures, axis=0)[4]
         rows.append([name, mean[0], median[0], *mean[1:4], total, np.median(seconds)])
-        out[name] = [*map(float, (mean[0], median[0], *mean[1:4], total)), float(np.median(seconds))]
+        out[name] = [
+            *map(float, (mean[0], median[0], *mean[1:4], total)),
+            float(np.median(seconds)),
+        ]
     table(
         "Flatten, 24 surfaces (floors: strain 0.0093 0.0353 0.0053 no flips; "
         "lengths 2.6e-5 1.7e-5 no flips; 0.15 s)",
@@ -206,7 +219,9 @@ def denoise() -> dict[str, Any]:
             angles.append(metrics.normal_angle(points, result.grid))
             estimates.append(result.details["sigma"] * metrics.unit(noisy))
             seconds.append(spent)
-        rows.append([f"{sigma:.3f}", np.mean(angles), floor, np.mean(estimates), 1e3 * np.median(seconds)])
+        rows.append(
+            [f"{sigma:.3f}", np.mean(angles), floor, np.mean(estimates), 1e3 * np.median(seconds)]
+        )
         out[f"{sigma:.3f}"] = [float(np.mean(angles)), float(np.median(seconds))]
     table(
         "Denoise, 24 surfaces, nothing told about sigma",
@@ -264,8 +279,10 @@ def breakdown() -> dict[str, Any]:
                 times[backend] = np.median(
                     [timed(lambda s=solver, v=values: s.factor(v))[1] for _ in range(repeats)]
                 )
-        rows.append([name, str(problem.variables.size), 1e3 * np.median(spent)]
-                    + [1e3 * times.get(k, np.nan) for k in sorted(linear.backends())])
+        rows.append(
+            [name, str(problem.variables.size), 1e3 * np.median(spent)]
+            + [1e3 * times.get(k, np.nan) for k in sorted(linear.backends())]
+        )
         out[name] = rows[-1][2:]
     table(
         "One iteration at 64 x 64, milliseconds",
@@ -306,9 +323,21 @@ def questions() -> dict[str, Any]:
             reach.append(metrics.point_to_surface(result.mesh.vertices, mesh).max() / bound)
             seconds.append(spent)
         kept = sum(r <= 1 + 1e-6 for r in reach)
-        rows.append([f"within {share:.2%}", f"kept on {kept}", np.mean(curvature), np.max(reach), np.median(seconds)])
+        rows.append(
+            [
+                f"within {share:.2%}",
+                f"kept on {kept}",
+                np.mean(curvature),
+                np.max(reach),
+                np.median(seconds),
+            ]
+        )
         out[f"within {share}"] = [kept, float(np.mean(curvature))]
-    table("max_deviation, share of the diagonal", ["bound", "", "loss_gc", "largest / bound", "median s"], rows)
+    table(
+        "max_deviation, share of the diagonal",
+        ["bound", "", "loss_gc", "largest / bound", "median s"],
+        rows,
+    )
     rows = []
     presets = {p: [] for p in PRESETS}
     for preset, found in presets.items():
@@ -318,14 +347,27 @@ def questions() -> dict[str, Any]:
     for target in (0.05, 0.02):
         met, closest, distance, seconds = 0, 0, [], []
         for k, points in enumerate(progress(surfaces, f"target {target}")):
-            result, spent = timed(lambda p=points: gso.tno.optimize(p, target_curvature=target))
+            result, spent = timed(
+                lambda p=points, t=target: gso.tno.optimize(p, target_curvature=t)
+            )
             m = result.metrics
             met += m["loss_gc"] <= target
-            best = min((d for c, d in (found[k] for found in presets.values()) if c <= target), default=np.inf)
+            best = min(
+                (d for c, d in (found[k] for found in presets.values()) if c <= target),
+                default=np.inf,
+            )
             closest += m["d_H"] <= best * (1 + 1e-9)
             distance.append(m["d_H"])
             seconds.append(spent)
-        rows.append([f"{target}", f"met on {met}", f"closest on {closest}", np.mean(distance), np.median(seconds)])
+        rows.append(
+            [
+                f"{target}",
+                f"met on {met}",
+                f"closest on {closest}",
+                np.mean(distance),
+                np.median(seconds),
+            ]
+        )
         out[f"target {target}"] = [int(met), int(closest), float(np.mean(distance))]
     table(
         "target_curvature; closest: no preset that meets it has a smaller mean distance",
@@ -360,11 +402,17 @@ def general() -> dict[str, Any]:
     table("Flatten, general meshes", ["mesh", "strain", "p99", "edges", "flipped", "s"], rows)
     rows = []
     for name, mesh in (("teapot patch, triangles", patch), ("quads with a hole", hole)):
-        noisy = mesh.vertices + 0.005 * metrics.unit(mesh) * rng.standard_normal(mesh.vertices.shape)
-        result, spent = timed(lambda m=mesh, v=noisy: gso.tno.optimize(m.replaced(v), task="denoise"))
+        noisy = mesh.vertices + 0.005 * metrics.unit(mesh) * rng.standard_normal(
+            mesh.vertices.shape
+        )
+        result, spent = timed(
+            lambda m=mesh, v=noisy: gso.tno.optimize(m.replaced(v), task="denoise")
+        )
         ours = metrics.normal_angle(mesh, result.mesh)
         theirs, which = best_trimesh(mesh, noisy)
-        rows.append([name, metrics.normal_angle(mesh, mesh.replaced(noisy)), ours, theirs, which, spent])
+        rows.append(
+            [name, metrics.normal_angle(mesh, mesh.replaced(noisy)), ours, theirs, which, spent]
+        )
         out[f"denoise {name}"] = [ours, theirs]
     table(
         "Denoise, general meshes, theta in degrees at noise 0.005",
@@ -377,7 +425,17 @@ def general() -> dict[str, Any]:
             result, spent = timed(lambda m=mesh, b=bound: gso.tno.optimize(m, max_deviation=b))
             m = result.metrics
             label = name if bound is None else f"{name}, within 1 %"
-            rows.append([label, m["loss_gc_before"], m["loss_gc"], m["K_A_r"], m["d_H"], m["deviation_max"], spent])
+            rows.append(
+                [
+                    label,
+                    m["loss_gc_before"],
+                    m["loss_gc"],
+                    m["K_A_r"],
+                    m["d_H"],
+                    m["deviation_max"],
+                    spent,
+                ]
+            )
             out[f"developable {label}"] = [m["K_A_r"], m["deviation_max"]]
     table(
         "Developable, irregular quad meshes",
@@ -394,11 +452,19 @@ def best_trimesh(mesh: gso.Mesh, noisy: np.ndarray) -> tuple[float, str]:
 
     settings: list[tuple[str, dict[str, Any]]] = []
     for n in (1, 2, 3, 5, 8, 12, 20, 40):
-        settings += [("filter_laplacian", {"lamb": lamb, "iterations": n}) for lamb in (0.2, 0.5, 0.9)]
-        settings += [("filter_humphrey", {"alpha": a, "beta": b, "iterations": n})
-                     for a in (0.0, 0.1) for b in (0.2, 0.5, 0.8)]
-        settings += [("filter_taubin", {"lamb": lamb, "nu": nu, "iterations": n})
-                     for lamb in (0.3, 0.5) for nu in (0.3, 0.5)]
+        settings += [
+            ("filter_laplacian", {"lamb": lamb, "iterations": n}) for lamb in (0.2, 0.5, 0.9)
+        ]
+        settings += [
+            ("filter_humphrey", {"alpha": a, "beta": b, "iterations": n})
+            for a in (0.0, 0.1)
+            for b in (0.2, 0.5, 0.8)
+        ]
+        settings += [
+            ("filter_taubin", {"lamb": lamb, "nu": nu, "iterations": n})
+            for lamb in (0.3, 0.5)
+            for nu in (0.3, 0.5)
+        ]
         settings += [("filter_mut_dif_laplacian", {"lamb": 0.5, "iterations": n})]
     best = (np.inf, "")
     for name, keywords in settings:
@@ -415,9 +481,12 @@ def best_trimesh(mesh: gso.Mesh, noisy: np.ndarray) -> tuple[float, str]:
 
 def sizes() -> dict[str, Any]:
     """Larger grids: time per vertex against 64 x 64, and peak memory."""
-    shape = bezier.generate(1, seed=77)[0]
     rows, out = [], {}
-    for task, preset in (("developable", "balanced"), ("developable", "accurate"), ("flatten", "balanced")):
+    for task, preset in (
+        ("developable", "balanced"),
+        ("developable", "accurate"),
+        ("flatten", "balanced"),
+    ):
         base = None
         for size in (64, 256, 512):
             if preset == "accurate" and size == 512:
@@ -425,7 +494,7 @@ def sizes() -> dict[str, Any]:
             code = (
                 "import time, resource, gso\n"
                 "from gso.dataset import bezier\n"
-                f"b = bezier.generate(1, seed=77)[0]\n"
+                "b = bezier.generate(1, seed=77)[0]\n"
                 f"gso.tno.optimize(b.sample(64), task={task!r}, options={preset!r})\n"
                 f"p = b.sample({size})\n"
                 "s = []\n"
@@ -433,15 +502,17 @@ def sizes() -> dict[str, Any]:
                 "    t = time.perf_counter()\n"
                 f"    r = gso.tno.optimize(p, task={task!r}, options={preset!r})\n"
                 "    s.append(time.perf_counter() - t)\n"
-                "print(sorted(s)[len(s) // 2], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
+                "peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+                "print(sorted(s)[len(s) // 2], peak)\n"
             )
-            done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+            done = subprocess.run(
+                [sys.executable, "-c", code], capture_output=True, text=True, check=True
+            )
             seconds, peak = map(float, done.stdout.split())
             each = 1e6 * seconds / size**2
             base = base or each
             rows.append([f"{task} {preset} {size}", seconds, each, each / base, peak / 1e6])
             out[f"{task} {preset} {size}"] = [seconds, each / base, peak / 1e6]
-    del shape
     table("Size", ["solve", "s", "us / vertex", "against 64", "peak GB"], rows)
     return out
 
@@ -450,24 +521,44 @@ def startup() -> dict[str, Any]:
     """A cold process, and what `import gso` costs."""
 
     def median(command: list[str], repeats: int = 5) -> float:
-        runs = [timed(lambda: subprocess.run(command, check=True, capture_output=True))[1] for _ in range(repeats)]
+        runs = [
+            timed(lambda: subprocess.run(command, check=True, capture_output=True))[1]
+            for _ in range(repeats)
+        ]
         return float(np.median(runs))
 
     with tempfile.TemporaryDirectory() as folder:
         panel = str(ROOT / "examples" / "panel.obj")
-        cold = median([sys.executable, "-m", "gso.cli", "optimize", panel, "-o", f"{folder}/out.obj"])
-    more = median([sys.executable, "-c", "import numpy, gso"]) - median([sys.executable, "-c", "import numpy"])
+        cold = median(
+            [sys.executable, "-m", "gso.cli", "optimize", panel, "-o", f"{folder}/out.obj"]
+        )
+    more = median([sys.executable, "-c", "import numpy, gso"]) - median(
+        [sys.executable, "-c", "import numpy"]
+    )
     table(
         "Start-up",
         ["what", "median s", "at most"],
-        [["gso optimize panel.obj -o out.obj, cold", cold, 2.0], ["import gso over import numpy", more, 0.1]],
+        [
+            ["gso optimize panel.obj -o out.obj, cold", cold, 2.0],
+            ["import gso over import numpy", more, 0.1],
+        ],
     )
     return {"cold": cold, "import": more}
 
 
 SECTIONS: dict[str, Callable[[], dict[str, Any]]] = {
     f.__name__: f
-    for f in (developable, flatten, denoise, breakdown, resolution, questions, general, sizes, startup)
+    for f in (
+        developable,
+        flatten,
+        denoise,
+        breakdown,
+        resolution,
+        questions,
+        general,
+        sizes,
+        startup,
+    )
 }
 
 
@@ -485,13 +576,17 @@ def machine() -> dict[str, Any]:
 
 def main() -> None:
     """Run the sections named on the command line, or all of them."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("sections", nargs="*", choices=[*SECTIONS, []], help="default: all")
     parser.add_argument("--json", type=Path, help="also write the figures here")
     arguments = parser.parse_args()
     figures = {name: SECTIONS[name]() for name in arguments.sections or SECTIONS}
     if arguments.json:
-        arguments.json.write_text(json.dumps({**figures, "machine": machine()}, indent=1, default=float))
+        arguments.json.write_text(
+            json.dumps({**figures, "machine": machine()}, indent=1, default=float)
+        )
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-
 _NAMES = {
     "Mesh": "gso.mesh",
     "load": "gso.io",
@@ -37,7 +36,7 @@ _OPTIONS = {
     "FlattenOptions": "gso.tasks.flatten",
     "DenoiseOptions": "gso.tasks.denoise",
 }
-_MODULES = ("tno", "metrics", "io", "dataset", "plot")
+_MODULES = ("tno", "metrics", "topology", "io", "dataset", "plot")
 
 __all__ = [*_NAMES, *_OPTIONS, *_MODULES, "__version__"]
 

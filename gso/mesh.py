@@ -82,11 +82,12 @@ class Mesh:
         self.faces.flags.writeable = False
 
     @classmethod
-    def from_grid(cls, points: ArrayLike) -> Mesh:
+    def from_grid(cls, points: ArrayLike, *, weld: bool = True) -> Mesh:
         """Mesh of a grid of points (H, W, 3), at least 3 x 3.
 
         A side collapsed to one point (a pole) is welded: the result is then a general
-        mesh with triangles at the pole, and `notes` says so.
+        mesh with triangles at the pole, and `notes` says so. With ``weld=False`` it stays
+        a grid.
         """
         grid = _numbers(points, "a grid is an array of numbers (H, W, 3)")
         if grid.ndim != 3 or grid.shape[2] != 3:
@@ -100,7 +101,7 @@ class Mesh:
             i, j = np.argwhere(~np.isfinite(grid))[0][:2]
             raise MeshError(f"the coordinates of grid vertex ({i}, {j}) are not finite")
         template = _grid_template(height, width)
-        welded = _weld_poles(grid, template.faces)
+        welded = _weld_poles(grid, template.faces) if weld else None
         if welded is not None:
             return cls(welded[0], welded[1], notes=welded[2])
         points = grid.reshape(-1, 3)

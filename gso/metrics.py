@@ -102,6 +102,8 @@ def _mesh(surface: Any) -> Mesh:
 
 def unit(surface: Any) -> float:
     """Largest distance of a vertex from the centroid: the length that counts as one."""
+    if hasattr(surface, "frame"):
+        return surface.frame.scale
     points = _points(surface)
     return float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).max()))
 
@@ -191,9 +193,7 @@ def surface_distance(before: Any, after: Any) -> Distances:
     a, b = _mesh(before), _mesh(after)
     there = point_to_surface(b.vertices, a)
     back = point_to_surface(a.vertices, b)
-    return Distances(
-        float(there.mean()), float(there.max()), float(back.mean()), float(back.max())
-    )
+    return Distances(float(there.mean()), float(there.max()), float(back.mean()), float(back.max()))
 
 
 def fairness(surface: Any, *, scale: float | None = None) -> float:
@@ -256,7 +256,7 @@ def isometry_defect(surface: Any, flat: Any, *, scale: float | None = None) -> A
     q = _flat(surface, flat) / scale
     a, b = geometry.diagonals(*(components(p[cells[:, k]]) for k in range(4)))
     a2, b2 = geometry.diagonals(*(components(q[cells[:, k]]) for k in range(4)))
-    return sum(np.abs(x) for x in geometry.isometry_defect(a, b, a2, b2))  # type: ignore[return-value]
+    return np.abs(np.stack(geometry.isometry_defect(a, b, a2, b2))).sum(axis=0)
 
 
 def loss_iso_cell(surface: Any, flat: Any, *, scale: float | None = None) -> float:
@@ -287,12 +287,12 @@ def principal_strains(surface: Any, flat: Any) -> Strains:
     """
     tri = topology.corner_triangles(_faces(surface))
     p, q = _points(surface), _flat(surface, flat)
-    corners = [p[tri[:, k]] for k in range(3)]
-    area = np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0]), axis=1)
+    area = _space_areas(p, tri)
     keep = area > 1e-12 * area.max()
     tri = tri[keep]
-    rest = geometry.rest_frame(*(components(p[tri[:, k]]) for k in range(3)))
-    s1, s2 = geometry.singular_values(*(components(q[tri[:, k]]) for k in range(3)), rest)
+    rest = geometry.rest_frame(*(components(p[k]) for k in tri.T))
+    a, b, c = (components(q[k]) for k in tri.T)
+    s1, s2 = geometry.singular_values(a, b, c, rest)
     values = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0))
     return Strains(float(values.mean()), float(np.percentile(values, 99)), values)
 
@@ -300,36 +300,45 @@ def principal_strains(surface: Any, flat: Any) -> Strains:
 def area_error(surface: Any, flat: Any) -> float:
     """Mean of |A'/A - 1| over the corner triangles, those without area left out."""
     tri = topology.corner_triangles(_faces(surface))
-    p = _points(surface)
-    corners = [p[tri[:, k]] for k in range(3)]
-    before = np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0]), axis=1)
+    before = _space_areas(_points(surface), tri)
     after = corner_areas(_flat(surface, flat), tri)
     keep = before > 1e-12 * before.max()
     return float(np.abs(after[keep] / before[keep] - 1.0).mean())
 
 
-def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None) -> int:
+def flipped_cells(
+    flat: Any, faces: NDArray[np.int64] | None = None, *, surface: Any = None
+) -> int:
     """Number of cells that are turned over in a flat image.
 
     A grid cell (`flat` is (H, W, 2)) counts when any of its four corner triangles has
-    signed area <= 0; another quad (`flat` is (n, 2), `faces` given) when a triangle of
-    its split along the shorter diagonal has; a triangle when it is itself.
+    signed area <= 0; another quad (`flat` is (n, 2), `faces` given), which may be an arrow,
+    when neither diagonal splits it into two triangles of positive area; a triangle when
+    it is itself. With `surface`, cells with a corner that has no area in space either are
+    not counted.
     """
     image = np.asarray(flat, float)
-    if faces is None:
-        if image.ndim != 3:
-            raise MeshError("flipped_cells needs faces=... for an image that is no grid (H, W, 2)")
-        cells = topology.grid_faces(*image.shape[:2])
-        area = corner_areas(image.reshape(-1, image.shape[-1])[:, :2], cells)
-        return int((area.reshape(4, -1) <= 0).any(axis=0).sum())
-    image = image.reshape(-1, image.shape[-1])[:, :2]
-    quads, tris = topology.by_size(faces)
-    split = np.linalg.norm(image[quads[:, 0]] - image[quads[:, 2]], axis=1) > np.linalg.norm(
-        image[quads[:, 1]] - image[quads[:, 3]], axis=1
-    )
-    turned = np.where(split[:, None], np.roll(quads, -1, axis=1), quads)
-    halves = [corner_areas(image, turned[:, list(c)]) <= 0 for c in ((0, 1, 2), (0, 2, 3))]
-    return int((halves[0] | halves[1]).sum() + (corner_areas(image, tris) <= 0).sum())
+    if faces is None and image.ndim != 3:
+        raise MeshError("flipped_cells needs faces=... for an image that is no grid (H, W, 2)")
+    points = image.reshape(-1, image.shape[-1])[:, :2]
+    grid = faces is None
+    quads, tris = topology.by_size(topology.grid_faces(*image.shape[:2]) if grid else faces)
+    # Corners 1 and 3 are the split along the diagonal 0-2, corners 0 and 2 the other one.
+    bad = corner_areas(points, quads).reshape(4, -1) <= 0
+    turned = bad.any(axis=0) if grid else (bad[0] | bad[2]) & (bad[1] | bad[3])
+    flipped = np.r_[turned, corner_areas(points, tris) <= 0]
+    if surface is not None:
+        space = _points(surface)
+        area = _space_areas(space, quads).reshape(4, -1).min(axis=0, initial=np.inf)
+        area = np.r_[area, _space_areas(space, tris)]
+        flipped &= area > 1e-12 * np.max(area, initial=0.0)
+    return int(flipped.sum())
+
+
+def _space_areas(points: Array, faces: NDArray[np.int64]) -> Array:
+    """Doubled areas of the corner triangles of faces in space."""
+    p, q, r = (points[k] for k in topology.corner_triangles(faces).T)
+    return np.linalg.norm(np.cross(q - p, r - p), axis=1)
 
 
 def corner_areas(flat: Array, faces: NDArray[np.int64]) -> Array:

@@ -47,5 +47,5 @@ def coarser(mesh: Mesh, largest: int) -> list[Mesh]:
         if halved == shape or (levels and max(shape) <= largest):
             break
         shape = (halved[0], halved[1])
-        levels.append(Mesh.from_grid(resample(grid, *shape)))
+        levels.append(Mesh.from_grid(resample(grid, *shape), weld=False))
     return levels[::-1]

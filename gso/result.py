@@ -76,6 +76,16 @@ class Result:
         return self.status.converged
 
     @property
+    def usable(self) -> bool:
+        """Whether it can be worked with: complete, on target, no cell turned over."""
+        points = self.mesh.vertices if self.flat is None else self.flat
+        return bool(
+            self.status not in (Status.CANCELLED, Status.TARGET_MISSED)
+            and np.isfinite(points).all()
+            and not self.metrics.get("flipped_cells", 0)
+        )
+
+    @property
     def grid(self) -> Array | None:
         """The result as (H, W, 3) when the input is a grid, otherwise None."""
         return self.mesh.grid
@@ -112,7 +122,9 @@ class Result:
                 np.savez(file, **self._arrays())
         elif suffix == "svg":
             if self.flat is None:
-                raise MeshError(f"{path}: only a flat result can be written as SVG; use task='flatten'")
+                raise MeshError(
+                    f"{path}: only a flat result can be written as SVG; use task='flatten'"
+                )
             io.save_flat(self.flat, self.design, path, unit=unit)
         else:
             io.save(self.mesh, path)
@@ -163,7 +175,9 @@ class Result:
         try:
             record = json.loads(data["record"].tobytes())
             if record["format"] != _FORMAT:
-                raise MeshError(f"{path} was written by another version (format {record['format']})")
+                raise MeshError(
+                    f"{path} was written by another version (format {record['format']})"
+                )
             design = Mesh(data["design"], data["faces"])
             result = cls(
                 record["task"],

@@ -185,8 +185,8 @@ def test_denoises(run):
         (["-o", "out.obj", "--backend", "abacus"], ["abacus", "superlu"]),
         (["-o", "out.obj", "--formulation", "magic"], ["magic", "curvature"]),
         (["-o", "out.obj", "--suffix", ".ply"], ["--suffix"]),
-        (["-o", "out.obj", "--task", "flatten", "--max-deviation", "1"], ["--max-deviation"]),
-        (["-o", "out.obj", "--task", "denoise", "--target-curvature", "1"], ["--target-curv"]),
+        (["-o", "out.obj", "--task", "flatten", "--max-deviation", "1"], ["max_deviation"]),
+        (["-o", "out.obj", "--task", "denoise", "--target-curvature", "1"], ["target_curvature"]),
     ],
 )
 def test_mistakes_are_found_before_the_solve(run, small, never, arguments, words):

@@ -193,7 +193,7 @@ def test_options_are_checked():
         Options(w_fairness=-1)
     with pytest.raises(gso.OptionError, match="variables"):
         Options(variables="pink")
-    with pytest.raises(gso.OptionError, match="no preset 'slow'.*balanced"):
+    with pytest.raises(gso.OptionError, match=r"no preset 'slow'.*balanced"):
         gso.tno.optimize(saddle(), options="slow")
     with pytest.raises(gso.OptionError, match="formulation"):
         gso.tno.optimize(saddle(), formulation="magic")

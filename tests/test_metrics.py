@@ -65,7 +65,7 @@ def test_features_split_the_curvature_by_sign():
 
 def test_distances_between_parallel_planes():
     lower = saddle(9, strength=0.0)
-    upper = lower + [0.3, 0.0, 0.1]
+    upper = lower + np.array([0.3, 0.0, 0.1])
     distance = metrics.surface_distance(lower, upper)
     # The part that sticks out is farther than the gap.
     assert distance.there_max == pytest.approx(np.hypot(0.3, 0.1))
@@ -73,7 +73,7 @@ def test_distances_between_parallel_planes():
         pytest.approx(0.1)
     )
     # Vertex-to-vertex distance counts the slide along the surface too.
-    assert metrics.d_H(lower, lower + [0.05, 0.0, 0.0]) > 0
+    assert metrics.d_H(lower, lower + np.array([0.05, 0.0, 0.0])) > 0
     assert metrics.surface_distance(lower, lower[1:-1, 1:-1]).there_max == pytest.approx(0.0)
 
 

@@ -31,7 +31,7 @@ def test_damaged_results_are_refused_by_name(tmp_path):
     data = path.read_bytes()
     for broken in (data[: len(data) // 2], b"", b"PK\x03\x04garbage"):
         path.write_bytes(broken)
-        with pytest.raises(gso.MeshError, match="r.npz"):
+        with pytest.raises(gso.MeshError, match=r"r\.npz"):
             gso.Result.load(path)
     np.savez(path, vertices=np.zeros((3, 3)))
     with pytest.raises(gso.MeshError, match="no result"):

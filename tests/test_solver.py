@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -97,7 +99,7 @@ def test_energy_falls_monotonically_and_the_best_comes_back(kind, method):
     before = problem.energy(x)
     solution = minimise(problem, x, iterations=12, method=method)
     energies = [p.energy for p in solution.history]
-    assert all(b <= a * (1 + 1e-12) for a, b in zip(energies, energies[1:], strict=False))
+    assert all(b <= a * (1 + 1e-12) for a, b in pairwise(energies))
     assert solution.energy == pytest.approx(problem.energy(solution.x))
     assert solution.energy < before
     assert sum(problem.by_term(solution.x).values()) == pytest.approx(solution.energy)
@@ -129,9 +131,7 @@ def test_bounds_hold_at_every_iterate():
     variables = unknowns()["normal"]
     problem = Problem(items(), variables)
     bound = np.full(variables.size, 0.004)
-    solution = minimise(
-        problem, np.zeros(variables.size), iterations=15, bounds=(-bound, bound)
-    )
+    solution = minimise(problem, np.zeros(variables.size), iterations=15, bounds=(-bound, bound))
     assert np.abs(solution.x).max() <= 0.004
     assert (np.abs(solution.x) > 0.0039).any()
     loose = minimise(problem, np.zeros(variables.size), iterations=15)
@@ -147,9 +147,7 @@ def test_the_callback_sees_every_iteration_and_can_stop():
         seen.append(progress)
         return progress.iteration < 3
 
-    solution = minimise(
-        problem, np.zeros(variables.size), iterations=10, callback=stop_at_three
-    )
+    solution = minimise(problem, np.zeros(variables.size), iterations=10, callback=stop_at_three)
     assert solution.status is Status.CANCELLED
     assert [p.iteration for p in seen] == [0, 1, 2, 3]
     assert sum(seen[-1].by_term.values()) == pytest.approx(seen[-1].energy)
@@ -166,9 +164,7 @@ def test_held_coordinates_stay():
     solution = minimise(
         Problem(items(), variables), variables.project(MESH.vertices.ravel()), iterations=5
     )
-    np.testing.assert_array_equal(
-        variables.points(solution.x)[:9], MESH.vertices.ravel()[:9]
-    )
+    np.testing.assert_array_equal(variables.points(solution.x)[:9], MESH.vertices.ravel()[:9])
 
 
 def test_the_sorting_and_the_table_analysis_agree(monkeypatch):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +39,7 @@ def many(
         workers = min(os.cpu_count() or 1, len(files))
         workers = workers if workers > 1 else 0  # a single process is this one
     records: dict[int, dict[str, Any]] = {}
-    with progress.files(len(files)) as bar, _workers_end_with_us(), report.status_only():
+    with progress.files(len(files)) as bar, report.status_only():
         for item in tno.optimize_many(files, workers=workers, **job.keywords):
             file, out = files[item.index], outs[item.index]
             try:
@@ -101,26 +99,3 @@ def _named(file: str, message: str) -> str:
     """The message in one line, with the file's name at its beginning."""
     message = " ".join(message.split())
     return message if message.startswith(file) else f"{file}: {message}"
-
-
-@contextmanager
-def _workers_end_with_us() -> Iterator[None]:
-    """On Ctrl-C end the worker processes at once instead of waiting for their results."""
-    import multiprocessing
-    import signal
-    import threading
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def stop(signum: int, frame: Any) -> None:
-        for child in multiprocessing.active_children():
-            child.terminate()
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGINT, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)

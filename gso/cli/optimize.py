@@ -158,37 +158,25 @@ def optimize(files: tuple[str, ...], out: str, **given: Any) -> None:
 
 def _keywords(given: dict[str, Any]) -> dict[str, Any]:
     """Keywords of :func:`gso.tno.optimize`, checked as far as that needs no mesh."""
-    task, formulation = given["task"], given["formulation"]
-    module = tasks.get(task)
-    if formulation is not None and formulation not in module.FORMULATIONS:
-        raise OptionError(
-            f"task {task!r} has no formulation {formulation!r}; "
-            f"there are {', '.join(module.FORMULATIONS)}"
-        )
-    settings = module.Options.preset(given["preset"])
+    from gso.tno import check
+
+    settings: Any = given["preset"]
     if given["backend"] is not None:
-        _check_backend(given["backend"])
-        settings = replace(settings, backend=given["backend"])
-    keywords = {"task": task, "formulation": formulation, "options": settings}
-    for name in ("max_deviation", "target_curvature"):
-        if given[name] is not None:
-            if task != "developable":
-                raise OptionError(f"--{name.replace('_', '-')} is for --task developable only")
-            keywords[name] = given[name]
+        module = tasks.get(given["task"])
+        settings = replace(module.Options.coerce(settings), backend=given["backend"])
+    questions = {k: given[k] for k in ("max_deviation", "target_curvature")}
+    check(given["task"], given["formulation"], settings, **questions)
+    keywords = {
+        "task": given["task"],
+        "formulation": given["formulation"],
+        "options": settings,
+        **questions,
+    }
     if given["fix_boundary"]:
         from gso.constraints import FixedBoundary
 
         keywords["constraints"] = [FixedBoundary()]
     return keywords
-
-
-def _check_backend(name: str) -> None:
-    """Refuse a linear solver that is unknown or not installed: try it on one equation."""
-    import numpy as np
-
-    from gso.tno import linear
-
-    linear.choose(linear.Pattern(1, np.array([0, 1]), np.array([0])), name)
 
 
 def _single(job: Job, file: str, out: str, plot: str | None, table: str | None) -> bool:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gso.metrics import INFO
-from gso.status import ConvergenceWarning, Status
+from gso.status import ConvergenceWarning
 
 if TYPE_CHECKING:
     from gso.result import Result
@@ -26,16 +26,6 @@ def status_only() -> Iterator[None]:
         yield
 
 
-def usable(result: Result) -> bool:
-    """Whether a result can be worked with: complete, on target, nothing turned over."""
-    points = result.mesh.vertices if result.flat is None else result.flat
-    return bool(
-        result.status not in (Status.CANCELLED, Status.TARGET_MISSED)
-        and np.isfinite(points).all()
-        and not result.metrics.get("flipped_cells", 0)
-    )
-
-
 def record(file: str, out: str, result: Result) -> dict[str, Any]:
     """A result without its geometry."""
     return {
@@ -45,7 +35,7 @@ def record(file: str, out: str, result: Result) -> dict[str, Any]:
         "formulation": result.formulation,
         "status": result.status.name,
         "message": str(result.status),
-        "usable": usable(result),
+        "usable": result.usable,
         "iterations": result.iterations,
         "seconds": result.seconds.get("total", 0.0),
         "backend": result.backend,

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def embed(mesh: Mesh, triangles: Ints) -> Array:
+def embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:
     """Plane image (n, 2) of a mesh, components over each other.
 
     Three maps are tried: least-squares conformal (Levy et al. 2002), harmonic to a circle
@@ -26,7 +26,9 @@ def embed(mesh: Mesh, triangles: Ints) -> Array:
     mesh : Mesh
         Components with a boundary and without handles.
     triangles : ndarray of int, (t, 3)
-        Triangles that carry strain and must not be turned over.
+        Triangles that carry strain.
+    upward : ndarray of int, (u, 3)
+        Triangles that must not be turned over.
 
     Returns
     -------
@@ -44,7 +46,9 @@ def embed(mesh: Mesh, triangles: Ints) -> Array:
         local[ids] = np.arange(len(ids))
         faces = mesh.faces[local[mesh.faces[:, 0]] >= 0]
         part = Mesh(mesh.vertices[ids], np.where(faces < 0, -1, local[faces]))
-        flat[ids] = _embed(part, local[triangles[local[triangles[:, 0]] >= 0]], int(ids[0]))
+        _check(part, int(ids[0]))
+        own = (local[t[local[t[:, 0]] >= 0]] for t in (triangles, upward))
+        flat[ids] = _embed(part, *own)
     return flat
 
 
@@ -54,8 +58,7 @@ def parts(mesh: Mesh) -> list[Ints]:
     return [np.flatnonzero(labels == k) for k in np.unique(labels[used])]
 
 
-def _embed(mesh: Mesh, triangles: Ints, name: int) -> Array:
-    _check(mesh, name)
+def _embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:
     outer = max(mesh.boundary_loops, key=lambda loop: _perimeter(mesh.vertices[loop]))
     images = [_conformal(mesh, outer), _harmonic(mesh, outer), _tutte(mesh, outer)]
     rated = []
@@ -63,7 +66,7 @@ def _embed(mesh: Mesh, triangles: Ints, name: int) -> Array:
         if image is None or not np.isfinite(image).all():
             continue
         scaled = _scaled(mesh, image)
-        flipped = int((_areas(scaled, triangles) <= 0).sum())
+        flipped = int((_areas(scaled, upward) <= 0).sum())
         rated.append((flipped, strain_level(mesh.vertices, triangles, scaled), scaled))
     return min(rated, key=lambda r: r[:2])[2]
 

@@ -45,9 +45,7 @@ def singular_values(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple
     return big + small, big - small
 
 
-def turn_and_shear(
-    p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]
-) -> tuple[Vec, Any, Any]:
+def turn_and_shear(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Vec, Any, Any]:
     """Parts ``((q1, q2), c, d)`` of a triangle's map, all linear in the unknowns.
 
     ``Q = |(q1, q2)|`` turns and scales, ``R = |(c, d)|`` shears.

@@ -77,7 +77,7 @@ class Options(BaseOptions):
             "iterations": 4,
             "coarse_iterations": 6,
             "w_curvature": 1.8e-3,
-            "w_fairness": 1.3e-5,
+            "w_fairness": 1.4e-5,
         },
         "balanced": {},
         "accurate": {"iterations": 25, "coarse_iterations": 15, "variables": "free"},
@@ -85,7 +85,7 @@ class Options(BaseOptions):
 
     iterations: int = 8
     w_curvature: float = 1.3e-3
-    w_fairness: float = 1e-5
+    w_fairness: float = 1.1e-5
     w_proximity: float = 1.0
     near: float = 0.01
     tangential: float = 0.7
@@ -187,7 +187,7 @@ def _objective(
     o = request.options
     w_curvature = o.w_curvature * request.curvature_weight
     w_curvature *= (TYPICAL_CURVATURE / max(curved, 1e-3)) ** 0.2
-    w_fairness = o.w_fairness * (TYPICAL_BENDING / (bending + 0.1)) ** 0.5
+    w_fairness = o.w_fairness * (TYPICAL_BENDING / (bending + 1.0)) ** 0.5
     w_proximity = o.w_proximity
     if request.max_deviation is not None:
         # The bound keeps the result close; the terms may ask for more.
@@ -196,21 +196,26 @@ def _objective(
     near = proximity.build(mesh, normals, tangential=o.tangential)
     items = [Weighted(t, w_curvature, Absolute(o.eps)) for t in curvature.build(mesh)]
     if mesh is not request.mesh:
-        smooth = mesh.replaced(resample(smooth.grid, *mesh.grid_shape).reshape(-1, 3))
+        smooth = mesh.replaced(_resampled(smooth, mesh))
     fair = fairness.build(mesh, reference=smooth.vertices, share=_own_bending(smooth))
     items.append(Weighted(fair, w_fairness))
     items.append(Weighted(near, w_proximity, Distance(o.near)))
     c = request.constraints
     if len(c.soft_ids) and mesh is request.mesh:
-        items.append(
-            Weighted(position.build(c.soft_ids, c.soft_positions, c.soft_weights), 1.0)
-        )
+        items.append(Weighted(position.build(c.soft_ids, c.soft_positions, c.soft_weights), 1.0))
     return items
 
 
 def _reach(request: Request) -> float | None:
     """Bound on the displacement: a hair inside what was asked for."""
     return None if request.max_deviation is None else request.max_deviation * (1.0 - 1e-7)
+
+
+def _resampled(source: Mesh, target: Mesh) -> Array:
+    """Vertices of one grid at the resolution of another, row by row."""
+    if source.grid is None or target.grid_shape is None:
+        return source.vertices
+    return resample(source.grid, *target.grid_shape).reshape(-1, 3)
 
 
 def _layout(mesh: Mesh) -> Layout:

@@ -22,7 +22,7 @@ from gso.resample import coarser, resample
 from gso.status import OptionError
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
-from gso.terms import Weighted, collapse, edges, fairness, isometry, stretch
+from gso.terms import Weighted, collapse, edges, fairness, isometry, shear, stretch
 from gso.terms.losses import Absolute
 from gso.topology import corner_triangles
 from gso.variables import Layout, Variables, free
@@ -42,9 +42,8 @@ _NEARLY = 1e-2
 _ROUGHLY = 1e-1
 #: Ratio to the level at which a start is strained too much for the powers of `Spread`.
 _STRAINED = 1.5
-#: Weights of the squeezed triangles and of the fairness in ``lengths``.
+#: Weight of the squeezed triangles in ``lengths``.
 _W_COLLAPSE = 3e-3
-_W_FAIRNESS = 1e-6
 
 
 @dataclass(frozen=True)
@@ -64,10 +63,12 @@ class Options(BaseOptions):
     w_peaks : float
         ``strain`` with norm "mixed": weight of the large strains; 0.006 makes those beyond
         twice the typical one expensive, 0.1 trades mean strain for smaller peaks.
-    w_fairness : float or None
+    w_shear : float
+        ``lengths``: weight of the squared shear, which keeps neighbouring vertices from
+        drifting apart unseen.
+    w_fairness : float
         Weight of the mean squared second derivative of the flat image, in units of the
-        surface's unit ball; None takes 0 for ``strain`` and 1e-6 for ``lengths``, which
-        needs some against drift between neighbouring vertices.
+        surface's unit ball.
     eps : float
         ``lengths``: differences of length below this share of the cells' diagonals count
         squared.
@@ -88,7 +89,8 @@ class Options(BaseOptions):
     norm: str = "mixed"
     w_edges: float = 0.5
     w_peaks: float = 0.006
-    w_fairness: float | None = None
+    w_shear: float = 1e-2
+    w_fairness: float = 0.0
     eps: float = 3e-4
     coarse_size: int = 40
     relax_iterations: int = 100
@@ -145,8 +147,10 @@ def _carrying(mesh: Mesh) -> Ints:
 
 
 def _upward(mesh: Mesh) -> Ints:
-    """Triangles that must not turn over: all corners of grid cells, else what carries strain."""
-    return _carrying(mesh) if mesh.grid_index is None else corner_triangles(mesh.faces)
+    """Triangles that must not turn over: all corners of the cells, unless they point inwards."""
+    if mesh.grid_index is not None:
+        return corner_triangles(mesh.faces)
+    return np.concatenate([corner_triangles(f) for f in stretch.cells(mesh)])
 
 
 def _flips(flat: Array, mesh: Mesh) -> int:
@@ -159,13 +163,13 @@ def _level(mesh: Mesh, flat: Array) -> float:
 
 def _start(mesh: Mesh, options: Options) -> flat_start.Relaxed:
     """An image without flips, close to the least squared strain, and its strain."""
-    carrying = _carrying(mesh)
+    carrying, upward = _carrying(mesh), _upward(mesh)
     if mesh.grid is not None:
         flat = flat_start.rectangle(mesh.grid).reshape(-1, 2)
     else:
-        flat = flat_start.embed(mesh, carrying)
+        flat = flat_start.embed(mesh, carrying, upward)
     return flat_start.relax(
-        mesh.vertices, carrying, flat, upward=_upward(mesh), iterations=options.relax_iterations
+        mesh.vertices, carrying, flat, upward=upward, iterations=options.relax_iterations
     )
 
 
@@ -205,7 +209,7 @@ def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
         stage.enter = partial(_refined, below, above, options)
     if request.formulation == "lengths":
         stages[-1].tolerance = _ROUGHLY
-        stages.append(_length_stage(options, mesh))
+        stages.append(_length_stage(options, mesh, level))
     elif options.norm == "l1":
         stages.append(_strain_stage(options, mesh, level))
     stages[-1].iterations, stages[-1].tolerance = options.iterations, options.tolerance
@@ -213,7 +217,7 @@ def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
 
 
 def _strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
-    items = _fair(mesh, options.w_fairness or 0.0)
+    items = _fair(mesh, options.w_fairness)
     if options.norm == "l2":
         items += [Weighted(t, 1.0) for t in stretch.build(mesh)]
     elif options.norm == "l1":
@@ -227,12 +231,14 @@ def _strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
     return _stage("strain", mesh, items)
 
 
-def _length_stage(options: Options, mesh: Mesh) -> Stage:
-    items = _fair(mesh, _W_FAIRNESS if options.w_fairness is None else options.w_fairness)
+def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:
+    items = _fair(mesh, options.w_fairness)
+    items += [Weighted(t, options.w_shear) for t in shear.build(mesh)]
     items += [Weighted(t, _W_COLLAPSE) for t in collapse.build(mesh)]
     terms = isometry.build(mesh)
     if options.norm == "l2":
-        return _stage("lengths", mesh, items + [Weighted(t, 1.0) for t in terms])
+        # Divided by the level it is as large as with "l1", and so are the other weights.
+        return _stage("lengths", mesh, items + [Weighted(t, 1.0 / level) for t in terms])
     size = isometry.typical_length(mesh)
     eps = options.eps * size
     stage = _stage("lengths", mesh, items + [Weighted(t, size, Absolute(eps)) for t in terms])
@@ -298,10 +304,11 @@ def metrics(mesh: Mesh, flat: Array) -> dict[str, float]:
     ``loss_iso_cell`` is left out on a mesh without quads.
     """
     strain = measure.principal_strains(mesh, flat)
-    if mesh.grid_index is None:
-        flipped = measure.flipped_cells(flat, mesh.faces)
+    grid = mesh.grid_index
+    if grid is None:
+        flipped = measure.flipped_cells(flat, mesh.faces, surface=mesh)
     else:
-        flipped = measure.flipped_cells(flat[mesh.grid_index])
+        flipped = measure.flipped_cells(flat[grid], surface=mesh.grid)
     out = {
         "loss_iso_cell": measure.loss_iso_cell(mesh, flat),
         "edge_length_error": measure.edge_length_error(mesh, flat),

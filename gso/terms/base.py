@@ -77,7 +77,7 @@ class Weighted:
 
     term: Term
     weight: float
-    loss: Loss = Squared()
+    loss: Loss = field(default_factory=Squared)
 
     @property
     def quadratic(self) -> bool:

@@ -106,11 +106,11 @@ class Spread:
         return (first * parts).reshape(r.shape), second.reshape(r.shape)
 
 
-def pieces(mesh: Mesh) -> list[Ints]:
-    """Faces by kind, (e, 4) and (e, 3): what carries strain.
+def cells(mesh: Mesh) -> list[Ints]:
+    """Faces by size, (e, 4) and (e, 3): what must not turn over in the plane.
 
-    A quad with a corner of no area or one that points inwards is split there into two
-    triangles; triangles without area are left out.
+    A quad with a corner of no area, or one that points inwards, is split there into two
+    triangles.
     """
     quads, triangles = topology.by_size(mesh.faces)
     if len(quads):
@@ -120,10 +120,18 @@ def pieces(mesh: Mesh) -> list[Ints]:
         turned = np.take_along_axis(quads[bad], (worst[bad, None] + np.arange(4)) % 4, axis=1)
         quads = quads[~bad]
         triangles = np.concatenate([triangles, turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
-    if len(triangles):
-        area, edges = _corner(mesh.vertices, triangles, (0, 1, 2))
-        triangles = triangles[np.linalg.norm(area, axis=1) > _FLAT_CORNER * edges]
     return [f for f in (quads, triangles) if len(f)]
+
+
+def pieces(mesh: Mesh) -> list[Ints]:
+    """The :func:`cells` that carry strain: all but triangles without area."""
+    out = []
+    for faces in cells(mesh):
+        if faces.shape[1] == 3:
+            area, sides = _corner(mesh.vertices, faces, (0, 1, 2))
+            faces = faces[np.linalg.norm(area, axis=1) > _FLAT_CORNER * sides]
+        out.append(faces)
+    return [f for f in out if len(f)]
 
 
 def _corner(vertices: Array, faces: Ints, corner: tuple[int, int, int]) -> tuple[Array, Array]:

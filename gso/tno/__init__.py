@@ -1,6 +1,6 @@
 """The traditional numerical optimiser: sparse Gauss-Newton on CasADi's derivatives."""
 
 from gso.tno.batch import optimize_many
-from gso.tno.optimize import optimize
+from gso.tno.optimize import check, optimize
 
-__all__ = ["optimize", "optimize_many"]
+__all__ = ["check", "optimize", "optimize_many"]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gso.result import Result
-from gso.status import GSOError
+from gso.status import ConvergenceWarning, GSOError
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,22 @@ def _one(index: int, mesh: Any, keywords: dict[str, Any]) -> Item:
     from gso.tno.optimize import optimize
 
     try:
-        return Item(index, optimize(mesh, **keywords))
+        result = optimize(mesh, **keywords)
+        result.metrics  # noqa: B018 - computed here, where there is a processor for it
+        return Item(index, result)
     except GSOError as error:
         return Item(index, None, str(error))
     except Exception as error:  # one broken surface must not end the batch
         return Item(index, None, f"{type(error).__name__}: {error}")
+
+
+def _prepare_worker() -> None:
+    """Leave Ctrl-C to the parent, and warnings to the status of the results."""
+    import signal
+    import warnings
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    warnings.simplefilter("ignore", ConvergenceWarning)
 
 
 def optimize_many(
@@ -76,8 +87,11 @@ def optimize_many(
     from multiprocessing import get_context
 
     # Forking would copy the threads' locks of BLAS and PARDISO in an unknown state.
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        running: dict[Future[Item], int] = {}
+    pool = ProcessPoolExecutor(
+        workers, mp_context=get_context("spawn"), initializer=_prepare_worker
+    )
+    running: dict[Future[Item], int] = {}
+    try:
         more = True
         while more or running:
             while more and len(running) < 2 * workers:
@@ -96,3 +110,9 @@ def optimize_many(
                     more = False
                 except Exception as error:  # what cannot travel between processes
                     yield Item(index, None, f"{type(error).__name__}: {error}")
+    finally:
+        # Left early, by Ctrl-C or because the caller has seen enough: end what still runs.
+        if running:
+            for process in list(pool._processes.values()):
+                process.terminate()
+        pool.shutdown(wait=True, cancel_futures=True)

@@ -35,6 +35,13 @@ def _numbers(c: Any, count: int) -> list[Any]:
     return [c[k] for k in range(count)]
 
 
+def _casadi() -> Any:
+    # Its type stubs are wrong about overloads.
+    import casadi
+
+    return casadi
+
+
 @lru_cache(maxsize=128)
 def casadi_function(residual: Residual, shape: tuple[int, ...], constants: int, jacobian: bool):
     """CasADi function of one element: (coordinates, constants) -> residuals (and Jacobian).
@@ -50,7 +57,7 @@ def casadi_function(residual: Residual, shape: tuple[int, ...], constants: int, 
     jacobian : bool
         Also return the dense Jacobian, row by row.
     """
-    import casadi as ca
+    ca: Any = _casadi()
 
     x = ca.SX.sym("x", sum(shape))
     c = ca.SX.sym("c", constants)
@@ -68,7 +75,7 @@ def casadi_turning(vectors: Residual, shape: tuple[int, ...], constants: int):
     The second derivative of the length of a vector (u, v) that is linear in the
     coordinates is the rank-one matrix ``h h^T``, ``h = (u dv - v du) / length^(3/2)``.
     """
-    import casadi as ca
+    ca: Any = _casadi()
 
     x = ca.SX.sym("x", sum(shape))
     c = ca.SX.sym("c", constants)
@@ -87,7 +94,7 @@ class Kernel:
 
     Made from a function of :func:`casadi_function` or :func:`casadi_turning`. Call with
     coordinates (k, e) and constants (c, e); returns residuals (r, e) and Jacobian
-    (r, k, e) or None.
+    (r, k, e), empty when it was not printed.
     """
 
     def __init__(self, function: Any, shape: tuple[int, ...], *, jacobian: bool):
@@ -99,17 +106,17 @@ class Kernel:
         exec(compile(self.source, "<gso kernel>", "exec"), scope)
         self._run = scope["kernel"]
 
-    def __call__(self, x: Array, c: Array) -> tuple[Array, Array | None]:
+    def __call__(self, x: Array, c: Array) -> tuple[Array, Array]:
         count = x.shape[1]
         value = np.empty((self.rows, count))
-        slope = np.empty((self.rows * self.columns, count)) if self.jacobian else value[:0]
+        slope = np.empty((self.rows * self.columns if self.jacobian else 0, count))
         work = np.empty((self._work, min(BLOCK, count)))
         with np.errstate(all="ignore"):
             for start in range(0, count, BLOCK):
                 at = slice(start, min(start + BLOCK, count))
                 w = work[:, : at.stop - start]
                 self._run(x[:, at], c[:, at], value[:, at], slope[:, at], w)
-        return value, slope.reshape(self.rows, -1, count) if self.jacobian else None
+        return value, slope.reshape(self.rows, self.columns if self.jacobian else 0, count)
 
 
 @lru_cache(maxsize=128)

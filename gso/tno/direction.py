@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gso.tno.linear import SingularError
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 #: Relative damping at which a matrix that is still indefinite is given up.
 _HOPELESS = 1e3
@@ -19,7 +22,7 @@ class GaussNewton:
     def __init__(self, damping: float = 1e-9):
         self.damping = damping
 
-    def step(self, solver, values: Array, diagonal: Array, gradient: Array) -> Array:
+    def step(self, solver: Any, values: Array, diagonal: Ints, gradient: Array) -> Array:
         """Solve ``(H + damping mean(diag H) I) d = -gradient``.
 
         The mean of the diagonal is the trace, which does not change when the surface is

@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-
 class _Elements:
     """One weighted term on given unknowns: gathers, kernels, pulled-back Jacobian."""
 
@@ -63,8 +62,7 @@ class _Elements:
         run = turning(vectors, self.shape, len(self.constants))
         return self._pulled(run(coordinates[self.gather], self.constants)[1])
 
-    def _pulled(self, slope: Array | None) -> Array:
-        assert slope is not None  # noqa: S101 - the kernel was printed with its Jacobian
+    def _pulled(self, slope: Array) -> Array:
         if self._pull is None:
             return slope
         q = len(self.columns)
@@ -138,7 +136,9 @@ class Problem:
         self.limits = tuple(limits)
         used = [i for i in items if i.weight > 0 and i.term.count]
         self._elements = [_Elements(i, variables) for i in used if not i.quadratic]
-        self._quadratic = _Quadratic([_Elements(i, variables) for i in used if i.quadratic], variables)
+        self._quadratic = _Quadratic(
+            [_Elements(i, variables) for i in used if i.quadratic], variables
+        )
 
     @cached_property
     def _assembly(self) -> _Assembly:
@@ -234,7 +234,7 @@ class _Quadratic:
         for element in elements:
             residual, slope = element.linearise(start)
             root = np.sqrt(element.item.weight * element.weights)
-            r, q, count = slope.shape
+            r, _, count = slope.shape
             row = base + np.arange(r * count).reshape(r, 1, count)
             keep = (slope != 0) & (element.columns < n)
             rows.append(np.broadcast_to(row, slope.shape)[keep])

@@ -59,7 +59,8 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
     request = replace(request, options=options)
     weight, low, high = 1.0, 0.0, np.inf
     value_low = value_high = np.nan
-    best = last = None
+    best: Any = None
+    last: Any = None
     distance = np.inf
     for _ in range(_SOLVES):
         last = run(replace(request, curvature_weight=weight))

@@ -160,7 +160,10 @@ def minimise(
                 timings.search += time.perf_counter() - t2
                 report(done, value, step)
                 if settled and energy - value <= tolerance * abs(energy):
-                    status = Status.CONVERGED if step > 0 or energy == 0 else Status.STALLED
+                    # Nothing is left to gain when rounding errors are all there is.
+                    expected = -0.5 * float(gradient @ d)
+                    done_well = step > 0 or expected <= max(tolerance * abs(energy), _NOTHING)
+                    status = Status.CONVERGED if done_well else Status.STALLED
                     break
     except Cancelled:
         status = Status.CANCELLED
@@ -171,6 +174,9 @@ def minimise(
     smooth(len(schedule))
     return Solution(best, best_energy, status, done, solver.name, history)
 
+
+#: Energy (dimensionless) that is as good as zero.
+_NOTHING = 1e-20
 
 #: Stiffness, relative to the matrix, that keeps an unknown at its bound.
 _STIFF = 1e6

@@ -65,7 +65,7 @@ def test_the_cheapest_installed_one_is_chosen():
 
 def test_unknown_and_missing_backends_are_named(monkeypatch):
     pattern, _ = lower(MATRICES["one"])
-    with pytest.raises(OptionError, match="nonsense.*cholmod"):
+    with pytest.raises(OptionError, match=r"nonsense.*cholmod"):
         linear.choose(pattern, "nonsense")
     monkeypatch.setattr(linear.backends()["cholmod"], "available", lambda: False)
     with pytest.raises(BackendError, match="pip install cvxopt"):

@@ -1,4 +1,4 @@
-"""Every registered term: one definition for all numbers, exact derivatives, declared invariances."""
+"""Every registered term: the same in all numbers, exact derivatives, declared invariances."""
 
 from __future__ import annotations
 

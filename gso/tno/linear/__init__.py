@@ -10,11 +10,12 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from types import ModuleType
+from typing import Any
 
 from gso.status import BackendError, OptionError
 from gso.tno.linear.base import Pattern, SingularError, one_thread
 
-__all__ = ["Pattern", "SingularError", "backends", "choose", "one_thread"]
+__all__ = ["Pattern", "SingularError", "backends", "choose", "find", "one_thread"]
 
 _SUPPORT = ("base",)
 
@@ -28,15 +29,25 @@ def backends() -> dict[str, ModuleType]:
     }
 
 
-def choose(pattern: Pattern, name: str | None = None):
-    """Solver of the named backend, or of the fastest installed one for this pattern."""
+def find(name: str) -> ModuleType:
+    """Module of an installed backend.
+
+    Raises
+    ------
+    OptionError, BackendError
+        There is no such backend; it needs a package that is not installed.
+    """
     found = backends()
+    if name not in found:
+        raise OptionError(f"no linear backend {name!r}; there are {', '.join(sorted(found))}")
+    if not found[name].available():
+        raise BackendError(f"backend {name!r} needs a package: pip install {found[name].PACKAGE}")
+    return found[name]
+
+
+def choose(pattern: Pattern, name: str | None = None) -> Any:
+    """Solver of the named backend, or of the fastest installed one for this pattern."""
     if name is not None:
-        if name not in found:
-            raise OptionError(f"no linear backend {name!r}; there are {', '.join(sorted(found))}")
-        if not found[name].available():
-            raise BackendError(f"backend {name!r} needs a package: pip install {found[name].PACKAGE}")
-        return found[name].Solver(pattern)
-    usable = {k: m for k, m in found.items() if m.available()}
-    best = min(usable, key=lambda k: usable[k].cost(pattern))
-    return usable[best].Solver(pattern)
+        return find(name).Solver(pattern)
+    usable = [m for m in backends().values() if m.available()]
+    return min(usable, key=lambda m: m.cost(pattern)).Solver(pattern)

@@ -39,9 +39,7 @@ class Solver:
 
         band = np.zeros(self._shape[0] * self._shape[1])
         band[self._at] = values
-        self._factor, info = dpbtrf(
-            band.reshape(self._shape, order="F"), lower=1, overwrite_ab=1
-        )
+        self._factor, info = dpbtrf(band.reshape(self._shape, order="F"), lower=1, overwrite_ab=1)
         if info != 0:
             raise SingularError(f"leading minor {info} is not positive")
 

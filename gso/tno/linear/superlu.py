@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from gso.tno.linear.base import Pattern, SingularError
@@ -36,7 +38,7 @@ class Solver:
         full.sort_indices()
         self._entry = full.data - 1
         self._matrix = csc_matrix((full.data.astype(float), full.indices, full.indptr), (n, n))
-        self._factor = None
+        self._factor: Any = None
 
     def factor(self, values: np.ndarray) -> None:
         """Factor the matrix with these values of the lower triangle."""

@@ -1,0 +1,55 @@
+"""Shear of the flat image: the part of the strain that is linear in the unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gso import geometry
+from gso.mesh import Mesh
+from gso.terms.base import Term
+from gso.terms.stretch import corners_of, pieces, rest_constants
+
+#: Turning or moving the flat image changes no shear.
+INVARIANT = ("translation", "rotation")
+
+
+def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """(c, d) of each corner triangle of a face, see :mod:`gso.geometry.strain`.
+
+    Constants: the three numbers of :func:`gso.geometry.rest_frame` per corner triangle.
+    """
+    out: list[Any] = []
+    for n, corner in enumerate(corners_of(len(points))):
+        p, q, r = (points[k] for k in corner)
+        m11, m12, m22 = constants[3 * n : 3 * n + 3]
+        out += geometry.turn_and_shear(p, q, r, (m11, m12, m22))[1:]
+    return tuple(out)
+
+
+def build(mesh: Mesh) -> list[Term]:
+    """Shear of all corner triangles; weights average over triangles.
+
+    Its energy is constant in its second derivative, holds neighbouring vertices together,
+    and couples no vertices but those of one face: a cheap regulariser.
+    """
+    groups = pieces(mesh)
+    count = sum(len(corners_of(f.shape[1])) * len(f) for f in groups)
+    return [
+        Term(
+            "shear",
+            residual,
+            (("flat", faces),),
+            weights=np.full(len(faces), 1.0 / count),
+            constants=rest_constants(mesh.vertices, faces),
+            linear=True,
+        )
+        for faces in groups
+    ]
+
+
+def examples(mesh: Mesh) -> list[Term]:
+    """Terms for the conformance tests."""
+    return build(mesh)
