@@ -83,7 +83,8 @@ class Options(BaseOptions):
         "accurate": {"iterations": 25, "coarse_iterations": 15, "variables": "free"},
     }
 
-    iterations: int = 8
+    iterations: int = 12
+    method: str = "levenberg-marquardt"
     w_curvature: float = 1.3e-3
     w_fairness: float = 1.1e-5
     w_proximity: float = 1.0

@@ -36,6 +36,8 @@ FORMULATIONS = ("strain", "lengths")
 _SMALLEST_LEVEL = 1e-7
 #: Root-mean-square strain above which the user is told to cut the surface.
 _FAR_FROM_FLAT = 0.1
+#: Typical strain above which large strains are made more expensive.
+_LARGE_STRAIN = 0.03
 #: Relative fall of the energy at which a stage that only prepares another one stops.
 _NEARLY = 1e-2
 #: The same where the next stage has another objective.
@@ -60,9 +62,9 @@ class Options(BaseOptions):
     w_edges : float
         ``strain`` with norm "mixed": weight of the relative change of the edges' lengths,
         beside that of the corner triangles' strain.
-    w_peaks : float
-        ``strain`` with norm "mixed": weight of the large strains; 0.006 makes those beyond
-        twice the typical one expensive, 0.1 trades mean strain for smaller peaks.
+    knee : float
+        ``strain`` with norm "mixed": strains of more than this many times the typical one
+        are made expensive; smaller numbers trade mean strain for smaller peaks.
     w_shear : float
         ``lengths``: weight of the squared shear, which keeps neighbouring vertices from
         drifting apart unseen.
@@ -87,8 +89,8 @@ class Options(BaseOptions):
     iterations: int = 40
     tolerance: float = 5e-3
     norm: str = "mixed"
-    w_edges: float = 0.5
-    w_peaks: float = 0.006
+    w_edges: float = 0.35
+    knee: float = 2.3
     w_shear: float = 1e-2
     w_fairness: float = 0.0
     eps: float = 3e-4
@@ -99,8 +101,8 @@ class Options(BaseOptions):
         super().__post_init__()
         if self.norm not in ("mixed", "l2", "l1"):
             raise OptionError(f"norm is {self.norm!r}; take 'mixed', 'l2' or 'l1'")
-        if not self.eps > 0:
-            raise OptionError(f"eps is {self.eps}; it must be positive")
+        if not (self.eps > 0 and self.knee > 0):
+            raise OptionError("eps and knee must be positive")
         if self.coarse_size < 4:
             raise OptionError(f"coarse_size is {self.coarse_size}; it must be 4 or more")
 
@@ -221,14 +223,19 @@ def _strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
     if options.norm == "l2":
         items += [Weighted(t, 1.0) for t in stretch.build(mesh)]
     elif options.norm == "l1":
-        loss = stretch.Spread(level, peak=0.0, eps=0.03)
+        loss = stretch.Spread(level, knee=np.inf, eps=0.03)
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
     else:
-        loss = stretch.Spread(level, peak=options.w_peaks)
+        loss = stretch.Spread(level, knee=options.knee * _bent(level))
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
         # Level times the size is what `Spread` costs at small strains, too.
         items.append(Weighted(edges.build(mesh), options.w_edges * level, Absolute(0.1 * level)))
     return _stage("strain", mesh, items)
+
+
+def _bent(level: float) -> float:
+    """Share of the knee: less where the strain is so large that peaks must be held down."""
+    return float(np.clip((_LARGE_STRAIN / level) ** (1 / 3), 0.68, 1.0))
 
 
 def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:

@@ -16,6 +16,7 @@ from gso.tasks.base import Request
 _SOLVES = 10
 _CLOSE = 0.03
 _RANGE = (1e-2, 1e5)
+_PROGRESS = 0.98
 _ITERATIONS = 25
 _COARSE_ITERATIONS = 15
 
@@ -73,9 +74,11 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
             if value >= (1.0 - _CLOSE) * target:
                 break
         else:
+            stuck = value > _PROGRESS * value_low
             low, value_low = weight, value
             # Curvature that is gone comes back slowly: go on from the side that has more.
-            request = replace(request, start=last.points)
+            # Where more weight changes nothing, a new start gets round the obstacle.
+            request = replace(request, start=None if stuck else last.points)
         if last.status is Status.CANCELLED or not _RANGE[0] < weight < _RANGE[1]:
             break
         weight = _next(weight, value, target, low, high, value_low, value_high)

@@ -19,7 +19,7 @@ def cost(pattern: Pattern) -> float:
     band = pattern.bandwidth
     if pattern.size * (band + 1) > 3e8:
         return np.inf
-    return 2e-3 + pattern.size * (band + 16.0) ** 2 / 1.4e10
+    return 2e-4 + pattern.size * (band + 16.0) ** 2 / 3.6e10
 
 
 class Solver:

@@ -17,9 +17,9 @@ def available() -> bool:
 
 
 def cost(pattern: Pattern) -> float:
-    """As measured on grids."""
+    """As measured on grids, with a tenth of the analysis."""
     density = pattern.nnz / max(pattern.size, 1)
-    return 1.2e-8 * pattern.size**1.25 * density
+    return 3e-4 + 8e-9 * pattern.size**1.25 * density
 
 
 class Solver:

@@ -19,7 +19,7 @@ def available() -> bool:
 def cost(pattern: Pattern) -> float:
     """As measured on grids: grows with the entries a column has and a bit over linearly."""
     density = pattern.nnz / max(pattern.size, 1)
-    return 1.2e-7 * pattern.size**1.25 * density
+    return 4e-8 * pattern.size**1.25 * density
 
 
 class Solver:
