@@ -236,7 +236,7 @@ def last_problem(points: np.ndarray, task: str, options: str) -> tuple[Any, np.n
     from gso import tasks
     from gso.constraints import Compiled
     from gso.tasks.base import Request
-    from gso.tno.optimize import Canonical
+    from gso.tno.canonical import Canonical
     from gso.tno.problem import Problem
 
     module = tasks.get(task)
@@ -305,7 +305,11 @@ def resolution() -> dict[str, Any]:
             mean = np.mean(figures, axis=0)
             rows.append([f"{preset} {size}", *mean])
             out[f"{preset} {size}"] = [*map(float, mean)]
-    table("One set of weights, 24 surfaces of seed 77", ["grid", "loss_gc", "K_A-r", "d_H %", "fairness"], rows)
+    table(
+        "One set of weights, 24 surfaces of seed 77",
+        ["grid", "loss_gc", "K_A-r", "d_H %", "fairness"],
+        rows,
+    )
     return out
 
 

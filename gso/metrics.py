@@ -306,9 +306,7 @@ def area_error(surface: Any, flat: Any) -> float:
     return float(np.abs(after[keep] / before[keep] - 1.0).mean())
 
 
-def flipped_cells(
-    flat: Any, faces: NDArray[np.int64] | None = None, *, surface: Any = None
-) -> int:
+def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None, *, surface: Any = None) -> int:
     """Number of cells that are turned over in a flat image.
 
     A grid cell (`flat` is (H, W, 2)) counts when any of its four corner triangles has

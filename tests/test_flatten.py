@@ -287,19 +287,17 @@ def test_arrow_shaped_quads_keep_their_shape():
 def test_what_cannot_be_flattened_is_said():
     box = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
     sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    with pytest.raises(gso.MeshError, match="closed.*cut it open"):
+    with pytest.raises(gso.MeshError, match=r"closed.*cut it open"):
         solve(Mesh(box, np.array(sides)))
     n, m = 12, 8
-    a, b = np.meshgrid(
-        2 * np.pi * np.arange(n) / n, 2 * np.pi * np.arange(m) / m, indexing="ij"
-    )
+    a, b = np.meshgrid(2 * np.pi * np.arange(n) / n, 2 * np.pi * np.arange(m) / m, indexing="ij")
     torus = np.stack(
         [(2 + np.cos(b)) * np.cos(a), (2 + np.cos(b)) * np.sin(a), np.sin(b)], -1
     ).reshape(-1, 3)
     ids = np.arange(n * m).reshape(n, m)
     right, up = np.roll(ids, -1, axis=0), np.roll(ids, -1, axis=1)
     quads = np.stack([ids, right, np.roll(right, -1, axis=1), up], -1).reshape(-1, 4)
-    with pytest.raises(gso.MeshError, match="1 handle .*cut it open"):
+    with pytest.raises(gso.MeshError, match=r"1 handle .*cut it open"):
         solve(Mesh(torus, quads[1:]))
     with pytest.raises(gso.OptionError, match="constraints"):
         solve(saddle(5), constraints=[gso.Fixed([0])])

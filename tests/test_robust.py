@@ -14,7 +14,7 @@ from gso import tasks
 from gso.constraints import Compiled
 from gso.mesh import Mesh
 from gso.tasks.base import Request
-from gso.tno.optimize import Canonical
+from gso.tno.canonical import Canonical
 from gso.tno.problem import Problem
 from gso.variables import free
 from tests.conftest import saddle

@@ -90,7 +90,7 @@ class Options(BaseOptions):
     tolerance: float = 5e-3
     norm: str = "mixed"
     w_edges: float = 0.35
-    knee: float = 2.3
+    knee: float = 2.2
     w_shear: float = 1e-2
     w_fairness: float = 0.0
     eps: float = 3e-4

@@ -19,6 +19,8 @@ _CORNERS = ((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2))
 _ROOT2 = 2.0**0.5
 #: Corners flatter than this (doubled area over the sum of its squared sides) hold no frame.
 _FLAT_CORNER = 1e-6
+#: Multiple of the knee from which on the cost of a strain goes on as its square.
+_STEEPEST = 1.3
 
 
 def corners_of(size: int) -> tuple[tuple[int, int, int], ...]:
@@ -60,7 +62,8 @@ class Spread:
     """Cost of a corner's strain s: its size, and steeply more for peaks.
 
     ``level^2 ((2/p) u^p + (2/q) knee^(p-q) u^q)`` with ``u = s / level``: a power `p` below two
-    lowers the mean strain, the second one keeps the largest strains down. Measured
+    lowers the mean strain, the second one keeps the largest strains down. Far beyond the
+    knee the cost goes on as a square, so that few steps bring peaks down. Measured
     against the square alone on random surfaces, mean, 99th percentile and maximum fall.
 
     Attributes
@@ -78,7 +81,7 @@ class Spread:
     level: float
     p: float = 1.0
     q: float = 10.0
-    knee: float = 2.3
+    knee: float = 2.2
     eps: float = 0.1
 
     @property
@@ -95,19 +98,20 @@ class Spread:
         y = self._squares(r)[1]
         e = self.eps**2
         low = 2.0 / self.p * ((y + e) ** (0.5 * self.p) - e ** (0.5 * self.p))
-        return self.level**2 * (low + 2.0 * self.peak / self.q * y ** (0.5 * self.q))
+        held = np.minimum(y, (_STEEPEST * self.knee) ** 2)
+        rise = self.peak * held ** (0.5 * self.q - 1.0)
+        return self.level**2 * (low + rise * (2.0 / self.q * held + y - held))
 
     def weights(self, r: Array) -> tuple[Array, Array]:
         """Derivative, and the curvature without its negative part and its cross terms."""
         parts, y = self._squares(r)
+        held = np.minimum(y, (_STEEPEST * self.knee) ** 2)
         low = (y + self.eps**2) ** (0.5 * self.p - 1.0)
-        high = self.peak * y ** (0.5 * self.q - 1.0)
-        first = low + high
-        growth = (0.5 * self.q - 1.0) * self.peak * y ** (0.5 * self.q - 2.0) / self.level**2
-        if self.p < 2.0:
-            growth = growth + (0.5 * self.p - 1.0) * low / (y + self.eps**2) / self.level**2
-        second = first + np.maximum(growth, 0.0) * parts**2
-        return (first * parts).reshape(r.shape), second.reshape(r.shape)
+        first = low + self.peak * held ** (0.5 * self.q - 1.0)
+        growth = (0.5 * self.p - 1.0) * low / (y + self.eps**2)
+        rising = (0.5 * self.q - 1.0) * self.peak * held ** (0.5 * self.q - 2.0)
+        growth = np.maximum(growth + np.where(y > held, 0.0, rising), 0.0) / self.level**2
+        return (first * parts).reshape(r.shape), (first + growth * parts**2).reshape(r.shape)
 
 
 def cells(mesh: Mesh) -> list[Ints]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
 
@@ -14,15 +13,15 @@ from numpy.typing import NDArray
 
 from gso import tasks
 from gso.constraints import Constraint, compile_constraints
-from gso.mesh import Frame, Mesh
+from gso.mesh import Mesh
 from gso.result import Result
-from gso.status import ConvergenceWarning, MeshError, OptionError, Progress, Status
-from gso.tasks.base import Options, Plan, Request
+from gso.status import ConvergenceWarning, OptionError, Status
+from gso.tasks.base import Options, Request
 from gso.tno import linear
-from gso.tno.problem import Problem
+from gso.tno.canonical import Canonical
+from gso.tno.run import Outcome, Run
 from gso.tno.search import reach_target, stay_within
-from gso.tno.solver import Callback, Solution, Timings, minimise
-from gso.variables import free
+from gso.tno.solver import Callback
 
 Array = NDArray[np.float64]
 
@@ -163,158 +162,6 @@ def check(
     return module, formulation, settings
 
 
-class Canonical:
-    """A mesh in the unit ball, grids numbered row by row, and the way back."""
-
-    def __init__(self, design: Mesh):
-        self.frame: Frame = design.frame
-        if not self.frame.scale > 0:
-            raise MeshError("all vertices are at one point")
-        n = len(design.vertices)
-        if design.grid_index is None:
-            self.order = np.arange(n)
-            self.mesh = design.replaced(self.frame.to_unit(design.vertices))
-        else:
-            self.order = design.grid_index.ravel()
-            self.mesh = Mesh.from_grid(self.frame.to_unit(design.grid), weld=False)  # type: ignore[arg-type]
-        self.new_index = np.empty(n, np.int64)
-        self.new_index[self.order] = np.arange(n)
-
-    def start(self, x0: Any, *, flat: bool) -> Array | None:
-        """Coordinates of a warm start in this numbering and frame."""
-        if x0 is None:
-            return None
-        points = np.asarray(getattr(x0, "vertices", x0), float)
-        ordered = points.ndim == 3
-        points = points.reshape(-1, points.shape[-1])
-        dim = 2 if flat else 3
-        if points.shape != (len(self.order), points.shape[-1]) or points.shape[1] < dim:
-            raise MeshError(f"x0 has shape {np.shape(x0)}; {len(self.order)} points are needed")
-        if not np.isfinite(points).all():
-            raise MeshError("x0 has coordinates that are not finite")
-        points = points if ordered else points[self.order]
-        return points[:, :2] / self.frame.scale if flat else self.frame.to_unit(points)
-
-    def back(self, values: Array) -> Array:
-        """Rows in this numbering, put in the user's."""
-        return values[self.new_index]
-
-
-@dataclass
-class Outcome:
-    """Coordinates that a run ended with, and how."""
-
-    block: str
-    points: Array
-    status: Status
-    energy: dict[str, float] = field(default_factory=dict)
-    iterations: int = 0
-    backend: str = ""
-    notes: tuple[str, ...] = ()
-    details: dict[str, Any] = field(default_factory=dict)
-
-
-class Run:
-    """Solves requests of one task, keeping history and time across several of them."""
-
-    def __init__(self, module: ModuleType, callback: Callback | None):
-        self.module = module
-        self.callback = callback
-        self.history: list[Progress] = []
-        self.timings = Timings()
-        self.iterations = 0
-
-    def __call__(self, request: Request) -> Outcome:
-        """Plan and solve the stages."""
-        clock = time.perf_counter()
-        plan: Plan = self.module.plan(request)
-        self.timings.setup += time.perf_counter() - clock
-        dim = 2 if plan.block == "flat" else 3
-        coordinates, solution = plan.start, None
-        for number, stage in enumerate(plan.stages):
-            clock = time.perf_counter()
-            coordinates = stage.enter(coordinates)
-            variables = stage.variables(coordinates)
-            problem = Problem(stage.items, variables, stage.limits)
-            x = variables.project(coordinates)
-            bounds = None if stage.bounds is None else stage.bounds(coordinates)
-            self.timings.setup += time.perf_counter() - clock
-            solution = self._solve(request, plan, number, problem, x, bounds)
-            coordinates = variables.points(solution.x)
-            if solution.status is Status.CANCELLED:
-                coordinates = self._finish(plan, number, coordinates)
-                break
-        if solution is None:
-            return Outcome(
-                plan.block,
-                coordinates.reshape(-1, dim),
-                plan.status or Status.CONVERGED,
-                {"objective": 0.0},
-                notes=tuple(plan.notes),
-                details=plan.details,
-            )
-        coordinates, energy = self._guard(request, plan, coordinates)
-        coordinates = plan.finish(coordinates)
-        return Outcome(
-            plan.block,
-            coordinates.reshape(-1, dim),
-            solution.status,
-            energy,
-            self.iterations,
-            solution.backend,
-            tuple(plan.notes),
-            plan.details,
-        )
-
-    def _solve(
-        self,
-        request: Request,
-        plan: Plan,
-        number: int,
-        problem: Problem,
-        x: Array,
-        bounds: tuple[Array, Array] | None,
-    ) -> Solution:
-        stage, options = plan.stages[number], request.options
-        solution = minimise(
-            problem,
-            x,
-            iterations=stage.iterations,
-            tolerance=stage.tolerance,
-            eps=stage.eps,
-            robust=stage.robust,
-            bounds=bounds,
-            method=options.method,
-            backend=options.backend,
-            threads=options.threads,
-            callback=self.callback,
-            stage=(number, len(plan.stages)),
-            timings=self.timings,
-        )
-        self.iterations += solution.iterations
-        self.history += solution.history
-        return solution
-
-    @staticmethod
-    def _finish(plan: Plan, number: int, coordinates: Array) -> Array:
-        """Carry a cancelled solve to the last stage's coordinates."""
-        for stage in plan.stages[number + 1 :]:
-            coordinates = stage.enter(coordinates)
-        return coordinates
-
-    @staticmethod
-    def _guard(request: Request, plan: Plan, coordinates: Array) -> tuple[Array, dict[str, float]]:
-        """The result, unless the start has less of the final objective."""
-        stage = plan.stages[-1]
-        problem = Problem(stage.items, free(stage.layout))
-        given = request.start if request.start is not None else request.mesh.vertices
-        feasible = plan.block == "surface" and request.constraints.empty
-        energy = problem.by_term(coordinates)
-        if feasible and not sum(energy.values()) <= problem.energy(given.ravel()):
-            return given.ravel(), problem.by_term(given.ravel())
-        return coordinates, energy
-
-
 def _result(
     task: str,
     formulation: str,
@@ -347,6 +194,3 @@ def _result(
         notes=design.notes + outcome.notes,
         details=outcome.details,
     )
-
-
-__all__ = ["Canonical", "Outcome", "Run", "check", "optimize"]

@@ -1,0 +1,50 @@
+"""A mesh as the solver wants it: in the unit ball, grids numbered row by row."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.mesh import Frame, Mesh
+from gso.status import MeshError
+
+Array = NDArray[np.float64]
+
+
+class Canonical:
+    """A mesh in the unit ball, grids numbered row by row, and the way back."""
+
+    def __init__(self, design: Mesh):
+        self.frame: Frame = design.frame
+        if not self.frame.scale > 0:
+            raise MeshError("all vertices are at one point")
+        n = len(design.vertices)
+        if design.grid_index is None:
+            self.order = np.arange(n)
+            self.mesh = design.replaced(self.frame.to_unit(design.vertices))
+        else:
+            self.order = design.grid_index.ravel()
+            self.mesh = Mesh.from_grid(self.frame.to_unit(design.grid), weld=False)  # type: ignore[arg-type]
+        self.new_index = np.empty(n, np.int64)
+        self.new_index[self.order] = np.arange(n)
+
+    def start(self, x0: Any, *, flat: bool) -> Array | None:
+        """Coordinates of a warm start in this numbering and frame."""
+        if x0 is None:
+            return None
+        points = np.asarray(getattr(x0, "vertices", x0), float)
+        ordered = points.ndim == 3
+        points = points.reshape(-1, points.shape[-1])
+        dim = 2 if flat else 3
+        if points.shape != (len(self.order), points.shape[-1]) or points.shape[1] < dim:
+            raise MeshError(f"x0 has shape {np.shape(x0)}; {len(self.order)} points are needed")
+        if not np.isfinite(points).all():
+            raise MeshError("x0 has coordinates that are not finite")
+        points = points if ordered else points[self.order]
+        return points[:, :2] / self.frame.scale if flat else self.frame.to_unit(points)
+
+    def back(self, values: Array) -> Array:
+        """Rows in this numbering, put in the user's."""
+        return values[self.new_index]
