@@ -12,7 +12,7 @@ from gso.mesh import Mesh
 Array = NDArray[np.float64]
 
 #: No side of a coarser grid has fewer vertices.
-SMALLEST = 12
+SMALLEST = 20
 
 
 @lru_cache(maxsize=64)

@@ -246,7 +246,13 @@ def test_ctrl_c(tmp_path):
     pipe = tmp_path / "in.obj"
     os.mkfifo(pipe)
     command = [sys.executable, "-m", "gso.cli", "optimize", pipe, "-o", tmp_path / "out.obj"]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    # A shell's background jobs ignore Ctrl-C, and so would their children.
+    process = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
     with open(pipe, "w") as writer:  # opens when the other side reads
         writer.write("v 0 0 0\n")
         writer.flush()

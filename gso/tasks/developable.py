@@ -80,7 +80,7 @@ class Options(BaseOptions):
             "w_fairness": 1.4e-5,
         },
         "balanced": {},
-        "accurate": {"iterations": 25, "coarse_iterations": 15, "variables": "free"},
+        "accurate": {"iterations": 36, "coarse_iterations": 15, "variables": "free"},
     }
 
     iterations: int = 12
@@ -264,19 +264,18 @@ def _stages(request: Request, mesh: Mesh, make: Any, coarser_grids: int) -> list
     if cold or not request.constraints.empty:
         first = stage("free" if not request.constraints.empty else "normal", 15, falling)
         return [first, stage(o.variables, o.iterations, (o.eps,))]
-    small = max(mesh.grid_shape or (0,)) <= o.coarse_size
-    return [stage(o.variables, _iterations(o, coarser_grids, small=small), falling)]
+    return [stage(o.variables, _iterations(o, coarser_grids), falling)]
 
 
-def _iterations(options: Options, coarser_grids: int, *, small: bool = False) -> int:
+def _iterations(options: Options, coarser_grids: int) -> int:
     """Iterations on a grid with so many coarser ones before it.
 
-    A small grid costs little, and the one before it was very coarse: it takes two more.
+    Offsets take half as many again on fine grids, where more has to settle.
     Free vertices are costly on very fine grids: from the third refinement on, each takes
     half the iterations of the one before.
     """
     if options.variables == "normal":
-        return options.iterations + (2 if small else 0)
+        return options.iterations * 3 // 2 if coarser_grids > 1 else options.iterations
     return max(options.iterations >> max(coarser_grids - 2, 0), min(options.iterations, 5))
 
 

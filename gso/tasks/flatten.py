@@ -40,8 +40,6 @@ _FAR_FROM_FLAT = 0.1
 _LARGE_STRAIN = 0.03
 #: Relative fall of the energy at which a stage that only prepares another one stops.
 _NEARLY = 1e-2
-#: The same where the next stage has another objective.
-_ROUGHLY = 1e-1
 #: Ratio to the level at which a start is strained too much for the powers of `Spread`.
 _STRAINED = 1.5
 #: Weight of the squeezed triangles in ``lengths``.
@@ -81,13 +79,13 @@ class Options(BaseOptions):
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
-        "fast": {"iterations": 2, "tolerance": 2e-2},
+        "fast": {"iterations": 2, "tolerance": 5e-2},
         "balanced": {},
         "accurate": {"iterations": 100, "tolerance": 1e-8},
     }
 
     iterations: int = 40
-    tolerance: float = 5e-3
+    tolerance: float = 1e-2
     norm: str = "mixed"
     w_edges: float = 0.35
     knee: float = 2.2
@@ -210,8 +208,11 @@ def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
     for below, above, stage in zip(levels, levels[1:], stages[1:], strict=False):
         stage.enter = partial(_refined, below, above, options)
     if request.formulation == "lengths":
-        stages[-1].tolerance = _ROUGHLY
-        stages.append(_length_stage(options, mesh, level))
+        lengths = _length_stage(options, mesh, level)
+        if len(levels) > 1:
+            # What comes from a coarser grid is near enough.
+            lengths.enter = stages.pop().enter
+        stages.append(lengths)
     elif options.norm == "l1":
         stages.append(_strain_stage(options, mesh, level))
     stages[-1].iterations, stages[-1].tolerance = options.iterations, options.tolerance
