@@ -98,6 +98,8 @@ def compile_constraints(constraints: Sequence[Constraint], mesh: Mesh) -> Compil
         An index or a shape is wrong, or two hard constraints want different positions of
         one vertex; the message names both.
     """
+    if isinstance(constraints, Fixed | FixedBoundary | Handle):
+        constraints = [constraints]
     hard: list[tuple[Ints, Array, str]] = []
     out = Compiled()
     for number, c in enumerate(constraints):
@@ -112,16 +114,16 @@ def compile_constraints(constraints: Sequence[Constraint], mesh: Mesh) -> Compil
         if isinstance(c, Fixed):
             hard.append((ids, mesh.vertices[ids], name))
             continue
-        positions = np.asarray(c.positions, float).reshape(-1, 3)
-        if len(positions) != len(ids) or not np.isfinite(positions).all():
+        positions = _positions(c.positions)
+        if positions.shape != (len(ids), 3) or not np.isfinite(positions).all():
             raise OptionError(
                 f"{name} needs {len(ids)} finite positions (k, 3), got {np.shape(c.positions)}"
             )
         if c.weight is None:
             hard.append((ids, positions, name))
             continue
-        if not c.weight > 0:
-            raise OptionError(f"{name} has weight {c.weight}; it must be positive")
+        if not (isinstance(c.weight, int | float) and 0 < c.weight < np.inf):
+            raise OptionError(f"{name} has weight {c.weight!r}; it must be a positive number")
         out.soft_ids = np.r_[out.soft_ids, ids]
         out.soft_positions = np.r_[out.soft_positions, positions]
         out.soft_weights = np.r_[out.soft_weights, np.full(len(ids), float(c.weight))]
@@ -145,8 +147,16 @@ def _merge(hard: list[tuple[Ints, Array, str]], out: Compiled, mesh: Mesh) -> No
             f"{hard[owner[at]][2]} and {hard[owner[at + 1]][2]} want different positions of "
             f"vertex {ids[at]}; remove one or give it a weight"
         )
-    keep = np.r_[True, ~same]
+    keep = np.ones(len(ids), bool)
+    keep[1:] = ~same
     out.hard_ids, out.hard_positions = ids[keep], positions[keep]
+
+
+def _positions(given: ArrayLike) -> Array:
+    try:
+        return np.atleast_2d(np.asarray(given, dtype=np.float64))
+    except (TypeError, ValueError):
+        return np.zeros((0, 3))
 
 
 def _ids(given: ArrayLike, count: int, name: str) -> Ints:

@@ -151,9 +151,14 @@ class Mesh:
         return topology.triangulate(self.faces, self.half_edges)
 
     @cached_property
+    def triangle_edges(self) -> topology.HalfEdges:
+        """Half-edges of the triangulation."""
+        return topology.half_edges(self.triangles, len(self.vertices))
+
+    @cached_property
     def stars(self) -> list[tuple[Ints, Ints]]:
         """Interior vertices and their rings in the triangulation, grouped by length."""
-        return topology.vertex_stars(topology.half_edges(self.triangles, len(self.vertices)))
+        return topology.vertex_stars(self.triangle_edges)
 
     @cached_property
     def edges(self) -> Ints:
@@ -179,7 +184,7 @@ class Mesh:
     @property
     def euler_characteristic(self) -> int:
         """Vertices - edges + faces, unused vertices not counted."""
-        return int(self._used.sum()) - len(self.edges) + len(self.faces)
+        return int(self.used.sum()) - len(self.edges) + len(self.faces)
 
     @property
     def is_disk(self) -> bool:
@@ -187,8 +192,13 @@ class Mesh:
         return (
             len(self.boundary_loops) == 1
             and self.euler_characteristic == 1
-            and np.unique(self.components[self._used]).size == 1
+            and np.unique(self.components[self.used]).size == 1
         )
+
+    @property
+    def has_triangles(self) -> bool:
+        """Some faces are triangles."""
+        return self.is_triangles or bool((self.faces < 0).any())
 
     @property
     def is_triangles(self) -> bool:
@@ -210,7 +220,7 @@ class Mesh:
     @property
     def diagonal(self) -> float:
         """Length of the bounding box's diagonal, unused vertices not counted."""
-        return float(np.linalg.norm(np.ptp(self.vertices[self._used], axis=0)))
+        return float(np.linalg.norm(np.ptp(self.vertices[self.used], axis=0)))
 
     @cached_property
     def frame(self) -> Frame:
@@ -218,13 +228,14 @@ class Mesh:
 
         A vertex of no face may lie anywhere and does not count.
         """
-        points = self.vertices[self._used]
+        points = self.vertices[self.used]
         centre = points.mean(axis=0)
         radius = float(np.sqrt(((points - centre) ** 2).sum(axis=1).max()))
         return Frame(centre, radius)
 
     @property
-    def _used(self) -> NDArray[np.bool_]:
+    def used(self) -> NDArray[np.bool_]:
+        """Mask over vertices: belongs to a face."""
         return self.half_edges.face_count > 0
 
 
@@ -245,6 +256,7 @@ _CONNECTIVITY = (
     "half_edges",
     "grid_index",
     "triangles",
+    "triangle_edges",
     "stars",
     "edges",
     "boundary_loops",

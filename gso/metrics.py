@@ -84,6 +84,11 @@ def _points(surface: Any) -> Array:
     return points.reshape(-1, points.shape[-1])
 
 
+def _used_points(surface: Any) -> Array:
+    """Vertices that belong to a face, (n, 3)."""
+    return surface.vertices[surface.used] if hasattr(surface, "used") else _points(surface)
+
+
 def _grid(surface: Any) -> Array | None:
     """Grid array of a mesh or grid, or None."""
     if hasattr(surface, "grid"):
@@ -173,8 +178,8 @@ def d_H(before: Any, after: Any) -> float:
     """
     from scipy.spatial import cKDTree
 
-    source = _points(before)
-    distance, _ = cKDTree(source).query(_points(after))
+    source = _used_points(before)
+    distance, _ = cKDTree(source).query(_used_points(after))
     return float(100.0 * distance.mean() / np.linalg.norm(np.ptp(source, axis=0)))
 
 
@@ -191,17 +196,17 @@ def point_to_surface(points: Array, mesh: Mesh) -> Array:
 def surface_distance(before: Any, after: Any) -> Distances:
     """True point-to-surface distances, output to input ("there") and back."""
     a, b = _mesh(before), _mesh(after)
-    there = point_to_surface(b.vertices, a)
-    back = point_to_surface(a.vertices, b)
+    there = point_to_surface(_used_points(b), a)
+    back = point_to_surface(_used_points(a), b)
     return Distances(float(there.mean()), float(there.max()), float(back.mean()), float(back.max()))
 
 
 def fairness(surface: Any, *, scale: float | None = None) -> float:
     """Sum of squared second differences along the polylines (Jiang et al. 2020).
 
-    Divided by `scale` squared, the unit ball's radius when not given. On a triangle mesh,
-    which has no polylines: over the pairs of triangles at the interior edges, the
-    difference of the two diagonals' midpoints, doubled.
+    Divided by `scale` squared, the unit ball's radius when not given. On a mesh with
+    triangles, which lacks polylines: over the pairs of triangles at the interior edges of
+    its triangulation, the difference of the two diagonals' midpoints, doubled.
     """
     scale = unit(surface) if scale is None else scale
     p = _grid(surface)
@@ -215,11 +220,11 @@ def fairness(surface: Any, *, scale: float | None = None) -> float:
         return float(sum((c**2).sum() for c in (*rows, *cols)) / scale**2)
     mesh = _mesh(surface)
     v = mesh.vertices
-    t = topology.polyline_triples(mesh.half_edges, mesh.faces)
-    if len(t):
+    if not mesh.has_triangles:
+        t = topology.polyline_triples(mesh.half_edges, mesh.faces)
         d = geometry.second_difference(*(components(v[t[:, k]]) for k in range(3)))
         return float(sum((c**2).sum() for c in d) / scale**2)
-    a, b, left, right = topology.hinges(mesh.half_edges).T
+    a, b, left, right = topology.hinges(mesh.triangle_edges).T
     return float(((v[a] + v[b] - v[left] - v[right]) ** 2).sum() / scale**2)
 
 
@@ -320,7 +325,9 @@ def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None, *, surface:
         raise MeshError("flipped_cells needs faces=... for an image that is no grid (H, W, 2)")
     points = image.reshape(-1, image.shape[-1])[:, :2]
     grid = faces is None
-    quads, tris = topology.by_size(topology.grid_faces(*image.shape[:2]) if grid else faces)
+    quads, tris = topology.by_size(
+        topology.grid_faces(*image.shape[:2]) if faces is None else faces
+    )
     # Corners 1 and 3 are the split along the diagonal 0-2, corners 0 and 2 the other one.
     bad = corner_areas(points, quads).reshape(4, -1) <= 0
     turned = bad.any(axis=0) if grid else (bad[0] | bad[2]) & (bad[1] | bad[3])

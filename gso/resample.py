@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.mesh import Mesh
+from gso.status import MeshError
 
 Array = NDArray[np.float64]
 
@@ -47,5 +48,9 @@ def coarser(mesh: Mesh, largest: int) -> list[Mesh]:
         if halved == shape or (levels and max(shape) <= largest):
             break
         shape = (halved[0], halved[1])
-        levels.append(Mesh.from_grid(resample(grid, *shape), weld=False))
+        try:
+            levels.append(Mesh.from_grid(resample(grid, *shape), weld=False))
+        except MeshError:
+            # A pattern finer than the coarse grid can leave it without area.
+            break
     return levels[::-1]

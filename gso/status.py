@@ -78,6 +78,8 @@ class Progress:
         The objective by term; the values sum to `energy`.
     step : float
         Length of the step that was accepted, as a fraction of the full step.
+    name : str
+        Name of the stage: its grid, or its unknowns.
     """
 
     stage: int
@@ -87,3 +89,4 @@ class Progress:
     energy: float
     by_term: dict[str, float] = field(default_factory=dict)
     step: float = 1.0
+    name: str = ""

@@ -196,7 +196,7 @@ def reverse(faces: Ints) -> Ints:
 
 
 def recognise_grid(he: HalfEdges, faces: Ints) -> Ints | None:
-    """Vertex ids (H, W) of a quad mesh that is a grid in any numbering, or None.
+    """Vertex ids (H, W) of a quad mesh that is a grid, 3 x 3 or more, in any numbering, or None.
 
     Corner (0, 0) is the grid corner with the smallest id; the first axis runs along the
     face's own direction there, so a grid written row by row is found row by row.
@@ -222,6 +222,8 @@ def recognise_grid(he: HalfEdges, faces: Ints) -> Ints | None:
     if table.size != len(faces) or np.unique(he.face[table]).size != len(faces):
         return None
     height, width = table.shape[0] + 1, table.shape[1] + 1
+    if min(height, width) < 3:
+        return None
     ids = np.empty((height, width), np.int64)
     ids[:-1, :-1] = he.origin[table]
     ids[-1, :-1] = he.dest[table[-1]]

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -251,11 +252,12 @@ def test_ctrl_c(tmp_path):
         command,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     with open(pipe, "w") as writer:  # opens when the other side reads
         writer.write("v 0 0 0\n")
         writer.flush()
+        time.sleep(0.3)  # in the midst of reading
         process.send_signal(signal.SIGINT)
         error = process.communicate(timeout=30)[1]
     assert process.returncode == 130

@@ -240,3 +240,128 @@ def test_one_set_of_weights_serves_three_resolutions():
         figures.append(np.mean(rows, axis=0))
     spread = np.max(figures, axis=0) / np.min(figures, axis=0)
     assert (spread < 1.2).all()
+
+
+def test_bounds_and_constraints_together(surfaces):
+    mesh = Mesh.from_grid(surfaces[0])
+    bound = 0.01 * mesh.diagonal
+    near = gso.Handle([40], mesh.vertices[[40]] + [0.0, 0.0, 0.5 * bound])
+    for constraints in ([gso.Fixed([3])], [gso.FixedBoundary()], [near]):
+        result = gso.tno.optimize(mesh, max_deviation=bound, constraints=constraints)
+        assert metrics.point_to_surface(result.mesh.vertices, mesh).max() <= bound * (1 + 1e-6)
+    far = gso.Handle([40], mesh.vertices[[40]] + [0.0, 0.0, 2 * bound])
+    with pytest.raises(gso.OptionError, match="max_deviation"):
+        gso.tno.optimize(mesh, max_deviation=bound, constraints=[far])
+
+
+def test_a_bound_holds_from_any_start(surfaces):
+    mesh = Mesh.from_grid(surfaces[0])
+    bound = 0.005 * mesh.diagonal
+    away = mesh.vertices + 3 * bound * np.array([0.0, 0.0, 1.0])
+    result = gso.tno.optimize(mesh, max_deviation=bound, x0=away)
+    assert metrics.point_to_surface(result.mesh.vertices, mesh).max() <= bound * (1 + 1e-6)
+
+
+def test_noise_bounds_a_warm_start_too():
+    clean = cylinder(40, 0.4)
+    noise = 1e-3 * metrics.unit(clean)
+    noisy = clean + noise * np.random.default_rng(0).standard_normal(clean.shape)
+    result = gso.tno.optimize(noisy, x0=clean)
+    assert moved(noisy, result.grid).max() <= 3.0 * noise
+
+
+def test_no_constraints_at_all_are_fine():
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=1)
+    options = replace(Options.preset("fast"), iterations=1)
+    gso.tno.optimize(ball, constraints=[gso.FixedBoundary(), gso.Fixed([])], options=options)
+
+
+def test_unused_vertices_change_nothing():
+    grid = Mesh.from_grid(sphere_cap(15, radius=1.0))
+    plain = Mesh(grid.vertices, grid.triangles)
+    far = Mesh(np.r_[grid.vertices, [[5.0, 5.0, 5.0]] * 50], grid.triangles)
+    a, b = gso.tno.optimize(plain), gso.tno.optimize(far)
+    np.testing.assert_allclose(b.mesh.vertices[:-50], a.mesh.vertices, atol=1e-9)
+    np.testing.assert_array_equal(b.mesh.vertices[-50:], far.vertices[-50:])
+    assert b.metrics == pytest.approx(a.metrics, rel=1e-6)
+
+
+def test_mixed_meshes_are_fair_across_their_triangles():
+    grid = Mesh.from_grid(sphere_cap(15, radius=1.0))
+    triangles = np.c_[grid.triangles, np.full(len(grid.triangles), -1)]
+    keep = grid.faces[0]
+    other = ~np.isin(triangles[:, :3], keep).all(axis=1)
+    mixed = Mesh(grid.vertices, np.r_[[keep], triangles[other]])
+    ratios = [
+        gso.tno.optimize(m).metrics["fairness_ratio"]
+        for m in (mixed, Mesh(grid.vertices, grid.triangles))
+    ]
+    assert ratios[0] == pytest.approx(ratios[1], rel=0.3)
+
+
+@pytest.mark.filterwarnings("ignore::gso.ConvergenceWarning")
+@pytest.mark.parametrize("question", [{"max_deviation": 0.01}, {"target_curvature": 0.02}])
+@pytest.mark.parametrize("calls", [5, 30])
+def test_a_cancelled_search_says_so(surfaces, question, calls):
+    seen = []
+
+    def stop(progress):
+        seen.append(progress)
+        return np.bool_(len(seen) < calls)
+
+    result = gso.tno.optimize(surfaces[0], callback=stop, **question)
+    assert result.status is gso.Status.CANCELLED
+    assert np.isfinite(result.grid).all()
+
+
+def test_a_target_already_met_ignores_the_start():
+    points = saddle(16, strength=0.05)
+    result = gso.tno.optimize(points, target_curvature=1.0, x0=points + 0.1)
+    np.testing.assert_array_equal(result.grid, points)
+
+
+def test_spline_offsets_as_last_unknowns(surfaces):
+    result = gso.tno.optimize(surfaces[0], options=Options(variables="spline", controls=10))
+    assert result.metrics["K_A_r"] > 0.4
+
+
+@pytest.mark.parametrize(
+    "x0", ["a.obj", 1.0, np.zeros((144, 4)), np.zeros((9, 16, 3)), (np.zeros((3, 3)), 1)]
+)
+def test_starts_that_do_not_fit_are_refused(x0):
+    with pytest.raises(gso.MeshError, match="x0"):
+        gso.tno.optimize(saddle(16, 9), x0=x0)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"iterations": 2.5},
+        {"iterations": "5"},
+        {"w_fairness": "a"},
+        {"w_curvature": np.inf},
+        {"eps": np.inf},
+        {"tolerance": np.nan},
+        {"threads": -1},
+        {"controls": 2},
+    ],
+)
+def test_settings_that_make_no_sense_are_named(settings):
+    with pytest.raises(gso.OptionError, match=next(iter(settings))):
+        Options(**settings)
+
+
+@pytest.mark.parametrize(
+    "handle",
+    [
+        gso.Handle([0], [1.0, 2.0]),
+        gso.Handle([0], [[0.0, 0.0, 0.0]], weight="a"),
+        gso.Handle([0], [[0.0, 0.0, 0.0]], weight=np.inf),
+        gso.Handle([0], "up"),
+    ],
+)
+def test_handles_that_make_no_sense_are_named(handle):
+    with pytest.raises(gso.OptionError, match=r"constraint 0 \(Handle\)"):
+        gso.tno.optimize(saddle(9), constraints=handle)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
@@ -63,6 +65,30 @@ def test_batches_stream_results_and_survive_failures():
     alone = gso.tno.optimize(saddle(8))
     np.testing.assert_allclose(done[0].result.grid, alone.grid, atol=1e-10)
     assert done[0].result.metrics["loss_gc"] > 0
+
+
+class Deadly:
+    """Kills the process that looks at it."""
+
+    @property
+    def __array__(self):
+        os._exit(1)
+
+
+def test_a_batch_outlives_its_workers():
+    meshes = [saddle(5), Deadly(), *[saddle(5)] * 6]
+    done = {i.index: i for i in gso.tno.optimize_many(meshes, workers=2, task="denoise")}
+    assert sorted(done) == list(range(8))
+    assert [k for k, item in done.items() if not item.ok] == [1]
+    assert "died" in done[1].error
+
+
+def test_strips_of_quads_are_meshes_like_any_other():
+    strip = Mesh(saddle(9, 3)[:, :2].reshape(-1, 3), gso.topology.grid_faces(9, 2))
+    assert np.isfinite(gso.tno.optimize(strip, task="flatten").flat).all()
+    assert np.isfinite(gso.tno.optimize(strip, task="denoise").mesh.vertices).all()
+    with pytest.raises(gso.MeshError, match="interior"):
+        gso.tno.optimize(strip)
 
 
 def test_batches_read_their_input_as_they_go():

@@ -152,7 +152,13 @@ def test_a_vertex_in_which_two_fans_touch_counts_as_two_on_the_boundary():
             topology.check_vertices(half_edges(faces))
 
 
-@pytest.mark.parametrize("shape", [(2, 2), (2, 5), (3, 3), (4, 7), (9, 6)])
+@pytest.mark.parametrize("shape", [(2, 2), (2, 5), (7, 2)])
+def test_strips_are_no_grids(shape):
+    plain = topology.grid_faces(*shape)
+    assert topology.recognise_grid(half_edges(plain), plain) is None
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (3, 5), (4, 7), (9, 6)])
 def test_a_grid_is_found_in_any_numbering(shape):
     plain = topology.grid_faces(*shape)
     found = topology.recognise_grid(half_edges(plain), plain)

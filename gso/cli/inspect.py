@@ -97,7 +97,7 @@ def _facts(mesh: Mesh) -> list[tuple[str, str]]:
 
     from gso import metrics as measure
 
-    used = mesh.half_edges.face_count > 0
+    used = mesh.used
     points = mesh.vertices[used]
     a, b = mesh.edges.T
     length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)

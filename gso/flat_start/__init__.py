@@ -1,18 +1,25 @@
 """Plane images of a surface to start from, and where the finished image is put."""
 
+from gso.flat_start.begin import begin, flips, refine, strain, upward
 from gso.flat_start.embed import embed, parts
 from gso.flat_start.grid import rectangle
-from gso.flat_start.place import beside, closest_motion, upright
+from gso.flat_start.place import beside, closest_motion, place, upright
 from gso.flat_start.relax import Relaxed, relax, strain_level
 
 __all__ = [
     "Relaxed",
+    "begin",
     "beside",
     "closest_motion",
     "embed",
+    "flips",
     "parts",
+    "place",
     "rectangle",
+    "refine",
     "relax",
+    "strain",
     "strain_level",
     "upright",
+    "upward",
 ]

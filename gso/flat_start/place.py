@@ -5,12 +5,36 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.flat_start.embed import parts
+from gso.flat_start.grid import rectangle
+from gso.mesh import Mesh
+
 Array = NDArray[np.float64]
 
 #: Ratio of the principal spreads above which an image counts as longer than wide.
 _OBLONG = 1.1
 #: Gap between parts, as a share of the widest.
 _GAP = 0.05
+
+
+def place(mesh: Mesh, flat: Array, target: Array | None = None) -> Array:
+    """Finished image (n, 2) of a mesh where it is wanted.
+
+    As close as possible to the target, if there is one. Otherwise, with the corner of its
+    bounding box at the origin, turned like Flatten-init on grids and with the long axis
+    along x on other meshes, components side by side. Vertices of no face are put at the
+    origin.
+    """
+    components = parts(mesh)
+    used = np.concatenate(components)
+    out = np.zeros_like(flat)
+    if target is not None:
+        out[used] = closest_motion(flat[used], target[used])
+    elif mesh.grid is not None:
+        out = beside([closest_motion(flat, rectangle(mesh.grid).reshape(-1, 2))])[0]
+    else:
+        out[used] = np.concatenate(beside([upright(flat[ids]) for ids in components]))
+    return out
 
 
 def closest_motion(flat: Array, target: Array) -> Array:

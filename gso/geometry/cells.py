@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gso.geometry.vector import Vec, dot, norm, norm2, sub
+from gso.geometry.vector import Vec, dot, norm, sub
 
 
 def diagonals(v0: Vec, v1: Vec, v2: Vec, v3: Vec) -> tuple[Vec, Vec]:
@@ -20,11 +20,6 @@ def isometry_defect(a: Vec, b: Vec, a2: Vec, b2: Vec) -> tuple[Any, Any, Any]:
     midpoints are congruent.
     """
     return norm(a) - norm(a2), norm(b) - norm(b2), dot(a, b) - dot(a2, b2)
-
-
-def isometry_defect_squared(a: Vec, b: Vec, a2: Vec, b2: Vec) -> tuple[Any, Any, Any]:
-    """As :func:`isometry_defect` with *squared* lengths (Jiang et al. 2020): quadratic."""
-    return norm2(a) - norm2(a2), norm2(b) - norm2(b2), dot(a, b) - dot(a2, b2)
 
 
 def corner_area2(p: Vec, q: Vec, r: Vec) -> Any:

@@ -32,7 +32,7 @@ def as_mesh(x: Any) -> Mesh:
     Examples
     --------
     >>> as_mesh(([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]]))
-    Mesh(4 vertices, 1 faces, grid 2 x 2)
+    Mesh(4 vertices, 1 faces, quads)
     """
     if isinstance(x, Mesh):
         return x

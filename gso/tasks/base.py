@@ -31,7 +31,7 @@ class Stage:
     Attributes
     ----------
     name : str
-        What it is called in the history.
+        What it is called in the progress and the history.
     layout : Layout
         Its coordinates.
     items : list of Weighted
@@ -114,6 +114,8 @@ class Plan:
         What the user should know.
     details : dict
         Numbers the task wants in the result.
+    reach : float, optional
+        No vertex may be farther than this from the design.
     finish : callable
         What is done to the coordinates after the last stage without changing the
         objective: a flat image is put in its place.
@@ -126,6 +128,7 @@ class Plan:
     notes: list[str] = field(default_factory=list)
     details: dict[str, Any] = field(default_factory=dict)
     finish: Callable[[Array], Array] = same
+    reach: float | None = None
 
 
 __all__ = ["Options", "Plan", "Request", "Stage", "same"]

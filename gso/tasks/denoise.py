@@ -57,8 +57,7 @@ def plan(request: Request) -> Plan:
     else:
         smoothed = smooth_mesh(mesh.vertices, mesh.faces, **settings)
     points = smoothed.points.reshape(-1, 3)
-    unused = mesh.half_edges.face_count == 0
-    points = np.where(unused[:, None], mesh.vertices, points)
+    points = np.where(mesh.used[:, None], points, mesh.vertices)
     return Plan(
         "surface",
         points.ravel(),
@@ -75,7 +74,7 @@ def plan(request: Request) -> Plan:
 def metrics(before: Mesh, after: Mesh, scale: float) -> dict[str, float]:
     """How much the surface changed, and how much rougher the input was."""
     rough = measure.fairness(before, scale=scale)
-    moved = np.linalg.norm(after.vertices - before.vertices, axis=1)
+    moved = np.linalg.norm((after.vertices - before.vertices)[before.used], axis=1)
     return {
         "theta": measure.normal_angle(before, after),
         "displacement_rms": 100.0 * float(np.sqrt((moved**2).mean())) / before.diagonal,

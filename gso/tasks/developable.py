@@ -28,7 +28,7 @@ from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, curvature, fairness, position, proximity
 from gso.terms.losses import Absolute, Distance
-from gso.variables import Layout, Variables, free, normal_offsets, vertex_normals
+from gso.variables import Layout, Variables, free, normal_offsets, spline_offsets, vertex_normals
 
 Array = NDArray[np.float64]
 
@@ -58,8 +58,12 @@ class Options(BaseOptions):
         Factor on the tangential part of a displacement.
     eps : float
         Smoothing of |K|: curvature well below it counts squared.
-    variables : {"normal", "free"}
-        Unknowns of the last stage: offsets along normals, or free vertices.
+    variables : {"normal", "free", "spline"}
+        Unknowns of the last stage: offsets along normals, free vertices, or (on grids) a
+        coarse bicubic field of offsets, which cannot crumple. With `max_deviation` they
+        are offsets along normals.
+    controls : int
+        "spline": control points of the field along each side.
     coarse_iterations : int
         Iterations on the coarsest grid.
     coarse_size : int
@@ -92,6 +96,7 @@ class Options(BaseOptions):
     tangential: float = 0.7
     eps: float = 0.01
     variables: str = "normal"
+    controls: int = 16
     coarse_iterations: int = 12
     coarse_size: int = 32
     between_iterations: int = 6
@@ -99,8 +104,10 @@ class Options(BaseOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.variables not in ("normal", "free"):
-            raise OptionError(f"variables is {self.variables!r}; take 'normal' or 'free'")
+        if self.variables not in ("normal", "free", "spline"):
+            raise OptionError(f"variables is {self.variables!r}; take 'normal', 'free' or 'spline'")
+        if self.controls < 4:
+            raise OptionError(f"controls is {self.controls}; it must be 4 or more")
         if not (self.eps > 0 and self.near > 0):
             raise OptionError("eps and near must be positive")
 
@@ -117,6 +124,7 @@ def plan(request: Request) -> Plan:
     """Stages of the solve: a coarse grid first, the design's own vertices last."""
     mesh, options = request.mesh, request.options
     notes: list[str] = []
+    _check_handles(request)
     if not mesh.stars:
         raise _nothing_inside(mesh)
     start = mesh.vertices if request.start is None else request.start
@@ -138,7 +146,20 @@ def plan(request: Request) -> Plan:
     for below, above, stage in zip(levels, [*levels[1:], mesh], stages[1:], strict=False):
         stage.enter = partial(_carry, below, above, _reach(request))
     begin = levels[0].vertices if levels else _inside(start, mesh, _reach(request))
-    return Plan("surface", begin.ravel(), stages, notes=notes)
+    return Plan("surface", begin.ravel(), stages, notes=notes, reach=request.max_deviation)
+
+
+def _check_handles(request: Request) -> None:
+    """Refuse hard handles that want more than `max_deviation`."""
+    c, reach = request.constraints, request.max_deviation
+    if reach is None or not len(c.hard_ids):
+        return
+    far = np.linalg.norm(c.hard_positions - request.mesh.vertices[c.hard_ids], axis=1)
+    if far.max() > reach:
+        raise OptionError(
+            f"a handle moves its vertex by {far.max() / reach:.3g} times max_deviation; "
+            "allow more, or give the handle a weight"
+        )
 
 
 def _smoothed(mesh: Mesh) -> tuple[Mesh, float]:
@@ -230,7 +251,14 @@ def _unknowns(kind: str, mesh: Mesh, request: Request, coordinates: Array) -> Va
         variables = free(layout)
     else:
         points = coordinates.reshape(-1, 3)
-        variables = normal_offsets(layout, points, vertex_normals(mesh.replaced(points)))
+        normals = vertex_normals(mesh.replaced(points))
+        shape = mesh.grid_shape
+        if kind == "spline" and shape is not None:
+            most = request.options.controls
+            controls = (min(most, shape[0]), min(most, shape[1]))
+            variables = spline_offsets(layout, points, normals, shape, controls)
+        else:
+            variables = normal_offsets(layout, points, normals)
     c = request.constraints
     if len(c.hard_ids) and mesh is request.mesh:
         columns = layout.columns("surface", c.hard_ids).ravel()
@@ -255,7 +283,7 @@ def _stages(request: Request, mesh: Mesh, make: Any, coarser_grids: int) -> list
             tolerance=o.tolerance,
             eps=eps,
             robust="curvature",
-            bounds=_bounds(mesh, _reach(request)),
+            bounds=_bounds(mesh, _reach(request), request.constraints.hard_ids),
         )
 
     if request.max_deviation is not None:
@@ -274,7 +302,7 @@ def _iterations(options: Options, coarser_grids: int) -> int:
     Free vertices are costly on very fine grids: from the third refinement on, each takes
     half the iterations of the one before.
     """
-    if options.variables == "normal":
+    if options.variables != "free":
         return options.iterations * 3 // 2 if coarser_grids > 1 else options.iterations
     return max(options.iterations >> max(coarser_grids - 2, 0), min(options.iterations, 5))
 
@@ -283,11 +311,11 @@ def _coarse_stage(request: Request, level: Mesh, make: Any, number: int) -> Stag
     """A coarse grid: free vertices on the first; the last stage's unknowns on the others."""
     o = request.options
     first = number == 0
-    if o.variables == "normal":
+    if o.variables != "free":
         between = o.between_iterations
     else:
         between = _iterations(o, number)
-    kind = "free" if first else o.variables
+    kind = "free" if first or o.variables == "free" else "normal"
     if request.max_deviation is not None:
         kind = "normal"
     return Stage(
@@ -310,18 +338,22 @@ def _carry(coarse: Mesh, fine: Mesh, reach: float | None, coordinates: Array) ->
     return _inside(moved, fine, reach).ravel()
 
 
-def _bounds(mesh: Mesh, reach: float | None) -> Any:
-    """Bounds on offsets along normals that keep every vertex within reach of its own place."""
-    return None if reach is None else partial(_offset_bounds, mesh, reach)
+def _bounds(mesh: Mesh, reach: float | None, held: Any = ()) -> Any:
+    """Bounds on offsets along normals that keep every vertex within reach of its own place.
+
+    Vertices in `held` have no unknown.
+    """
+    return None if reach is None else partial(_offset_bounds, mesh, reach, held)
 
 
-def _offset_bounds(mesh: Mesh, reach: float, coordinates: Array) -> tuple[Array, Array]:
+def _offset_bounds(mesh: Mesh, reach: float, held: Any, coordinates: Array) -> tuple[Array, Array]:
     points = coordinates.reshape(-1, 3)
     n = vertex_normals(mesh.replaced(points))
     u = points - mesh.vertices
     along = (u * n).sum(axis=1)
     root = np.sqrt(np.maximum(along**2 - (u * u).sum(axis=1) + reach**2, 0.0))
-    return np.minimum(-along - root, 0.0), np.maximum(-along + root, 0.0)
+    low, high = np.minimum(-along - root, 0.0), np.maximum(-along + root, 0.0)
+    return np.delete(low, held), np.delete(high, held)
 
 
 def _inside(points: Array, mesh: Mesh, reach: float | None) -> Array:

@@ -18,17 +18,15 @@ from numpy.typing import NDArray
 from gso import flat_start, limits
 from gso import metrics as measure
 from gso.mesh import Mesh
-from gso.resample import coarser, resample
+from gso.resample import coarser
 from gso.status import OptionError
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, collapse, edges, fairness, isometry, shear, stretch
 from gso.terms.losses import Absolute
-from gso.topology import corner_triangles
 from gso.variables import Layout, Variables, free
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 FORMULATIONS = ("strain", "lengths")
 
@@ -120,10 +118,10 @@ def plan(request: Request) -> Plan:
         raise OptionError("flatten keeps lengths, not positions: it takes no constraints")
     grid = mesh.grid_index is not None
     levels = [*(coarser(mesh, options.coarse_size) if grid else []), mesh]
-    start = _start(levels[0], options)
+    start = flat_start.begin(levels[0], iterations=options.relax_iterations)
     notes = _remarks(mesh, start.level)
     given = _given(request, notes)
-    strained = given is not None and _level(mesh, given) > _STRAINED * start.level
+    strained = given is not None and flat_start.strain(mesh, given) > _STRAINED * start.level
     if given is not None:
         levels = [mesh]
     stages = _stages(request, levels, max(start.level, _SMALLEST_LEVEL))
@@ -138,38 +136,6 @@ def plan(request: Request) -> Plan:
         notes=notes,
         details={"strain_level": start.level},
         finish=partial(_place, mesh, given),
-    )
-
-
-def _carrying(mesh: Mesh) -> Ints:
-    """Triangles that carry strain."""
-    return np.concatenate([corner_triangles(f) for f in stretch.pieces(mesh)])
-
-
-def _upward(mesh: Mesh) -> Ints:
-    """Triangles that must not turn over: all corners of the cells, unless they point inwards."""
-    if mesh.grid_index is not None:
-        return corner_triangles(mesh.faces)
-    return np.concatenate([corner_triangles(f) for f in stretch.cells(mesh)])
-
-
-def _flips(flat: Array, mesh: Mesh) -> int:
-    return int((measure.corner_areas(flat.reshape(-1, 2), _upward(mesh)) <= 0).sum())
-
-
-def _level(mesh: Mesh, flat: Array) -> float:
-    return flat_start.strain_level(mesh.vertices, _carrying(mesh), flat)
-
-
-def _start(mesh: Mesh, options: Options) -> flat_start.Relaxed:
-    """An image without flips, close to the least squared strain, and its strain."""
-    carrying, upward = _carrying(mesh), _upward(mesh)
-    if mesh.grid is not None:
-        flat = flat_start.rectangle(mesh.grid).reshape(-1, 2)
-    else:
-        flat = flat_start.embed(mesh, carrying, upward)
-    return flat_start.relax(
-        mesh.vertices, carrying, flat, upward=upward, iterations=options.relax_iterations
     )
 
 
@@ -193,7 +159,7 @@ def _given(request: Request, notes: list[str]) -> Array | None:
     if request.start is None:
         return None
     flat = np.ascontiguousarray(request.start[:, :2])
-    flips = _flips(flat, request.mesh)
+    flips = flat_start.flips(request.mesh, flat)
     if flips:
         notes.append(f"x0 turns {flips} corner triangles over and was not used")
         return None
@@ -206,7 +172,7 @@ def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
     even = options if options.norm != "l1" else replace(options, norm="mixed")
     stages = [_strain_stage(even, m, level) for m in levels]
     for below, above, stage in zip(levels, levels[1:], stages[1:], strict=False):
-        stage.enter = partial(_refined, below, above, options)
+        stage.enter = partial(_refine, below, above)
     if request.formulation == "lengths":
         lengths = _length_stage(options, mesh, level)
         if len(levels) > 1:
@@ -265,7 +231,7 @@ def _stage(name: str, mesh: Mesh, items: list[Weighted]) -> Stage:
         items,
         partial(_unknowns, layout),
         tolerance=_NEARLY,
-        limits=[limits.orientation(_upward(mesh), layout)],
+        limits=[limits.orientation(flat_start.upward(mesh), layout)],
     )
 
 
@@ -273,37 +239,12 @@ def _unknowns(layout: Layout, coordinates: Array) -> Variables:
     return free(layout)
 
 
-def _refined(coarse: Mesh, fine: Mesh, options: Options, coordinates: Array) -> Array:
-    """Image of a coarse grid interpolated to a finer one; where that flips, a new start."""
-    height, width = fine.grid_shape  # type: ignore[misc]
-    image = coordinates.reshape(*coarse.grid_shape, 2)  # type: ignore[misc]
-    flat = resample(image, height, width)
-    if _flips(flat, fine):
-        flat = _start(fine, options).flat
-    return flat.ravel()
+def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
+    return flat_start.refine(coarse, fine, coordinates.reshape(-1, 2)).ravel()
 
 
 def _place(mesh: Mesh, given: Array | None, coordinates: Array) -> Array:
-    """The image where it is wanted.
-
-    Close to the user's start; or, with the corner of its bounding box at the origin, turned
-    like Flatten-init on grids and with the long axis along x otherwise, components side
-    by side.
-    """
-    flat = coordinates.reshape(-1, 2)
-    parts = flat_start.parts(mesh)
-    used = np.concatenate(parts)
-    out = np.zeros_like(flat)
-    if given is not None:
-        out[used] = flat_start.closest_motion(flat[used], given[used])
-    elif mesh.grid is not None:
-        target = flat_start.rectangle(mesh.grid).reshape(-1, 2)
-        out = flat_start.beside([flat_start.closest_motion(flat, target)])[0]
-    else:
-        out[used] = np.concatenate(
-            flat_start.beside([flat_start.upright(flat[ids]) for ids in parts])
-        )
-    return out.ravel()
+    return flat_start.place(mesh, coordinates.reshape(-1, 2), given).ravel()
 
 
 def metrics(mesh: Mesh, flat: Array) -> dict[str, float]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
+import numpy as np
+
 from gso.status import OptionError
 
 
@@ -17,7 +19,7 @@ class Options:
     Attributes
     ----------
     iterations : int
-        Largest number of iterations of the last stage.
+        Largest number of iterations of the last stage; tasks adapt it to the grid's size.
     tolerance : float
         Stop when an iteration lowers the energy by less than this share of it.
     method : {"gauss-newton", "levenberg-marquardt"}
@@ -26,7 +28,8 @@ class Options:
         Linear solver: "banded", "superlu", "cholmod", "pardiso"; None takes the fastest
         installed one for the matrix at hand.
     threads : int
-        BLAS threads around factorisations; 0 leaves the library's own setting.
+        BLAS threads around factorisations; 0 leaves the library's own setting, which is
+        slower on a busy machine.
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {}
@@ -38,16 +41,12 @@ class Options:
     threads: int = 1
 
     def __post_init__(self) -> None:
-        if self.iterations < 0:
-            raise OptionError(f"iterations is {self.iterations}; it must be 0 or more")
+        for f in fields(self):
+            _check_number(f.name, str(f.type), getattr(self, f.name))
         if self.method not in ("gauss-newton", "levenberg-marquardt"):
             raise OptionError(
                 f"method is {self.method!r}; take 'gauss-newton' or 'levenberg-marquardt'"
             )
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if f.name.startswith("w_") and value is not None and not value >= 0:
-                raise OptionError(f"{f.name} is {value}; a weight must be 0 or more")
 
     @classmethod
     def preset(cls, name: str) -> Options:
@@ -67,3 +66,19 @@ class Options:
                 f"{', '.join(cls.PRESETS)}, not {type(given).__name__}"
             )
         return given
+
+
+def _check_number(name: str, kind: str, value: Any) -> None:
+    """Refuse a setting annotated as int or float that is no such number, or below zero."""
+    wanted = kind.split(" | ")
+    if value is None and "None" in wanted:
+        return
+    if "int" in wanted:
+        good, what = isinstance(value, int | np.integer) and value >= 0, "an integer"
+    elif "float" in wanted:
+        good = isinstance(value, int | float | np.number) and np.isfinite(value) and value >= 0
+        what = "a finite number"
+    else:
+        return
+    if isinstance(value, bool) or not good:
+        raise OptionError(f"{name} is {value!r}; it must be {what}, 0 or more")

@@ -34,12 +34,12 @@ def differences(mesh: Mesh) -> tuple[Ints, Array]:
     On quads ``(1, -2, 1) / h^2`` along polylines. On a grid h is the length of a side over
     its number of cells; sides less than a factor of two apart count as equally long (their
     geometric mean), which leaves the plain second differences of the published measure.
-    On other meshes h is the mean edge length. Across an edge of a triangle
-    mesh, the combination of its four vertices that vanishes on every affine function,
-    scaled like a second derivative times the edge's share of the area.
+    On other quad meshes h is the mean edge length. On meshes with triangles, across every
+    edge of the triangulation: the combination of its four vertices that vanishes on every
+    affine function, scaled like a second derivative times the edge's share of the area.
     """
     v = mesh.vertices
-    if mesh.is_triangles:
+    if mesh.has_triangles:
         return _hinge_differences(mesh)
     if mesh.grid_index is not None:
         ids = mesh.grid_index
@@ -68,7 +68,7 @@ def _spacing(grid: Array) -> tuple[float, float]:
 
 
 def _hinge_differences(mesh: Mesh) -> tuple[Ints, Array]:
-    stencil = topology.hinges(mesh.half_edges)
+    stencil = topology.hinges(mesh.triangle_edges)
     a, b, c, d = (mesh.vertices[stencil[:, k]] for k in range(4))
     edge = b - a
     length2 = np.maximum((edge**2).sum(axis=1), 1e-300)
@@ -116,7 +116,7 @@ def build(
         wanted = np.einsum("ke,ekd->de", coefficients, reference[stencil])
         if share is not None:
             wanted *= share[stencil].mean(axis=1)
-    count = len(stencil) if mesh.is_triangles else len(stencil) / 2
+    count = len(stencil) if mesh.has_triangles else len(stencil) / 2
     return Term(
         "fairness",
         residual,

@@ -9,7 +9,7 @@ import numpy as np
 
 from gso.geometry import dot, sub
 from gso.mesh import Mesh
-from gso.terms.base import Array, Term, mean_weights
+from gso.terms.base import Array, Term
 
 #: The reference does not move with the surface.
 INVARIANT = ()
@@ -45,7 +45,7 @@ def build(mesh: Mesh, normals: Array, *, tangential: float = 1.0) -> Term:
         "proximity",
         residual,
         (("surface", np.arange(n)[:, None]),),
-        weights=mean_weights(n),
+        weights=mesh.used / mesh.used.sum(),
         constants=constants,
         linear=True,
     )

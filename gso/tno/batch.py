@@ -62,7 +62,7 @@ def optimize_many(
     workers : int, optional
         Processes; the number of cores when not given, 0 for none (in this process).
     **keywords
-        Passed to :func:`gso.tno.optimize`, except `callback`, which stays here.
+        Passed to :func:`gso.tno.optimize`; a `callback` is left out.
 
     Yields
     ------
@@ -84,35 +84,89 @@ def optimize_many(
         for index, mesh in numbered:
             yield _one(index, mesh, keywords)
         return
-    from multiprocessing import get_context
-
-    # Forking would copy the threads' locks of BLAS and PARDISO in an unknown state.
-    pool = ProcessPoolExecutor(
-        workers, mp_context=get_context("spawn"), initializer=_prepare_worker
-    )
-    running: dict[Future[Item], int] = {}
+    pool = _Pool(workers, keywords)
     try:
         more = True
-        while more or running:
-            while more and len(running) < 2 * workers:
+        while more or pool.busy:
+            while more and pool.has_room:
                 entry = next(numbered, None)
                 if entry is None:
                     more = False
                 else:
-                    running[pool.submit(_one, entry[0], entry[1], keywords)] = entry[0]
-            done, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in done:
-                index = running.pop(future)
-                try:
-                    yield future.result()
-                except BrokenProcessPool:
-                    yield Item(index, None, "the worker process died; try fewer workers")
-                    more = False
-                except Exception as error:  # what cannot travel between processes
-                    yield Item(index, None, f"{type(error).__name__}: {error}")
+                    pool.add(*entry)
+            yield from pool.finished()
     finally:
-        # Left early, by Ctrl-C or because the caller has seen enough: end what still runs.
-        if running:
-            for process in list(pool._processes.values()):
+        pool.close()
+
+
+class _Pool:
+    """Worker processes that are replaced when one dies.
+
+    A death breaks all that was under way. Those surfaces are then worked on one at a
+    time, so that the one that kills its worker is found and the others get their results.
+    """
+
+    def __init__(self, workers: int, keywords: dict[str, Any]):
+        self.workers, self.keywords = workers, keywords
+        self.running: dict[Future[Item], tuple[int, Any, bool]] = {}
+        self.suspects: list[tuple[int, Any]] = []
+        self._start()
+
+    def _start(self) -> None:
+        from multiprocessing import get_context
+
+        # Forking would copy the threads' locks of BLAS and PARDISO in an unknown state.
+        self.executor = ProcessPoolExecutor(
+            self.workers, mp_context=get_context("spawn"), initializer=_prepare_worker
+        )
+
+    @property
+    def busy(self) -> bool:
+        return bool(self.running or self.suspects)
+
+    @property
+    def has_room(self) -> bool:
+        return not self.suspects and len(self.running) < 2 * self.workers
+
+    def add(self, index: int, mesh: Any, *, alone: bool = False) -> None:
+        try:
+            future = self.executor.submit(_one, index, mesh, self.keywords)
+        except BrokenProcessPool:
+            self._replace()
+            self.suspects.append((index, mesh))
+        else:
+            self.running[future] = (index, mesh, alone)
+
+    def finished(self) -> Iterator[Item]:
+        """Wait for at least one surface."""
+        if not self.running and self.suspects:
+            self.add(*self.suspects.pop(), alone=True)
+        done, _ = wait(self.running, return_when=FIRST_COMPLETED)
+        for future in done:
+            if future not in self.running:
+                continue
+            index, mesh, alone = self.running.pop(future)
+            try:
+                yield future.result()
+            except BrokenProcessPool:
+                if alone:
+                    yield Item(index, None, "the worker process died; is there enough memory?")
+                else:
+                    self.suspects.append((index, mesh))
+                self._replace()
+            except Exception as error:  # what cannot travel between processes
+                yield Item(index, None, f"{type(error).__name__}: {error}")
+
+    def _replace(self) -> None:
+        """Start anew; what was under way is under suspicion."""
+        self.suspects += [(index, mesh) for index, mesh, _ in self.running.values()]
+        self.running.clear()
+        self.executor.shutdown(wait=False, cancel_futures=True)
+        self._start()
+
+    def close(self) -> None:
+        """End; what still runs when it is left early, by Ctrl-C or a satisfied caller, too."""
+        if self.running:
+            for process in list(self.executor._processes.values()):
                 process.terminate()
-        pool.shutdown(wait=True, cancel_futures=True)
+        self.executor.shutdown(wait=True, cancel_futures=True)

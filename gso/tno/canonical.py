@@ -34,12 +34,18 @@ class Canonical:
         """Coordinates of a warm start in this numbering and frame."""
         if x0 is None:
             return None
-        points = np.asarray(getattr(x0, "vertices", x0), float)
+        try:
+            points = np.asarray(getattr(x0, "vertices", x0), dtype=np.float64)
+        except (TypeError, ValueError):
+            raise MeshError("x0 must be a mesh or an array of numbers") from None
+        n, shape = len(self.order), self.mesh.grid_shape
+        columns = (2, 3) if flat else (3,)
         ordered = points.ndim == 3
-        points = points.reshape(-1, points.shape[-1])
-        dim = 2 if flat else 3
-        if points.shape != (len(self.order), points.shape[-1]) or points.shape[1] < dim:
-            raise MeshError(f"x0 has shape {np.shape(x0)}; {len(self.order)} points are needed")
+        fits = points.shape[:1] == (n,) if not ordered else points.shape[:2] == shape
+        if points.ndim not in (2, 3) or not fits or points.shape[-1] not in columns:
+            grid = "" if shape is None else f" or {(*shape, columns[0])}"
+            raise MeshError(f"x0 has shape {points.shape}; it must be {(n, columns[0])}{grid}")
+        points = points.reshape(n, -1)
         if not np.isfinite(points).all():
             raise MeshError("x0 has coordinates that are not finite")
         points = points if ordered else points[self.order]

@@ -155,8 +155,8 @@ def check(
             continue
         if task != "developable":
             raise OptionError(f"{name} belongs to task 'developable', not {task!r}")
-        if not (np.isfinite(value) and value > 0):
-            raise OptionError(f"{name} is {value}; it must be a positive number")
+        if not (isinstance(value, int | float | np.number) and 0 < value < np.inf):
+            raise OptionError(f"{name} is {value!r}; it must be a positive number")
     if max_deviation is not None and target_curvature is not None:
         raise OptionError("give max_deviation or target_curvature, not both")
     return module, formulation, settings

@@ -19,7 +19,7 @@ from gso.terms.base import Limit, Weighted
 from gso.terms.losses import Loss
 from gso.tno.codegen import kernel, turning
 from gso.tno.linear.base import Pattern
-from gso.variables import Layout, Variables
+from gso.variables import Variables
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -151,11 +151,6 @@ class Problem:
         values = np.zeros(self._assembly.pattern.nnz)
         values[self._assembly.quadratic] = self._quadratic.matrix.data
         return values
-
-    @property
-    def layout(self) -> Layout:
-        """The coordinates."""
-        return self.variables.layout
 
     @property
     def pattern(self) -> Pattern:

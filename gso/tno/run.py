@@ -27,7 +27,6 @@ class Outcome:
     points: Array
     status: Status
     energy: dict[str, float] = field(default_factory=dict)
-    iterations: int = 0
     backend: str = ""
     notes: tuple[str, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
@@ -79,7 +78,6 @@ class Run:
             coordinates.reshape(-1, dim),
             solution.status,
             energy,
-            self.iterations,
             solution.backend,
             tuple(plan.notes),
             plan.details,
@@ -108,6 +106,7 @@ class Run:
             threads=options.threads,
             callback=self.callback,
             stage=(number, len(plan.stages)),
+            name=stage.name,
             timings=self.timings,
         )
         self.iterations += solution.iterations
@@ -128,7 +127,7 @@ class Run:
         problem = Problem(stage.items, free(stage.layout))
         given = request.start if request.start is not None else request.mesh.vertices
         feasible = plan.block == "surface" and request.constraints.empty
-        feasible &= request.start is None or request.max_deviation is None
+        feasible &= request.start is None or plan.reach is None
         energy = problem.by_term(coordinates)
         if feasible and not sum(energy.values()) <= problem.energy(given.ravel()):
             return given.ravel(), problem.by_term(given.ravel())

@@ -28,8 +28,10 @@ def stay_within(run: Callable[[Request], Any], request: Request, bound: float) -
         return bounded
     free = run(request)
     if free.status is Status.CANCELLED:
+        bounded.status = Status.CANCELLED
         return bounded
-    distance = metrics.point_to_surface(free.points, request.mesh)
+    used = request.mesh.used
+    distance = metrics.point_to_surface(free.points[used], request.mesh)
     if distance.max() > bound or _curvature(request, free) >= _curvature(request, bounded):
         return bounded
     return free
@@ -48,8 +50,8 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
     every solve started from the last one above the target.
     """
     if metrics.loss_gc(request.mesh, scale=1.0) <= target and request.constraints.empty:
-        request = replace(request, options=replace(request.options, developable_below=target))
-        return run(request)
+        options = replace(request.options, developable_below=target)
+        return run(replace(request, options=options, start=None))
     given = request.options
     options = replace(
         given,
@@ -69,6 +71,7 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
         if value <= target:
             high, value_high = weight, value
             moved = float(np.linalg.norm(last.points - request.mesh.vertices, axis=1).mean())
+            last.details = {**last.details, "curvature_weight": weight}
             if moved < distance:
                 best, distance = last, moved
             if value >= (1.0 - _CLOSE) * target:
@@ -83,8 +86,10 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
             break
         weight = _next(weight, value, target, low, high, value_low, value_high)
     chosen = last if best is None else best
-    chosen.status = Status.TARGET_MISSED if best is None else Status.TARGET_REACHED
-    chosen.details = {**chosen.details, "curvature_weight": weight}
+    if last.status is Status.CANCELLED:
+        chosen.status = Status.CANCELLED
+    else:
+        chosen.status = Status.TARGET_MISSED if best is None else Status.TARGET_REACHED
     return chosen
 
 

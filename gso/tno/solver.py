@@ -65,6 +65,7 @@ def minimise(
     threads: int = 1,
     callback: Callback | None = None,
     stage: tuple[int, int] = (0, 1),
+    name: str = "",
     timings: Timings | None = None,
 ) -> Solution:
     """Minimise a problem from x; never returns a worse energy than it was given.
@@ -97,11 +98,11 @@ def minimise(
         Called with each :class:`gso.Progress`; returning False stops the solve.
     stage : (int, int)
         Index and number of stages, for the callback.
+    name : str
+        Name of the stage, likewise.
     timings : Timings, optional
         Where to add the seconds spent.
     """
-    from contextlib import nullcontext
-
     timings = Timings() if timings is None else timings
     clock = time.perf_counter()
     solver = linear.choose(problem.pattern, backend)
@@ -112,9 +113,9 @@ def minimise(
 
     def report(iteration: int, energy: float, step: float) -> None:
         by_term = problem.by_term(x) if callback is not None else {}
-        progress = Progress(stage[0], stage[1], iteration, iterations, energy, by_term, step)
+        progress = Progress(*stage, iteration, iterations, energy, by_term, step, name)
         history.append(progress)
-        if callback is not None and callback(progress) is False:
+        if callback is not None and _says_no(callback(progress)):
             raise Cancelled
 
     def smooth(iteration: int) -> bool:
@@ -135,7 +136,7 @@ def minimise(
     done = 0
     try:
         report(0, best_energy, 0.0)
-        with linear.one_thread() if threads == 1 else nullcontext():
+        with linear.blas_threads(threads):
             for k in range(iterations):
                 settled = smooth(k)
                 t0 = time.perf_counter()
@@ -180,6 +181,10 @@ _NOTHING = 1e-20
 
 #: Stiffness, relative to the matrix, that keeps an unknown at its bound.
 _STIFF = 1e6
+
+
+def _says_no(answer: object) -> bool:
+    return isinstance(answer, bool | np.bool_) and not answer
 
 
 def _held(x: Array, gradient: Array, bounds: tuple[Array, Array]) -> NDArray[np.bool_]:

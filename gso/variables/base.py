@@ -44,14 +44,6 @@ class Layout:
         """Coordinate vector from arrays (count, dim) by block."""
         return np.concatenate([np.asarray(blocks[b], float).ravel() for b, _, _ in self.blocks])
 
-    def unpack(self, coordinates: Array) -> dict[str, Array]:
-        """Arrays (count, dim) by block."""
-        out = {}
-        for name, count, dim in self.blocks:
-            start = self.where(name)[0]
-            out[name] = coordinates[start : start + count * dim].reshape(count, dim)
-        return out
-
 
 class Variables:
     """Unknowns x that make coordinates ``offset + basis @ x``.

@@ -13,9 +13,9 @@ from types import ModuleType
 from typing import Any
 
 from gso.status import BackendError, OptionError
-from gso.tno.linear.base import Pattern, SingularError, one_thread
+from gso.tno.linear.base import Pattern, SingularError, blas_threads
 
-__all__ = ["Pattern", "SingularError", "backends", "choose", "find", "one_thread"]
+__all__ = ["Pattern", "SingularError", "backends", "blas_threads", "choose", "find"]
 
 _SUPPORT = ("base",)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -56,6 +56,9 @@ def _controller() -> Any:
     return ThreadpoolController()
 
 
-def one_thread() -> AbstractContextManager[Any]:
-    """Pin the BLAS to one thread: two on a busy machine make factorisations slower."""
-    return _controller().limit(limits=1, user_api="blas")
+def blas_threads(count: int) -> AbstractContextManager[Any]:
+    """Limit the BLAS to so many threads; 0 leaves it alone.
+
+    Two on a busy machine of two cores make factorisations slower than one.
+    """
+    return _controller().limit(limits=count, user_api="blas") if count else nullcontext()

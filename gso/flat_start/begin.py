@@ -1,0 +1,74 @@
+"""An image of a whole mesh to start from, and one that a coarser grid gives."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import geometry
+from gso.flat_start.embed import embed
+from gso.flat_start.grid import rectangle
+from gso.flat_start.relax import Relaxed, relax, strain_level
+from gso.mesh import Mesh
+from gso.resample import resample
+from gso.terms.stretch import cells, pieces
+from gso.topology import corner_triangles
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def carrying(mesh: Mesh) -> Ints:
+    """Triangles that carry strain."""
+    return np.concatenate([corner_triangles(f) for f in pieces(mesh)])
+
+
+def upward(mesh: Mesh) -> Ints:
+    """Triangles that must not turn over: all corners of the cells, unless they point inwards."""
+    if mesh.grid_index is not None:
+        return corner_triangles(mesh.faces)
+    return np.concatenate([corner_triangles(f) for f in cells(mesh)])
+
+
+def flips(mesh: Mesh, flat: Array) -> int:
+    """Number of triangles that an image (n, 2) turns over."""
+    corners = upward(mesh).T
+    return int((geometry.corner_area2(*(tuple(flat[k].T) for k in corners)) <= 0).sum())
+
+
+def strain(mesh: Mesh, flat: Array) -> float:
+    """Root-mean-square strain of an image (n, 2)."""
+    return strain_level(mesh.vertices, carrying(mesh), flat)
+
+
+def begin(mesh: Mesh, *, iterations: int = 100) -> Relaxed:
+    """Image without flips, close to the least squared strain, and its strain.
+
+    Grids start from their rectangle, other meshes from :func:`gso.flat_start.embed`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Components with a boundary and without handles.
+    iterations : int
+        Most steps of :func:`gso.flat_start.relax`.
+
+    Raises
+    ------
+    MeshError
+        A component is closed or has handles.
+    """
+    strained, kept = carrying(mesh), upward(mesh)
+    if mesh.grid is not None:
+        flat = rectangle(mesh.grid).reshape(-1, 2)
+    else:
+        flat = embed(mesh, strained, kept)
+    return relax(mesh.vertices, strained, flat, upward=kept, iterations=iterations)
+
+
+def refine(coarse: Mesh, fine: Mesh, flat: Array) -> Array:
+    """Image (n, 2) of a coarse grid interpolated to a finer one; where that flips, a new start."""
+    if coarse.grid_shape is None or fine.grid_shape is None:
+        raise ValueError("both meshes must be grids")
+    image = resample(flat.reshape(*coarse.grid_shape, 2), *fine.grid_shape).reshape(-1, 2)
+    return begin(fine).flat if flips(fine, image) else image
