@@ -23,7 +23,7 @@ from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.resample import coarser, resample
 from gso.smoothing import smooth_grid
-from gso.status import OptionError, Status
+from gso.status import MeshError, OptionError, Status
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, curvature, fairness, position, proximity
@@ -185,9 +185,7 @@ def _own_bending(mesh: Mesh) -> Array:
     return 1.0 / (1.0 + (k / FLAT_CURVATURE) ** 2)
 
 
-def _nothing_inside(mesh: Mesh) -> Exception:
-    from gso.status import MeshError
-
+def _nothing_inside(mesh: Mesh) -> MeshError:
     return MeshError(
         f"{mesh!r} has no interior vertex, so no curvature; refine it or give a larger piece"
     )

@@ -181,7 +181,9 @@ def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
         stages.append(lengths)
     elif options.norm == "l1":
         stages.append(_strain_stage(options, mesh, level))
-    stages[-1].iterations, stages[-1].tolerance = options.iterations, options.tolerance
+    # Without a coarser grid before it, the last stage has farther to go.
+    closer = 1.0 if levels[-1].grid_index is not None else 0.2
+    stages[-1].iterations, stages[-1].tolerance = options.iterations, closer * options.tolerance
     return stages
 
 
