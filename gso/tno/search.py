@@ -17,7 +17,7 @@ _SOLVES = 10
 _CLOSE = 0.03
 _RANGE = (1e-2, 1e5)
 _PROGRESS = 0.98
-_ITERATIONS = 36
+_ITERATIONS = 25
 _COARSE_ITERATIONS = 15
 
 
@@ -37,6 +37,11 @@ def stay_within(run: Callable[[Request], Any], request: Request, bound: float) -
     return free
 
 
+def _distance(request: Request, outcome: Any) -> float:
+    """``d_H`` of an outcome."""
+    return metrics.d_H(request.mesh, request.mesh.replaced(outcome.points))
+
+
 def _curvature(request: Request, outcome: Any) -> float:
     """``loss_gc`` of an outcome, in the frame of the request."""
     return metrics.loss_gc(request.mesh.replaced(outcome.points), scale=1.0)
@@ -52,6 +57,10 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
     if metrics.loss_gc(request.mesh, scale=1.0) <= target and request.constraints.empty:
         options = replace(request.options, developable_below=target)
         return run(replace(request, options=options, start=None))
+    # The options as they are may meet the target already: nothing farther away is returned.
+    last = run(request)
+    best = last if _curvature(request, last) <= target else None
+    distance = np.inf if best is None else _distance(request, last)
     given = request.options
     options = replace(
         given,
@@ -62,15 +71,14 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
     request = replace(request, options=options)
     weight, low, high = 1.0, 0.0, np.inf
     value_low = value_high = np.nan
-    best: Any = None
-    last: Any = None
-    distance = np.inf
     for _ in range(_SOLVES):
+        if last.status is Status.CANCELLED:
+            break
         last = run(replace(request, curvature_weight=weight))
         value = _curvature(request, last)
         if value <= target:
             high, value_high = weight, value
-            moved = float(np.linalg.norm(last.points - request.mesh.vertices, axis=1).mean())
+            moved = _distance(request, last)
             last.details = {**last.details, "curvature_weight": weight}
             if moved < distance:
                 best, distance = last, moved
@@ -82,7 +90,7 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
             # Curvature that is gone comes back slowly: go on from the side that has more.
             # Where more weight changes nothing, a new start gets round the obstacle.
             request = replace(request, start=None if stuck else last.points)
-        if last.status is Status.CANCELLED or not _RANGE[0] < weight < _RANGE[1]:
+        if not _RANGE[0] < weight < _RANGE[1]:
             break
         weight = _next(weight, value, target, low, high, value_low, value_high)
     chosen = last if best is None else best
