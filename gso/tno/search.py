@@ -57,11 +57,16 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
     if metrics.loss_gc(request.mesh, scale=1.0) <= target and request.constraints.empty:
         options = replace(request.options, developable_below=target)
         return run(replace(request, options=options, start=None))
-    # The options as they are may meet the target already: nothing farther away is returned.
-    last = run(request)
-    best = last if _curvature(request, last) <= target else None
-    distance = np.inf if best is None else _distance(request, last)
     given = request.options
+    best: Any = None
+    distance = np.inf
+    # A preset may meet the target already: nothing farther away is returned.
+    for preset in ({}, *given.PRESETS.values()):
+        last = run(replace(request, options=replace(given, **preset)))
+        if last.status is Status.CANCELLED:
+            break
+        if _curvature(request, last) <= target and _distance(request, last) < distance:
+            best, distance = last, _distance(request, last)
     options = replace(
         given,
         variables="free",
