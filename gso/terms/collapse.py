@@ -11,7 +11,7 @@ from gso import geometry
 from gso.geometry import ops
 from gso.mesh import Mesh
 from gso.terms.base import Array, Ints, Term
-from gso.terms.stretch import corners_of, pieces
+from gso.terms.stretch import corners_of, per_corner
 
 #: Turning or moving the flat image changes no area.
 INVARIANT = ("translation", "rotation")
@@ -40,27 +40,16 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 def build(mesh: Mesh) -> list[Term]:
     """Resistance of all corner triangles; weights average over triangles."""
-    groups = pieces(mesh)
-    count = sum(len(corners_of(f.shape[1])) * len(f) for f in groups)
-    return [
-        Term(
-            "collapse",
-            residual,
-            (("flat", faces),),
-            weights=np.full(len(faces), 1.0 / count),
-            constants=SQUEEZED * _areas(mesh.vertices, faces),
-        )
-        for faces in groups
-    ]
+    return per_corner(mesh, "collapse", residual, _squeezed_areas)
 
 
-def _areas(vertices: Array, faces: Ints) -> Array:
-    """Doubled areas in space of the corner triangles of faces (4 or 1, e)."""
+def _squeezed_areas(vertices: Array, faces: Ints) -> Array:
+    """Doubled areas below which the corner triangles of faces resist (4 or 1, e)."""
     out = []
     for corner in corners_of(faces.shape[1]):
         p, q, r = (tuple(vertices[faces[:, k]].T) for k in corner)
         out.append(geometry.norm(geometry.cross(geometry.sub(q, p), geometry.sub(r, p))))
-    return np.stack(out)
+    return SQUEEZED * np.stack(out)
 
 
 def examples(mesh: Mesh) -> list[Term]:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from gso import geometry
 from gso.mesh import Mesh
 from gso.terms.base import Term
-from gso.terms.stretch import corners_of, pieces, rest_constants
+from gso.terms.stretch import corners_of, per_corner, rest_constants
 
 #: Turning or moving the flat image changes no shear.
 INVARIANT = ("translation", "rotation")
@@ -35,19 +33,7 @@ def build(mesh: Mesh) -> list[Term]:
     Its energy is constant in its second derivative, holds neighbouring vertices together,
     and couples no vertices but those of one face: a cheap regulariser.
     """
-    groups = pieces(mesh)
-    count = sum(len(corners_of(f.shape[1])) * len(f) for f in groups)
-    return [
-        Term(
-            "shear",
-            residual,
-            (("flat", faces),),
-            weights=np.full(len(faces), 1.0 / count),
-            constants=rest_constants(mesh.vertices, faces),
-            linear=True,
-        )
-        for faces in groups
-    ]
+    return per_corner(mesh, "shear", residual, rest_constants, linear=True)
 
 
 def examples(mesh: Mesh) -> list[Term]:

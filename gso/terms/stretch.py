@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from gso import geometry, topology
 from gso.mesh import Mesh
-from gso.terms.base import Array, Ints, Term
+from gso.terms.base import Array, Ints, Residual, Term
 
 #: Turning or moving the flat image changes no strain.
 INVARIANT = ("translation", "rotation")
@@ -166,25 +166,46 @@ def rest_constants(vertices: Array, faces: Ints) -> Array:
     return np.stack([x for frame in rows for x in frame])
 
 
+def per_corner(
+    mesh: Mesh,
+    name: str,
+    residual: Residual,
+    constants: Callable[[Array, Ints], Array],
+    **more: Any,
+) -> list[Term]:
+    """Terms on the corner triangles of a flat image, averaged over the triangles.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The surface in space.
+    name, residual, more
+        As for :class:`gso.terms.Term`.
+    constants : callable
+        Constants (c, e) of faces from the vertices in space and the faces.
+    """
+    groups = pieces(mesh)
+    count = sum(len(corners_of(f.shape[1])) * len(f) for f in groups)
+    return [
+        Term(
+            name,
+            residual,
+            (("flat", faces),),
+            weights=np.full(len(faces), 1.0 / count),
+            constants=constants(mesh.vertices, faces),
+            **more,
+        )
+        for faces in groups
+    ]
+
+
 def build(mesh: Mesh) -> list[Term]:
     """Strain of all corner triangles; weights average over triangles.
 
     With squared loss the energy is the mean of ``((s1 - 1)^2 + (s2 - 1)^2) / 2``, the
     as-rigid-as-possible energy of Liu et al. 2008 with equal weights.
     """
-    groups = pieces(mesh)
-    count = sum(len(corners_of(f.shape[1])) * len(f) for f in groups)
-    return [
-        Term(
-            "strain",
-            residual,
-            (("flat", faces),),
-            weights=np.full(len(faces), 1.0 / count),
-            constants=rest_constants(mesh.vertices, faces),
-            vectors=vectors,
-        )
-        for faces in groups
-    ]
+    return per_corner(mesh, "strain", residual, rest_constants, vectors=vectors)
 
 
 def examples(mesh: Mesh) -> list[Term]:

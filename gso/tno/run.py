@@ -62,26 +62,19 @@ class Run:
             if solution.status is Status.CANCELLED:
                 coordinates = self._finish(plan, number, coordinates)
                 break
-        if solution is None:
-            return Outcome(
-                plan.block,
-                coordinates.reshape(-1, dim),
-                plan.status or Status.CONVERGED,
-                {"objective": 0.0},
-                notes=tuple(plan.notes),
-                details=plan.details,
-            )
-        coordinates, energy = self._guard(request, plan, coordinates)
-        coordinates = plan.finish(coordinates)
-        return Outcome(
+        outcome = Outcome(
             plan.block,
             coordinates.reshape(-1, dim),
-            solution.status,
-            energy,
-            solution.backend,
-            tuple(plan.notes),
-            plan.details,
+            plan.status or Status.CONVERGED,
+            {"objective": 0.0},
+            notes=tuple(plan.notes),
+            details=plan.details,
         )
+        if solution is not None:
+            coordinates, outcome.energy = self._guard(request, plan, coordinates)
+            outcome.points = plan.finish(coordinates).reshape(-1, dim)
+            outcome.status, outcome.backend = solution.status, solution.backend
+        return outcome
 
     def _solve(
         self,

@@ -61,12 +61,13 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
     best: Any = None
     distance = np.inf
     # A preset may meet the target already: nothing farther away is returned.
-    for preset in ({}, *given.PRESETS.values()):
-        last = run(replace(request, options=replace(given, **preset)))
+    presets = (replace(given, **preset) for preset in given.PRESETS.values())
+    for options in dict.fromkeys((given, *presets)):
+        last = run(replace(request, options=options))
         if last.status is Status.CANCELLED:
             break
-        if _curvature(request, last) <= target and _distance(request, last) < distance:
-            best, distance = last, _distance(request, last)
+        if _curvature(request, last) <= target and (moved := _distance(request, last)) < distance:
+            best, distance = last, moved
     options = replace(
         given,
         variables="free",

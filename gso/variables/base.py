@@ -63,11 +63,10 @@ class Variables:
         Coordinates at x = 0; with the identity they are the fixed part only.
     """
 
-    def __init__(self, layout: Layout, basis: csr_matrix | None, offset: Array, *, name: str):
+    def __init__(self, layout: Layout, basis: csr_matrix | None, offset: Array):
         self.layout = layout
         self.basis = basis
         self.offset = offset
-        self.name = name
         self.size = layout.size if basis is None else int(basis.shape[1])
 
     def points(self, x: Array) -> Array:
@@ -107,4 +106,4 @@ class Variables:
         held = (diags(free) @ basis).tocsc()
         held.eliminate_zeros()
         used = np.diff(held.indptr) > 0
-        return Variables(self.layout, held[:, used].tocsr(), offset, name=self.name)
+        return Variables(self.layout, held[:, used].tocsr(), offset)

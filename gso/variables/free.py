@@ -13,4 +13,4 @@ from gso.variables.base import Layout, Variables
 
 def free(layout: Layout) -> Variables:
     """Unknowns = coordinates."""
-    return Variables(layout, None, np.zeros(layout.size), name="free")
+    return Variables(layout, None, np.zeros(layout.size))

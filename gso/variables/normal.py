@@ -38,4 +38,4 @@ def normal_offsets(layout: Layout, points: Array, normals: Array) -> Variables:
     basis = csr_matrix(
         (normals.ravel(), np.repeat(np.arange(n), 3), np.arange(3 * n + 1)), shape=(3 * n, n)
     )
-    return Variables(layout, basis, layout.pack({"surface": points}), name="normal")
+    return Variables(layout, basis, layout.pack({"surface": points}))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gso.variables.base import Array, Layout, Variables
+from gso.variables.normal import normal_offsets
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -48,14 +49,9 @@ def spline_offsets(
 
     The vertices of the block "surface" must be numbered row by row.
     """
-    from scipy.sparse import csr_matrix
-
-    n = len(points)
-    along = csr_matrix(
-        (normals.ravel(), np.repeat(np.arange(n), 3), np.arange(3 * n + 1)), shape=(3 * n, n)
-    )
-    basis = (along @ tensor_matrix(shape, controls)).tocsr()
-    return Variables(layout, basis, layout.pack({"surface": points}), name="spline-offsets")
+    along = normal_offsets(layout, points, normals)
+    basis = (along.basis @ tensor_matrix(shape, controls)).tocsr()
+    return Variables(layout, basis, along.offset)
 
 
 def spline_surface(layout: Layout, shape: tuple[int, int], controls: tuple[int, int]) -> Variables:
@@ -66,4 +62,4 @@ def spline_surface(layout: Layout, shape: tuple[int, int], controls: tuple[int, 
     from scipy.sparse import identity, kron
 
     basis = kron(tensor_matrix(shape, controls), identity(3), format="csr")
-    return Variables(layout, basis, np.zeros(layout.size), name="spline-surface")
+    return Variables(layout, basis, np.zeros(layout.size))
