@@ -33,7 +33,7 @@ class Result:
         The optimised surface, vertices in the input's order and unit; for `flatten` the
         flat image at z = 0.
     flat : ndarray, (n, 2), or None
-        The flat image of `flatten`, in the input's unit of length.
+        The flat image, where the task makes one, in the input's unit of length.
     status : Status
         Why the solve ended; its value is a message.
     iterations : int
@@ -103,9 +103,7 @@ class Result:
         from gso import metrics, tasks
 
         module = tasks.get(self.task)
-        if self.flat is not None:
-            return module.metrics(self.design, self.flat)
-        return module.metrics(self.design, self.mesh, metrics.unit(self.design))
+        return module.metrics(self.design, self.mesh, self.flat, metrics.unit(self.design))
 
     def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
         """Write the result.
@@ -123,7 +121,7 @@ class Result:
         elif suffix == "svg":
             if self.flat is None:
                 raise MeshError(
-                    f"{path}: only a flat result can be written as SVG; use task='flatten'"
+                    f"{path}: this result has no flat image to write as SVG; use task='flatten'"
                 )
             io.save_flat(self.flat, self.design, path, unit=unit)
         else:

@@ -48,14 +48,14 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
     from gso import tasks
 
     size = measure.unit(before)
-    values = dict(tasks.get("developable").metrics(before, after, size))
+    values = dict(tasks.get("developable").metrics(before, after, None, size))
     notes = []
     same = np.array_equal(before.faces, after.faces)
     flat = np.ptp(after.vertices[:, 2]) <= 1e-9 * after.diagonal
     if same and not flat:
         values["theta"] = measure.normal_angle(before, after)
     if same and flat:
-        values |= tasks.get("flatten").metrics(before, after.vertices[:, :2])
+        values |= tasks.get("flatten").metrics(before, after, after.vertices[:, :2], size)
         notes.append(
             "AFTER is flat: measured as the flat pattern of BEFORE too; how far it lies from "
             "BEFORE means nothing then"

@@ -50,6 +50,8 @@ class Stage:
         What a step must not cross.
     bounds : callable, optional
         Smallest and largest value of every unknown, from the coordinates at its start.
+    enough : callable, optional
+        Whether the coordinates at its end make the stages after it needless.
     """
 
     name: str
@@ -63,6 +65,7 @@ class Stage:
     robust: str = ""
     limits: Sequence[Limit] = ()
     bounds: Callable[[Array], tuple[Array, Array]] | None = None
+    enough: Callable[[Array], bool] | None = None
 
 
 @dataclass
@@ -102,8 +105,8 @@ class Plan:
 
     Attributes
     ----------
-    block : str
-        Which block of the coordinates is the result: "surface" or "flat".
+    layout : Layout
+        Blocks of the result: "surface", "flat", or both.
     start : ndarray
         Coordinates before the first stage.
     stages : list of Stage
@@ -114,21 +117,21 @@ class Plan:
         What the user should know.
     details : dict
         Numbers the task wants in the result.
-    reach : float, optional
-        No vertex may be farther than this from the design.
+    fallback : ndarray, optional
+        Coordinates that the result must not be worse than, by the last objective.
     finish : callable
         What is done to the coordinates after the last stage without changing the
         objective: a flat image is put in its place.
     """
 
-    block: str
+    layout: Layout
     start: Array
     stages: list[Stage] = field(default_factory=list)
     status: Status | None = None
     notes: list[str] = field(default_factory=list)
     details: dict[str, Any] = field(default_factory=dict)
     finish: Callable[[Array], Array] = same
-    reach: float | None = None
+    fallback: Array | None = None
 
 
 __all__ = ["Options", "Plan", "Request", "Stage", "same"]

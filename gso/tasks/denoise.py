@@ -17,6 +17,7 @@ from gso.smoothing import smooth_grid, smooth_mesh
 from gso.status import OptionError, Status
 from gso.tasks.base import Plan, Request
 from gso.tasks.options import Options as BaseOptions
+from gso.variables import Layout
 
 FORMULATIONS = ("smooth", "crease")
 
@@ -59,7 +60,7 @@ def plan(request: Request) -> Plan:
     points = smoothed.points.reshape(-1, 3)
     points = np.where(mesh.used[:, None], points, mesh.vertices)
     return Plan(
-        "surface",
+        Layout.of(len(points), "surface"),
         points.ravel(),
         status=Status.CONVERGED,
         details={
@@ -71,7 +72,7 @@ def plan(request: Request) -> Plan:
     )
 
 
-def metrics(before: Mesh, after: Mesh, scale: float) -> dict[str, float]:
+def metrics(before: Mesh, after: Mesh, flat: None, scale: float) -> dict[str, float]:
     """How much the surface changed, and how much rougher the input was."""
     rough = measure.fairness(before, scale=scale)
     moved = np.linalg.norm((after.vertices - before.vertices)[before.used], axis=1)

@@ -131,7 +131,7 @@ def plan(request: Request) -> Plan:
     curved = measure.loss_gc(mesh, scale=1.0)
     good = curved <= options.developable_below
     if good and request.start is None and request.constraints.empty:
-        return Plan("surface", mesh.vertices.ravel(), status=Status.ALREADY_GOOD)
+        return Plan(_layout(mesh), mesh.vertices.ravel(), status=Status.ALREADY_GOOD)
     smooth, sigma = _smoothed(mesh)
     left = measure.loss_gc(smooth, scale=1.0)
     if request.constraints.empty and left <= min(NOISE_ONLY * curved, FLAT_CURVATURE):
@@ -146,7 +146,15 @@ def plan(request: Request) -> Plan:
     for below, above, stage in zip(levels, [*levels[1:], mesh], stages[1:], strict=False):
         stage.enter = partial(_carry, below, above, _reach(request))
     begin = levels[0].vertices if levels else _inside(start, mesh, _reach(request))
-    return Plan("surface", begin.ravel(), stages, notes=notes, reach=request.max_deviation)
+    free_to_return = request.constraints.empty
+    free_to_return &= request.start is None or request.max_deviation is None
+    return Plan(
+        _layout(mesh),
+        begin.ravel(),
+        stages,
+        notes=notes,
+        fallback=start.ravel() if free_to_return else None,
+    )
 
 
 def _check_handles(request: Request) -> None:
@@ -239,7 +247,7 @@ def _resampled(source: Mesh, target: Mesh) -> Array:
 
 
 def _layout(mesh: Mesh) -> Layout:
-    return Layout((("surface", len(mesh.vertices), 3),))
+    return Layout.of(len(mesh.vertices), "surface")
 
 
 def _unknowns(kind: str, mesh: Mesh, request: Request, coordinates: Array) -> Variables:
@@ -363,7 +371,7 @@ def _inside(points: Array, mesh: Mesh, reach: float | None) -> Array:
     return mesh.vertices + u * np.minimum(1.0, reach / np.maximum(length, 1e-300))
 
 
-def metrics(before: Mesh, after: Mesh, scale: float) -> dict[str, float]:
+def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict[str, float]:
     """Published and corrected metrics of a developable result (units: gso.metrics.INFO)."""
     true = measure.surface_distance(before, after)
     percent = 100.0 / before.diagonal

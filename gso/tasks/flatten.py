@@ -130,7 +130,7 @@ def plan(request: Request) -> Plan:
         if strained and request.formulation == "strain":
             stages = [_strain_stage(replace(options, norm="l2"), mesh, 1.0), *stages]
     return Plan(
-        "flat",
+        Layout.of(len(mesh.vertices), "flat"),
         (start.flat if given is None else given).ravel(),
         stages,
         notes=notes,
@@ -226,7 +226,7 @@ def _fair(mesh: Mesh, weight: float) -> list[Weighted]:
 
 
 def _stage(name: str, mesh: Mesh, items: list[Weighted]) -> Stage:
-    layout = Layout((("flat", len(mesh.vertices), 2),))
+    layout = Layout.of(len(mesh.vertices), "flat")
     return Stage(
         name,
         layout,
@@ -249,8 +249,8 @@ def _place(mesh: Mesh, given: Array | None, coordinates: Array) -> Array:
     return flat_start.place(mesh, coordinates.reshape(-1, 2), given).ravel()
 
 
-def metrics(mesh: Mesh, flat: Array) -> dict[str, float]:
-    """Metrics of a flat image (n, 2); meaning and unit stand in :data:`gso.metrics.INFO`.
+def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[str, float]:
+    """Metrics of a flat image (n, 2) of `mesh`; units: :data:`gso.metrics.INFO`.
 
     ``loss_iso_cell`` is left out on a mesh without quads.
     """

@@ -50,6 +50,9 @@ class Term:
         vector does not change the residual to first order, so Gauss-Newton sees no
         stiffness there and overshoots; with the vectors it keeps the second derivative
         of the length wherever the loss pulls (projected Newton).
+    refresh : callable, optional
+        ``refresh(coordinates) -> constants``: new constants before every linearisation, from
+        the coordinate vector; for closest points, and for targets that are moved by hand.
     """
 
     name: str
@@ -59,6 +62,7 @@ class Term:
     constants: Array = field(default_factory=_no_constants)
     linear: bool = False
     vectors: Residual | None = None
+    refresh: Callable[[Array], Array] | None = None
 
     @property
     def count(self) -> int:
@@ -82,4 +86,5 @@ class Weighted:
     @property
     def quadratic(self) -> bool:
         """Its part of the energy is a quadratic function of the unknowns."""
-        return self.term.linear and isinstance(self.loss, Squared)
+        fixed = self.term.linear and self.term.refresh is None
+        return fixed and isinstance(self.loss, Squared)

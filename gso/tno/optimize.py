@@ -170,14 +170,14 @@ def _result(
     outcome: Outcome,
     run: Run,
 ) -> Result:
-    points = frame.back(outcome.points)
-    untouched = outcome.status is Status.ALREADY_GOOD
-    flat = None
-    if outcome.block == "flat":
-        flat = points * frame.frame.scale
-        mesh = design.replaced(np.c_[flat, np.zeros(len(flat))])
+    blocks = {name: frame.back(values) for name, values in outcome.blocks.items()}
+    flat = blocks["flat"] * frame.frame.scale if "flat" in blocks else None
+    if outcome.status is Status.ALREADY_GOOD:
+        mesh = design
+    elif "surface" in blocks:
+        mesh = design.replaced(frame.frame.to_user(blocks["surface"]))
     else:
-        mesh = design if untouched else design.replaced(frame.frame.to_user(points))
+        mesh = design.replaced(np.c_[flat, np.zeros(len(design.vertices))])
     seconds = run.timings.as_dict()
     return Result(
         task=task,

@@ -43,6 +43,11 @@ class _Elements:
         self.weights = term.weights
         self._pull, self.columns = _pull_back(self.gather, variables)
 
+    def refresh(self, coordinates: Array) -> None:
+        """Renew the constants of a term that asks for it."""
+        if self.item.term.refresh is not None:
+            self.constants = self.item.term.refresh(coordinates)
+
     def residual(self, coordinates: Array) -> Array:
         """Residuals (r, e)."""
         run = kernel(self.item.term.residual, self.shape, len(self.constants), False)
@@ -168,8 +173,15 @@ class Problem:
             if element.item.term.name == name:
                 element.item = replace(element.item, loss=loss)
 
+    def refresh(self, x: Array) -> None:
+        """Renew the constants that follow the unknowns: closest points, moved targets."""
+        coordinates = self.variables.points(x)
+        for element in self._elements:
+            element.refresh(coordinates)
+
     def by_term(self, x: Array) -> dict[str, float]:
-        """Energy by term name; the values sum to :meth:`energy`."""
+        """Energy by term name, constants renewed; the values sum to :meth:`energy`."""
+        self.refresh(x)
         coordinates = self.variables.points(x)
         out: dict[str, float] = {}
         for element in self._elements:

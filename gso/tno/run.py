@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.status import Progress, Status
-from gso.tasks.base import Plan, Request
+from gso.tasks.base import Plan, Request, Stage
 from gso.tno.problem import Problem
 from gso.tno.solver import Callback, Solution, Timings, minimise
 from gso.variables import free
@@ -23,13 +23,17 @@ Array = NDArray[np.float64]
 class Outcome:
     """Coordinates that a run ended with, and how."""
 
-    block: str
-    points: Array
+    blocks: dict[str, Array]
     status: Status
     energy: dict[str, float] = field(default_factory=dict)
     backend: str = ""
     notes: tuple[str, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def points(self) -> Array:
+        """Its surface (n, 3), or its flat image (n, 2) where that is all there is."""
+        return self.blocks["surface"] if "surface" in self.blocks else self.blocks["flat"]
 
 
 class Run:
@@ -47,8 +51,7 @@ class Run:
         clock = time.perf_counter()
         plan: Plan = self.module.plan(request)
         self.timings.setup += time.perf_counter() - clock
-        dim = 2 if plan.block == "flat" else 3
-        coordinates, solution = plan.start, None
+        coordinates, solution, stage = plan.start, None, None
         for number, stage in enumerate(plan.stages):
             clock = time.perf_counter()
             coordinates = stage.enter(coordinates)
@@ -62,17 +65,20 @@ class Run:
             if solution.status is Status.CANCELLED:
                 coordinates = self._finish(plan, number, coordinates)
                 break
+            if stage.enough is not None and stage.enough(coordinates):
+                break
         outcome = Outcome(
-            plan.block,
-            coordinates.reshape(-1, dim),
+            plan.layout.split(coordinates),
             plan.status or Status.CONVERGED,
             {"objective": 0.0},
             notes=tuple(plan.notes),
             details=plan.details,
         )
-        if solution is not None:
-            coordinates, outcome.energy = self._guard(request, plan, coordinates)
-            outcome.points = plan.finish(coordinates).reshape(-1, dim)
+        if solution is not None and stage is not None:
+            if solution.status is Status.CANCELLED:
+                stage = plan.stages[-1]
+            coordinates, outcome.energy = self._guard(plan, stage, coordinates)
+            outcome.blocks = plan.layout.split(plan.finish(coordinates))
             outcome.status, outcome.backend = solution.status, solution.backend
         return outcome
 
@@ -114,14 +120,10 @@ class Run:
         return coordinates
 
     @staticmethod
-    def _guard(request: Request, plan: Plan, coordinates: Array) -> tuple[Array, dict[str, float]]:
-        """The result, unless the start has less of the final objective."""
-        stage = plan.stages[-1]
+    def _guard(plan: Plan, stage: Stage, coordinates: Array) -> tuple[Array, dict[str, float]]:
+        """The result, unless what it must not be worse than has less of the objective."""
         problem = Problem(stage.items, free(stage.layout))
-        given = request.start if request.start is not None else request.mesh.vertices
-        feasible = plan.block == "surface" and request.constraints.empty
-        feasible &= request.start is None or plan.reach is None
         energy = problem.by_term(coordinates)
-        if feasible and not sum(energy.values()) <= problem.energy(given.ravel()):
-            return given.ravel(), problem.by_term(given.ravel())
+        if plan.fallback is not None and not sum(energy.values()) <= problem.energy(plan.fallback):
+            return plan.fallback, problem.by_term(plan.fallback)
         return coordinates, energy

@@ -130,6 +130,7 @@ def minimise(
 
     project = None if bounds is None else partial(np.clip, a_min=bounds[0], a_max=bounds[1])
     clock = time.perf_counter()
+    problem.refresh(x)
     best, best_energy = x, final_energy(x)
     timings.search += time.perf_counter() - clock
     status = Status.MAX_ITERATIONS
@@ -140,6 +141,7 @@ def minimise(
             for k in range(iterations):
                 settled = smooth(k)
                 t0 = time.perf_counter()
+                problem.refresh(x)
                 energy, gradient, values = problem.linearise(x)
                 t1 = time.perf_counter()
                 if bounds is not None:

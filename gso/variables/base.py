@@ -15,6 +15,10 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
+#: Components of a row of every block.
+DIMENSIONS = {"surface": 3, "flat": 2}
+
+
 @dataclass(frozen=True)
 class Layout:
     """Named blocks of coordinates in one vector: ("surface", n, 3), ("flat", n, 2) ..."""
@@ -34,6 +38,19 @@ class Layout:
                 return start, count, dim
             start += count * dim
         raise KeyError(name)
+
+    @classmethod
+    def of(cls, count: int, *names: str) -> Layout:
+        """Layout of the blocks named, each with `count` rows."""
+        return cls(tuple((name, count, DIMENSIONS[name]) for name in names))
+
+    def split(self, coordinates: Array) -> dict[str, Array]:
+        """Arrays (count, dim) by block."""
+        out, start = {}, 0
+        for block, count, dim in self.blocks:
+            out[block] = coordinates[start : start + count * dim].reshape(count, dim)
+            start += count * dim
+        return out
 
     def columns(self, name: str, rows: Ints) -> Ints:
         """Positions (..., dim) in the coordinate vector of rows (...) of a block."""
