@@ -6,7 +6,7 @@ NumPy arrays (metrics), torch tensors (losses) and CasADi symbols (derivatives),
 solver residual, a training loss and a metric cannot drift apart.
 """
 
-from gso.geometry.cells import corner_area2, diagonals, isometry_defect
+from gso.geometry.cells import corner_area2, diagonals, face_products, isometry_defect
 from gso.geometry.curvature import gaussian_curvature, star_area, star_defect
 from gso.geometry.differences import second_difference
 from gso.geometry.strain import rest_frame, singular_values, stretch, turn_and_shear
@@ -18,6 +18,7 @@ __all__ = [
     "cross",
     "diagonals",
     "dot",
+    "face_products",
     "gaussian_curvature",
     "isometry_defect",
     "norm",

@@ -4,12 +4,25 @@ from __future__ import annotations
 
 from typing import Any
 
-from gso.geometry.vector import Vec, dot, norm, sub
+from gso.geometry.vector import Vec, dot, norm, norm2, sub
 
 
 def diagonals(v0: Vec, v1: Vec, v2: Vec, v3: Vec) -> tuple[Vec, Vec]:
     """Diagonals ``a = v0 - v2`` and ``b = v1 - v3`` (Jiang et al. 2020)."""
     return sub(v0, v2), sub(v1, v3)
+
+
+def face_products(*corners: Vec) -> tuple[Any, Any, Any]:
+    """What isometric faces have in common (Jiang et al. 2020).
+
+    The squared diagonals and their inner product of a quad: its midpoints' parallelogram.
+    The squared sides 01, 12, 20 of a triangle.
+    """
+    if len(corners) == 4:
+        a, b = diagonals(*corners)
+        return norm2(a), norm2(b), dot(a, b)
+    p, q, r = corners
+    return norm2(sub(q, p)), norm2(sub(r, q)), norm2(sub(p, r))
 
 
 def isometry_defect(a: Vec, b: Vec, a2: Vec, b2: Vec) -> tuple[Any, Any, Any]:

@@ -12,7 +12,7 @@ from types import ModuleType
 
 from gso.status import OptionError
 
-_SUPPORT = ("base", "options")
+_SUPPORT = ("base", "held", "joint", "options")
 
 
 def names() -> list[str]:

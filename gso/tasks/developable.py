@@ -24,9 +24,10 @@ from gso.mesh import Mesh
 from gso.resample import coarser, resample
 from gso.smoothing import smooth_grid
 from gso.status import MeshError, OptionError, Status
+from gso.tasks import held
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
-from gso.terms import Weighted, curvature, fairness, position, proximity
+from gso.terms import Weighted, curvature, fairness, proximity
 from gso.terms.losses import Absolute, Distance
 from gso.variables import Layout, Variables, free, normal_offsets, spline_offsets, vertex_normals
 
@@ -228,10 +229,7 @@ def _objective(
     fair = fairness.build(mesh, reference=smooth.vertices, share=_own_bending(smooth))
     items.append(Weighted(fair, w_fairness))
     items.append(Weighted(near, w_proximity, Distance(o.near)))
-    c = request.constraints
-    if len(c.soft_ids) and mesh is request.mesh:
-        items.append(Weighted(position.build(c.soft_ids, c.soft_positions, c.soft_weights), 1.0))
-    return items
+    return items + (held.pulls(request) if mesh is request.mesh else [])
 
 
 def _reach(request: Request) -> float | None:
@@ -265,11 +263,7 @@ def _unknowns(kind: str, mesh: Mesh, request: Request, coordinates: Array) -> Va
             variables = spline_offsets(layout, points, normals, shape, controls)
         else:
             variables = normal_offsets(layout, points, normals)
-    c = request.constraints
-    if len(c.hard_ids) and mesh is request.mesh:
-        columns = layout.columns("surface", c.hard_ids).ravel()
-        variables = variables.fixing(columns, c.hard_positions.ravel())
-    return variables
+    return held.hold(request, variables) if mesh is request.mesh else variables
 
 
 def _stages(request: Request, mesh: Mesh, make: Any, coarser_grids: int) -> list[Stage]:
