@@ -1,18 +1,22 @@
 """Draw the pictures of the documentation: ``python docs/pictures.py`` from the repository's root.
 
-They are those of ``gso optimize --plot``, reduced to a palette of 256 colours, a third of
-the size.
+They are those of ``gso optimize --plot`` and ``gso plot --rulings``, reduced to a palette of 256
+colours, a third of the size.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
 
 import gso
-from gso.plot import plot_result
+from gso.plot import plot_result, plot_rulings
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = ROOT / "docs" / "images"
@@ -22,16 +26,16 @@ def main() -> None:
     """Draw every picture."""
     panel = gso.load(ROOT / "examples" / "panel.obj")
     developable = gso.tno.optimize(panel)
-    draw("developable", developable)
-    draw("flatten", gso.tno.optimize(developable.mesh, task="flatten"))
+    draw("developable", plot_result(developable))
+    draw("flatten", plot_result(gso.tno.optimize(developable.mesh, task="flatten")))
+    draw("rulings", plot_rulings(developable.mesh, before=panel))
     noise = np.random.default_rng(0).standard_normal(panel.vertices.shape)
     noisy = panel.replaced(panel.vertices + 0.005 * panel.frame.scale * noise)
-    draw("denoise", gso.tno.optimize(noisy, task="denoise"))
+    draw("denoise", plot_result(gso.tno.optimize(noisy, task="denoise")))
 
 
-def draw(name: str, result: gso.Result) -> None:
-    """Write the picture of a result."""
-    figure = plot_result(result)
+def draw(name: str, figure: Figure) -> None:
+    """Write a picture."""
     figure.set_dpi(100)
     figure.canvas.draw()
     pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]  # type: ignore[attr-defined]

@@ -15,6 +15,9 @@ _NAMES = {
     "Mesh": "gso.mesh",
     "load": "gso.io",
     "save": "gso.io",
+    "save_spline": "gso.io",
+    "fit_spline": "gso.fit",
+    "BSplineSurface": "gso.spline",
     "as_mesh": "gso.io",
     "Result": "gso.result",
     "Status": "gso.status",
@@ -29,14 +32,22 @@ _NAMES = {
     "Options": "gso.tasks.options",
     "Fixed": "gso.constraints",
     "FixedBoundary": "gso.constraints",
+    "FixedLengths": "gso.constraints",
+    "Glue": "gso.constraints",
     "Handle": "gso.constraints",
+    "OnCurve": "gso.constraints",
+    "PlanarFaces": "gso.constraints",
+    "SlidingBoundary": "gso.constraints",
+    "SymmetryPlane": "gso.constraints",
 }
 _OPTIONS = {
     "DevelopableOptions": "gso.tasks.developable",
     "FlattenOptions": "gso.tasks.flatten",
     "DenoiseOptions": "gso.tasks.denoise",
+    "BendOptions": "gso.tasks.bend",
+    "ConformalOptions": "gso.tasks.conformal",
 }
-_MODULES = ("tno", "metrics", "topology", "io", "dataset", "plot")
+_MODULES = ("constraints", "tno", "metrics", "topology", "io", "dataset", "plot", "rulings")
 
 __all__ = [*_NAMES, *_OPTIONS, *_MODULES, "__version__"]
 

@@ -1,7 +1,8 @@
 """The published metrics, exactly as their figures were computed, and the corrected ones.
 
 Each function takes surfaces as a :class:`gso.Mesh` or a grid array (H, W, 3), and flat
-images as (H, W, 2) or (n, 2). Quantities that change with the unit of length
+images as (H, W, 2) or (n, 2); those that compare lengths also take another surface, as a
+:class:`gso.Mesh`, for the image. Quantities that change with the unit of length
 (``loss_gc``, ``loss_iso_cell``, ``fairness``) are measured on the surface normalised to
 the unit ball; pass `scale`, the length that counts as one, to measure in another frame:
 ``scale=1`` takes the coordinates as they are. Meaning, unit and direction of every
@@ -20,6 +21,7 @@ from gso.status import MeshError
 
 if TYPE_CHECKING:
     from gso.mesh import Mesh
+from gso.nearest import Nearest
 
 Array = NDArray[np.float64]
 
@@ -45,12 +47,18 @@ INFO: dict[str, Info] = {
     "displacement_max": Info("%", True, "largest vertex displacement / diagonal"),
     "fairness_ratio": Info("", True, "sum of squared second differences, out / in"),
     "loss_iso_cell": Info("size", True, "isometry defect of the cells (published)"),
+    "isometry_energy": Info("", True, "mean E_iso of the faces, relative (Jiang et al. 2020)"),
+    "parallelogram_strain": Info("", True, "mean strain of the faces' midpoint parallelograms"),
     "edge_length_error": Info("", True, "mean |l'/l - 1| over edges"),
     "strain_mean": Info("", True, "mean of the larger principal strain"),
     "strain_p99": Info("", True, "99th percentile of the larger principal strain"),
     "strain_max": Info("", True, "largest principal strain"),
     "area_error": Info("", True, "mean |A'/A - 1| over corner triangles"),
     "flipped_cells": Info("", True, "cells with a corner turned over"),
+    "angle_distortion_mean": Info("", True, "mean over faces of s1/s2 - 1, principal stretches"),
+    "angle_distortion_p99": Info("", True, "99th percentile of s1/s2 - 1"),
+    "scale_min": Info("", False, "smallest ratio of lengths, flat over surface"),
+    "scale_max": Info("", True, "largest ratio of lengths, flat over surface"),
     "theta": Info("deg", True, "mean angle between cell normals (published)"),
     "roughness_ratio": Info("", True, "sum of squared second differences, out / in"),
 }
@@ -185,12 +193,7 @@ def d_H(before: Any, after: Any) -> float:
 
 def point_to_surface(points: Array, mesh: Mesh) -> Array:
     """Distance of each point (n, 3) to the triangulated surface, in its unit."""
-    import igl
-
-    squared = igl.point_mesh_squared_distance(
-        np.ascontiguousarray(points, float), np.asarray(mesh.vertices), mesh.triangles
-    )[0]
-    return np.sqrt(np.maximum(squared, 0.0))
+    return Nearest(mesh).distances(points)
 
 
 def surface_distance(before: Any, after: Any) -> Distances:
@@ -229,7 +232,9 @@ def fairness(surface: Any, *, scale: float | None = None) -> float:
 
 
 def _flat(surface: Any, flat: Any) -> Array:
-    """Flat image as (n, 2) in the order of the mesh's vertices."""
+    """Flat image as (n, 2), or another surface as (n, 3), in the order of the mesh's vertices."""
+    if hasattr(flat, "vertices"):
+        return flat.vertices
     image = np.asarray(flat, float)
     if image.ndim == 3:
         index = None if not hasattr(surface, "grid_index") else surface.grid_index
@@ -274,6 +279,40 @@ def loss_iso_cell(surface: Any, flat: Any, *, scale: float | None = None) -> flo
     return float(defect.mean()) if defect.size else float("nan")
 
 
+def isometry_energy(surface: Any, flat: Any) -> float:
+    """Mean over the faces of E_iso (Jiang et al. 2020), dimensionless.
+
+    The squared differences of the squared diagonals and of their product (of the squared
+    sides of triangles), divided by the squared mean of the surface's squared lengths. Its
+    square root is about twice the strain.
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> isometry_energy(grid, grid[..., :2])
+    0.0
+    """
+    p, q = _points(surface), _flat(surface, flat)
+    differences, squares = [], []
+    for some in topology.by_size(_faces(surface)):
+        here, there = (
+            np.stack(
+                np.broadcast_arrays(*geometry.face_products(*(components(x[k]) for k in some.T)))
+            )
+            for x in (p, q)
+        )
+        differences.append(((here - there) ** 2).sum(axis=0))
+        squares.append(here[: 2 if some.shape[1] == 4 else 3].ravel())
+    return float(np.concatenate(differences).mean() / np.concatenate(squares).mean() ** 2)
+
+
+def parallelogram_strain(surface: Any, flat: Any) -> Array:
+    """Larger principal strain max |s - 1| (m,) of every face's parallelogram of midpoints.
+
+    Triangles count whole; zero where a face has no area.
+    """
+    large, small = stretches(surface, flat)
+    return np.nan_to_num(np.maximum(np.abs(large - 1.0), np.abs(small - 1.0)))
+
+
 def edge_length_error(surface: Any, flat: Any) -> float:
     """Mean of |l'/l - 1| over the mesh edges."""
     mesh = _mesh(surface)
@@ -295,11 +334,46 @@ def principal_strains(surface: Any, flat: Any) -> Strains:
     area = _space_areas(p, tri)
     keep = area > 1e-12 * area.max()
     tri = tri[keep]
-    rest = geometry.rest_frame(*(components(p[k]) for k in tri.T))
-    a, b, c = (components(q[k]) for k in tri.T)
-    s1, s2 = geometry.singular_values(a, b, c, rest)
+    here, there = ([components(x[k]) for k in tri.T] for x in (p, q))
+    if q.shape[1] == 2:
+        a, b, c = there
+        s1, s2 = geometry.singular_values(a, b, c, geometry.rest_frame(*here))
+    else:
+        s1, s2 = geometry.principal_stretches(
+            geometry.first_form(*here), geometry.first_form(*there)
+        )
     values = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0))
     return Strains(float(values.mean()), float(np.percentile(values, 99)), values)
+
+
+def stretches(surface: Any, flat: Any) -> tuple[Array, Array]:
+    """Largest and smallest ratio of lengths (m,) of every face, image over surface.
+
+    Of the parallelograms of a quad's edge midpoints, and of triangles: their product is the
+    ratio of areas, their quotient the quasi-conformal ratio. NaN where a face has no area.
+    """
+    faces, p, q = _faces(surface), _points(surface), _flat(surface, flat)
+    out = np.full((2, len(faces)), np.nan)
+    quad = faces[:, -1] >= 0 if faces.shape[1] == 4 else np.zeros(len(faces), bool)
+    for which, some in zip((quad, ~quad), topology.by_size(faces), strict=True):
+        rest, image = (geometry.first_form(*(components(x[k]) for k in some.T)) for x in (p, q))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            good = rest[0] * rest[2] - rest[1] ** 2 > 1e-12 * rest[0] * rest[2]
+            out[:, which] = np.where(good, geometry.principal_stretches(rest, image), np.nan)
+    return out[0], out[1]
+
+
+def quasi_conformal(surface: Any, flat: Any) -> Array:
+    """Quasi-conformal ratio (m,) of every face: largest stretch over smallest, 1 at best.
+
+    Second-order accurate on quads, first-order on triangles; NaN where a face has no area.
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> quasi_conformal(grid, grid[..., :2] * [1.0, 2.0]).round(12)
+    array([2., 2., 2., 2.])
+    """
+    large, small = stretches(surface, flat)
+    return large / np.maximum(small, 1e-300)
 
 
 def area_error(surface: Any, flat: Any) -> float:
@@ -340,6 +414,14 @@ def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None, *, surface:
     return int(flipped.sum())
 
 
+def flips(mesh: Mesh, flat: Array) -> int:
+    """:func:`flipped_cells` of a flat image (n, 2) of a mesh, grid or not."""
+    grid = mesh.grid_index
+    if grid is None:
+        return flipped_cells(flat, mesh.faces, surface=mesh)
+    return flipped_cells(flat[grid], surface=mesh.grid)
+
+
 def _space_areas(points: Array, faces: NDArray[np.int64]) -> Array:
     """Doubled areas of the corner triangles of faces in space."""
     p, q, r = (points[k] for k in topology.corner_triangles(faces).T)
@@ -355,13 +437,7 @@ def corner_areas(flat: Array, faces: NDArray[np.int64]) -> Array:
 def face_normals(surface: Any) -> Array:
     """Unit normals (m, 3): diagonals' cross product for quads, zero where there is no area."""
     faces, p = _faces(surface), _points(surface)
-    corner = [p[faces[:, k]] for k in range(3)]
-    if faces.shape[1] == 4:
-        # A triangle padded with -1 takes its first corner for the fourth.
-        last = p[np.where(faces[:, 3] < 0, faces[:, 0], faces[:, 3])]
-    else:
-        last = corner[0]
-    a, b = geometry.diagonals(*(components(c) for c in (*corner, last)))
+    a, b = geometry.diagonals(*(components(p[c]) for c in topology.four_corners(faces).T))
     normal = np.stack(geometry.cross(a, b), axis=1)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -12,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.mesh import Mesh
+from gso.spline import BSplineSurface
 from gso.status import MeshError, Progress, Status
 
 Array = NDArray[np.float64]
 
 _FORMAT = 1
+_UNUSABLE = (Status.CANCELLED, Status.TARGET_MISSED, Status.CONSTRAINTS_MISSED)
 
 
 @dataclass
@@ -34,6 +37,9 @@ class Result:
         flat image at z = 0.
     flat : ndarray, (n, 2), or None
         The flat image, where the task makes one, in the input's unit of length.
+    cell_scale : ndarray, (m,), or None
+        Of `conformal`: the length of a face's diagonals (sides, of a triangle) in the flat
+        image over that on the surface, in the order of the input's faces.
     status : Status
         Why the solve ended; its value is a message.
     iterations : int
@@ -51,7 +57,11 @@ class Result:
     notes : tuple of str
         What was repaired in the input or restricted in the run.
     details : dict
-        Numbers of the task: weights chosen, noise estimate ...
+        Numbers of the task: weights chosen, noise estimate ... With constraints,
+        "constraints": the largest length by which each is missed, in the input's unit. With
+        a spline, "spline": its curvature and distances, see :func:`gso.fit.describe_spline`.
+    spline : BSplineSurface or None
+        The surface that `mesh` has samples of, with the option ``variables="surface"``.
     """
 
     task: str
@@ -69,6 +79,8 @@ class Result:
     warm_start: str = "cold"
     notes: tuple[str, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
+    spline: BSplineSurface | None = None
+    cell_scale: Array | None = None
 
     @property
     def converged(self) -> bool:
@@ -77,10 +89,10 @@ class Result:
 
     @property
     def usable(self) -> bool:
-        """Whether it can be worked with: complete, on target, no cell turned over."""
+        """Whether it can be worked with: complete, as asked for, no cell turned over."""
         points = self.mesh.vertices if self.flat is None else self.flat
         return bool(
-            self.status not in (Status.CANCELLED, Status.TARGET_MISSED)
+            self.status not in _UNUSABLE
             and np.isfinite(points).all()
             and not self.metrics.get("flipped_cells", 0)
         )
@@ -109,12 +121,13 @@ class Result:
         """Write the result.
 
         ``.npz`` keeps everything and is read back by :meth:`load`; ``.svg`` is the flat
-        image at 1:1, `unit` the unit of the mesh's coordinates; any other suffix of
-        :func:`gso.save` is the surface (the flat image at z = 0 for `flatten`).
+        image at 1:1, `unit` the unit of the mesh's coordinates; ``.step``, ``.iges`` and
+        ``.3dm`` are the spline, in that unit (see :func:`gso.save_spline`); any other suffix
+        of :func:`gso.save` is the surface (the flat image at z = 0 for `flatten`).
         """
         from gso import io
 
-        suffix = str(path).lower().rpartition(".")[2]
+        suffix = os.path.splitext(os.fsdecode(path))[1].lower()[1:]
         if suffix == "npz":
             with io.replacing(path) as file:
                 np.savez(file, **self._arrays())
@@ -124,6 +137,13 @@ class Result:
                     f"{path}: this result has no flat image to write as SVG; use task='flatten'"
                 )
             io.save_flat(self.flat, self.design, path, unit=unit)
+        elif f".{suffix}" in io.SPLINE_SUFFIXES:
+            if self.spline is None:
+                raise MeshError(
+                    f"{path}: this result is a mesh; solve with the option variables='surface', "
+                    "or give its mesh to gso.fit_spline and gso.save_spline"
+                )
+            io.save_spline(self.spline, path, unit=unit)
         else:
             io.save(self.mesh, path)
 
@@ -152,6 +172,10 @@ class Result:
         }
         if self.flat is not None:
             arrays["flat"] = self.flat
+        if self.cell_scale is not None:
+            arrays["cell_scale"] = self.cell_scale
+        if self.spline is not None:
+            arrays |= self.spline.arrays()
         return arrays
 
     @classmethod
@@ -193,6 +217,8 @@ class Result:
                 record["warm_start"],
                 tuple(record["notes"]),
                 record["details"],
+                spline=BSplineSurface.from_arrays(data),
+                cell_scale=data.get("cell_scale"),
             )
             result.__dict__["metrics"] = record["metrics"]
         except (KeyError, TypeError, ValueError) as error:

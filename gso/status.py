@@ -45,6 +45,7 @@ class Status(enum.Enum):
     ALREADY_GOOD = "the input already meets the tolerance and comes back untouched"
     TARGET_REACHED = "the target was reached"
     TARGET_MISSED = "the target could not be reached; the closest result is returned"
+    CONSTRAINTS_MISSED = "not all constraints could be met; the notes name those that are not"
     MAX_ITERATIONS = "done: all iterations that the options allow were used"
     STALLED = "stopped: no step lowers the energy any further"
     CANCELLED = "stopped by the callback; the best iterate so far is returned"

@@ -269,6 +269,12 @@ def by_size(faces: Ints) -> tuple[Ints, Ints]:
     return faces[quad], faces[~quad, :3]
 
 
+def four_corners(faces: Ints) -> Ints:
+    """Faces with four corners each (m, 4): a triangle repeats its first one at the end."""
+    first, last = faces[:, :1], faces[:, 3:]
+    return np.c_[faces[:, :3], np.where(last < 0, first, last) if last.size else first]
+
+
 def triangulate(faces: Ints, he: HalfEdges) -> Ints:
     """Split quads into triangles so that neighbours are split alike.
 
@@ -385,8 +391,16 @@ def polyline_triples(he: HalfEdges, faces: Ints) -> Ints:
     Lines run straight through regular vertices (four faces inside, two on the boundary)
     and end at irregular ones.
     """
+    return polyline_crosses(he, faces)[:, :3]
+
+
+def polyline_crosses(he: HalfEdges, faces: Ints) -> Ints:
+    """The triples of :func:`polyline_triples` and the line across (a, b, c, p, q), (t, 5).
+
+    p and q are the neighbours of b on both sides of the polyline; on the boundary q is b.
+    """
     if faces.shape[1] == 3:
-        return np.empty((0, 3), np.int64)
+        return np.empty((0, 5), np.int64)
     quad = (faces[:, 3] >= 0)[he.face]
     edge = he.boundary_vertex
     regular = np.where(edge, he.face_count == 2, he.face_count == 4)
@@ -394,10 +408,13 @@ def polyline_triples(he: HalfEdges, faces: Ints) -> Ints:
     ok = quad & (side >= 0) & regular[he.dest]
     ok &= np.where(side >= 0, quad[side], False)
     ahead = he.next[side[ok]]
-    triples = np.stack([he.origin[ok], he.dest[ok], he.dest[ahead]], axis=1)
-    swap = triples[:, 0] > triples[:, 2]
-    triples[swap] = triples[swap, ::-1]
-    return np.unique(triples, axis=0)
+    left, right = he.dest[he.next[ok]], he.origin[he.prev[he.twin[ok]]]
+    right = np.where(he.twin[ok] >= 0, right, he.dest[ok])
+    crosses = np.stack([he.origin[ok], he.dest[ok], he.dest[ahead], left, right], axis=1)
+    swap = crosses[:, 0] > crosses[:, 2]
+    crosses[swap] = crosses[swap][:, [2, 1, 0, 3, 4]]
+    _, once = np.unique(crosses[:, :3], axis=0, return_index=True)
+    return crosses[once]
 
 
 def hinges(he: HalfEdges) -> Ints:

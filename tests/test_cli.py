@@ -134,6 +134,14 @@ def test_boundary_is_kept(run, small):
     assert not np.allclose(before.vertices[~rim], after.vertices[~rim])
 
 
+def test_constraints_come_from_a_file(run, small):
+    Path("c.json").write_text('[{"type": "Fixed", "ids": [0, 5]}]')
+    assert run("optimize", small, "-o", "out.npz", "--constraints", "c.json").exit_code == 0
+    left = gso.Result.load("out.npz").details["constraints"]
+    assert left == pytest.approx({"constraint 0 (Fixed)": 0.0}, abs=1e-12)
+    assert refused(run("optimize", small, "-o", "out.npz", "--constraints", "no.json"), "no.json")
+
+
 def test_missed_target_is_no_success(run, small):
     done = run("optimize", small, "-o", "out.obj", "--target-curvature", 1e-12)
     assert done.exit_code == 1

@@ -126,8 +126,6 @@ def test_denoise_of_meshes_and_refusals():
     assert gso.metrics.normal_angle(triangles, result.mesh) < 0.4 * gso.metrics.normal_angle(
         triangles, noisy
     )
-    with pytest.raises(gso.OptionError, match="constraints"):
-        gso.tno.optimize(noisy, task="denoise", constraints=[gso.FixedBoundary()])
     with pytest.raises(gso.OptionError, match="x0"):
         gso.tno.optimize(noisy, task="denoise", x0=noisy)
 

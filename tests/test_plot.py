@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import gso
-from gso.plot import plot_result, plot_surface
+from gso.plot import plot_result, plot_rulings, plot_surface
 from gso.plot.draw import Panel, draw
 from gso.plot.heat import curvatures, distance, numbers, per_face, strain
 from gso.plot.view import View
@@ -105,6 +105,38 @@ def test_numbers_of_ones_own():
         plot_surface(mesh, np.arange(5.0))
 
 
+@pytest.mark.parametrize("make", [bump, plane, mixed, triangles, sphere])
+def test_rulings_are_drawn(tmp_path, make):
+    figure = plot_rulings(make(), count=4, path=tmp_path / "out.png")
+    assert (tmp_path / "out.png").stat().st_size > 1000
+    rulings, gauss = (ax.get_title() for ax in figure.axes)
+    if make is plane:
+        assert rulings == "no rulings: the surface is flat"
+    else:
+        assert rulings.startswith("rulings, off straight by ")
+    thickness = gso.rulings.shape_operator(make()).thickness
+    assert gauss == f"Gauss image, thickness {thickness:.2g}"
+
+
+def test_gauss_image_before_is_drawn_first():
+    figure = plot_rulings(bump(height=0.1), count=4, before=bump())
+    titles = [ax.get_title() for ax in figure.axes]
+    assert len(titles) == 3
+    assert titles[0].startswith("Gauss image before, thickness ")
+    assert titles[1].startswith("rulings")
+    with pytest.raises(gso.OptionError, match="count=0"):
+        plot_rulings(bump(), count=0)
+
+
+def test_lines_are_painted_over_their_face_and_under_nearer_ones():
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 2], [1, 0, 2], [0, 1, 2.0]])
+    panel = Panel(points, np.array([[3, 4, 5], [0, 1, 2]]), shaded=False)
+    panel.lines = [np.array([[0.1, 0.1, 0.0], [0.3, 0.1, 0.0], [0.5, 0.1, 0.0]])]
+    painted = draw([panel]).axes[0].collections[0]
+    assert [len(path.vertices) > 3 for path in painted.get_paths()] == [True, False, False, True]
+    assert np.allclose(painted.get_facecolor()[:, 3], [1.0, 0.0, 0.0, 1.0])
+
+
 def test_mistakes():
     with pytest.raises(gso.OptionError, match="no colour 'heat'"):
         plot_surface(bump(), "heat")
@@ -123,6 +155,8 @@ def test_without_matplotlib(monkeypatch):
         plot_surface(bump())
     with pytest.raises(gso.GSOError, match=r'pip install "gso\[plot\]"'):
         plot_result(None)
+    with pytest.raises(gso.GSOError, match=r'pip install "gso\[plot\]"'):
+        plot_rulings(bump())
 
 
 def test_no_window_system_is_touched(tmp_path):

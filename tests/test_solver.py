@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+import gso
 from gso import Progress, Status
+from gso.constraints import compile_constraints
 from gso.mesh import Mesh
 from gso.terms import Weighted, curvature, fairness, position, proximity
 from gso.terms.losses import Absolute, Distance
@@ -17,6 +20,7 @@ from gso.tno.problem import Problem
 from gso.tno.solver import minimise
 from gso.variables import (
     Layout,
+    Variables,
     free,
     normal_offsets,
     spline_offsets,
@@ -28,6 +32,7 @@ from tests.conftest import saddle
 MESH = Mesh.from_grid(saddle(13, 11))
 LAYOUT = Layout((("surface", len(MESH.vertices), 3),))
 NORMALS = vertex_normals(MESH)
+ACROSS, PAIRS = ([0, 0, 0], [1, 2, 0.5]), [[3, 3], [20, 30], [50, 60]]
 
 
 def items() -> list[Weighted]:
@@ -39,13 +44,19 @@ def items() -> list[Weighted]:
     ]
 
 
+def held(*constraints) -> Variables:
+    reduction = compile_constraints(constraints, MESH).reduction
+    return free(LAYOUT).following(*reduction.maps(0, LAYOUT.size))
+
+
 def unknowns() -> dict:
     return {
         "free": free(LAYOUT),
         "normal": normal_offsets(LAYOUT, MESH.vertices, NORMALS),
         "spline-offsets": spline_offsets(LAYOUT, MESH.vertices, NORMALS, (13, 11), (6, 5)),
         "spline-surface": spline_surface(LAYOUT, (13, 11), (9, 8)),
-        "fixed": free(LAYOUT).fixing(np.arange(9), MESH.vertices.ravel()[:9]),
+        "fixed": held(gso.Fixed([0, 1, 2])),
+        "glued": held(gso.Glue([[0, 60], [60, 14]]), gso.SymmetryPlane(*ACROSS, pairs=PAIRS)),
     }
 
 
@@ -177,3 +188,34 @@ def test_the_sorting_and_the_table_analysis_agree(monkeypatch):
     monkeypatch.setattr(module, "_LARGEST_TABLE", 0)
     for a, b in zip(table, module._places(column, row, 40), strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("held_ids", [[], [0, 5]])
+def test_an_element_may_name_a_vertex_twice(held_ids):
+    # Not quadratic by name, but in fact: the gradient's change is the matrix times the step.
+    term = fairness.build(MESH)
+    triples = term.stencil[0][1].copy()
+    triples[:, 2] = triples[:, 1]
+    twice = replace(term, stencil=(("surface", triples),), linear=False)
+    variables = held(gso.Fixed(held_ids)) if held_ids else free(LAYOUT)
+    problem = Problem([Weighted(twice, 1.0)], variables)
+    x = variables.project(MESH.vertices.ravel())
+    _, gradient, values = problem.linearise(x)
+    dense = np.zeros((variables.size, variables.size))
+    dense[problem.pattern.indices, problem.pattern.columns] = values
+    dense += np.tril(dense, -1).T
+    d = np.random.default_rng(1).standard_normal(variables.size)
+    change = problem.linearise(x + d)[1] - gradient
+    np.testing.assert_allclose(dense @ d, change, atol=1e-9 * np.abs(change).max())
+
+
+def test_a_problem_takes_over_the_sparsity_of_one_like_it(monkeypatch):
+    from gso.tno import problem as module
+
+    variables = unknowns()["normal"]
+    first = Problem(items(), variables)
+    pattern = first.pattern
+    monkeypatch.setattr(module, "_assemble", None)
+    assert Problem(items(), variables, like=first).pattern is pattern
+    with pytest.raises(TypeError):
+        Problem(items()[:1], variables, like=first).pattern  # noqa: B018

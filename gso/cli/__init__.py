@@ -1,4 +1,4 @@
-"""The command line: ``gso optimize``, ``gso metrics``, ``gso info``, ``gso plot``."""
+"""The command line: ``gso optimize``, ``gso metrics``, ``gso info``, ``gso plot`` ..."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from gso.cli.dataset import dataset
 from gso.cli.inspect import info, metrics, plot
 from gso.cli.optimize import optimize
 from gso.status import GSOError
@@ -55,5 +56,5 @@ def main() -> None:
     """Make quad and grid surfaces developable, flatten them, denoise them."""
 
 
-for _command in (optimize, metrics, info, plot):
+for _command in (optimize, metrics, info, plot, dataset):
     main.add_command(_command)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gso.status import GSOError
+from gso.status import GSOError, OptionError
 
 if TYPE_CHECKING:
     from gso.mesh import Mesh
@@ -152,7 +152,13 @@ def _point(point: Any) -> str:
     help="What the colours show: curvature unless said otherwise; distance to, and strain of "
     "the map from, the surface before.",
 )
-def plot(file: str, out: str, before: str | None, colour: str | None) -> None:
+@click.option(
+    "--rulings",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Draw so many ruling lines instead, and the Gauss image: a curve if developable.",
+)
+def plot(file: str, out: str, before: str | None, colour: str | None, rulings: int | None) -> None:
     """Draw the surface FILE as a picture (.png, .pdf, .svg).
 
     A full result (.npz of gso optimize) is drawn beside its design, unless --before or
@@ -164,13 +170,21 @@ def plot(file: str, out: str, before: str | None, colour: str | None) -> None:
 
     pictures.require()
     io.check_writable(out, pictures.SUFFIXES)
+    if rulings is not None and colour is not None:
+        raise OptionError("--rulings and --color cannot be drawn in one picture; give one of them")
     if before is None and colour is None and file.lower().endswith(".npz"):
         try:
             result = Result.load(file)
         except GSOError:
             pass  # a mesh in an .npz file, or what load() says about it
         else:
-            pictures.plot_result(result, out)
+            if rulings is None:
+                pictures.plot_result(result, out)
+            else:
+                pictures.plot_rulings(result.mesh, path=out, count=rulings, before=result.design)
             return
     first = None if before is None else io.load(before)
+    if rulings is not None:
+        pictures.plot_rulings(io.load(file), path=out, count=rulings, before=first)
+        return
     pictures.plot_surface(io.load(file), colour or "curvature", before=first, path=out)

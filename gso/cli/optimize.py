@@ -42,9 +42,16 @@ class Job:
         from gso import io
 
         if out.lower().endswith(".svg"):
-            if self.keywords["task"] != "flatten":
+            if getattr(tasks.get(self.keywords["task"]), "BLOCK", "surface") != "flat":
                 raise OptionError(f"{out}: only a flat pattern is drawn as SVG; use --task flatten")
             io.check_writable(out)
+        elif _is_cad(out):
+            if self.keywords["task"] != "developable":
+                raise OptionError(
+                    f"{out}: only developable surfaces are written as splines; "
+                    "use --task developable"
+                )
+            io.check_spline(out, self.unit)
         else:
             io.check_writable(out, io.SUFFIXES)
         if plot is not None:
@@ -55,6 +62,12 @@ class Job:
 
     def write(self, result: Result, out: str, plot: str | None = None) -> None:
         """Write a result and its picture."""
+        if _is_cad(out) and result.spline is None:
+            from gso.fit import fit_spline
+
+            result.spline = fit_spline(result.mesh)
+            far = max(result.spline.gap or (0.0,))
+            result.notes += (f"the spline was fitted to the result, {far:.3g} away at most",)
         result.save(out, unit=self.unit)
         if plot is not None:
             from gso.plot import plot_result
@@ -72,7 +85,8 @@ class Job:
     required=True,
     type=click.Path(),
     help="File to write; a folder when there are several inputs. The suffix says the format: "
-    ".npz is the full result, .svg the flat pattern at 1:1.",
+    ".npz is the full result, .svg the flat pattern at 1:1; .step, .iges and .3dm are the "
+    "surface as a B-spline, which is then what is optimised.",
 )
 @click.option(
     "--task",
@@ -103,6 +117,12 @@ class Job:
     help="developable: mean |K| (loss_gc) to reach with the smallest displacement.",
 )
 @click.option("--fix-boundary", is_flag=True, help="Keep the boundary where it is.")
+@click.option(
+    "--constraints",
+    metavar="JSON",
+    type=click.Path(),
+    help='File with what must hold: a list such as [{"type": "Glue", "pairs": [[0, 9]]}].',
+)
 @click.option("--backend", metavar="NAME", help="Linear solver; the fastest installed by default.")
 @click.option("--workers", metavar="N", type=click.IntRange(0), help="Processes for many inputs.")
 @click.option(
@@ -122,7 +142,7 @@ class Job:
     type=click.Choice(UNITS),
     default="mm",
     show_default=True,
-    help="Unit of the coordinates, for .svg.",
+    help="Unit of the coordinates, for .svg, .step, .iges and .3dm.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 def optimize(files: tuple[str, ...], out: str, **given: Any) -> None:
@@ -132,7 +152,7 @@ def optimize(files: tuple[str, ...], out: str, **given: Any) -> None:
     when every result is usable: it was computed, reached its target if it had one, and has
     no cell turned over.
     """
-    job = Job(_keywords(given), given["unit"], given["quiet"])
+    job = Job(_keywords(given, given["suffix"] or out), given["unit"], given["quiet"])
     if given["table"] is not None:
         from gso.io import check_writable
 
@@ -156,7 +176,14 @@ def optimize(files: tuple[str, ...], out: str, **given: Any) -> None:
     click.get_current_context().exit(0 if good else 1)
 
 
-def _keywords(given: dict[str, Any]) -> dict[str, Any]:
+def _is_cad(out: str) -> bool:
+    """Whether a file name, or a suffix with or without its dot, is that of a CAD file."""
+    from gso.io import SPLINE_SUFFIXES
+
+    return f".{out.lower().rpartition('.')[2]}" in SPLINE_SUFFIXES
+
+
+def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
     """Keywords of :func:`gso.tno.optimize`, checked as far as that needs no mesh."""
     from gso.tno import check
 
@@ -164,6 +191,10 @@ def _keywords(given: dict[str, Any]) -> dict[str, Any]:
     if given["backend"] is not None:
         module = tasks.get(given["task"])
         settings = replace(module.Options.coerce(settings), backend=given["backend"])
+    # What a spline cannot keep is solved as a mesh, and the spline fitted to the result.
+    apart = given["max_deviation"] is not None or given["fix_boundary"]
+    if _is_cad(out) and given["task"] == "developable" and not apart:
+        settings = replace(tasks.get("developable").Options.coerce(settings), variables="surface")
     questions = {k: given[k] for k in ("max_deviation", "target_curvature")}
     check(given["task"], given["formulation"], settings, **questions)
     keywords = {
@@ -172,10 +203,17 @@ def _keywords(given: dict[str, Any]) -> dict[str, Any]:
         "options": settings,
         **questions,
     }
+    wanted: list[Any] = []
+    if given["constraints"] is not None:
+        from gso.constraints import read_constraints
+
+        wanted += read_constraints(given["constraints"])
     if given["fix_boundary"]:
         from gso.constraints import FixedBoundary
 
-        keywords["constraints"] = [FixedBoundary()]
+        wanted.append(FixedBoundary())
+    if wanted:
+        keywords["constraints"] = wanted
     return keywords
 
 

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from typing import Any
 
 from gso.status import Progress
@@ -57,3 +58,54 @@ def files(count: int) -> Iterator[Any]:
 
     with tqdm(total=count, disable=not watched(), leave=False, unit="file") as bar:
         yield bar
+
+
+@dataclass
+class Counts:
+    """Bars over things that are counted, one after the other, and the time they took.
+
+    Attributes
+    ----------
+    spent : dict of str to (int, float)
+        How many were added, and in how many seconds, by name.
+    """
+
+    spent: dict[str, tuple[int, float]] = field(default_factory=dict)
+    _bar: Any = None
+    _what: str = ""
+    _first: int = 0
+    _start: float = 0.0
+
+    def tick(self, what: str, count: int, total: int) -> None:
+        """Show how many there are."""
+        if what != self._what:
+            from tqdm import tqdm
+
+            self.close()
+            # The time left follows from the mean speed since the start: files of many
+            # surfaces come in bursts.
+            self._bar = tqdm(
+                desc=what,
+                total=total,
+                initial=count,
+                smoothing=0,
+                disable=not watched(),
+            )
+            self._what, self._first, self._start = what, count, time.perf_counter()
+        self._bar.update(count - self._bar.n if not self._bar.disable else 0)
+        self.spent[what] = (count - self._first, time.perf_counter() - self._start)
+
+    def close(self) -> None:
+        """Leave the last bar."""
+        if self._bar is not None:
+            self._bar.close()
+
+
+@contextmanager
+def counts() -> Iterator[Counts]:
+    """Bars over whatever is counted."""
+    bars = Counts()
+    try:
+        yield bars
+    finally:
+        bars.close()

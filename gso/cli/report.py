@@ -40,6 +40,7 @@ def record(file: str, out: str, result: Result) -> dict[str, Any]:
         "seconds": result.seconds.get("total", 0.0),
         "backend": result.backend,
         "notes": list(result.notes),
+        "spline": result.details.get("spline"),
         "details": {k: v for k, v in result.details.items() if isinstance(v, (int, float, str))},
         "metrics": {name: _number(value) for name, value in result.metrics.items()},
     }
@@ -54,10 +55,21 @@ def text(record: Mapping[str, Any]) -> str:
     lines.append(spent + (f", {record['backend']}" if record["backend"] else ""))
     if record["details"]:
         lines.append(", ".join(f"{k} {_short(v)}" for k, v in record["details"].items()))
+    if record["spline"]:
+        lines.append(_spline(record["spline"]))
     lines += [f"note: {note}" for note in record["notes"]]
     if not record["usable"]:
         lines.append("this result is not usable as it is")
     return "\n".join(lines)
+
+
+def _spline(said: Mapping[str, Any]) -> str:
+    n, m = said["controls"]
+    return (
+        f"spline of {n} x {m} control points: mean |K| {_short(said['curvature'])} 1/size^2, "
+        f"at most {_short(said['mesh']['between_max'])} from the mesh between its vertices, "
+        f"{_short(said['design']['between_max'])} from the input"
+    )
 
 
 def line(record: Mapping[str, Any]) -> str:

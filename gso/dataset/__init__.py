@@ -1,1 +1,28 @@
-"""Surfaces to train and to compare on."""
+"""Surfaces to train and to compare on: build them, open them, import and export them."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+# Looked up at first use, so that to read a set does not load the solver that made it.
+_NAMES = {
+    "Dataset": "gso.dataset.store",
+    "Recipe": "gso.dataset.recipe",
+    "Split": "gso.dataset.store",
+    "build": "gso.dataset.builder",
+    "export": "gso.dataset.folder",
+    "open": "gso.dataset.store",
+}
+
+__all__ = list(_NAMES)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _NAMES:
+        raise AttributeError(f"module 'gso.dataset' has no attribute {name!r}")
+    return getattr(importlib.import_module(_NAMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,6 +1,7 @@
 """Plane images of a surface to start from, and where the finished image is put."""
 
-from gso.flat_start.begin import begin, flips, refine, strain, upward
+from gso.flat_start.align import align, settle
+from gso.flat_start.begin import begin, flips, given, refine, strain, upward
 from gso.flat_start.embed import embed, parts
 from gso.flat_start.grid import rectangle
 from gso.flat_start.place import beside, closest_motion, place, upright
@@ -8,16 +9,19 @@ from gso.flat_start.relax import Relaxed, relax, strain_level
 
 __all__ = [
     "Relaxed",
+    "align",
     "begin",
     "beside",
     "closest_motion",
     "embed",
     "flips",
+    "given",
     "parts",
     "place",
     "rectangle",
     "refine",
     "relax",
+    "settle",
     "strain",
     "strain_level",
     "upright",

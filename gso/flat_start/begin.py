@@ -66,6 +66,18 @@ def begin(mesh: Mesh, *, iterations: int = 100) -> Relaxed:
     return relax(mesh.vertices, strained, flat, upward=kept, iterations=iterations)
 
 
+def given(mesh: Mesh, start: Array | None, notes: list[str]) -> Array | None:
+    """The user's start (n, 2) unless it has flips, which the notes then say."""
+    if start is None:
+        return None
+    flat = np.ascontiguousarray(start[:, :2])
+    turned = flips(mesh, flat)
+    if turned:
+        notes.append(f"x0 turns {turned} corner triangles over and was not used")
+        return None
+    return flat
+
+
 def refine(coarse: Mesh, fine: Mesh, flat: Array) -> Array:
     """Image (n, 2) of a coarse grid interpolated to a finer one; where that flips, a new start."""
     if coarse.grid_shape is None or fine.grid_shape is None:

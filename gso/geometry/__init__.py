@@ -6,29 +6,55 @@ NumPy arrays (metrics), torch tensors (losses) and CasADi symbols (derivatives),
 solver residual, a training loss and a metric cannot drift apart.
 """
 
-from gso.geometry.cells import corner_area2, diagonals, face_products, isometry_defect
+from gso.geometry.cells import (
+    corner_area2,
+    diagonal_distance,
+    diagonals,
+    face_products,
+    isometry_defect,
+)
 from gso.geometry.curvature import gaussian_curvature, star_area, star_defect
 from gso.geometry.differences import second_difference
+from gso.geometry.parametric import smooth_gaussian_curvature
+from gso.geometry.shape import (
+    Matrix,
+    determinant,
+    eigen,
+    half_trace,
+    shape_matrix,
+    tangent_frame,
+)
 from gso.geometry.strain import rest_frame, singular_values, stretch, turn_and_shear
+from gso.geometry.stretches import first_form, principal_stretches
 from gso.geometry.vector import angle, cross, dot, norm, norm2, sub
 
 __all__ = [
+    "Matrix",
     "angle",
     "corner_area2",
     "cross",
+    "determinant",
+    "diagonal_distance",
     "diagonals",
     "dot",
+    "eigen",
     "face_products",
+    "first_form",
     "gaussian_curvature",
+    "half_trace",
     "isometry_defect",
     "norm",
     "norm2",
+    "principal_stretches",
     "rest_frame",
     "second_difference",
+    "shape_matrix",
     "singular_values",
+    "smooth_gaussian_curvature",
     "star_area",
     "star_defect",
     "stretch",
     "sub",
+    "tangent_frame",
     "turn_and_shear",
 ]

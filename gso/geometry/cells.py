@@ -4,12 +4,24 @@ from __future__ import annotations
 
 from typing import Any
 
-from gso.geometry.vector import Vec, dot, norm, norm2, sub
+from gso.geometry.vector import Vec, cross, dot, norm, norm2, sub
 
 
 def diagonals(v0: Vec, v1: Vec, v2: Vec, v3: Vec) -> tuple[Vec, Vec]:
     """Diagonals ``a = v0 - v2`` and ``b = v1 - v3`` (Jiang et al. 2020)."""
     return sub(v0, v2), sub(v1, v3)
+
+
+def diagonal_distance(v0: Vec, v1: Vec, v2: Vec, v3: Vec) -> Any:
+    """Signed distance between the lines of a quad's diagonals: zero when it is planar.
+
+    >>> corners = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (1.0, 1.0, 1.0), (0.0, 1.0, 0.0)
+    >>> float(diagonal_distance(*corners))
+    -1.0
+    """
+    a, b = diagonals(v0, v1, v2, v3)
+    normal = cross(a, b)
+    return dot(normal, sub(v1, v0)) / norm(normal)
 
 
 def face_products(*corners: Vec) -> tuple[Any, Any, Any]:

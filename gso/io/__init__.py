@@ -1,4 +1,4 @@
-"""Read and write mesh files; flat patterns as drawings.
+"""Read and write mesh files; flat patterns as drawings, lines in space.
 
 >>> import tempfile, os
 >>> import numpy as np
@@ -18,13 +18,27 @@ from os import PathLike
 from typing import Any, NamedTuple
 
 from gso.io.atomic import check_writable, replacing
+from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_spline
 from gso.io.convert import as_mesh
+from gso.io.lines import save_lines
 from gso.io.source import read_bytes
 from gso.io.svg import save_flat
 from gso.mesh import Mesh
 from gso.status import MeshError
 
-__all__ = ["SUFFIXES", "as_mesh", "check_writable", "load", "replacing", "save", "save_flat"]
+__all__ = [
+    "SPLINE_SUFFIXES",
+    "SUFFIXES",
+    "as_mesh",
+    "check_spline",
+    "check_writable",
+    "load",
+    "replacing",
+    "save",
+    "save_flat",
+    "save_lines",
+    "save_spline",
+]
 
 
 class _Format(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from os import PathLike
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.io.atomic import check_writable, replacing
+from gso.io.lines import polyline
 from gso.io.source import Array, Ints
 from gso.mesh import Mesh
 from gso.status import MeshError, OptionError
@@ -38,13 +40,14 @@ def save_flat(
     *,
     unit: str = "mm",
     mesh_lines: bool = False,
+    lines: Sequence[Any] = (),
 ) -> None:
     """Write a flat pattern as an SVG drawing at the scale 1:1.
 
     The pattern lies as seen from above (from positive z, with x to the right and y up),
     so that faces which are anticlockwise in `flat` are so on paper. The layer `outline`
     has one closed path per boundary loop, holes included; the layer `mesh` has the inner
-    edges.
+    edges, the layer `lines` what you give.
 
     Parameters
     ----------
@@ -58,12 +61,14 @@ def save_flat(
         Unit of the coordinates in `flat`. The drawing itself is in millimetres.
     mesh_lines : bool
         Draw the inner edges too.
+    lines : sequence of array_like (k, 2)
+        Polylines in the coordinates of `flat` to draw too: the rulings, to bend along.
 
     Raises
     ------
     MeshError
-        `flat` does not fit the mesh or is not finite, the mesh is closed, or the file
-        cannot be written.
+        `flat` does not fit the mesh, it or a line is not finite, the mesh is closed, or the
+        file cannot be written.
     OptionError
         Unknown unit.
 
@@ -91,12 +96,15 @@ def save_flat(
     points *= MILLIMETRES[unit]
     if not np.isfinite(points[used]).all():
         raise MeshError("the flat pattern has coordinates that are not finite")
-    text = _drawing(points, used, loops, mesh.edges if mesh_lines else None)
+    extra = [MILLIMETRES[unit] * polyline(line, k, 2) for k, line in enumerate(lines)]
+    text = _drawing(points, used, loops, mesh.edges if mesh_lines else None, extra)
     with replacing(path) as file:
         file.write(text.encode("utf-8"))
 
 
-def _drawing(points: Array, used: Ints, loops: list[Ints], edges: Ints | None) -> str:
+def _drawing(
+    points: Array, used: Ints, loops: list[Ints], edges: Ints | None, lines: Sequence[Array]
+) -> str:
     """SVG text; `points` in millimetres with y up."""
     import svgwrite
     from svgwrite.extensions import Inkscape
@@ -105,8 +113,12 @@ def _drawing(points: Array, used: Ints, loops: list[Ints], edges: Ints | None) -
     line = min(_LINE, _FINEST * float((high - low).max()))
     margin = 10 * line
     width, height = (high - low + 2 * margin).tolist()
+
     # SVG counts y downwards: turned round here once, no transform is left in the file.
-    paper = np.stack([points[:, 0] - low[0], high[1] - points[:, 1]], axis=1) + margin
+    def on_paper(p: Array) -> Array:
+        return np.stack([p[:, 0] - low[0], high[1] - p[:, 1]], axis=1) + margin
+
+    paper = on_paper(points)
     drawing = svgwrite.Drawing(
         size=(f"{width:.9g}mm", f"{height:.9g}mm"),
         viewBox=f"0 0 {width:.9g} {height:.9g}",
@@ -124,17 +136,24 @@ def _drawing(points: Array, used: Ints, loops: list[Ints], edges: Ints | None) -
         rim = np.concatenate([np.stack([p, np.roll(p, -1)], axis=1) for p in loops])
         n = np.int64(len(points))
         inner = edges[~np.isin(_keys(edges, n), _keys(rim, n))]
-        lines = paper[inner].reshape(-1, 4)
-        if len(lines):
-            path = ("M%.9g %.9gL%.9g %.9g" * len(lines)) % tuple(lines.ravel().tolist())
+        pairs = paper[inner].reshape(-1, 4)
+        if len(pairs):
+            path = ("M%.9g %.9gL%.9g %.9g" * len(pairs)) % tuple(pairs.ravel().tolist())
             layer("mesh", "#808080").add(drawing.path(d=path))
+    if lines:
+        inside = layer("lines", "#0050a0")
+        for given in lines:
+            inside.add(drawing.path(d=_path(on_paper(given))))
     outline = layer("outline", "#000000")
     for loop in loops:
-        path = "M" + "L".join(f"{x:.9g} {y:.9g}" for x, y in paper[loop].tolist()) + "Z"
-        outline.add(drawing.path(d=path))
+        outline.add(drawing.path(d=_path(paper[loop]) + "Z"))
     text = io.StringIO()
     drawing.write(text)
     return text.getvalue()
+
+
+def _path(points: Array) -> str:
+    return "M" + "L".join(f"{x:.9g} {y:.9g}" for x, y in points.tolist())
 
 
 def _keys(edges: Ints, count: np.int64) -> Ints:

@@ -21,7 +21,8 @@ from gso import metrics
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.plot.draw import GRAZING, SUFFIXES, Panel, draw, write
-from gso.plot.heat import curvatures, distance, numbers, strain
+from gso.plot.heat import curvatures, distance, numbers, scales, strain, stretch
+from gso.plot.rulings import gauss, ruled
 from gso.plot.view import View
 from gso.result import Result
 from gso.status import GSOError, OptionError
@@ -29,7 +30,7 @@ from gso.status import GSOError, OptionError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "SUFFIXES", "plot_result", "plot_surface", "require"]
+__all__ = ["COLOURS", "SUFFIXES", "plot_result", "plot_rulings", "plot_surface", "require"]
 
 COLOURS = ("curvature", "distance", "strain", "none")
 """Names that :func:`plot_surface` takes for its values."""
@@ -125,16 +126,19 @@ def _named(name: str, meshes: list[Mesh]) -> list[Panel]:
     return panels
 
 
-def _flattened(design: Mesh, flat: np.ndarray) -> list[Panel]:
-    """A surface and its flat pattern, which is turned like the picture of the surface."""
-    heat = strain(design, flat)
+def _flattened(design: Mesh, flat: np.ndarray, scale: np.ndarray | None = None) -> list[Panel]:
+    """A surface and its flat pattern, which is turned like the picture of the surface.
+
+    They are coloured by the scale of their faces, if that is given, else by the strain.
+    """
+    heat = strain(design, flat) if scale is None else scales(design, flat, scale)
     surface = _plain([design])[0]
     surface.title, surface.heat = "surface", heat
     z, w = (p[:, 0] + 1j * p[:, 1] for p in (flat - flat.mean(axis=0), surface.points))
     turned = z * np.exp(1j * np.angle((np.conj(z) * (w - w.mean())).sum()))
     points = np.stack([turned.real, turned.imag, np.zeros(len(z))], axis=1)
     pattern = Panel(points / design.frame.scale, design.faces, shaded=False, heat=heat)
-    pattern.title = "flat pattern: strain " + heat.summary
+    pattern.title = "flat pattern: " + heat.summary
     return [surface, pattern]
 
 
@@ -142,7 +146,8 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
     """Draw a result beside its design.
 
     `developable`: the curvature before and after in one scale, and the distance between
-    the two. `flatten`: the strain on the surface and on the flat pattern. `denoise`: both
+    the two; `bend`: the stretch instead. `flatten`: the strain on the surface and on the flat
+    pattern; `conformal`: the scale of the faces. `denoise`: both
     surfaces in a light that grazes them, and the distance between the two.
 
     Parameters
@@ -166,10 +171,11 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
     require()
     design, mesh = result.design, result.mesh
     if result.flat is not None:
-        return write(draw(_flattened(design, result.flat)), path)
+        return write(draw(_flattened(design, result.flat, result.cell_scale)), path)
     before, after, apart = panels = _plain([design, mesh, mesh])
-    apart.heat = distance(design, mesh)
-    apart.title = "distance: " + apart.heat.summary
+    bent = result.task == "bend"
+    apart.heat = stretch(design, mesh) if bent else distance(design, mesh)
+    apart.title = ("stretch: " if bent else "distance: ") + apart.heat.summary
     if result.task == "denoise":
         before.title, after.title = "input", "denoised"
         before.light = after.light = GRAZING
@@ -178,4 +184,46 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
         before.heat, after.heat = curvatures([design, mesh])
         before.title = f"input: mean |K| {metrics.loss_gc(design, scale=size):.2g}"
         after.title = f"result: mean |K| {metrics.loss_gc(mesh, scale=size):.2g}"
+    return write(draw(panels), path)
+
+
+def plot_rulings(
+    mesh: Any,
+    *,
+    path: str | PathLike[str] | None = None,
+    count: int = 24,
+    before: Any = None,
+) -> Figure:
+    """Draw a surface with its ruling lines, and its Gauss image beside it.
+
+    Parameters
+    ----------
+    mesh : Mesh, or anything that :func:`gso.as_mesh` takes
+        The surface.
+    path : str or PathLike, optional
+        A .png, .pdf or .svg file to write.
+    count : int
+        Number of lines.
+    before : Mesh, optional
+        A surface whose Gauss image is drawn first, from the same side.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    GSOError
+        Matplotlib is not installed.
+    OptionError
+        `count` is no number of lines.
+    MeshError
+        The surface cannot be used, or the file cannot be written.
+    """
+    require()
+    surface = as_mesh(mesh)
+    view = View.of(surface)
+    panels = [ruled(surface, view, count), gauss(surface, view)]
+    if before is not None:
+        panels.insert(0, gauss(as_mesh(before), view, "Gauss image before"))
     return write(draw(panels), path)

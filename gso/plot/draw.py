@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso import topology
 from gso.io import check_writable, replacing
 from gso.plot.heat import Heat, Scale
 
 if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -35,6 +37,11 @@ GRAZING = np.array([-0.70, 0.50, 0.50])
 
 _PLAIN = (0.60, 0.71, 0.82)
 _UNKNOWN = (0.80, 0.80, 0.80)
+_INK = (0.12, 0.16, 0.30)
+_RIM = (0.70, 0.70, 0.70)
+
+#: Widths of mesh lines and of lines on the surface, points.
+_EDGE, _STROKE = 0.35, 0.9
 
 #: Inches of a panel's width, of the room for the bars, and for the titles.
 _WIDTH, _BAR, _TITLE = 4.0, 0.85, 0.35
@@ -61,6 +68,10 @@ class Panel:
         Where the light comes from.
     shaded : bool
         Shade the faces by their normals.
+    lines : sequence of ndarray, (k, 3)
+        Polylines on the surface, in the same coordinates.
+    circle : float
+        Radius of a circle about the origin, behind the faces; 0 for none.
     """
 
     points: Array
@@ -69,12 +80,13 @@ class Panel:
     heat: Heat | None = None
     light: Array = field(default_factory=lambda: LIGHT)
     shaded: bool = True
+    lines: Sequence[Array] = ()
+    circle: float = 0.0
 
     @property
     def corners(self) -> NDArray[np.int64]:
         """Faces (m, 4); a triangle repeats its first corner."""
-        first, last = self.faces[:, :1], self.faces[:, 3:]
-        return np.c_[self.faces[:, :3], np.where(last < 0, first, last) if last.size else first]
+        return topology.four_corners(self.faces)
 
 
 def draw(panels: Sequence[Panel]) -> Figure:
@@ -114,26 +126,24 @@ def draw(panels: Sequence[Panel]) -> Figure:
 
 
 def _seen(panel: Panel) -> Array:
+    if panel.circle:
+        return panel.circle * np.array([(-1.0, -1.0), (1.0, 1.0)])
     return panel.points[np.unique(panel.corners), :2]
 
 
-def _paint(ax: Any, panel: Panel, span: Array) -> ScalarMappable | None:
-    """Paint the faces; what a colour bar is made from."""
-    from matplotlib.collections import PolyCollection
+def _segments(lines: Sequence[Array]) -> Array:
+    """The segments of polylines, (s, 2, 3)."""
+    return np.concatenate([np.empty((0, 2, 3)), *(np.stack([p[:-1], p[1:]], 1) for p in lines)])
 
-    corners = panel.corners
+
+def _paint(ax: Any, panel: Panel, span: Array) -> ScalarMappable | None:
+    """Paint a panel; what a colour bar is made from."""
+    from matplotlib.patches import Circle
+
+    if panel.circle:
+        ax.add_patch(Circle((0.0, 0.0), panel.circle, facecolor="none", edgecolor=_RIM))
     colours, mappable = _colours(panel)
-    order = np.argsort(panel.points[corners, 2].mean(axis=1))
-    colours = colours[order]
-    few = len(corners) <= _LINES
-    faces = PolyCollection(
-        list(panel.points[corners[order], :2]),
-        facecolors=colours,
-        edgecolors=0.72 * colours if few else colours,
-        linewidths=0.35,
-        rasterized=not few,
-    )
-    ax.add_collection(faces)
+    ax.add_collection(_polygons(panel, colours))
     seen = _seen(panel)
     middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
     ax.set_xlim(middle[0] - span[0] / 2, middle[0] + span[0] / 2)
@@ -142,6 +152,33 @@ def _paint(ax: Any, panel: Panel, span: Array) -> ScalarMappable | None:
     ax.set_title(panel.title, fontsize=11)
     ax.axis("off")
     return mappable
+
+
+def _polygons(panel: Panel, colours: Array) -> PolyCollection:
+    """Faces in their colours and the segments of the lines, from back to front."""
+    from matplotlib.collections import PolyCollection
+
+    corners, strokes = panel.points[panel.corners], _segments(panel.lines)
+    few = len(corners) <= _LINES
+    # A line comes after the faces that it lies on and before those that hide it.
+    thick = np.ptp(corners[..., 2], axis=1).max()
+    depth = np.r_[corners[..., 2].mean(axis=1), strokes[..., 2].mean(axis=1) + thick]
+    order = np.argsort(depth, kind="stable")
+    fill = np.zeros((depth.size, 4))
+    edge = np.tile((*_INK, 1.0), (depth.size, 1))
+    width = np.full(depth.size, _STROKE)
+    m = len(corners)
+    fill[:m, :3], fill[:m, 3] = colours, 1.0
+    edge[:m, :3] = 0.72 * colours if few else colours
+    width[:m] = _EDGE
+    shapes = [*corners[..., :2], *strokes[..., :2]]
+    return PolyCollection(
+        [shapes[k] for k in order],
+        facecolors=fill[order],
+        edgecolors=edge[order],
+        linewidths=width[order],
+        rasterized=not few,
+    )
 
 
 def _colours(panel: Panel) -> tuple[Array, ScalarMappable | None]:

@@ -111,8 +111,25 @@ def strain(design: Mesh, flat: Array) -> Heat:
         if len(faces):
             values[group] = 100.0 * _face_strain(design.vertices, flat, faces)
     pooled = metrics.principal_strains(design, flat)
-    summary = f"mean {100 * pooled.mean:.2g} %, largest {100 * pooled.values.max():.2g} %"
+    summary = f"strain mean {100 * pooled.mean:.2g} %, largest {100 * pooled.values.max():.2g} %"
     return Heat(values, _rising([values], "principal strain (%)", "PuRd"), summary)
+
+
+def scales(design: Mesh, flat: Array, scale: Array) -> Heat:
+    """Scale of each face (m,) in a conformal image (n, 2)."""
+    ratio = metrics.quasi_conformal(design, flat)
+    worst = 100.0 * float(np.nanmax(ratio) - 1.0)
+    heat = numbers(design, scale, "length in the flat image / on the surface")
+    return Heat(heat.values, heat.scale, f"angle distortion at most {worst:.2g} %")
+
+
+def stretch(design: Mesh, mesh: Mesh) -> Heat:
+    """How far the faces' lengths are from those of the design, percent: the larger stretch."""
+    large, small = metrics.stretches(design, mesh)
+    values = 100.0 * np.maximum(np.abs(large - 1.0), np.abs(small - 1.0))
+    known = values[np.isfinite(values)]
+    summary = f"mean {known.mean():.2g} %, largest {known.max():.2g} %"
+    return Heat(values, _rising([values], "stretch (%)", "PuRd", top=100.0), summary)
 
 
 def _face_strain(vertices: Array, flat: Array, faces: NDArray[np.int64]) -> Array:

@@ -9,15 +9,41 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from types import ModuleType
+from typing import Any
 
 from gso.status import OptionError
+from gso.tasks.options import Options
 
-_SUPPORT = ("base", "held", "joint", "options")
+_SUPPORT = ("base", "held", "joint", "options", "splined")
 
 
 def names() -> list[str]:
     """Names of the tasks."""
     return sorted(info.name for info in pkgutil.iter_modules(__path__) if info.name not in _SUPPORT)
+
+
+def choose(
+    module: ModuleType, formulation: str | None, options: Any
+) -> tuple[str, type[Options]]:
+    """Formulation that is meant, and the class of its settings.
+
+    Without a name it is the one that the preset or the settings belong to.
+    """
+    kinds: dict[str, type[Options]] = getattr(module, "OPTIONS", {})
+    implied = getattr(module, "IMPLIES", {}).get(options) if isinstance(options, str) else None
+    if formulation is None:
+        of_class = (name for name, kind in kinds.items() if type(options) is kind)
+        formulation = implied or next(of_class, module.FORMULATIONS[0])
+    if formulation not in module.FORMULATIONS:
+        raise OptionError(
+            f"task {module.__name__.rpartition('.')[2]!r} has no formulation {formulation!r}; "
+            f"there are {', '.join(module.FORMULATIONS)}"
+        )
+    if implied not in (None, formulation):
+        raise OptionError(
+            f"options {options!r} are those of the formulation {implied!r}, not {formulation!r}"
+        )
+    return formulation, kinds.get(formulation, module.Options)
 
 
 def get(name: str) -> ModuleType:

@@ -122,6 +122,8 @@ class Plan:
     finish : callable
         What is done to the coordinates after the last stage without changing the
         objective: a flat image is put in its place.
+    spline : (int, int), optional
+        Control points along both sides, where the last stage makes the surface a B-spline.
     """
 
     layout: Layout
@@ -132,6 +134,7 @@ class Plan:
     details: dict[str, Any] = field(default_factory=dict)
     finish: Callable[[Array], Array] = same
     fallback: Array | None = None
+    spline: tuple[int, int] | None = None
 
 
 __all__ = ["Options", "Plan", "Request", "Stage", "same"]

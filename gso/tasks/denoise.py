@@ -1,7 +1,8 @@
 """Remove noise, the amount of smoothing read off the noisy data alone.
 
 Grids are smoothed in closed form and other meshes by sparse solves; see
-:mod:`gso.smoothing` for the methods and their sources.
+:mod:`gso.smoothing` for the methods and their sources. Where there are constraints, the
+smallest and smoothest change that satisfies them follows.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.smoothing import smooth_grid, smooth_mesh
 from gso.status import OptionError, Status
+from gso.tasks import held
 from gso.tasks.base import Plan, Request
 from gso.tasks.options import Options as BaseOptions
 from gso.variables import Layout
@@ -42,10 +44,8 @@ class Options(BaseOptions):
 
 
 def plan(request: Request) -> Plan:
-    """The smoothed surface; there is nothing left to solve."""
+    """The smoothed surface; what is left to solve is its constraints."""
     mesh, options = request.mesh, request.options
-    if not request.constraints.empty:
-        raise OptionError("task 'denoise' takes no constraints; remove them")
     if request.start is not None:
         raise OptionError("task 'denoise' has no start to choose; leave x0 out")
     settings = {
@@ -59,10 +59,13 @@ def plan(request: Request) -> Plan:
         smoothed = smooth_mesh(mesh.vertices, mesh.faces, **settings)
     points = smoothed.points.reshape(-1, 3)
     points = np.where(mesh.used[:, None], points, mesh.vertices)
+    bound = not request.constraints.empty
+    stages = [held.approach(request, points, iterations=options.iterations)] if bound else []
     return Plan(
         Layout.of(len(points), "surface"),
         points.ravel(),
-        status=Status.CONVERGED,
+        stages,
+        status=None if bound else Status.CONVERGED,
         details={
             "order": smoothed.order,
             "weight": smoothed.weight,

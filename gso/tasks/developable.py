@@ -20,11 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import metrics as measure
+from gso.constraints import Pins
 from gso.mesh import Mesh
 from gso.resample import coarser, resample
 from gso.smoothing import smooth_grid
 from gso.status import MeshError, OptionError, Status
-from gso.tasks import held
+from gso.tasks import held, joint, splined
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, curvature, fairness, proximity
@@ -33,7 +34,9 @@ from gso.variables import Layout, Variables, free, normal_offsets, spline_offset
 
 Array = NDArray[np.float64]
 
-FORMULATIONS = ("curvature",)
+FORMULATIONS = ("curvature", "isometry")
+#: The formulation that a preset belongs to.
+IMPLIES = {"jiang2020": "isometry"}
 
 #: Mean |K| and mean squared bending of a typical design, for which weights are quoted.
 TYPICAL_CURVATURE = 0.3
@@ -59,12 +62,13 @@ class Options(BaseOptions):
         Factor on the tangential part of a displacement.
     eps : float
         Smoothing of |K|: curvature well below it counts squared.
-    variables : {"normal", "free", "spline"}
+    variables : {"normal", "free", "spline", "surface"}
         Unknowns of the last stage: offsets along normals, free vertices, or (on grids) a
         coarse bicubic field of offsets, which cannot crumple. With `max_deviation` they
-        are offsets along normals.
+        are offsets along normals. With "surface" (on grids) they are the control points of
+        a bicubic B-spline surface, which the result then is: its `spline`.
     controls : int
-        "spline": control points of the field along each side.
+        "spline", "surface": control points along each side; fewer on small grids.
     coarse_iterations : int
         Iterations on the coarsest grid.
     coarse_size : int
@@ -105,8 +109,10 @@ class Options(BaseOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.variables not in ("normal", "free", "spline"):
-            raise OptionError(f"variables is {self.variables!r}; take 'normal', 'free' or 'spline'")
+        if self.variables not in ("normal", "free", "spline", "surface"):
+            raise OptionError(
+                f"variables is {self.variables!r}; take 'normal', 'free', 'spline' or 'surface'"
+            )
         if self.controls < 4:
             raise OptionError(f"controls is {self.controls}; it must be 4 or more")
         if not (self.eps > 0 and self.near > 0):
@@ -121,8 +127,24 @@ NOISE_ONLY = 0.1
 NOISE_REACH = 2.8
 
 
+#: Settings by formulation.
+OPTIONS = {"curvature": Options, "isometry": joint.Options}
+
+
 def plan(request: Request) -> Plan:
-    """Stages of the solve: a coarse grid first, the design's own vertices last."""
+    """Stages of the solve."""
+    if request.formulation == "isometry":
+        return joint.plan(request, _before_joint)
+    return _plan(request)
+
+
+def _before_joint(request: Request) -> Plan:
+    """What the joint solve starts from, of the same request."""
+    return _plan(replace(request, options=Options()))
+
+
+def _plan(request: Request) -> Plan:
+    """A coarse grid first, the design's own vertices last."""
     mesh, options = request.mesh, request.options
     notes: list[str] = []
     _check_handles(request)
@@ -130,7 +152,11 @@ def plan(request: Request) -> Plan:
         raise _nothing_inside(mesh)
     start = mesh.vertices if request.start is None else request.start
     curved = measure.loss_gc(mesh, scale=1.0)
-    good = curved <= options.developable_below
+    spline = splined.controls(request)
+    if spline is not None:
+        # The usual solve comes first; the spline starts from its result.
+        request = replace(request, options=replace(options, variables="normal"))
+    good = curved <= options.developable_below and spline is None
     if good and request.start is None and request.constraints.empty:
         return Plan(_layout(mesh), mesh.vertices.ravel(), status=Status.ALREADY_GOOD)
     smooth, sigma = _smoothed(mesh)
@@ -138,7 +164,8 @@ def plan(request: Request) -> Plan:
     if request.constraints.empty and left <= min(NOISE_ONLY * curved, FLAT_CURVATURE):
         reach = min(NOISE_REACH * sigma, request.max_deviation or np.inf)
         request = replace(request, max_deviation=reach)
-        notes.append("the design is developable but for noise: it moves no further than that")
+        if spline is None:
+            notes.append("the design is developable but for noise: it moves no further than that")
     make = partial(_objective, request, curved, _bending(mesh), smooth)
     climb = request.start is None and request.constraints.empty and mesh.grid_index is not None
     levels = coarser(mesh, options.coarse_size) if climb else []
@@ -146,22 +173,37 @@ def plan(request: Request) -> Plan:
     stages += _stages(request, mesh, make, len(levels))
     for below, above, stage in zip(levels, [*levels[1:], mesh], stages[1:], strict=False):
         stage.enter = partial(_carry, below, above, _reach(request))
+    if spline is not None:
+        stages.append(splined.stage(stages[-1], mesh, spline))
     begin = levels[0].vertices if levels else _inside(start, mesh, _reach(request))
     free_to_return = request.constraints.empty
     free_to_return &= request.start is None or request.max_deviation is None
+    fallback = start.ravel()
+    if spline is not None:
+        fallback = splined.closest(_layout(mesh), mesh, spline, fallback)
     return Plan(
         _layout(mesh),
         begin.ravel(),
         stages,
         notes=notes,
-        fallback=start.ravel() if free_to_return else None,
+        fallback=fallback if free_to_return else None,
+        spline=spline,
     )
 
 
 def _check_handles(request: Request) -> None:
     """Refuse hard handles that want more than `max_deviation`."""
     c, reach = request.constraints, request.max_deviation
-    if reach is None or not len(c.hard_ids):
+    if reach is None:
+        return
+    for part in c.parts:
+        if part.hard and not isinstance(part, Pins):
+            raise OptionError(
+                f"{c.names[part.owner]} cannot be kept with max_deviation, under which vertices "
+                "move along their normals only; leave one out, or give the constraint a weight "
+                "where it takes one"
+            )
+    if not len(c.hard_ids):
         return
     far = np.linalg.norm(c.hard_positions - request.mesh.vertices[c.hard_ids], axis=1)
     if far.max() > reach:
@@ -290,8 +332,14 @@ def _stages(request: Request, mesh: Mesh, make: Any, coarser_grids: int) -> list
         # Only offsets along normals have bounds; normals are renewed half-way.
         return [stage("normal", o.iterations, e) for e in (falling, (o.eps,))]
     if cold or not request.constraints.empty:
-        first = stage("free" if not request.constraints.empty else "normal", 15, falling)
-        return [first, stage(o.variables, o.iterations, (o.eps,))]
+        bound = not request.constraints.empty
+        first = stage("free" if bound else "normal", 15, falling)
+        # Only free vertices can slide, stay together, or keep their distances.
+        last = stage("free" if bound else o.variables, o.iterations, (o.eps,))
+        if not bound:
+            return [first, last]
+        start = mesh.vertices if request.start is None else request.start
+        return [held.approach(request, start), first, last]
     return [stage(o.variables, _iterations(o, coarser_grids), falling)]
 
 
@@ -365,12 +413,27 @@ def _inside(points: Array, mesh: Mesh, reach: float | None) -> Array:
     return mesh.vertices + u * np.minimum(1.0, reach / np.maximum(length, 1e-300))
 
 
+def _flat_metrics(surface: Mesh, flat: Array) -> dict[str, float]:
+    """How well a flat image (n, 2) keeps the lengths of its surface."""
+    strain = measure.principal_strains(surface, flat)
+    out = {
+        "isometry_energy": measure.isometry_energy(surface, flat),
+        "parallelogram_strain": float(measure.parallelogram_strain(surface, flat).mean()),
+        "loss_iso_cell": measure.loss_iso_cell(surface, flat),
+        "edge_length_error": measure.edge_length_error(surface, flat),
+        "strain_mean": strain.mean,
+        "strain_p99": strain.p99,
+        "flipped_cells": float(measure.flips(surface, flat)),
+    }
+    return {name: value for name, value in out.items() if not np.isnan(value)}
+
+
 def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict[str, float]:
     """Published and corrected metrics of a developable result (units: gso.metrics.INFO)."""
     true = measure.surface_distance(before, after)
     percent = 100.0 / before.diagonal
     was = measure.fairness(before, scale=scale)
-    return {
+    out = {
         "loss_gc_before": measure.loss_gc(before, scale=scale),
         "loss_gc": measure.loss_gc(after, scale=scale),
         "K_A_meyer": 3.0 * measure.loss_gc(after, scale=scale),
@@ -381,3 +444,4 @@ def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict
         "deviation_max": percent * true.there_max,
         "fairness_ratio": measure.fairness(after, scale=scale) / was if was > 0 else 1.0,
     }
+    return out if flat is None else out | _flat_metrics(after, flat)

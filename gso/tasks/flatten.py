@@ -20,6 +20,7 @@ from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.resample import coarser
 from gso.status import OptionError
+from gso.tasks import held
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, collapse, edges, fairness, isometry, shear, stretch
@@ -29,6 +30,7 @@ from gso.variables import Layout, Variables, free
 Array = NDArray[np.float64]
 
 FORMULATIONS = ("strain", "lengths")
+BLOCK = "flat"
 
 #: Strains below it are rounding errors, and are not told apart.
 _SMALLEST_LEVEL = 1e-7
@@ -40,6 +42,8 @@ _LARGE_STRAIN = 0.03
 _NEARLY = 1e-2
 #: Ratio to the level at which a start is strained too much for the powers of `Spread`.
 _STRAINED = 1.5
+#: Weights with which a start is drawn to its constraints, one after the other.
+_DRAWN = (1.0, 30.0)
 #: Weight of the squeezed triangles in ``lengths``.
 _W_COLLAPSE = 3e-3
 
@@ -110,17 +114,13 @@ def plan(request: Request) -> Plan:
     ------
     MeshError
         A component is closed or has handles: it must be cut open first.
-    OptionError
-        There are constraints.
     """
     mesh, options = request.mesh, request.options
-    if not request.constraints.empty:
-        raise OptionError("flatten keeps lengths, not positions: it takes no constraints")
-    grid = mesh.grid_index is not None
+    grid = mesh.grid_index is not None and request.constraints.empty
     levels = [*(coarser(mesh, options.coarse_size) if grid else []), mesh]
     start = flat_start.begin(levels[0], iterations=options.relax_iterations)
     notes = _remarks(mesh, start.level)
-    given = _given(request, notes)
+    given = flat_start.given(mesh, request.start, notes)
     strained = given is not None and flat_start.strain(mesh, given) > _STRAINED * start.level
     if given is not None:
         levels = [mesh]
@@ -129,14 +129,48 @@ def plan(request: Request) -> Plan:
         stages = stages[-1:]
         if strained and request.formulation == "strain":
             stages = [_strain_stage(replace(options, norm="l2"), mesh, 1.0), *stages]
+    first = start.flat if given is None else given
+    finish = partial(_place, mesh, given)
+    if not request.constraints.empty:
+        if given is None:
+            first = flat_start.align(mesh, first, request.constraints)
+        stages = _bound(request, stages)
+        finish = partial(_settle, request)
     return Plan(
         Layout.of(len(mesh.vertices), "flat"),
-        (start.flat if given is None else given).ravel(),
+        first.ravel(),
         stages,
         notes=notes,
         details={"strain_level": start.level},
-        finish=partial(_place, mesh, given),
+        finish=finish,
     )
+
+
+def _bound(request: Request, stages: list[Stage]) -> list[Stage]:
+    """Stages under constraints: first the sheet is drawn to them, then it keeps them."""
+    even = replace(request.options, norm="l2")
+    steps = []
+    for weight in _DRAWN:
+        step = _strain_stage(even, request.mesh, 1.0)
+        step.items += held.drawn(request, weight)
+        steps.append(replace(step, name="approach", iterations=30))
+    stages = [_strain_stage(even, request.mesh, 1.0), *stages]
+    for stage in stages:
+        stage.items = stage.items + held.pulls(request)
+        stage.variables = partial(_holding, request, stage.layout)
+    return [*steps, *stages]
+
+
+def _holding(request: Request, layout: Layout, coordinates: Array) -> Variables:
+    return held.hold(request, free(layout))
+
+
+def _settle(request: Request, coordinates: Array) -> Array:
+    """Constrained images stay where they are, but for parts that nothing holds."""
+    mesh, flat = request.mesh, coordinates.reshape(-1, 2)
+    if not request.constraints.anchored and len(flat_start.parts(mesh)) == 1:
+        return _place(mesh, None, coordinates)
+    return flat_start.settle(mesh, flat, request.constraints).ravel()
 
 
 def _remarks(mesh: Mesh, level: float) -> list[str]:
@@ -152,18 +186,6 @@ def _remarks(mesh: Mesh, level: float) -> list[str]:
             "closes around itself, or cut it into pieces"
         )
     return notes
-
-
-def _given(request: Request, notes: list[str]) -> Array | None:
-    """The user's start, unless it has flips."""
-    if request.start is None:
-        return None
-    flat = np.ascontiguousarray(request.start[:, :2])
-    flips = flat_start.flips(request.mesh, flat)
-    if flips:
-        notes.append(f"x0 turns {flips} corner triangles over and was not used")
-        return None
-    return flat
 
 
 def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
@@ -255,11 +277,6 @@ def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[s
     ``loss_iso_cell`` is left out on a mesh without quads.
     """
     strain = measure.principal_strains(mesh, flat)
-    grid = mesh.grid_index
-    if grid is None:
-        flipped = measure.flipped_cells(flat, mesh.faces, surface=mesh)
-    else:
-        flipped = measure.flipped_cells(flat[grid], surface=mesh.grid)
     out = {
         "loss_iso_cell": measure.loss_iso_cell(mesh, flat),
         "edge_length_error": measure.edge_length_error(mesh, flat),
@@ -267,6 +284,6 @@ def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[s
         "strain_p99": strain.p99,
         "strain_max": float(strain.values.max()),
         "area_error": measure.area_error(mesh, flat),
-        "flipped_cells": float(flipped),
+        "flipped_cells": float(measure.flips(mesh, flat)),
     }
     return {name: value for name, value in out.items() if not np.isnan(value)}

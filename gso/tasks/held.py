@@ -2,21 +2,97 @@
 
 from __future__ import annotations
 
-from gso.tasks.base import Request
-from gso.terms import Weighted, position
-from gso.variables import Variables
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.constraints import Lengths, OnLines, OnPlane, Pins, Planar, Relations
+from gso.tasks.base import Request, Stage
+from gso.terms import Weighted, curve, equation, fairness, length, planarity, position, proximity
+from gso.terms.multipliers import STIFF, hardened
+from gso.variables import Layout, Variables, free
+
+Array = NDArray[np.float64]
+
+#: How far round a vertex that is moved others go along, in the unit ball.
+_REACH = 0.3
 
 
 def hold(request: Request, variables: Variables) -> Variables:
     """Unknowns that can only make what the hard linear constraints allow."""
+    reduction = request.constraints.reduction
+    if reduction is None:
+        return variables
+    layout = variables.layout
+    start, _, _ = layout.where(request.constraints.block)
+    return variables.following(*reduction.maps(start, layout.size))
+
+
+def approach(request: Request, points: Array, *, iterations: int = 10) -> Stage:
+    """The smallest and smoothest change of a surface (n, 3) that satisfies the constraints.
+
+    It minimises ``|u|^2 + reach^4 |second derivative of u|^2`` of the displacement u, in the
+    mean, so that a vertex takes its neighbourhood along.
+    """
+    layout = Layout.of(len(points), "surface")
+    mesh = request.mesh
+    normals = np.zeros_like(points)
+    items = [
+        Weighted(proximity.build(mesh.replaced(points), normals), 1.0),
+        Weighted(fairness.build(mesh, reference=points), _REACH**4),
+        *pulls(request),
+    ]
+    variables = partial(_free, request, layout)
+    return Stage("approach", layout, items, variables, iterations=iterations)
+
+
+def drawn(request: Request, weight: float) -> list[Weighted]:
+    """All constraints as terms of one weight, for a start that only comes closer to them."""
     c = request.constraints
-    columns = variables.layout.columns("surface", c.hard_ids).ravel()
-    return variables.fixing(columns, c.hard_positions.ravel())
+    block = c.block
+    out = []
+    for p in c.parts:
+        if isinstance(p, Pins):
+            term = position.build(p.ids, p.positions, np.ones(len(p.ids)), block=block)
+        elif isinstance(p, OnPlane | Relations):
+            term = equation.build(p, block=block)
+        elif isinstance(p, Lengths):
+            term = length.build(p.pairs, p.lengths, block=block)
+        elif isinstance(p, OnLines):
+            term = curve.build(replace(p, weight=1.0), block=block)
+        else:
+            continue
+        out.append(Weighted(term, weight))
+    return out
+
+
+def _free(request: Request, layout: Layout, coordinates: Array) -> Variables:
+    return hold(request, free(layout))
 
 
 def pulls(request: Request) -> list[Weighted]:
-    """Terms of the other constraints, for an objective on the design's own vertices."""
+    """Terms of the other constraints, for an objective on the design's own vertices.
+
+    The block that is constrained must be the first of the stage's layout. Terms of hard
+    constraints have `multipliers`: the last stage is repeated until they hold.
+    """
     c = request.constraints
-    if not len(c.soft_ids):
-        return []
-    return [Weighted(position.build(c.soft_ids, c.soft_positions, c.soft_weights), 1.0)]
+    block, dim = c.block, 2 if c.flat else 3
+    out = []
+    for hard in (False, True):
+        factor = STIFF if hard else 1.0
+        terms = []
+        for p in c.of(Planar, hard=hard):
+            terms.append(planarity.build(p.quads, weight=p.weight or 1.0))
+        for e in c.of(Lengths, hard=hard):
+            terms.append(length.build(e.pairs, e.lengths, block=block, weight=e.weight or 1.0))
+        if hard:
+            terms = [hardened(t, dim) for t in terms]
+        terms += [curve.build(p, block=block) for p in c.of(OnLines, hard=hard)]
+        out += [Weighted(t, factor) for t in terms]
+    for pin in c.of(Pins, hard=False):
+        weights = np.full(len(pin.ids), pin.weight)
+        out.append(Weighted(position.build(pin.ids, pin.positions, weights, block=block), 1.0))
+    return out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,16 @@ Limit = Callable[[Array, Array], float]
 
 def _no_constants() -> Array:
     return np.empty((0, 0))
+
+
+class Multipliers(Protocol):
+    """What makes a term hold exactly when solves are repeated."""
+
+    def push(self, coordinates: Array) -> float:
+        """Take up what is left of the residuals; returns the largest (a length)."""
+
+    def scale(self, factor: float) -> None:
+        """Follow a change of the weight of all other terms."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +63,9 @@ class Term:
     refresh : callable, optional
         ``refresh(coordinates) -> constants``: new constants before every linearisation, from
         the coordinate vector; for closest points, and for targets that are moved by hand.
+    multipliers : Multipliers, optional
+        For what must hold exactly: after a solve they move the targets that `refresh` gives
+        by what is left, so that the next solve leaves less.
     """
 
     name: str
@@ -63,6 +76,7 @@ class Term:
     linear: bool = False
     vectors: Residual | None = None
     refresh: Callable[[Array], Array] | None = None
+    multipliers: Multipliers | None = None
 
     @property
     def count(self) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gso import geometry, topology
 from gso.mesh import Mesh
-from gso.terms.base import Array, Ints, Term
+from gso.terms.base import Array, Ints, Term, mean_weights
 from gso.terms.isometry import typical_length
 
 #: Turning or moving a mesh changes no length.
@@ -82,6 +82,28 @@ def build(
     return terms
 
 
+def edge_residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """Difference of the squared length of an edge and the wanted one, times a constant.
+
+    Constants: one over the typical squared length of an edge; the wanted squared length.
+    """
+    a, b = points
+    return ((geometry.norm2(geometry.sub(b, a)) - constants[1]) * constants[0],)
+
+
+def edges(mesh: Mesh, block: str) -> Term:
+    """Change of the edges' squared lengths, averaged over the edges of the faces.
+
+    On quads they say what the diagonals leave open: the two lattices of a checkerboard may
+    slide against each other and change no diagonal.
+    """
+    a, b = mesh.vertices[mesh.edges.T]
+    squared = ((b - a) ** 2).sum(axis=1)
+    constants = np.stack([np.full(len(squared), 1.0 / squared.mean()), squared])
+    weights = mean_weights(len(squared))
+    return Term("edges", edge_residual, ((block, mesh.edges),), weights, constants)
+
+
 def _products(vertices: Array, faces: Ints) -> Array:
     corners = [tuple(vertices[faces[:, k]].T) for k in range(faces.shape[1])]
     return np.stack(geometry.face_products(*corners))
@@ -93,4 +115,6 @@ def examples(mesh: Mesh) -> list[Term]:
         *build(mesh, "surface"),
         *build(mesh, "flat"),
         *build(mesh, "surface", counterpart="flat"),
+        *build(mesh, "flat", scale="scale"),
+        edges(mesh, "surface"),
     ]

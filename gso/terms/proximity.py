@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from gso.geometry import dot, sub
 from gso.mesh import Mesh
+from gso.nearest import Nearest
 from gso.terms.base import Array, Term
 
 #: The reference does not move with the surface.
@@ -49,6 +51,30 @@ def build(mesh: Mesh, normals: Array, *, tangential: float = 1.0) -> Term:
         constants=constants,
         linear=True,
     )
+
+
+def closest(mesh: Mesh, normals: Array, *, tangential: float = 0.0) -> Term:
+    """Proximity of the block "surface" to the surface `mesh`, wherever its vertices slide.
+
+    Before every linearisation each vertex gets the point of the surface that is closest to
+    it then, and the tangent plane there (Jiang et al. 2020; as iterated closest points do).
+
+    Parameters
+    ----------
+    mesh, normals
+        As for :func:`build`.
+    tangential : float
+        Weight of the distance to the point itself, beside that to the tangent plane.
+    """
+    count = len(mesh.vertices)
+    near = Nearest(mesh, normals)
+    own = build(mesh, normals, tangential=tangential)
+
+    def refresh(coordinates: Array) -> Array:
+        feet = near.feet(coordinates[: 3 * count].reshape(-1, 3))
+        return np.concatenate([feet.points.T, feet.normals.T, own.constants[6:]])
+
+    return replace(own, name="closest", refresh=refresh)
 
 
 def examples(mesh: Mesh) -> list[Term]:

@@ -2,5 +2,6 @@
 
 from gso.tno.batch import optimize_many
 from gso.tno.optimize import check, optimize
+from gso.tno.session import Session
 
-__all__ = ["check", "optimize", "optimize_many"]
+__all__ = ["Session", "check", "optimize", "optimize_many"]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.constraints import Compiled, Constraint, compile_constraints
 from gso.mesh import Frame, Mesh
 from gso.status import MeshError
 
@@ -17,6 +20,7 @@ class Canonical:
     """A mesh in the unit ball, grids numbered row by row, and the way back."""
 
     def __init__(self, design: Mesh):
+        self.design = design
         self.frame: Frame = design.frame
         if not self.frame.scale > 0:
             raise MeshError("all vertices are at one point")
@@ -51,6 +55,23 @@ class Canonical:
         points = points if ordered else points[self.order]
         return points[:, :2] / self.frame.scale if flat else self.frame.to_unit(points)
 
-    def back(self, values: Array) -> Array:
-        """Rows in this numbering, put in the user's."""
-        return values[self.new_index]
+    def constraints(self, given: Sequence[Constraint], *, flat: bool) -> Compiled:
+        """Constraints checked against the design, in this numbering and frame."""
+        frame = Frame(np.zeros(2), self.frame.scale) if flat else self.frame
+        return compile_constraints(given, self.design, flat=flat).mapped(frame, self.new_index)
+
+    def back(self, block: str, values: Array) -> Array:
+        """Rows of a block in this numbering, put in the user's."""
+        return values[self._new_face if block == "scale" else self.new_index]
+
+    @cached_property
+    def _new_face(self) -> NDArray[np.int64]:
+        """Index in this numbering of every face."""
+        here, there = self.mesh.faces, self.design.faces
+        if self.design.grid_index is None:
+            return np.arange(len(there))
+        corners = (np.sort(x, axis=1) for x in (self.new_index[there], here))
+        users, own = (np.lexsort(x.T[::-1]) for x in corners)
+        new = np.empty(len(there), np.int64)
+        new[users] = own
+        return new

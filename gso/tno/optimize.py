@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import tasks
-from gso.constraints import Constraint, compile_constraints
+from gso.constraints import TIGHT, Constraint
+from gso.fit import describe_spline
 from gso.mesh import Mesh
 from gso.result import Result
 from gso.status import ConvergenceWarning, OptionError, Status
@@ -44,14 +45,16 @@ def optimize(
     ----------
     mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, or path
         The design, in any unit of length.
-    task : {"developable", "flatten", "denoise"}
+    task : {"developable", "flatten", "denoise", "bend", "conformal"}
         What to do.
     formulation : str, optional
         Which energy; the task's first when not given.
     options : str or Options, optional
         "fast", "balanced" (default), "accurate", or the task's options dataclass.
-    constraints : sequence of Fixed, FixedBoundary, Handle
-        What the result must keep.
+    constraints : sequence of Constraint
+        What the result must keep: `Fixed`, `FixedBoundary`, `Handle`, `OnCurve`,
+        `SlidingBoundary`, `Glue`, `SymmetryPlane`, `PlanarFaces`, `FixedLengths`. For
+        `flatten` and `conformal` they are about the flat image.
     max_deviation : float, optional
         `developable` only: no vertex of the result is farther than this from the design,
         in the mesh's unit; as developable as that allows.
@@ -59,7 +62,7 @@ def optimize(
         `developable` only: the mean absolute curvature ``loss_gc`` to reach, with the
         smallest displacement that does.
     x0 : Mesh or array, optional
-        Where to start: vertices (n, 3) or a grid; (n, 2) or (H, W, 2) for `flatten`.
+        Where to start: vertices (n, 3) or a grid; (n, 2) or (H, W, 2) for a flat image.
         Proximity and lengths stay those of `mesh`.
     callback : callable, optional
         Called with a :class:`gso.Progress` after each iteration; returning False stops
@@ -97,12 +100,13 @@ def optimize(
         task, formulation, options, max_deviation, target_curvature
     )
     frame = Canonical(design)
+    flat = getattr(module, "BLOCK", "surface") == "flat"
     request = Request(
         frame.mesh,
         settings,
         formulation,
-        compile_constraints(constraints, design).mapped(frame.frame.to_unit, frame.new_index),
-        start=frame.start(x0, flat=task == "flatten"),
+        frame.constraints(constraints, flat=flat),
+        start=frame.start(x0, flat=flat),
     )
     run = Run(module, callback)
     if max_deviation is not None:
@@ -111,7 +115,8 @@ def optimize(
         outcome = reach_target(run, request, target_curvature)
     else:
         outcome = run(request)
-    result = _result(task, formulation, design, frame, outcome, run)
+    judge(request, frame, outcome)
+    result = packed(task, formulation, design, frame, outcome, run)
     result.warm_start = "cold" if x0 is None else "x0"
     result.seconds["total"] = time.perf_counter() - clock
     if not result.converged and result.status is not Status.MAX_ITERATIONS:
@@ -141,13 +146,8 @@ def check(
         The backend that is asked for is not installed.
     """
     module = tasks.get(task)
-    formulation = formulation or module.FORMULATIONS[0]
-    if formulation not in module.FORMULATIONS:
-        raise OptionError(
-            f"task {task!r} has no formulation {formulation!r}; "
-            f"there are {', '.join(module.FORMULATIONS)}"
-        )
-    settings = module.Options.coerce(options)
+    formulation, kind = tasks.choose(module, formulation, options)
+    settings = kind.coerce(options)
     if settings.backend is not None:
         linear.find(settings.backend)
     for name, value in (("max_deviation", max_deviation), ("target_curvature", target_curvature)):
@@ -155,6 +155,8 @@ def check(
             continue
         if task != "developable":
             raise OptionError(f"{name} belongs to task 'developable', not {task!r}")
+        if formulation != "curvature":
+            raise OptionError(f"{name} belongs to the formulation 'curvature', not {formulation!r}")
         if not (isinstance(value, int | float | np.number) and 0 < value < np.inf):
             raise OptionError(f"{name} is {value!r}; it must be a positive number")
     if max_deviation is not None and target_curvature is not None:
@@ -162,7 +164,24 @@ def check(
     return module, formulation, settings
 
 
-def _result(
+def judge(request: Request, frame: Canonical, outcome: Outcome) -> None:
+    """Say how well the constraints are kept, in the user's unit, and which are not."""
+    compiled = request.constraints
+    if not compiled.names:
+        return
+    unit = frame.frame.scale
+    misses = compiled.misses(outcome.blocks[compiled.block])
+    lengths = {name: unit * miss.length for name, miss in misses.items()}
+    outcome.details = {**outcome.details, "constraints": lengths}
+    broken = [k for k, miss in misses.items() if miss.hard and not miss.length <= TIGHT]
+    for name in broken:
+        where = ", ".join(map(str, frame.order[misses[name].vertices]))
+        outcome.notes += (f"{name} is missed by {lengths[name]:.3g} (vertices {where})",)
+    if broken and outcome.status is not Status.CANCELLED:
+        outcome.status = Status.CONSTRAINTS_MISSED
+
+
+def packed(
     task: str,
     formulation: str,
     design: Mesh,
@@ -170,7 +189,8 @@ def _result(
     outcome: Outcome,
     run: Run,
 ) -> Result:
-    blocks = {name: frame.back(values) for name, values in outcome.blocks.items()}
+    """An outcome in the user's frame and numbering."""
+    blocks = {name: frame.back(name, values) for name, values in outcome.blocks.items()}
     flat = blocks["flat"] * frame.frame.scale if "flat" in blocks else None
     if outcome.status is Status.ALREADY_GOOD:
         mesh = design
@@ -179,12 +199,19 @@ def _result(
     else:
         mesh = design.replaced(np.c_[flat, np.zeros(len(design.vertices))])
     seconds = run.timings.as_dict()
+    spline, details = None, outcome.details
+    if outcome.spline is not None:
+        before = outcome.fitted.get("surface")
+        fitted = None if before is None else frame.frame.to_user(frame.back("surface", before))
+        spline, said = describe_spline(mesh, outcome.spline, design, fitted)
+        details = {**details, "spline": said}
     return Result(
         task=task,
         formulation=formulation,
         design=design,
         mesh=mesh,
         flat=flat,
+        cell_scale=blocks["scale"][:, 0] if "scale" in blocks else None,
         status=outcome.status,
         iterations=run.iterations,
         energy=outcome.energy,
@@ -192,5 +219,6 @@ def _result(
         seconds=seconds,
         backend=outcome.backend,
         notes=design.notes + outcome.notes,
-        details=outcome.details,
+        details=details,
+        spline=spline,
     )

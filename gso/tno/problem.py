@@ -87,6 +87,9 @@ def _pull_back(gather: Ints, variables: Variables):
     """
     if variables.basis is None:
         return None, gather
+    chosen = _chosen(variables)
+    if chosen is not None:
+        return None, chosen[gather]
     from scipy.sparse import csr_matrix
 
     k, count = gather.shape
@@ -106,12 +109,38 @@ def _pull_back(gather: Ints, variables: Variables):
     return pull, columns
 
 
+def _repeated(columns: Ints) -> Ints:
+    """Pairs a < b of an element that are one unknown, in the order of :func:`_products`.
+
+    They stand for two entries of the matrix, both on its diagonal.
+    """
+    a, b = np.triu_indices(columns.shape[0])
+    apart = np.flatnonzero(a != b)
+    same = columns[a[apart]] == columns[b[apart]]
+    which, element = np.nonzero(same)
+    return apart[which] * columns.shape[1] + element
+
+
+def _chosen(variables: Variables) -> Ints | None:
+    """The unknown that every coordinate is, where each is one itself or fixed."""
+    basis = variables.basis
+    if basis is None:
+        return np.arange(variables.size)
+    count = np.diff(basis.indptr)
+    if count.max(initial=0) > 1 or not (basis.data == 1.0).all():
+        return None
+    chosen = np.full(len(count), variables.size)
+    chosen[count > 0] = basis.indices
+    return chosen
+
+
 @dataclass
 class _Assembly:
-    """Where the entries of the elements' matrices go."""
+    """Where the entries of the elements' matrices go, and which count twice."""
 
     pattern: Pattern
     scatter: list[Ints]
+    repeated: list[Ints]
     quadratic: Ints
     diagonal: Ints
 
@@ -132,10 +161,16 @@ class Problem:
         The unknowns.
     limits : sequence of callables
         Bounds on a step, see :data:`Limit`.
+    like : Problem, optional
+        One that may have the same sparsity, which is then taken over.
     """
 
     def __init__(
-        self, items: Sequence[Weighted], variables: Variables, limits: Sequence[Limit] = ()
+        self,
+        items: Sequence[Weighted],
+        variables: Variables,
+        limits: Sequence[Limit] = (),
+        like: Problem | None = None,
     ):
         self.variables = variables
         self.limits = tuple(limits)
@@ -144,6 +179,17 @@ class Problem:
         self._quadratic = _Quadratic(
             [_Elements(i, variables) for i in used if i.quadratic], variables
         )
+        if like is not None and self._sparsity_of(like):
+            self._assembly = like._assembly
+
+    def _sparsity_of(self, other: Problem) -> bool:
+        """Whether the Gauss-Newton matrices have the same sparsity."""
+        if self.variables.size != other.variables.size:
+            return False
+        here, there = ([e.columns for e in p._elements] for p in (self, other))
+        here += [self._quadratic.matrix.indptr, self._quadratic.matrix.indices]
+        there += [other._quadratic.matrix.indptr, other._quadratic.matrix.indices]
+        return len(here) == len(there) and all(map(np.array_equal, here, there))
 
     @cached_property
     def _assembly(self) -> _Assembly:
@@ -205,7 +251,8 @@ class Problem:
         n = self.variables.size
         total, gradient = self._quadratic.energy_and_gradient(x)
         values = self._constant.copy()
-        for element, scatter in zip(self._elements, self._assembly.scatter, strict=True):
+        places = self._assembly.scatter, self._assembly.repeated
+        for element, scatter, repeated in zip(self._elements, *places, strict=True):
             residual, slope = element.linearise(coordinates)
             first, second = element.item.loss.weights(residual)
             factor = element.item.weight * element.weights
@@ -216,6 +263,7 @@ class Problem:
             turn = element.turning(coordinates)
             if turn is not None:
                 products += _products(turn, np.maximum(first[: len(turn)], 0.0) * factor)
+            products.ravel()[repeated] *= 2.0
             values += np.bincount(scatter, products.ravel(), len(values) + 1)[:-1]
         return total if np.isfinite(total) else np.inf, gradient, values
 
@@ -338,7 +386,8 @@ def _analyse(n: int, columns: list[Ints], quadratic: Any) -> _Assembly:
     keep = column < n
     indptr = np.searchsorted(column[keep], np.arange(n + 1))
     *scatter, fixed, diagonal = np.split(place, splits)
-    return _Assembly(Pattern(n, indptr, row[keep]), scatter, fixed, diagonal)
+    pattern = Pattern(n, indptr, row[keep])
+    return _Assembly(pattern, scatter, [_repeated(c) for c in columns], fixed, diagonal)
 
 
 #: Largest table of columns times diagonals that is worked out without sorting.

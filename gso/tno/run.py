@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -11,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.status import Progress, Status
-from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.base import Options, Plan, Request, Stage
 from gso.tno.problem import Problem
 from gso.tno.solver import Callback, Solution, Timings, minimise
+from gso.tno.tighten import tighten
 from gso.variables import free
 
 Array = NDArray[np.float64]
@@ -21,7 +23,11 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Outcome:
-    """Coordinates that a run ended with, and how."""
+    """Coordinates that a run ended with, and how.
+
+    Where the surface is a B-spline: with how many control points, and the coordinates that
+    it was fitted to before its own stage.
+    """
 
     blocks: dict[str, Array]
     status: Status
@@ -29,6 +35,8 @@ class Outcome:
     backend: str = ""
     notes: tuple[str, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
+    spline: tuple[int, int] | None = None
+    fitted: dict[str, Array] = field(default_factory=dict)
 
     @property
     def points(self) -> Array:
@@ -52,46 +60,51 @@ class Run:
         plan: Plan = self.module.plan(request)
         self.timings.setup += time.perf_counter() - clock
         coordinates, solution, stage = plan.start, None, None
+        given, number = coordinates, 0
         for number, stage in enumerate(plan.stages):
             clock = time.perf_counter()
-            coordinates = stage.enter(coordinates)
-            variables = stage.variables(coordinates)
-            problem = Problem(stage.items, variables, stage.limits)
-            x = variables.project(coordinates)
-            bounds = None if stage.bounds is None else stage.bounds(coordinates)
+            given, coordinates = coordinates, stage.enter(coordinates)
             self.timings.setup += time.perf_counter() - clock
-            solution = self._solve(request, plan, number, problem, x, bounds)
-            coordinates = variables.points(solution.x)
+            place = number, len(plan.stages)
+            coordinates, solution = self.solve(request.options, place, stage, coordinates)
             if solution.status is Status.CANCELLED:
                 coordinates = self._finish(plan, number, coordinates)
                 break
             if stage.enough is not None and stage.enough(coordinates):
                 break
+        if solution is not None and stage is not None:
+            solve = partial(self.solve, request.options, place)
+            coordinates, solution = tighten(stage, coordinates, solution, solve)
         outcome = Outcome(
             plan.layout.split(coordinates),
             plan.status or Status.CONVERGED,
             {"objective": 0.0},
             notes=tuple(plan.notes),
             details=plan.details,
+            spline=plan.spline,
         )
+        if plan.spline is not None and number == len(plan.stages) - 1:
+            outcome.fitted = plan.layout.split(given)
         if solution is not None and stage is not None:
             if solution.status is Status.CANCELLED:
                 stage = plan.stages[-1]
-            coordinates, outcome.energy = self._guard(plan, stage, coordinates)
+            coordinates, outcome.energy = self.guard(plan, stage, coordinates)
             outcome.blocks = plan.layout.split(plan.finish(coordinates))
-            outcome.status, outcome.backend = solution.status, solution.backend
+            outcome.backend = solution.backend
+            if plan.status is None or solution.status is Status.CANCELLED:
+                outcome.status = solution.status
         return outcome
 
-    def _solve(
-        self,
-        request: Request,
-        plan: Plan,
-        number: int,
-        problem: Problem,
-        x: Array,
-        bounds: tuple[Array, Array] | None,
-    ) -> Solution:
-        stage, options = plan.stages[number], request.options
+    def solve(
+        self, options: Options, place: tuple[int, int], stage: Stage, coordinates: Array
+    ) -> tuple[Array, Solution]:
+        """Solve one stage from coordinates."""
+        clock = time.perf_counter()
+        variables = stage.variables(coordinates)
+        problem = Problem(stage.items, variables, stage.limits)
+        x = variables.project(coordinates)
+        bounds = None if stage.bounds is None else stage.bounds(coordinates)
+        self.timings.setup += time.perf_counter() - clock
         solution = minimise(
             problem,
             x,
@@ -104,13 +117,13 @@ class Run:
             backend=options.backend,
             threads=options.threads,
             callback=self.callback,
-            stage=(number, len(plan.stages)),
+            stage=place,
             name=stage.name,
             timings=self.timings,
         )
         self.iterations += solution.iterations
         self.history += solution.history
-        return solution
+        return variables.points(solution.x), solution
 
     @staticmethod
     def _finish(plan: Plan, number: int, coordinates: Array) -> Array:
@@ -120,7 +133,7 @@ class Run:
         return coordinates
 
     @staticmethod
-    def _guard(plan: Plan, stage: Stage, coordinates: Array) -> tuple[Array, dict[str, float]]:
+    def guard(plan: Plan, stage: Stage, coordinates: Array) -> tuple[Array, dict[str, float]]:
         """The result, unless what it must not be worse than has less of the objective."""
         problem = Problem(stage.items, free(stage.layout))
         energy = problem.by_term(coordinates)

@@ -61,7 +61,8 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
     best: Any = None
     distance = np.inf
     # A preset may meet the target already: nothing farther away is returned.
-    presets = (replace(given, **preset) for preset in given.PRESETS.values())
+    spline = {"variables": "surface"} if given.variables == "surface" else {}
+    presets = (replace(given, **preset | spline) for preset in given.PRESETS.values())
     for options in dict.fromkeys((given, *presets)):
         last = run(replace(request, options=options))
         if last.status is Status.CANCELLED:
@@ -70,7 +71,7 @@ def reach_target(run: Callable[[Request], Any], request: Request, target: float)
             best, distance = last, moved
     options = replace(
         given,
-        variables="free",
+        variables=spline.get("variables", "free"),
         iterations=max(given.iterations, _ITERATIONS),
         coarse_iterations=max(given.coarse_iterations, _COARSE_ITERATIONS),
     )

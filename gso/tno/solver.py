@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,8 @@ def minimise(
     bounds: tuple[Array, Array] | None = None,
     method: str = "gauss-newton",
     backend: str | None = None,
+    solver: Any = None,
+    direction: Any = None,
     threads: int = 1,
     callback: Callback | None = None,
     stage: tuple[int, int] = (0, 1),
@@ -92,6 +95,10 @@ def minimise(
         Direction.
     backend : str, optional
         Linear backend; the fastest installed one when not given.
+    solver : backend solver, optional
+        One that has analysed the problem's pattern already.
+    direction : GaussNewton, optional
+        One that goes on with its damping; `method` then means nothing.
     threads : int
         BLAS threads around factorisations; 0 leaves them alone.
     callback : callable, optional
@@ -105,9 +112,10 @@ def minimise(
     """
     timings = Timings() if timings is None else timings
     clock = time.perf_counter()
-    solver = linear.choose(problem.pattern, backend)
+    if solver is None:
+        solver = linear.choose(problem.pattern, backend)
     timings.setup += time.perf_counter() - clock
-    direction = DIRECTIONS[method]()
+    direction = DIRECTIONS[method]() if direction is None else direction
     schedule = list(eps)
     history: list[Progress] = []
 

@@ -16,7 +16,7 @@ Ints = NDArray[np.int64]
 
 
 #: Components of a row of every block.
-DIMENSIONS = {"surface": 3, "flat": 2}
+DIMENSIONS = {"surface": 3, "flat": 2, "scale": 1}
 
 
 @dataclass(frozen=True)
@@ -62,13 +62,16 @@ class Layout:
         return np.concatenate([np.asarray(blocks[b], float).ravel() for b, _, _ in self.blocks])
 
 
+#: Products of unit columns below it are rounding errors.
+_ROUNDING = 1e-15
+
+
 class Variables:
     """Unknowns x that make coordinates ``offset + basis @ x``.
 
     Every kind of unknowns (free vertices, offsets along normals, spline coefficients,
     joint surface and plane) is such an affine map; the kinds differ in how they are
-    built. Coordinates that a constraint fixes have an empty row and the wanted value as
-    offset, so hard constraints are eliminated here.
+    built. Hard linear constraints are eliminated here: what they leave is such a map again.
 
     Parameters
     ----------
@@ -104,23 +107,30 @@ class Variables:
         rhs = self.basis.T @ (coordinates - self.offset)
         gram = (self.basis.T @ self.basis).tocsc()
         diagonal = gram.diagonal()
+        gram.data[np.abs(gram.data) <= _ROUNDING * diagonal.max(initial=0.0)] = 0.0
+        gram.eliminate_zeros()
         if gram.nnz == np.count_nonzero(diagonal):
             return rhs / np.where(diagonal > 0, diagonal, 1.0)
         ridge = 1e-12 * diagonal.max()
         return splu((gram + ridge * identity(gram.shape[0], format="csc")).tocsc()).solve(rhs)
 
-    def fixing(self, columns: Ints, values: Array) -> Variables:
-        """The same unknowns with some coordinates held at values."""
-        if len(columns) == 0:
-            return self
-        from scipy.sparse import diags, identity
+    def following(self, projection: csr_matrix, basis: csr_matrix, offset: Array) -> Variables:
+        """The same unknowns, with coordinates that linear equations allow.
 
-        basis = identity(self.size, format="csr") if self.basis is None else self.basis
-        free = np.ones(self.layout.size)
-        free[columns] = 0.0
-        offset = np.where(free > 0, self.offset, 0.0)
-        offset[columns] = values
-        held = (diags(free) @ basis).tocsc()
-        held.eliminate_zeros()
-        used = np.diff(held.indptr) > 0
-        return Variables(self.layout, held[:, used].tocsr(), offset)
+        Coordinates are projected: ``offset + projection @ c``. Where the unknowns are the
+        coordinates themselves they become those of the equations' own basis, so that each
+        of them counts.
+
+        Parameters
+        ----------
+        projection, basis : csr_matrix, (layout.size, layout.size)
+            Two matrices with the same range; see :meth:`gso.constraints.Reduction.maps`.
+        offset : ndarray (layout.size,)
+            Coordinates that satisfy the equations.
+        """
+        free = basis if self.basis is None else projection @ self.basis
+        shift = offset if self.basis is None else offset + projection @ self.offset
+        free = free.tocsc()
+        free.eliminate_zeros()
+        used = np.diff(free.indptr) > 0
+        return Variables(self.layout, free[:, used].tocsr(), shift)

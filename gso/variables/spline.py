@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gso.spline import clamped_knots
 from gso.variables.base import Array, Layout, Variables
 from gso.variables.normal import normal_offsets
 
@@ -22,9 +23,8 @@ def spline_matrix(samples: int, controls: int) -> csr_matrix:
     """
     from scipy.interpolate import BSpline
 
-    degree = min(3, controls - 1)
-    inner = np.linspace(0.0, 1.0, controls - degree + 1)
-    knots = np.r_[np.zeros(degree), inner, np.ones(degree)]
+    knots = clamped_knots(controls)
+    degree = len(knots) - controls - 1
     return BSpline.design_matrix(np.linspace(0.0, 1.0, samples), knots, degree).tocsr()
 
 
@@ -55,11 +55,32 @@ def spline_offsets(
 
 
 def spline_surface(layout: Layout, shape: tuple[int, int], controls: tuple[int, int]) -> Variables:
-    """The surface is a bicubic B-spline: three unknowns per control point.
+    """The block "surface" is a bicubic B-spline; all other blocks are free.
 
+    Three unknowns per control point, numbered row by row, in the place of the block: with
+    ("surface", "flat") first the control net, then the plane coordinates, which makes a
+    spline that is isometric to a plane (the second algorithm of Jiang et al. 2020).
     `project` fits a given surface; the misfit is the caller's to report.
-    """
-    from scipy.sparse import identity, kron
 
-    basis = kron(tensor_matrix(shape, controls), identity(3), format="csr")
-    return Variables(layout, basis, np.zeros(layout.size))
+    Parameters
+    ----------
+    layout : Layout
+        The block "surface" has the points of the grid, row by row.
+    shape, controls : (int, int)
+        Points of the grid, and control points, along both sides.
+
+    Examples
+    --------
+    >>> variables = spline_surface(Layout.of(63, "surface", "flat"), (7, 9), (4, 5))
+    >>> variables.size == 3 * 4 * 5 + 2 * 7 * 9
+    True
+    """
+    from scipy.sparse import block_diag, identity, kron
+
+    bases = [
+        kron(tensor_matrix(shape, controls), identity(3), format="csr")
+        if name == "surface"
+        else identity(count * dim, format="csr")
+        for name, count, dim in layout.blocks
+    ]
+    return Variables(layout, block_diag(bases, format="csr"), np.zeros(layout.size))

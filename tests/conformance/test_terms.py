@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from gso.terms import Term, registry
 from gso.tno import codegen
+from gso.variables.base import DIMENSIONS
 from tests.conftest import meshes
 
 MESHES = meshes()
@@ -28,7 +29,9 @@ def coordinates(term: Term, seed: int = 0, collapse: bool = False) -> tuple[np.n
         points = np.zeros_like(points)
     rows, shape = [], []
     for block, index in term.stencil:
-        block_points = points[:, :2] if block == "flat" else points
+        block_points = points[:, : DIMENSIONS[block]]
+        if block == "scale":
+            block_points = 1.0 + 0.03 * rng.standard_normal((int(index.max()) + 1, 1))
         for k in range(index.shape[1]):
             rows.append(block_points[index[:, k]].T)
             shape.append(block_points.shape[1])
@@ -36,7 +39,8 @@ def coordinates(term: Term, seed: int = 0, collapse: bool = False) -> tuple[np.n
 
 
 def _fits(term: Term, mesh) -> bool:
-    return max(int(i.max()) for _, i in term.stencil) < len(mesh.vertices)
+    ids = [int(i.max()) for block, i in term.stencil if block != "scale"]
+    return max(ids, default=0) < len(mesh.vertices)
 
 
 def constants(term: Term) -> np.ndarray:
@@ -99,13 +103,16 @@ def test_declared_invariances_hold(module, term):
     here = run(x, c)[0]
     size = 1.0 + np.abs(here)
     if "translation" in module.INVARIANT:
-        shift = np.concatenate([np.array([0.3, -0.7, 0.5])[:dim] for dim in shape])
+        # A point of one component is a number, not a place.
+        shift = np.concatenate([np.array([0.3, -0.7, 0.5])[:dim] * (dim > 1) for dim in shape])
         np.testing.assert_array_less(np.abs(run(x + shift[:, None], c)[0] - here), 1e-10 * size)
     if "rotation" in module.INVARIANT:
         turn = Rotation.from_rotvec([0.0, 0.0, 0.8]).as_matrix()
         if 2 not in shape:
             turn = Rotation.from_rotvec([0.4, -0.9, 0.3]).as_matrix()
-        moved = np.concatenate([turn[:d, :d] @ np.stack(p) for p, d in _points(x, shape)])
+        moved = np.concatenate(
+            [turn[:d, :d] @ np.stack(p) if d > 1 else np.stack(p) for p, d in _points(x, shape)]
+        )
         norms = [np.linalg.norm(v, axis=0) for v in (here, run(moved, c)[0])]
         np.testing.assert_allclose(norms[0], norms[1], atol=1e-10 * size.max())
 

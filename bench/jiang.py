@@ -1,0 +1,248 @@
+"""Figures of the isometric tasks of Jiang et al. 2020: bending, conformal maps, sessions.
+
+    python bench/jiang.py                  everything (about two minutes on two cores)
+    python bench/jiang.py interactive      one section
+    python bench/jiang.py --json out.json  the figures as JSON, with machine and versions
+
+Times are medians, one process, BLAS on one thread.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+from tno import machine, progress, reference, table, timed
+
+import gso
+from gso import metrics
+from gso.dataset import bezier
+from gso.mesh import Mesh
+
+#: Frames of a drag.
+FRAMES = 40
+
+
+def sheet(size: int) -> np.ndarray:
+    """A flat square of side two."""
+    u = np.linspace(-1.0, 1.0, size)
+    return np.stack([*np.meshgrid(u, u, indexing="ij"), np.zeros((size, size))], axis=-1)
+
+
+def rolled(points: np.ndarray, angle: float) -> np.ndarray:
+    """Points of the sheet (k, 3) on a cylinder; its side at x = -1 stays where it is."""
+    radius = 2.0 / angle
+    s = (points[:, 0] + 1.0) / radius
+    x, z = radius * np.sin(s) - 1.0, radius * (1.0 - np.cos(s))
+    return np.stack([x, points[:, 1], z], axis=1)
+
+
+def interactive() -> dict[str, Any]:
+    """Frames per second while handles are dragged, and how far the surface lags behind."""
+    rows, out = [], {}
+    for name, drag in _drags().items():
+        for steps in (1, 2):
+            figures = _dragged(*drag, steps)
+            rows.append([name, str(steps), *figures.values()])
+            out[f"{name}, {steps}"] = figures
+    columns = ["task", "iterations", "frames / s", "slowest, ms", "lag %", "lag / frame", "backend"]
+    columns += ["analyses"]
+    table(
+        "Dragging (aim: 10 frames / s). Lag: largest distance from the settled surface, percent "
+        "of its diagonal, and relative to what the handle moves in a frame",
+        columns,
+        rows,
+    )
+    return out
+
+
+def _drags() -> dict[str, tuple[gso.tno.Session, Any, Any]]:
+    """Sessions, the vertices in hand, and where these are at a share of the way."""
+    flat = sheet(64)
+    v = flat.reshape(-1, 3)
+    first, last = np.arange(128), np.arange(64 * 62, 64 * 64)
+    held = [gso.Fixed(first), gso.Handle(last, v[last])]
+    bend = gso.tno.Session(flat, constraints=held)
+    found = {"bend 64 x 64, rolled up": (bend, last, lambda s: rolled(v[last], max(3.0 * s, 1e-9)))}
+    curved = bezier.generate(1, seed=77)[0]
+    # How far a corner is drawn towards the opposite one, and up: relative to their distance.
+    # Corners that have to become developable are held softly: their own shape cannot stay.
+    for task, formulation, size, reach, weight in (
+        ("bend", "isometry", 64, 0.15, None),
+        ("developable", "curvature", 64, 0.05, 0.1),
+        ("developable", "isometry", 32, 0.05, 0.1),
+    ):
+        mesh = Mesh.from_grid(curved.sample(size))
+        p, grid = mesh.vertices, mesh.grid_index
+        corners = [grid[a, b].ravel() for a in (_HEAD, _TAIL) for b in (_HEAD, _TAIL)]
+        ids = np.concatenate(corners)
+        session = gso.tno.Session(
+            mesh,
+            task=task,
+            formulation=formulation,
+            constraints=[gso.Handle(ids, p[ids], weight=weight)],
+        )
+        along = p[grid[0, 0]] - p[grid[-1, -1]]
+        way = reach * (along + np.linalg.norm(along) * _normal(mesh))
+        moved = np.isin(ids, corners[3])[:, None]
+        name = f"{task}, {formulation}, {size} x {size}, a corner"
+        found[name] = session, ids, _straight(p[ids], moved * way)
+    return found
+
+
+#: Rows or columns of the grid in a corner.
+_HEAD, _TAIL = slice(0, 3), slice(-3, None)
+
+
+def _straight(start: np.ndarray, way: np.ndarray) -> Callable[[float], np.ndarray]:
+    return lambda share: start + share * way
+
+
+def _normal(mesh: Mesh) -> np.ndarray:
+    mean = metrics.face_normals(mesh).mean(axis=0)
+    return mean / np.linalg.norm(mean)
+
+
+def _dragged(session: gso.tno.Session, ids: Any, place: Any, steps: int) -> dict[str, Any]:
+    """Drag there in a number of frames and measure; the session is back at the start then."""
+    session.move(ids, place(0.0))
+    session.settle()
+    seconds = []
+    for k in progress(range(1, FRAMES + 1), "drag"):
+        start = time.perf_counter()
+        session.move(ids, place(k / FRAMES))
+        vertices = session.step(steps)
+        seconds.append(time.perf_counter() - start)
+    moved = np.linalg.norm(place(1.0) - place(1.0 - 1.0 / FRAMES), axis=1).max()
+    result = session.settle()
+    lag = np.linalg.norm(result.mesh.vertices - vertices, axis=1).max()
+    return {
+        "fps": 1.0 / float(np.median(seconds)),
+        "slowest": 1e3 * max(seconds),
+        "lag": 100.0 * lag / result.design.diagonal,
+        "lag_frames": lag / moved,
+        "backend": result.backend,
+        "analyses": float(session.analyses),
+    }
+
+
+def bend() -> dict[str, Any]:
+    """Sheets rolled up by their ends: lengths, and the distance from the cylinder."""
+    rows, out = [], {}
+    for size in (32, 64):
+        v = sheet(size).reshape(-1, 3)
+        ids = np.r_[: 2 * size, size * (size - 2) : size * size]
+        for preset in ("fast", "balanced", "accurate"):
+            for turn in (0.5, 1.0, 1.6):
+                wanted = rolled(v, turn * np.pi)
+                handles = [gso.Handle(ids, wanted[ids])]
+                result, seconds = timed(
+                    lambda s=size, p=preset, h=handles: gso.tno.optimize(
+                        sheet(s), task="bend", options=p, constraints=h
+                    )
+                )
+                m = result.metrics
+                far = np.linalg.norm(result.mesh.vertices - wanted, axis=1).max()
+                rows.append(
+                    [
+                        f"{size} x {size}, {preset}, {turn * 180:.0f} degrees",
+                        m["edge_length_error"],
+                        m["strain_max"],
+                        m["loss_gc"],
+                        far / 2.0,
+                        float(result.iterations),
+                        seconds,
+                    ]
+                )
+                out[rows[-1][0]] = rows[-1][1:]
+    table(
+        "A sheet rolled up; its handles are on a smooth cylinder, whose chords are shorter",
+        ["sheet", "edges", "strain max", "loss_gc", "from cylinder", "iterations", "s"],
+        rows,
+    )
+    return out
+
+
+def conformal() -> dict[str, Any]:
+    """Angle distortion on the 24 surfaces, beside libigl's least-squares conformal map."""
+    surfaces = [Mesh.from_grid(s) for s in reference()[0]]
+    rows, out = [], {}
+    for name in ("fast", "balanced", "accurate", "libigl LSCM"):
+        figures, seconds = [], []
+        for mesh in progress(surfaces, name):
+            if name == "libigl LSCM":
+                flat, spent = timed(lambda m=mesh: lscm(m))
+            else:
+                result, spent = timed(
+                    lambda m=mesh, o=name: gso.tno.optimize(m, task="conformal", options=o)
+                )
+                flat = result.flat
+            seconds.append(spent)
+            figures.append(_rated(mesh, flat))
+        rows.append([name, *np.mean(figures, axis=0), float(np.median(seconds))])
+        out[name] = rows[-1][1:]
+    table(
+        "Conformal maps of the 24 surfaces: s1/s2 - 1 of the cells, lengths flat / surface",
+        ["map", "mean", "p99", "max", "scale min", "scale max", "flipped", "median s"],
+        rows,
+    )
+    return out
+
+
+def lscm(mesh: Mesh) -> np.ndarray:
+    """Least-squares conformal map (Levy et al. 2002) of a triangulated mesh, (n, 2)."""
+    import igl
+
+    loop = mesh.boundary_loops[0]
+    p = mesh.vertices[loop]
+    far = int(np.linalg.norm(p - p[0], axis=1).argmax())
+    pins = np.array([[0.0, 0.0], [np.linalg.norm(p[far] - p[0]), 0.0]])
+    held = np.array([loop[0], loop[far]])
+    return igl.lscm(mesh.vertices.copy(), mesh.triangles.copy(), held, pins)[0]
+
+
+def _rated(mesh: Mesh, flat: np.ndarray) -> tuple[float, ...]:
+    distortion = metrics.quasi_conformal(mesh, flat) - 1.0
+    scale = np.sqrt(np.prod(metrics.stretches(mesh, flat), axis=0))
+    scale /= np.sqrt((scale**2).mean())
+    return (
+        float(distortion.mean()),
+        float(np.percentile(distortion, 99)),
+        float(distortion.max()),
+        float(scale.min()),
+        float(scale.max()),
+        float(metrics.flips(mesh, flat)),
+    )
+
+
+SECTIONS: dict[str, Callable[[], dict[str, Any]]] = {
+    f.__name__: f for f in (bend, conformal, interactive)
+}
+
+
+def main() -> None:
+    """Run the sections named on the command line, or all of them."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("sections", nargs="*", choices=[*SECTIONS, []], help="default: all")
+    parser.add_argument("--json", type=Path, help="also write the figures here")
+    arguments = parser.parse_args()
+    figures = {name: SECTIONS[name]() for name in arguments.sections or SECTIONS}
+    if arguments.json:
+        arguments.json.write_text(
+            json.dumps({**figures, "machine": machine()}, indent=1, default=float)
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,191 @@
+"""``gso dataset``: build a set of surfaces, look at it, export it."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gso.status import DatasetError
+
+if TYPE_CHECKING:
+    from gso.dataset import Dataset
+
+#: Splits whose features are plotted.
+_PLOTTED = ("train", "validation", "test", "hard")
+
+
+@click.group(short_help="Build and inspect sets of surfaces.")
+def dataset() -> None:
+    """Surfaces to train and to compare on."""
+
+
+@dataset.command(short_help="Build a set of surfaces with labels.")
+@click.option(
+    "-o", "--output", "out", metavar="DIR", required=True, type=click.Path(), help="Folder."
+)
+@click.option(
+    "--n", default=10401, show_default=True, help="Surfaces, without hard and named ones."
+)
+@click.option("--seed", default=0, show_default=True, help="Seed of all random numbers.")
+@click.option("--size", default=64, show_default=True, help="Samples along each side.")
+@click.option(
+    "--label",
+    "labels",
+    multiple=True,
+    type=click.Choice(["developable", "strain", "lengths"]),
+    help="Label to make; all when not given. May be repeated.",
+)
+@click.option(
+    "--extras/--no-extras",
+    default=True,
+    show_default=True,
+    help="Small splits of other shapes: analytic surfaces, teapot, terrain.",
+)
+@click.option(
+    "--reference",
+    multiple=True,
+    type=click.Choice(["jiang2020"]),
+    help="Reference labels to add, also to a set that is there already.",
+)
+@click.option(
+    "--reference-split",
+    "reference_splits",
+    multiple=True,
+    metavar="SPLIT",
+    default=("test",),
+    show_default=True,
+    help="Split that gets them. May be repeated.",
+)
+@click.option("--workers", metavar="N", type=click.IntRange(0), help="Processes; all cores.")
+@click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that does the work instead.")
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+def build(out: str, quiet: bool, **given: Any) -> None:
+    """Build a set of surfaces in the folder DIR.
+
+    A build that was ended, however it was, goes on where it was when the same command is
+    given again; the finished set is the same to the last byte.
+    """
+    from gso import dataset as sets
+    from gso.cli import progress
+    from gso.dataset.labels import LABELS
+
+    recipe = sets.Recipe(
+        given["n"], given["seed"], given["size"], given["labels"] or LABELS, given["extras"]
+    )
+    start = time.perf_counter()
+    with progress.counts() as bars:
+        data = sets.build(
+            out,
+            recipe,
+            reference=given["reference"],
+            reference_splits=given["reference_splits"],
+            workers=given["workers"],
+            scheduler=given["scheduler"],
+            tick=bars.tick,
+        )
+    if quiet:
+        return
+    for what, (count, seconds) in bars.spent.items():
+        click.echo(
+            f"{count} {what} in {seconds:.1f} s, {count / max(seconds, 1e-9):.2f} per second"
+        )
+    megabytes = sum(e["bytes"] for e in data.manifest["files"]) / 1e6
+    click.echo(
+        f"{out}: {sum(map(len, data.values()))} surfaces, {megabytes:.0f} MB, "
+        f"{time.perf_counter() - start:.1f} s{_memory()}"
+    )
+
+
+def _memory() -> str:
+    """Peak memory, where the system tells."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return ""
+    here, workers = (
+        resource.getrusage(who).ru_maxrss / 1024
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
+    each = f", {workers:.0f} MiB in the largest worker" if workers else ""
+    return f"; at most {here:.0f} MiB in this process{each}"
+
+
+@dataset.command(short_help="Say what a set holds.")
+@click.argument("folder", metavar="DIR", type=click.Path())
+@click.option("--split", help="Split whose labels are shown; test when there is one.")
+@click.option("--verify", is_flag=True, help="Compare the checksums of all files.")
+@click.option(
+    "--json",
+    "table",
+    metavar="FILE",
+    type=click.Path(),
+    help="File for the manifest with its statistics, without the list of files.",
+)
+@click.option(
+    "--plot", metavar="PNG", type=click.Path(), help="Picture of the features' histograms."
+)
+def info(folder: str, split: str | None, verify: bool, table: str | None, plot: str | None) -> None:
+    """Say what the set in DIR holds: surfaces per interval, metrics of the labels."""
+    from gso import dataset as sets
+    from gso.cli import report
+    from gso.cli.dataset_text import lines
+    from gso.dataset.summary import summarise
+
+    data = sets.open(folder)
+    summary = data.manifest.get("summary") or summarise(data)
+    click.echo("\n".join(lines(data, summary, split)))
+    if table is not None:
+        kept = {k: v for k, v in data.manifest.items() if k != "files"}
+        report.write_json(table, kept | {"summary": summary})
+    if plot is not None:
+        _plot(data, plot)
+    if verify:
+        bad = data.damaged()
+        if bad:
+            raise DatasetError(
+                f"{len(bad)} files are missing or damaged, {bad[0]} first; build the set again "
+                "with the same options, which makes those anew"
+            )
+        click.echo("all files are as they were written")
+
+
+def _plot(data: Dataset, path: str) -> None:
+    from gso.dataset.summary import INTERVALS
+    from gso.plot.histogram import plot_histograms
+
+    groups = {n: s.features for n, s in data.items() if n in _PLOTTED or not data.manifest}
+    values = {
+        name: {group: abs(features[name]) for group, features in groups.items()}
+        for name in INTERVALS
+    }
+    limits = {name: (0.0, edges[-3]) for name, edges in INTERVALS.items()}
+    plot_histograms(values, limits, path=path)
+
+
+@dataset.command(short_help="Write a set as .npy files.")
+@click.argument("folder", metavar="DIR", type=click.Path())
+@click.option(
+    "-o", "--output", "out", metavar="FOLDER", required=True, type=click.Path(), help="Folder."
+)
+@click.option(
+    "--array",
+    default="surface",
+    show_default=True,
+    help="What to write: surface, developable, strain, noisy_0.005 ...",
+)
+@click.option(
+    "--split",
+    "only",
+    multiple=True,
+    metavar="SPLIT",
+    help="Split; all that have it. May be repeated.",
+)
+def export(folder: str, out: str, array: str, only: tuple[str, ...]) -> None:
+    """Write an array of the set in DIR as .npy files, a folder per split, a file per surface."""
+    from gso import dataset as sets
+
+    count = sets.export(sets.open(folder), Path(out), array=array, only=only)
+    click.echo(f"{count} files in {out}")

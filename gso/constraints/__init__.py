@@ -1,0 +1,37 @@
+"""What a result must keep: one kind of constraint per class, and all of them checked together."""
+
+from gso.constraints.base import Constraint
+from gso.constraints.compiled import TIGHT, Compiled, compile_constraints
+from gso.constraints.curve import OnCurve, SlidingBoundary
+from gso.constraints.glue import Glue
+from gso.constraints.linear import Reduction
+from gso.constraints.parts import Lengths, OnLines, OnPlane, Part, Pins, Planar, Relations
+from gso.constraints.positions import Fixed, FixedBoundary, Handle
+from gso.constraints.read import read_constraints
+from gso.constraints.shape import FixedLengths, PlanarFaces
+from gso.constraints.symmetry import SymmetryPlane
+
+__all__ = [
+    "TIGHT",
+    "Compiled",
+    "Constraint",
+    "Fixed",
+    "FixedBoundary",
+    "FixedLengths",
+    "Glue",
+    "Handle",
+    "Lengths",
+    "OnCurve",
+    "OnLines",
+    "OnPlane",
+    "Part",
+    "Pins",
+    "Planar",
+    "PlanarFaces",
+    "Reduction",
+    "Relations",
+    "SlidingBoundary",
+    "SymmetryPlane",
+    "compile_constraints",
+    "read_constraints",
+]

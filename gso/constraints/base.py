@@ -1,0 +1,149 @@
+"""What kinds of constraints have in common: the mesh they are checked against."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gso.mesh import Mesh
+from gso.status import OptionError
+
+if TYPE_CHECKING:
+    from gso.constraints.parts import Part
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Constraint:
+    """Something that a result must keep. Kinds of it say what, in :meth:`parts`."""
+
+    def parts(self, subject: Subject) -> list[Part]:
+        """Equations of the constraint on a mesh; raises `OptionError` when they make no sense."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The mesh that a constraint is for, and the checks that all kinds need.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The design, in the user's frame and numbering.
+    flat : bool
+        Positions are those of a flat image, which does not exist yet: two components.
+    number : int
+        Place of the constraint in the user's list.
+    name : str
+        What messages call it.
+    """
+
+    mesh: Mesh
+    flat: bool
+    number: int
+    name: str
+
+    @property
+    def dim(self) -> int:
+        """Components of a position."""
+        return 2 if self.flat else 3
+
+    def refuse(self, why: str) -> OptionError:
+        """An error about this constraint."""
+        return OptionError(f"{self.name} {why}")
+
+    def in_space(self, instead: str) -> None:
+        """Refuse what needs the design's own positions when a flat image is made."""
+        if self.flat:
+            raise self.refuse(
+                f"refers to positions of the design, not of its flat image; {instead}"
+            )
+
+    def ids(self, given: ArrayLike) -> Ints:
+        """Vertex indices (k,), from a list or a mask."""
+        ids = np.atleast_1d(np.asarray(given))
+        count = len(self.mesh.vertices)
+        if ids.dtype == bool:
+            if ids.shape != (count,):
+                raise self.refuse(f"has a mask of shape {ids.shape}; the mesh has {count} vertices")
+            ids = np.flatnonzero(ids)
+        return self._indices(ids, 1, "a list of vertex indices", count, "vertex")
+
+    def pairs(self, given: ArrayLike, what: str) -> Ints:
+        """Pairs of vertex indices (k, 2)."""
+        return self._indices(
+            _array(given), 2, f"{what} as pairs of vertex indices (k, 2)", self.count, "vertex"
+        )
+
+    def faces(self, given: ArrayLike) -> Ints:
+        """Face indices (k,), from a list or a mask."""
+        ids, count = np.atleast_1d(np.asarray(given)), len(self.mesh.faces)
+        if ids.dtype == bool and ids.shape == (count,):
+            ids = np.flatnonzero(ids)
+        return self._indices(ids, 1, "a list of face indices", count, "face")
+
+    @property
+    def count(self) -> int:
+        """Number of vertices."""
+        return len(self.mesh.vertices)
+
+    def _indices(self, ids: Any, ndim: int, what: str, count: int, kind: str) -> Ints:
+        if ids.size == 0:
+            return np.zeros((0, 2)[:ndim], np.int64)
+        if ids.ndim != ndim or (ndim == 2 and ids.shape[1] != 2) or ids.dtype.kind not in "iu":
+            raise self.refuse(f"needs {what}")
+        ids = ids.astype(np.int64)
+        bad = ids[(ids < 0) | (ids >= count)]
+        if bad.size:
+            raise self.refuse(f"names {kind} {bad[0]}; the mesh has {count}")
+        return ids
+
+    def points(self, given: ArrayLike, what: str, count: int | None = None) -> Array:
+        """Finite positions (count, dim)."""
+        points = np.atleast_2d(numbers(given))
+        wanted = len(points) if count is None else count
+        if points.shape != (wanted, self.dim) or not np.isfinite(points).all():
+            number = "k" if count is None else count
+            got = np.shape(_array(given))
+            raise self.refuse(f"needs {what} as finite numbers ({number}, {self.dim}), got {got}")
+        return points
+
+    def vector(self, given: ArrayLike, what: str) -> Array:
+        """A finite vector (dim,)."""
+        vector = numbers(given)
+        if vector.shape != (self.dim,) or not np.isfinite(vector).all():
+            raise self.refuse(f"needs {what} with {self.dim} finite components, got {given!r}")
+        return vector
+
+    def weight(self, given: float | None) -> float | None:
+        """Weight of a soft constraint, None for a hard one."""
+        if given is None:
+            return None
+        return self.positive(given, "weight")
+
+    def positive(self, given: Any, what: str) -> float:
+        """A finite number above zero."""
+        good = isinstance(given, int | float | np.number) and not isinstance(given, bool)
+        if not (good and 0 < given < np.inf):
+            raise self.refuse(f"has {what} {given!r}; it must be a positive number")
+        return float(given)
+
+
+def _array(given: Any) -> Any:
+    """The argument as an array; a single number when it is ragged."""
+    try:
+        return np.asarray(given)
+    except ValueError:
+        return np.zeros(1)
+
+
+def numbers(given: Any) -> Array:
+    """The argument as numbers; NaN when it is none."""
+    try:
+        return np.array(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return np.full((1, 1), np.nan)

@@ -1,0 +1,161 @@
+"""Constraints of a mesh in one place, checked against it and against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.constraints.base import Constraint, Subject
+from gso.constraints.conflicts import check
+from gso.constraints.linear import Reduction, reduce
+from gso.constraints.parts import Lengths, Part, Pins, Planar, Relations
+from gso.mesh import Frame, Mesh
+from gso.status import OptionError
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Kind = TypeVar("Kind", bound=Part)
+
+#: Largest share of the size by which a hard constraint may be missed.
+TIGHT = 1e-6
+
+
+class Miss(NamedTuple):
+    """The equation of a constraint that is missed most: by what length, and its vertices."""
+
+    length: float
+    vertices: Ints
+    hard: bool
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """What a result must keep, in the frame and numbering of one mesh.
+
+    Attributes
+    ----------
+    parts : tuple of Part
+        Equations.
+    names : tuple of str
+        What messages call the constraints, by number.
+    flat : bool
+        The vertices meant are those of the flat image.
+    """
+
+    parts: tuple[Part, ...] = ()
+    names: tuple[str, ...] = ()
+    flat: bool = False
+
+    @property
+    def empty(self) -> bool:
+        """Nothing is constrained."""
+        return not self.parts
+
+    @property
+    def block(self) -> str:
+        """Whose coordinates are meant."""
+        return "flat" if self.flat else "surface"
+
+    def of(self, kind: type[Kind], *, hard: bool) -> list[Kind]:
+        """Parts of one kind."""
+        return [p for p in self.parts if isinstance(p, kind) and p.hard is hard]
+
+    @cached_property
+    def reduction(self) -> Reduction | None:
+        """The hard linear part, solved; None when there is none."""
+        return reduce(self.parts)
+
+    @property
+    def hard_ids(self) -> Ints:
+        """Vertices with a place of their own, each once."""
+        return self._pins(True)[0]
+
+    @property
+    def hard_positions(self) -> Array:
+        """Where they are, (k, dim)."""
+        return self._pins(True)[1]
+
+    @property
+    def soft_ids(self) -> Ints:
+        """Vertices drawn to a place, each once."""
+        return self._pins(False)[0]
+
+    @property
+    def soft_positions(self) -> Array:
+        """Where to, (k, dim)."""
+        return self._pins(False)[1]
+
+    def _pins(self, hard: bool) -> tuple[Ints, Array]:
+        pins = self.of(Pins, hard=hard)
+        if not pins:
+            return np.zeros(0, np.int64), np.zeros((0, 2 if self.flat else 3))
+        ids, at = np.unique(np.concatenate([p.ids for p in pins]), return_index=True)
+        return ids, np.concatenate([p.positions for p in pins])[at]
+
+    @property
+    def anchored(self) -> tuple[Part, ...]:
+        """Parts that say where vertices are: all but glue, planarity and lengths."""
+        loose = Lengths | Planar
+        return tuple(p for p in self.parts if not (isinstance(p, loose) or is_glue(p)))
+
+    def mapped(self, frame: Frame, order: Ints) -> Compiled:
+        """In the unit of a frame, with vertex i numbered ``order[i]``."""
+        return replace(self, parts=tuple(p.mapped(frame, order) for p in self.parts))
+
+    def misses(self, points: Array) -> dict[str, Miss]:
+        """How far vertices (n, dim) are from keeping each constraint, by its name."""
+        out = {name: Miss(0.0, np.zeros(0, np.int64), False) for name in self.names}
+        for p in self.parts:
+            violation = p.violation(points)
+            at, name = int(violation.argmax()), self.names[p.owner]
+            if not violation[at] < out[name].length:
+                out[name] = Miss(float(violation[at]), p.vertices[at], p.hard)
+        return out
+
+
+def is_glue(part: Part) -> bool:
+    """Whether a part says that vertices coincide."""
+    return isinstance(part, Relations) and bool((part.matrix == np.eye(len(part.matrix))).all())
+
+
+def compile_constraints(
+    constraints: Sequence[Constraint], mesh: Mesh, *, flat: bool = False
+) -> Compiled:
+    """Check constraints against a mesh and against each other, and gather them.
+
+    Parameters
+    ----------
+    constraints : sequence of Constraint, or one
+        As the user gave them.
+    mesh : Mesh
+        The design.
+    flat : bool
+        They are about its flat image.
+
+    Raises
+    ------
+    OptionError
+        An index or a shape is wrong, a constraint means nothing for this task, or hard
+        linear ones contradict each other; the message names them and a vertex.
+    """
+    if isinstance(constraints, Constraint):
+        constraints = [constraints]
+    parts: list[Part] = []
+    names = []
+    try:
+        given = list(constraints)
+    except TypeError:
+        raise OptionError(f"constraints is {constraints!r}; it must be a list of them") from None
+    for number, c in enumerate(given):
+        name = f"constraint {number} ({type(c).__name__})"
+        names.append(name)
+        if not isinstance(c, Constraint):
+            raise OptionError(f"{name} is none of those in gso.constraints, such as gso.Fixed")
+        parts += c.parts(Subject(mesh, flat, number, name))
+    check(parts, names, mesh)
+    return Compiled(tuple(p for p in parts if p.count), tuple(names), flat)

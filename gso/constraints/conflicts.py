@@ -1,0 +1,77 @@
+"""Hard linear constraints that contradict each other are found and named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.constraints.linear import reduce
+from gso.constraints.parts import OnPlane, Part, Pins, Relations
+from gso.mesh import Mesh
+from gso.status import OptionError
+
+Ints = NDArray[np.int64]
+
+#: Contradictions smaller than this share of the mesh, or of its coordinates, are rounding.
+_ROUNDING = 1e-9
+_DIGITS = 1e-13
+
+
+def check(parts: Sequence[Part], names: Sequence[str], mesh: Mesh) -> None:
+    """Refuse parts that cannot hold together.
+
+    Raises
+    ------
+    OptionError
+        Names a smallest set of constraints that contradict each other, and a vertex.
+    """
+    reach = float(np.abs(mesh.vertices[mesh.used]).max())
+    tolerance = max(_ROUNDING * mesh.diagonal, _DIGITS * reach)
+    found = _worst(parts, tolerance)
+    if found is None:
+        return
+    parts = _within(parts, found[2])
+    for owner in sorted({p.owner for p in parts}):
+        fewer = [p for p in parts if p.owner != owner]
+        if _worst(fewer, tolerance) is not None:
+            parts = fewer
+    miss, vertex, _ = _worst(parts, tolerance) or found
+    culprits = [names[k] for k in sorted({p.owner for p in parts})]
+    if len(culprits) == 1:
+        raise OptionError(f"{culprits[0]} contradicts itself at vertex {vertex} (by {miss:.3g})")
+    raise OptionError(
+        f"{', '.join(culprits[:-1])} and {culprits[-1]} contradict each other at vertex {vertex} "
+        f"(by {miss:.3g}); remove one, or give it a weight where it takes one"
+    )
+
+
+def _worst(parts: Sequence[Part], tolerance: float) -> tuple[float, int, Ints] | None:
+    """The equation missed most: by how much, its vertex, and all vertices tied to that one."""
+    reduction = reduce(parts)
+    if reduction is None:
+        return None
+    missed = reduction.residuals()
+    at = int(missed.argmax())
+    if missed[at] <= tolerance:
+        return None
+    equations = reduction.equations
+    tied = reduction.ids[reduction.root == equations.root[at]]
+    return float(missed[at]), int(equations.vertex[at]), tied
+
+
+def _within(parts: Sequence[Part], ids: Ints) -> list[Part]:
+    """The linear parts on some vertices."""
+    out: list[Part] = []
+    for p in parts:
+        if isinstance(p, Pins) and p.hard:
+            keep = np.isin(p.ids, ids)
+            out.append(replace(p, ids=p.ids[keep], positions=p.positions[keep]))
+        elif isinstance(p, OnPlane):
+            out.append(replace(p, ids=p.ids[np.isin(p.ids, ids)]))
+        elif isinstance(p, Relations):
+            keep = np.isin(p.first, ids)
+            out.append(replace(p, first=p.first[keep], second=p.second[keep]))
+    return [p for p in out if p.count]

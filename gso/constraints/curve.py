@@ -1,0 +1,105 @@
+"""Vertices that slide along a curve; the boundary along its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gso.constraints.base import Constraint, Subject
+from gso.constraints.parts import OnLines, Part, Pins
+from gso.constraints.polyline import CORNER, Polylines, turns
+
+
+@dataclass(frozen=True, eq=False)
+class OnCurve(Constraint):
+    """Vertices that lie on a polyline, and may slide along it.
+
+    They do not slide beyond the ends of an open polyline, nor round a corner of more than
+    45 degrees.
+
+    Parameters
+    ----------
+    ids : array_like of int, (k,)
+        Vertex indices.
+    points : array_like, (m, 3)
+        The polyline, in the unit of the mesh; (m, 2) for a flat image.
+    closed : bool
+        Its last point is joined to the first.
+    weight : float, optional
+        Strength of a soft constraint, of the order of 1; a hard one when not given.
+
+    Examples
+    --------
+    A straight edge for the pattern of a curved sheet:
+
+    >>> import numpy as np, gso
+    >>> u, v = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9), indexing="ij")
+    >>> sheet = np.stack([u, v, 0.2 * u * v], axis=-1)
+    >>> edge = gso.OnCurve(np.arange(9), [[0, -5], [0, 5]])
+    >>> flat = gso.tno.optimize(sheet, task="flatten", constraints=[edge]).flat
+    >>> bool(abs(flat[:9, 0]).max() < 1e-6)
+    True
+    """
+
+    ids: ArrayLike
+    points: ArrayLike
+    closed: bool = False
+    weight: float | None = None
+
+    def parts(self, subject: Subject) -> list[Part]:
+        ids = subject.ids(self.ids)
+        points = subject.points(self.points, "the points of a polyline")
+        size = float(np.ptp(points, axis=0).max(initial=0.0))
+        step = np.abs(points - np.roll(points, 1, axis=0)).max(axis=1, initial=0.0)
+        new = step > 1e-12 * size
+        new[0] |= not self.closed
+        points = points[new]
+        if len(points) < (3 if self.closed else 2):
+            what = "3 points for a closed" if self.closed else "2 points for a"
+            raise subject.refuse(f"needs {what} polyline, no two of them the same")
+        lines = Polylines.of(points, closed=bool(self.closed))
+        return [OnLines(subject.number, ids, lines, subject.weight(self.weight))]
+
+
+@dataclass(frozen=True)
+class SlidingBoundary(Constraint):
+    """The boundary slides along its own curve; not for flat images.
+
+    Corners, where the boundary turns by more than `corner`, stay where they are: those of
+    a grid over a rectangle, none on a round hole.
+
+    Parameters
+    ----------
+    corner : float
+        Degrees, between 0 and 180.
+    weight : float, optional
+        Strength of a soft constraint, of the order of 1; a hard one when not given.
+    """
+
+    corner: float = CORNER
+    weight: float | None = None
+
+    def parts(self, subject: Subject) -> list[Part]:
+        subject.in_space("give OnCurve(ids, points) with points (m, 2)")
+        corner, weight = subject.positive(self.corner, "corner"), subject.weight(self.weight)
+        vertices = subject.mesh.vertices
+        lines, held, sliding = [], [], []
+        for loop in subject.mesh.boundary_loops:
+            points = vertices[loop]
+            way = np.roll(points, -1, axis=0) - points
+            length = np.linalg.norm(way, axis=1, keepdims=True)
+            # A vertex on top of the one before it stays: it has no direction.
+            sharp = turns(way / np.maximum(length, 1e-300)) > corner
+            sharp |= (np.minimum(length, np.roll(length, 1, axis=0)) == 0)[:, 0]
+            held.append(loop[sharp])
+            sliding.append(loop[~sharp])
+            lines.append(Polylines.of(points[length[:, 0] > 0], closed=True, corner=corner))
+        if not lines:
+            return []
+        fixed, free = np.concatenate(held), np.concatenate(sliding)
+        return [
+            Pins(subject.number, fixed, vertices[fixed], weight),
+            OnLines(subject.number, free, Polylines.join(lines), weight),
+        ]

@@ -1,0 +1,260 @@
+"""Hard linear constraints solved once: every vertex by the free ones.
+
+Glue and symmetry say that a vertex is the image of another under a motion; pins and
+planes say where a vertex may be. The first make trees of vertices that follow a root, the
+second become equations of the roots alone: at most three unknowns each, however large the
+mesh and however long the chains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.constraints.parts import OnPlane, Part, Pins, Relations
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Squared singular value of the equations of a root below which a direction is free.
+_FREE = 1e-8
+
+
+class _Equations(NamedTuple):
+    """Rows ``a . p[root] = b``, and whose they are."""
+
+    root: Ints
+    a: Array
+    b: Array
+    owner: Ints
+    vertex: Ints
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """Constrained vertices as affine functions of free ones.
+
+    ``p[ids] = shift + turn p[root]``, and ``p[root] = point + axes y`` with y free.
+
+    Attributes
+    ----------
+    ids, root : ndarray of int, (k,)
+        Vertices, and for each the place in `ids` of the one that it follows.
+    turn, shift : ndarray, (k, d, d) and (k, d)
+        The motion from there.
+    point : ndarray, (k, d)
+        Where a root is for y = 0.
+    axes : ndarray, (k, d, d)
+        Orthonormal columns, zero where there is no freedom.
+    equations : _Equations
+        What the roots have to satisfy.
+    """
+
+    ids: Ints
+    root: Ints
+    turn: Array
+    shift: Array
+    point: Array
+    axes: Array
+    equations: _Equations
+
+    def residuals(self) -> Array:
+        """By how much each equation is missed: zero but for rounding, unless they contradict."""
+        e = self.equations
+        return np.abs((e.a * self.point[e.root]).sum(axis=1) - e.b)
+
+    def maps(self, start: int, size: int) -> tuple[csr_matrix, csr_matrix, Array]:
+        """The constraints as maps of a coordinate vector.
+
+        Parameters
+        ----------
+        start, size : int
+            Where the vertices' coordinates begin, and how many coordinates there are.
+
+        Returns
+        -------
+        projection : csr_matrix, (size, size)
+            From any coordinates to ones that satisfy the constraints, less `offset`.
+        basis : csr_matrix, (size, size)
+            From unknowns, of which only those with a column count.
+        offset : ndarray, (size,)
+        """
+        axes = self.axes[self.root]
+        along = self.turn @ axes
+        point = self.shift + np.einsum("kab,kb->ka", self.turn, self.point[self.root])
+        offset = np.zeros(size)
+        offset[start + self._rows(self.ids)] = point
+        projection = self._matrix(along @ axes.transpose(0, 2, 1), start, size)
+        return projection, self._matrix(along, start, size), offset
+
+    def _rows(self, ids: Ints) -> Ints:
+        dim = self.turn.shape[1]
+        return ids[:, None] * dim + np.arange(dim)
+
+    def _matrix(self, blocks: Array, start: int, size: int) -> csr_matrix:
+        """Identity, but for the blocks (k, d, d) from the roots to the vertices."""
+        from scipy.sparse import coo_matrix
+
+        here, there = start + self._rows(self.ids), start + self._rows(self.ids[self.root])
+        rows = np.broadcast_to(here[:, :, None], blocks.shape)
+        columns = np.broadcast_to(there[:, None, :], blocks.shape)
+        keep = np.abs(blocks) > 0
+        others = np.ones(size, bool)
+        others[here] = False
+        (same,) = np.nonzero(others)
+        return coo_matrix(
+            (
+                np.r_[blocks[keep], np.ones(len(same))],
+                (np.r_[rows[keep], same], np.r_[columns[keep], same]),
+            ),
+            shape=(size, size),
+        ).tocsr()
+
+
+def reduce(parts: Sequence[Part]) -> Reduction | None:
+    """Solve the hard linear parts; None when there are none.
+
+    Where they contradict each other, the solution is that of least squares.
+    """
+    relations = [p for p in parts if isinstance(p, Relations) and len(p.first)]
+    places = [p for p in parts if isinstance(p, Pins | OnPlane) and p.hard and len(p.ids)]
+    if not relations and not places:
+        return None
+    every = [p.ids for p in places] + [x for p in relations for x in (p.first, p.second)]
+    ids = np.unique(np.concatenate(every))
+    dim = _dim((*places, *relations)[0])
+    joints = _joints(relations, ids, dim)
+    root, turn, shift = _follow(len(ids), joints, dim)
+    equations = _equations(places, ids, joints, (root, turn, shift), dim)
+    point, axes = _solve(equations, len(ids), dim)
+    return Reduction(ids, root, turn, shift, point, axes, equations)
+
+
+def _dim(part: Part) -> int:
+    """Components of a position."""
+    return part.positions.shape[1] if isinstance(part, Pins) else len(part.anchor)  # type: ignore[attr-defined]
+
+
+class _Joints(NamedTuple):
+    """``p[second] = shift + turn p[first]``, vertices by their place among the ids."""
+
+    first: Ints
+    second: Ints
+    turn: Array
+    shift: Array
+    owner: Ints
+
+
+def _joints(relations: list[Relations], ids: Ints, dim: int) -> _Joints:
+    if not relations:
+        none = np.zeros(0, np.int64)
+        return _Joints(none, none, np.zeros((0, dim, dim)), np.zeros((0, dim)), none)
+    count = [len(p.first) for p in relations]
+    return _Joints(
+        np.searchsorted(ids, np.concatenate([p.first for p in relations])),
+        np.searchsorted(ids, np.concatenate([p.second for p in relations])),
+        np.repeat([p.matrix for p in relations], count, axis=0),
+        np.repeat([p.anchor - p.matrix @ p.anchor for p in relations], count, axis=0),
+        np.repeat([p.owner for p in relations], count),
+    )
+
+
+def _follow(count: int, joints: _Joints, dim: int) -> tuple[Ints, Array, Array]:
+    """Root of every vertex, and the motion from there."""
+    parent = np.arange(count)
+    turn = np.broadcast_to(np.eye(dim), (count, dim, dim)).copy()
+    shift = np.zeros((count, dim))
+    if not len(joints.first):
+        return parent, turn, shift
+    child, above, which = _forest(count, joints)
+    forward = joints.second[which] == child
+    there = joints.turn[which]
+    back = there.transpose(0, 2, 1)
+    parent[child] = above
+    turn[child] = np.where(forward[:, None, None], there, back)
+    away = np.einsum("kab,kb->ka", back, joints.shift[which])
+    shift[child] = np.where(forward[:, None], joints.shift[which], -away)
+    # Every pass doubles the distance that the motions reach.
+    while (parent != parent[parent]).any():
+        shift = shift + np.einsum("kab,kb->ka", turn, shift[parent])
+        turn = turn @ turn[parent]
+        parent = parent[parent]
+    return parent, turn, shift
+
+
+def _forest(count: int, joints: _Joints) -> tuple[Ints, Ints, Ints]:
+    """Children, parents and joints of a spanning forest."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    a, b = joints.first, joints.second
+    links = coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
+    label = connected_components(links, directed=False)[1]
+    roots = np.unique(label, return_index=True)[1]
+    # One more vertex, joined to one of every component, makes it one tree.
+    tied = coo_matrix(
+        (np.ones(len(a) + len(roots)), (np.r_[a, np.full(len(roots), count)], np.r_[b, roots])),
+        shape=(count + 1, count + 1),
+    )
+    order, before = breadth_first_order(tied, count, directed=False)
+    child = order[1:][before[order[1:]] != count].astype(np.int64)
+    above = before[child].astype(np.int64)
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    key, at = np.unique(low * count + high, return_index=True)
+    wanted = np.minimum(child, above) * count + np.maximum(child, above)
+    return child, above, at[np.searchsorted(key, wanted)]
+
+
+def _equations(
+    places: list[Pins | OnPlane],
+    ids: Ints,
+    joints: _Joints,
+    motion: tuple[Ints, Array, Array],
+    dim: int,
+) -> _Equations:
+    """Every constraint as equations of the roots."""
+    root, turn, shift = motion
+    rows = []
+    for p in places:
+        at = np.searchsorted(ids, p.ids)
+        if isinstance(p, Pins):
+            a = turn[at].reshape(-1, dim)
+            b = (p.positions - shift[at]).ravel()
+            at = np.repeat(at, dim)
+        else:
+            a = np.einsum("a,kab->kb", p.normal, turn[at])
+            b = p.normal @ p.anchor - shift[at] @ p.normal
+        rows.append(_Equations(root[at], a, b, np.full(len(b), p.owner), ids[at]))
+    first, second = joints.first, joints.second
+    loop = turn[second] - joints.turn @ turn[first]
+    left = np.einsum("kab,kb->ka", joints.turn, shift[first]) + joints.shift - shift[second]
+    rows.append(
+        _Equations(
+            np.repeat(root[second], dim),
+            loop.reshape(-1, dim),
+            left.ravel(),
+            np.repeat(joints.owner, dim),
+            np.repeat(ids[second], dim),
+        )
+    )
+    return _Equations(*(np.concatenate(column) for column in zip(*rows, strict=True)))
+
+
+def _solve(equations: _Equations, count: int, dim: int) -> tuple[Array, Array]:
+    """Point of least squares and free axes of every root."""
+    normal = np.zeros((count, dim, dim))
+    right = np.zeros((count, dim))
+    np.add.at(normal, equations.root, equations.a[:, :, None] * equations.a[:, None, :])
+    np.add.at(right, equations.root, equations.a * equations.b[:, None])
+    value, axes = np.linalg.eigh(normal)
+    free = value < _FREE
+    inverse = np.where(free, 0.0, 1.0 / np.where(free, 1.0, value))
+    point = np.einsum("kab,kb,kcb,kc->ka", axes, inverse, axes, right)
+    return point, np.where(free[:, None, :], axes, 0.0)

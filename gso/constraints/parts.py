@@ -1,0 +1,179 @@
+"""What constraints come down to: a few kinds of equations on vertices.
+
+`Pins`, `Relations` and `OnPlane` are linear and hard: the unknowns leave them out (see
+:mod:`gso.constraints.linear`). The others become terms.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import geometry
+from gso.constraints.polyline import Polylines
+from gso.mesh import Frame
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Part:
+    """Equations of one constraint.
+
+    Attributes
+    ----------
+    owner : int
+        Number of the constraint.
+    """
+
+    owner: int
+
+    def mapped(self, frame: Frame, order: Ints) -> Part:
+        """In the unit of a frame and with vertex i numbered ``order[i]``."""
+        raise NotImplementedError
+
+    def violation(self, points: Array) -> Array:
+        """By what length each equation is missed by vertices (n, dim)."""
+        raise NotImplementedError
+
+    @property
+    def hard(self) -> bool:
+        """Holds exactly."""
+        return getattr(self, "weight", None) is None
+
+    @property
+    def vertices(self) -> Ints:
+        """Vertices of each equation, (k, .)."""
+        raise NotImplementedError
+
+    @property
+    def count(self) -> int:
+        """Number of equations."""
+        return len(self.vertices)
+
+
+@dataclass(frozen=True)
+class Pins(Part):
+    """Vertices `ids` (k,) are at `positions` (k, dim); with a weight, they are drawn there."""
+
+    ids: Ints
+    positions: Array
+    weight: float | None = None
+
+    @property
+    def vertices(self) -> Ints:
+        return self.ids[:, None]
+
+    def mapped(self, frame: Frame, order: Ints) -> Pins:
+        return replace(self, ids=order[self.ids], positions=frame.to_unit(self.positions))
+
+    def violation(self, points: Array) -> Array:
+        return np.linalg.norm(points[self.ids] - self.positions, axis=1)
+
+
+@dataclass(frozen=True)
+class Relations(Part):
+    """``p[second] = anchor + matrix (p[first] - anchor)``, `matrix` orthogonal."""
+
+    first: Ints
+    second: Ints
+    matrix: Array
+    anchor: Array
+
+    @property
+    def vertices(self) -> Ints:
+        return np.stack([self.first, self.second], axis=1)
+
+    def mapped(self, frame: Frame, order: Ints) -> Relations:
+        return replace(
+            self,
+            first=order[self.first],
+            second=order[self.second],
+            anchor=frame.to_unit(self.anchor),
+        )
+
+    def violation(self, points: Array) -> Array:
+        image = self.anchor + (points[self.first] - self.anchor) @ self.matrix.T
+        return np.linalg.norm(points[self.second] - image, axis=1)
+
+
+@dataclass(frozen=True)
+class OnPlane(Part):
+    """Vertices `ids` lie on the plane (or line) through `anchor` with a unit `normal`."""
+
+    ids: Ints
+    normal: Array
+    anchor: Array
+
+    @property
+    def vertices(self) -> Ints:
+        return self.ids[:, None]
+
+    def mapped(self, frame: Frame, order: Ints) -> OnPlane:
+        return replace(self, ids=order[self.ids], anchor=frame.to_unit(self.anchor))
+
+    def violation(self, points: Array) -> Array:
+        return np.abs((points[self.ids] - self.anchor) @ self.normal)
+
+
+@dataclass(frozen=True)
+class OnLines(Part):
+    """Vertices `ids` lie on polylines."""
+
+    ids: Ints
+    lines: Polylines
+    weight: float | None = None
+
+    @property
+    def vertices(self) -> Ints:
+        return self.ids[:, None]
+
+    def mapped(self, frame: Frame, order: Ints) -> OnLines:
+        return replace(self, ids=order[self.ids], lines=self.lines.mapped(frame))
+
+    def violation(self, points: Array) -> Array:
+        return np.linalg.norm(
+            points[self.ids] - self.lines.nearest(points[self.ids]).points, axis=1
+        )
+
+
+@dataclass(frozen=True)
+class Planar(Part):
+    """Quads (k, 4), each planar."""
+
+    quads: Ints
+    weight: float | None = None
+
+    @property
+    def vertices(self) -> Ints:
+        return self.quads
+
+    def mapped(self, frame: Frame, order: Ints) -> Planar:
+        return replace(self, quads=order[self.quads])
+
+    def violation(self, points: Array) -> Array:
+        corners = (tuple(points[self.quads[:, k]].T) for k in range(4))
+        return np.abs(geometry.diagonal_distance(*corners))
+
+
+@dataclass(frozen=True)
+class Lengths(Part):
+    """Pairs of vertices (k, 2) are `lengths` (k,) apart."""
+
+    pairs: Ints
+    lengths: Array
+    weight: float | None = None
+
+    @property
+    def vertices(self) -> Ints:
+        return self.pairs
+
+    def mapped(self, frame: Frame, order: Ints) -> Lengths:
+        return replace(self, pairs=order[self.pairs], lengths=self.lengths / frame.scale)
+
+    def violation(self, points: Array) -> Array:
+        a, b = (points[self.pairs[:, k]] for k in (0, 1))
+        return np.abs(np.linalg.norm(a - b, axis=1) - self.lengths)

@@ -1,0 +1,74 @@
+"""Constraints from a JSON file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+from os import PathLike
+from typing import Any
+
+from gso.constraints.base import Constraint
+from gso.constraints.curve import OnCurve, SlidingBoundary
+from gso.constraints.glue import Glue
+from gso.constraints.positions import Fixed, FixedBoundary, Handle
+from gso.constraints.shape import FixedLengths, PlanarFaces
+from gso.constraints.symmetry import SymmetryPlane
+from gso.status import OptionError
+
+KINDS: dict[str, type[Constraint]] = {
+    kind.__name__: kind
+    for kind in (
+        Fixed,
+        FixedBoundary,
+        FixedLengths,
+        Glue,
+        Handle,
+        OnCurve,
+        PlanarFaces,
+        SlidingBoundary,
+        SymmetryPlane,
+    )
+}
+
+
+def read_constraints(path: str | PathLike[str]) -> list[Constraint]:
+    """Read a list of constraints.
+
+    Parameters
+    ----------
+    path : path
+        JSON: a list of objects, each with the ``type`` of a constraint, such as
+        ``{"type": "Handle", "ids": [0], "positions": [[0, 0, 1]]}``, and its parameters.
+
+    Raises
+    ------
+    OptionError
+        The file cannot be read, or an entry is no constraint.
+    """
+    try:
+        with open(path, encoding="utf-8") as file:
+            entries = json.load(file)
+    except OSError as error:
+        raise OptionError(f"{path}: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise OptionError(f"{path} is no JSON: {error}") from None
+    if not isinstance(entries, list):
+        raise OptionError(f'{path} must hold a list, such as [{{"type": "FixedBoundary"}}]')
+    return [_constraint(entry, f"{path}: entry {k}") for k, entry in enumerate(entries)]
+
+
+def _constraint(entry: Any, where: str) -> Constraint:
+    if not isinstance(entry, dict) or entry.get("type") not in KINDS:
+        raise OptionError(f'{where} needs a "type": {", ".join(KINDS)}')
+    kind = KINDS[entry["type"]]
+    given = {name: value for name, value in entry.items() if name != "type"}
+    known = [f.name for f in fields(kind)]  # type: ignore[arg-type]
+    for name in given:
+        if name not in known:
+            raise OptionError(
+                f"{where}: {kind.__name__} has no parameter {name!r}; it has {', '.join(known)}"
+            )
+    try:
+        return kind(**given)
+    except TypeError as error:
+        raise OptionError(f"{where}: {error}") from None

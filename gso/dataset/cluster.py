@@ -1,0 +1,85 @@
+"""Work sent to a Dask cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable
+from importlib.util import find_spec
+from typing import Any
+
+from gso.status import DatasetError, GSOError
+from gso.tno.pool import Done
+
+#: Seconds within which a scheduler must answer.
+PATIENCE = 20
+
+
+def spread(
+    function: Callable[[Any], Any], pieces: Iterable[Any], *, scheduler: str
+) -> Generator[Done, None, None]:
+    """Apply a function to many pieces of work on a Dask cluster, results as they finish.
+
+    Work of a worker that is lost is done again by others, unless workers are lost with it
+    time and again.
+
+    Parameters
+    ----------
+    function : callable
+        Of one argument; what it is made of must be installed on the workers.
+    pieces : iterable
+        Read as workers become free.
+    scheduler : str
+        Address, such as ``tcp://host:8786``.
+
+    Yields
+    ------
+    Done
+        In the order of completion.
+
+    Raises
+    ------
+    DatasetError
+        Dask is not installed, or the scheduler does not answer.
+    """
+    if find_spec("distributed") is None:
+        raise DatasetError('a scheduler needs Dask: pip install "gso[cluster]"')
+    from distributed import Client, as_completed
+
+    try:
+        client = Client(scheduler, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise DatasetError(f"no Dask scheduler answers at {scheduler}: {reason}") from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=PATIENCE)
+        except TimeoutError:
+            raise DatasetError(f"the Dask scheduler at {scheduler} has no workers") from None
+        numbered = enumerate(pieces)
+        waiting: dict[Any, int] = {}
+        running = as_completed(loop=client.loop)
+
+        def fill() -> None:
+            # Twice as much as there are workers: none waits, and results stay few.
+            room = 2 * max(len(client.scheduler_info(n_workers=-1)["workers"]), 1) - len(waiting)
+            for _ in range(room):
+                entry = next(numbered, None)
+                if entry is None:
+                    return
+                future = client.submit(function, entry[1], pure=False)
+                waiting[future.key] = entry[0]
+                running.add(future)
+
+        fill()
+        while waiting:
+            future = next(running)
+            index = waiting.pop(future.key)
+            try:
+                # This waits once more when the worker that held the value has died since.
+                done = Done(index, future.result())
+            except GSOError as error:
+                done = Done(index, error=str(error))
+            except Exception as error:  # whatever became of it there
+                done = Done(index, error=f"{type(error).__name__}: {error}")
+            del future
+            yield done
+            fill()

@@ -1,0 +1,130 @@
+"""Folders of .npy files, as the published data have them: a folder per split, a file each."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.dataset.bezier import normalise
+from gso.io import replacing
+from gso.status import DatasetError, MeshError
+
+if TYPE_CHECKING:
+    from gso.dataset.store import Dataset
+
+Array = NDArray[np.float64]
+
+
+def splits(path: Path) -> dict[str, list[Path]]:
+    """Files of every split, sorted by name.
+
+    Raises
+    ------
+    DatasetError
+        There are none.
+    """
+    try:
+        folders = sorted(p for p in path.iterdir() if p.is_dir())
+        found = {folder.name: sorted(folder.glob("*.npy")) for folder in folders}
+    except OSError as error:
+        raise DatasetError(f"{path} cannot be read: {error.strerror}") from None
+    found = {name: files for name, files in found.items() if files}
+    if not found:
+        raise DatasetError(
+            f"{path} holds no dataset: neither a manifest nor folders of .npy files such as train/"
+        )
+    return found
+
+
+def load(path: Path) -> Array:
+    """A grid of numbers (H, W, d) in a .npy file.
+
+    Raises
+    ------
+    DatasetError
+        The file is missing, damaged, or holds something else.
+    """
+    try:
+        # A map checks what the header claims against the size of the file.
+        grid = np.asarray(np.load(path, mmap_mode="r", allow_pickle=False), np.float64)
+    except (OSError, ValueError, EOFError, TypeError) as error:
+        raise DatasetError(f"{path} is no intact array of NumPy: {error}") from None
+    if grid.ndim != 3 or grid.shape[-1] not in (2, 3) or min(grid.shape) < 2:
+        raise DatasetError(f"{path} holds an array {grid.shape}, no grid (H, W, 3)")
+    if not np.isfinite(grid).all():
+        i, j = np.argwhere(~np.isfinite(grid))[0][:2]
+        raise DatasetError(f"{path}: grid vertex ({i}, {j}) is not finite")
+    if not np.ptp(grid, axis=(0, 1)).any():
+        raise DatasetError(f"{path}: all points of the grid are one")
+    return grid
+
+
+def rows(path: Path, shape: tuple[int, ...], some: Any) -> Array:
+    """The only row of a file, in a split whose grids all have one shape."""
+    grid = load(path)
+    if grid.shape != shape:
+        raise DatasetError(f"{path} holds a grid {grid.shape}; the split's first one has {shape}")
+    return grid[None][some]
+
+
+def unit(grids: Array) -> Array:
+    """Grids (b, H, W, 3), each in the unit ball."""
+    return np.stack([normalise(grid) for grid in grids])
+
+
+def export(
+    data: Dataset,
+    path: str | PathLike[str],
+    *,
+    array: str = "surface",
+    only: tuple[str, ...] = (),
+) -> int:
+    """Write an array of a set as .npy files, one per surface, in a folder per split.
+
+    Surfaces and results have the same names, so that a folder of results goes with one of
+    surfaces.
+
+    Parameters
+    ----------
+    data : Dataset
+        The set.
+    path : path
+        Folder to write to; files in it are replaced.
+    array : str
+        "surface", "developable", "strain", "noisy_0.005" ...
+    only : tuple of str
+        Splits; all that have the array when not given.
+
+    Returns
+    -------
+    int
+        Files written: float64, (H, W, 3), or (H, W, 2) for flat images.
+
+    Raises
+    ------
+    DatasetError
+        No split has such an array, it is no grid, or a file cannot be written.
+    """
+    chosen = [data[name] for name in only] or list(data.values())
+    chosen = [split for split in chosen if only or array in split.arrays]
+    if not chosen:
+        raise DatasetError(f"no split has an array {array!r}")
+    count = 0
+    for split in chosen:
+        values = split[array]
+        if values.ndim != 4:
+            raise DatasetError(f"{array!r} is no grid of points; its rows have {values.shape[1:]}")
+        target = Path(path) / split.name
+        try:
+            target.mkdir(parents=True, exist_ok=True)
+            for k in range(len(split)):
+                with replacing(target / f"{k:05d}.npy") as file:
+                    np.lib.format.write_array(file, values[k].astype(np.float64))
+                count += 1
+        except (OSError, MeshError) as error:
+            raise DatasetError(f"after {count} files: {error}") from None
+    return count

@@ -1,0 +1,73 @@
+"""Files of a set: arrays of equal length by name, as HDF5."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.status import DatasetError
+
+Rows = slice | NDArray[np.int64]
+
+
+def pack(arrays: dict[str, np.ndarray]) -> bytes:
+    """Arrays of equal length as an HDF5 file, the same bytes for the same arrays."""
+    import h5py
+
+    buffer = BytesIO()
+    with h5py.File(buffer, "w", libver=("v110", "v110")) as file:
+        for name, values in arrays.items():
+            # A surface is a chunk of its own; numbers per surface stand in one piece.
+            chunked: dict[str, Any] = {}
+            if values.ndim > 1 and len(values):
+                chunked = {"chunks": (1, *values.shape[1:]), "compression": 1, "shuffle": True}
+            file.create_dataset(name, data=values, track_times=False, **chunked)
+    return buffer.getvalue()
+
+
+def contents(path: str | os.PathLike[str]) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
+    """Shape and type of each array of a file, by name."""
+    import h5py
+
+    def collect(file: Any) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
+        found: dict[str, tuple[tuple[int, ...], np.dtype]] = {}
+
+        def visit(name: str, item: Any) -> None:
+            if isinstance(item, h5py.Dataset):
+                found[name] = (item.shape, item.dtype)
+
+        file.visititems(visit)
+        return found
+
+    return _opened(path, collect)
+
+
+def read(path: str | os.PathLike[str], name: str, rows: Rows = slice(None)) -> np.ndarray:
+    """Rows of an array of a file; numbers of rows must rise."""
+    return _opened(path, lambda file: file[name][rows])
+
+
+def _opened(path: str | os.PathLike[str], use: Callable[[Any], Any]) -> Any:
+    """What `use` makes of an open file.
+
+    Raises
+    ------
+    DatasetError
+        The file is missing or damaged.
+    """
+    import h5py
+
+    try:
+        # Files never change once they are there: locks, which some disks lack, are no use.
+        with h5py.File(path, "r", locking=False) as file:
+            return use(file)
+    except (OSError, KeyError, RuntimeError) as error:
+        raise DatasetError(
+            f"{os.fsdecode(path)} is missing or damaged ({error}); "
+            "build the set again with the same options, which makes such files anew"
+        ) from None

@@ -1,0 +1,225 @@
+"""What the solver makes of a surface: the labels of the set."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import tasks, tno
+from gso.mesh import Mesh
+from gso.metrics import unit
+from gso.result import Result
+from gso.status import ConvergenceWarning, GSOError, MeshError
+from gso.variables import vertex_normals
+from gso.variables.spline import spline_matrix
+
+Array = NDArray[np.float64]
+
+#: Control points along a side of the spline of offsets.
+CONTROLS = 16
+#: Status of a surface that the solver refused.
+FAILED = "FAILED"
+
+_DEVELOPABLE = (
+    "loss_gc_before",
+    "loss_gc",
+    "K_A_r",
+    "d_H",
+    "distance_mean",
+    "distance_max",
+    "deviation_max",
+    "fairness_ratio",
+)
+_FLATTEN = (
+    "loss_iso_cell",
+    "edge_length_error",
+    "strain_mean",
+    "strain_p99",
+    "strain_max",
+    "area_error",
+    "flipped_cells",
+)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of label.
+
+    Attributes
+    ----------
+    arguments : dict
+        For :func:`gso.tno.optimize`.
+    arrays : callable
+        Arrays of a result by name.
+    metrics : tuple of str
+        Metrics that are kept.
+    """
+
+    arguments: dict[str, Any]
+    arrays: Callable[[Result], dict[str, Array]]
+    metrics: tuple[str, ...]
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Settings of the solver, by name."""
+        return asdict(tno.check(**self.arguments)[2])
+
+
+@dataclass(frozen=True)
+class Label:
+    """A label of one surface: arrays and metrics by name, and how the solve ended."""
+
+    arrays: dict[str, Array]
+    metrics: dict[str, float]
+    status: str
+
+
+def solve(kind: str, points: Array) -> Label:
+    """Label one surface (H, W, 3) of the unit ball.
+
+    A surface that the solver refuses gets NaN and the status :data:`FAILED`.
+
+    Examples
+    --------
+    >>> u, v = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
+    >>> label = solve("strain", np.stack([u, v, 0.3 * u * v], axis=-1))
+    >>> label.arrays["strain"].shape, label.metrics["flipped_cells"]
+    ((17, 17, 2), 0.0)
+    """
+    what = KINDS[kind]
+    try:
+        mesh = Mesh.from_grid(points, weld=False)
+        with warnings.catch_warnings():
+            # The status is kept, which says the same.
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            result = tno.optimize(mesh, **what.arguments)
+        known = _measured(result)
+        return Label(
+            what.arrays(result),
+            {name: float(known.get(name, np.nan)) for name in what.metrics},
+            result.status.name,
+        )
+    except GSOError:
+        nowhere = {name: np.full(s, np.nan) for name, s in shapes(kind, len(points)).items()}
+        return Label(nowhere, dict.fromkeys(what.metrics, np.nan), FAILED)
+
+
+def _measured(result: Result) -> dict[str, float]:
+    """Metrics of a result; of its flat image too, where a surface has one."""
+    if result.flat is None or result.task == "flatten":
+        return result.metrics
+    flatten = tasks.get("flatten").metrics
+    return flatten(result.mesh, None, result.flat, unit(result.design)) | result.metrics
+
+
+def shapes(kind: str, size: int) -> dict[str, tuple[int, ...]]:
+    """Shapes of the arrays of a label of a grid size x size."""
+    controls = min(CONTROLS, size)
+    known: dict[str, dict[str, tuple[int, ...]]] = {
+        "developable": {
+            "developable": (size, size, 3),
+            "offsets": (size, size),
+            "spline": (controls, controls),
+            "spline_residual": (),
+        },
+        "strain": {"strain": (size, size, 2)},
+        "lengths": {"lengths": (size, size, 2)},
+        "jiang2020": {"jiang2020": (size, size, 3), "jiang2020_flat": (size, size, 2)},
+    }
+    return known[kind]
+
+
+def fit_spline(offsets: Array, controls: int = CONTROLS) -> tuple[Array, float]:
+    """Bicubic coefficients closest to a field on a grid, and the root mean square misfit.
+
+    Parameters
+    ----------
+    offsets : ndarray, (H, W)
+        Values on the grid.
+    controls : int
+        Control points along each side; at most as many as samples.
+
+    Returns
+    -------
+    coefficients : ndarray, (controls, controls)
+        Of the basis of :func:`gso.variables.spline.tensor_matrix`.
+    misfit : float
+        In the unit of the field.
+
+    Examples
+    --------
+    >>> u, v = np.meshgrid(np.linspace(0, 1, 32), np.linspace(0, 1, 32), indexing="ij")
+    >>> coefficients, misfit = fit_spline(u**3 - v)
+    >>> coefficients.shape, misfit < 1e-12
+    ((16, 16), True)
+    """
+    along, across = (_basis(n, min(controls, n)) for n in offsets.shape)
+    # A least-squares fit by a product of bases is one fit along each direction.
+    coefficients = along.inverse @ offsets @ across.inverse.T
+    misfit = along.matrix @ coefficients @ across.matrix.T - offsets
+    return coefficients, float(np.sqrt((misfit**2).mean()))
+
+
+@dataclass(frozen=True)
+class _Basis:
+    matrix: Array
+    inverse: Array
+
+
+@lru_cache(maxsize=8)
+def _basis(samples: int, controls: int) -> _Basis:
+    matrix = spline_matrix(samples, controls).toarray()
+    return _Basis(matrix, np.linalg.pinv(matrix))
+
+
+def _developable(result: Result) -> dict[str, Array]:
+    design, grid = result.design, result.design.grid_index
+    moved = result.mesh.vertices - design.vertices
+    offsets = (moved * vertex_normals(design)).sum(axis=1)[grid]
+    coefficients, misfit = fit_spline(offsets)
+    return {
+        "developable": result.mesh.vertices[grid],
+        "offsets": offsets,
+        "spline": coefficients,
+        "spline_residual": np.array(misfit),
+    }
+
+
+def _flat(name: str, result: Result) -> Array:
+    if result.flat_grid is None:
+        raise MeshError(f"the solver gave no flat image for {name!r}")
+    return result.flat_grid
+
+
+def _jiang(result: Result) -> dict[str, Array]:
+    vertices = result.mesh.vertices[result.design.grid_index]
+    return {"jiang2020": vertices, "jiang2020_flat": _flat("jiang2020", result)}
+
+
+#: Every surface of a set has these ...
+LABELS = ("developable", "strain", "lengths")
+#: ... and splits that are asked for these.
+REFERENCES = ("jiang2020",)
+
+KINDS = {
+    "developable": Kind({"task": "developable", "options": "balanced"}, _developable, _DEVELOPABLE),
+    "strain": Kind(
+        {"task": "flatten", "formulation": "strain", "options": "balanced"},
+        lambda result: {"strain": _flat("strain", result)},
+        _FLATTEN,
+    ),
+    "lengths": Kind(
+        {"task": "flatten", "formulation": "lengths", "options": "balanced"},
+        lambda result: {"lengths": _flat("lengths", result)},
+        _FLATTEN,
+    ),
+    "jiang2020": Kind(
+        {"task": "developable", "options": "jiang2020"}, _jiang, _DEVELOPABLE + _FLATTEN
+    ),
+}

@@ -1,0 +1,63 @@
+"""The manifest of a set: what it is made of, by what, its files, its statistics."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from gso.io import replacing
+from gso.status import DatasetError
+
+NAME = "manifest.json"
+FORMAT = 1
+
+#: (reference, split).
+References = set[tuple[str, str]]
+
+
+def load(folder: Path) -> dict[str, Any]:
+    """Read a manifest.
+
+    Raises
+    ------
+    DatasetError
+        It is missing, damaged, or of another format.
+    """
+    path = folder / NAME
+    try:
+        record = json.loads(path.read_bytes())
+        if record["format"] != FORMAT:
+            raise DatasetError(f"{path} is of format {record['format']}, not {FORMAT}")
+        if not isinstance(record["files"], list):
+            raise DatasetError(f"{path} is damaged: it lists no files")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        if isinstance(error, DatasetError):
+            raise
+        raise DatasetError(f"{path} is missing or damaged: {error}") from None
+    return record
+
+
+def write(folder: Path, record: dict[str, Any]) -> None:
+    """Write a manifest, whole or not at all."""
+    with replacing(folder / NAME) as file:
+        file.write(json.dumps(record, indent=1).encode() + b"\n")
+
+
+def pairs(record: dict[str, Any]) -> References:
+    """References and splits of a manifest."""
+    return {(name, split) for name, splits in record["references"].items() for split in splits}
+
+
+def damaged(folder: Path, record: dict[str, Any]) -> list[str]:
+    """Files that are missing or not as the manifest says, by their checksums."""
+    return [entry["name"] for entry in record["files"] if not _good(folder, entry)]
+
+
+def _good(folder: Path, entry: dict[str, Any]) -> bool:
+    try:
+        content = (folder / entry["name"]).read_bytes()
+    except OSError:
+        return False
+    return hashlib.sha256(content).hexdigest() == entry["sha256"]

@@ -1,0 +1,132 @@
+"""Statistics of a set: surfaces per interval of each feature, metrics of the labels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.dataset.screen import CURVATURE, CURVED, SHAPE
+from gso.dataset.store import Dataset, Split
+
+#: Intervals of the features; K_N is counted by its size. Those of K_A and sigma^2 start with
+#: the ones that are filled in stated shares; the rest is for hard and named splits.
+INTERVALS: dict[str, tuple[float, ...]] = {
+    "K_A": (*CURVATURE, 1.5, CURVED, np.inf),
+    "K_P": (0.0, 0.01, 0.03, 0.06, 0.1, 0.2, 0.3, 0.9, np.inf),
+    "K_N": (0.0, 0.03, 0.06, 0.12, 0.2, 0.3, 0.45, 0.9, np.inf),
+    "sigma2": (*SHAPE, 1.0, np.inf),
+}
+
+#: Figures of the numerical optimiser in Tables 1 and 2 of Wang et al. 2024, by metric, and
+#: which of our labels stand beside them.
+PUBLISHED = {"loss_gc_before": 0.307, "loss_gc": 0.0283, "K_A_r": 0.8888, "d_H": 0.823}
+PUBLISHED_FLAT = {"loss_iso_cell": 3.30e-4}
+#: Splits whose means are compared; others have extremes that no mean survives.
+_EVEN = ("train", "validation", "test")
+
+
+def summarise(data: Dataset) -> dict[str, Any]:
+    """Statistics of every split, of plain numbers, for a manifest.
+
+    Returns
+    -------
+    dict
+        By split: ``count``; ``features`` and ``labels`` by name, each with mean, median and
+        90th percentile; ``intervals`` with the counts of :data:`INTERVALS`; ``status`` with
+        how many solves of each kind of label ended how.
+    """
+    return {name: _split(split) for name, split in data.items()}
+
+
+def _split(split: Split) -> dict[str, Any]:
+    found = split.features if len(split) else {name: np.empty(0) for name in INTERVALS}
+    statuses = {
+        name.removeprefix("status/"): dict(
+            zip(*(a.tolist() for a in np.unique(array[:].astype(str), return_counts=True)))
+        )
+        for name, array in split.arrays.items()
+        if name.startswith("status/")
+    }
+    return {
+        "count": len(split),
+        "features": {name: _statistics(values) for name, values in found.items()},
+        "intervals": {name: counts(name, found[name]) for name in INTERVALS},
+        "labels": {
+            kind: {name: _statistics(values) for name, values in table.items()}
+            for kind, table in split.metrics.items()
+        },
+        "status": statuses,
+    }
+
+
+def counts(feature: str, values: NDArray[np.float64]) -> list[int]:
+    """Surfaces in each interval of a feature; an interval contains its upper end.
+
+    >>> counts("sigma2", np.array([0.0, 0.03, 0.04, 2.0]))
+    [2, 1, 0, 0, 0, 0, 0, 1]
+    """
+    edges = INTERVALS[feature]
+    place = np.searchsorted(edges[1:-1], np.abs(values))
+    return np.bincount(place, minlength=len(edges) - 1).tolist()
+
+
+def _statistics(values: NDArray[np.float64]) -> dict[str, float | None]:
+    """Mean, median and 90th percentile of what is known."""
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return {"mean": None, "median": None, "p90": None}
+    return {
+        "mean": float(known.mean()),
+        "median": float(np.median(known)),
+        "p90": float(np.percentile(known, 90)),
+    }
+
+
+def differences(one: Any, other: Any, *, tolerance: float = 0.02) -> list[str]:
+    """Where two summaries differ by more than a tolerance, relative to the larger number.
+
+    Counts may differ by two: a draw on the border of an interval can fall on either side of
+    it on another machine. Of the hard and the named splits only medians are compared.
+
+    Examples
+    --------
+    >>> a = {"test": {"count": 10, "features": {"K_A": {"mean": 0.300, "median": 0.2}}}}
+    >>> b = {"test": {"count": 11, "features": {"K_A": {"mean": 0.307, "median": 0.2}}}}
+    >>> differences(a, b)
+    ['test/features/K_A/mean: 0.3 and 0.307']
+    """
+    left, right = dict(_leaves(one)), dict(_leaves(other))
+    found = []
+    for path in sorted(left.keys() | right.keys()):
+        split, *_, last = path.split("/")
+        if split not in _EVEN and last in ("mean", "p90"):
+            continue
+        a, b = left.get(path), right.get(path)
+        if not _close(a, b, tolerance):
+            found.append(f"{path}: {a} and {b}")
+    return found
+
+
+def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(tree, dict):
+        items = tree.items()
+    elif isinstance(tree, list):
+        items = enumerate(tree)  # type: ignore[assignment]
+    else:
+        yield path, tree
+        return
+    for key, value in items:
+        yield from _leaves(value, f"{path}/{key}" if path else str(key))
+
+
+def _close(a: Any, b: Any, tolerance: float) -> bool:
+    if isinstance(a, int) or isinstance(b, int):
+        # A status or an interval that only one of them has is counted as zero.
+        a, b = a or 0, b or 0
+        return abs(a - b) <= max(2, tolerance * max(abs(a), abs(b)))
+    if a is None or b is None:
+        return a is b
+    return abs(a - b) <= tolerance * max(abs(a), abs(b)) + 1e-12

@@ -1,0 +1,164 @@
+"""B-splines fitted to grids, and how far they are from them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import metrics
+from gso.mesh import Mesh
+from gso.spline import BSplineSurface, Gap, basis, clamped_knots
+from gso.status import MeshError, OptionError
+
+Array = NDArray[np.float64]
+
+#: Points of a spline per edge of a mesh that it is compared with.
+_REFINED = 4
+_LARGE = 100_000
+
+
+def fit_spline(surface: Any, controls: int | tuple[int, int] = 16) -> BSplineSurface:
+    """Bicubic B-spline closest to a grid at uniform parameters, by least squares.
+
+    Vertex (i, j) of an (H, W) grid belongs to the parameters (i / (H - 1), j / (W - 1)), as
+    in the optimiser's spline unknowns: fitted to what they made, it is the spline itself.
+
+    Parameters
+    ----------
+    surface : Mesh, array (H, W, 3), path ...
+        A grid, or anything of which :func:`gso.as_mesh` makes one; for a result, its `mesh`.
+    controls : int or (int, int)
+        Control points along both sides, 4 or more; see :func:`fitting_controls` for small
+        grids, which carry fewer.
+
+    Returns
+    -------
+    BSplineSurface
+        In the unit and place of the grid; its `gap` is the distance between the two.
+
+    Raises
+    ------
+    MeshError
+        The surface is no grid.
+    OptionError
+        `controls` is no such number.
+
+    Examples
+    --------
+    >>> u, v = np.meshgrid(np.linspace(-1, 1, 33), np.linspace(-1, 1, 33), indexing="ij")
+    >>> spline = fit_spline(np.stack([u, v, 0.3 * u * v], axis=-1), controls=8)
+    >>> spline.net.shape
+    (8, 8, 3)
+    >>> spline.gap.vertices_max < 1e-12
+    True
+    """
+    from gso.io import as_mesh
+
+    mesh = as_mesh(surface)
+    spline = interpolated(grid_of(mesh), fitting_controls(controls, grid_of(mesh).shape[:2]))
+    return replace(spline, gap=gap(spline, mesh))
+
+
+def grid_of(mesh: Mesh) -> Array:
+    """Grid (H, W, 3) of a mesh.
+
+    Raises
+    ------
+    MeshError
+        It is none.
+    """
+    if mesh.grid is None:
+        raise MeshError(
+            f"{mesh!r} is no grid, so it has no parameters u and v for a spline; resample it on "
+            "a grid of quads (H, W, 3), or save it as a mesh"
+        )
+    return mesh.grid
+
+
+def fitting_controls(controls: int | tuple[int, int], shape: tuple[int, ...]) -> tuple[int, int]:
+    """Control points along both sides of a grid.
+
+    At most two for three vertices, so that the vertices say what the spline does between
+    them, but four (or all, if there are fewer) always.
+
+    >>> fitting_controls(16, (64, 9))
+    (16, 6)
+    """
+    wanted = controls if isinstance(controls, tuple | list) else (controls, controls)
+    numbers = all(isinstance(c, int | np.integer) and not isinstance(c, bool) for c in wanted)
+    if len(wanted) != 2 or not numbers or min(wanted) < 4:
+        raise OptionError(f"controls is {controls!r}; it must be one or two integers, 4 or more")
+    low, high = (min(c, max(2 * (s + 1) // 3, min(s, 4))) for c, s in zip(wanted, shape))
+    return int(low), int(high)
+
+
+def interpolated(points: Array, controls: tuple[int, int]) -> BSplineSurface:
+    """Least-squares spline of a grid (H, W, 3), with so many control points."""
+    shape = points.shape[:2]
+    # Far from the origin digits would be lost; the basis sums to one, so moving is exact.
+    centre = points.reshape(-1, 3).mean(axis=0)
+    knots = [clamped_knots(c) for c in controls]
+    bases = [
+        basis(k, c, np.linspace(0.0, 1.0, s))
+        for k, c, s in zip(knots, controls, shape, strict=True)
+    ]
+    net = np.linalg.lstsq(bases[0], (points - centre).reshape(shape[0], -1), rcond=None)[0]
+    net = np.swapaxes(net.reshape(controls[0], shape[1], 3), 0, 1).reshape(shape[1], -1)
+    net = np.linalg.lstsq(bases[1], net, rcond=None)[0]
+    net = np.swapaxes(net.reshape(controls[1], controls[0], 3), 0, 1)
+    return BSplineSurface(net + centre, knots[0], knots[1])
+
+
+def describe_spline(
+    mesh: Mesh, controls: tuple[int, int], design: Mesh, fitted: Array | None = None
+) -> tuple[BSplineSurface, dict[str, Any]]:
+    """The spline that a mesh consists of samples of, and what a user should know of it.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Samples of a spline at uniform parameters.
+    controls : (int, int)
+        Its control points along both sides.
+    design : Mesh
+        What it should be close to.
+    fitted : ndarray, (n, 3), optional
+        Vertices that it was fitted to when its own solve began.
+
+    Returns
+    -------
+    BSplineSurface
+    dict
+        "controls"; "curvature", the mean |K| of the smooth surface in 1/size^2, size being
+        the design's; and distances (:class:`gso.spline.Gap`) to the "mesh" between its
+        vertices, to the "design", and of the first fit to what was "fitted".
+    """
+    spline = interpolated(grid_of(mesh), controls)
+    spline = replace(spline, gap=gap(spline, mesh))
+    said: dict[str, Any] = {
+        "controls": list(controls),
+        "curvature": spline.mean_gaussian_curvature() * metrics.unit(design) ** 2,
+        "mesh": spline.gap._asdict(),  # type: ignore[union-attr]
+        "design": gap(spline, design)._asdict(),
+    }
+    if fitted is not None:
+        source = mesh.replaced(fitted)
+        said["fitted"] = gap(interpolated(grid_of(source), controls), source)._asdict()
+    return spline, said
+
+
+def gap(spline: BSplineSurface, mesh: Mesh) -> Gap:
+    """Distances between a spline and a grid of about the same size.
+
+    The spline is replaced by triangles of a quarter of the grid's spacing (of half of it, on
+    large grids), whose corners are on it.
+    """
+    shape = grid_of(mesh).shape[:2]
+    finer = _REFINED if mesh.vertices.size < _LARGE else 2
+    dense = Mesh.from_grid(spline.sample(*(finer * (s - 1) + 1 for s in shape)), weld=False)
+    there = metrics.point_to_surface(mesh.vertices[mesh.used], dense)
+    back = metrics.point_to_surface(dense.vertices, mesh)
+    return Gap(*(float(f) for f in (there.mean(), there.max(), back.mean(), back.max())))

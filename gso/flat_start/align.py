@@ -1,0 +1,143 @@
+"""Plane images moved to where their constraints want them, before they are bent there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.constraints import Compiled, OnLines, Part, Pins, Relations
+from gso.constraints.compiled import is_glue
+from gso.constraints.linear import reduce
+from gso.flat_start.embed import parts
+from gso.flat_start.place import beside, upright
+from gso.mesh import Mesh
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Directions tried, and steps from each: a curve has several places where an image may lie.
+_TURNS, _STEPS = 8, 60
+
+
+def align(mesh: Mesh, flat: Array, constraints: Compiled) -> Array:
+    """Move and turn an image (n, 2), part by part, as close as possible to its constraints.
+
+    Iterated closest points (Besl and McKay 1992) on the vertices that have a place, a line
+    or a mirror image; handles alone are met as well as a motion can in one step.
+    """
+    wanted = (*constraints.anchored, *_seams(mesh, constraints))
+    if not wanted:
+        return flat
+    held = replace(constraints, parts=wanted)
+    out = flat.copy()
+    pieces = parts(mesh)
+    # Pieces that are glued to others come after those have their place.
+    for ids in pieces if len(pieces) == 1 else 2 * pieces:
+        tries = [_closer(_turn(flat[ids], k), ids, out, held) for k in range(_TURNS)]
+        out[ids] = min(tries, key=lambda t: t[0])[1]
+    return out
+
+
+def _seams(mesh: Mesh, constraints: Compiled) -> list[Part]:
+    """Glue between different parts of a mesh."""
+    out: list[Part] = []
+    for p in constraints.parts:
+        if isinstance(p, Relations) and is_glue(p):
+            apart = mesh.components[p.first] != mesh.components[p.second]
+            if apart.any():
+                out.append(replace(p, first=p.first[apart], second=p.second[apart]))
+    return out
+
+
+def settle(mesh: Mesh, flat: Array, constraints: Compiled) -> Array:
+    """Leave what is anchored where it is, and lay the rest beside it.
+
+    Parts of the mesh that constraints tie to each other move together.
+    """
+    groups = _groups(mesh, constraints)
+    fixed = np.zeros(len(flat), bool)
+    for part in constraints.anchored:
+        fixed[part.vertices] = True
+    loose = [ids for ids in groups if not fixed[ids].any()]
+    tight = [ids for ids in groups if fixed[ids].any()]
+    out = flat.copy()
+    images = beside([upright(flat[ids]) for ids in loose])
+    if tight and loose:
+        there = flat[np.concatenate(tight)]
+        gap = 0.05 * float(np.ptp(there[:, 0]))
+        corner = np.array([there[:, 0].max() + gap, there[:, 1].min()])
+        images = [p + corner for p in images]
+    for ids, image in zip(loose, images, strict=True):
+        out[ids] = image
+    return out
+
+
+def _groups(mesh: Mesh, constraints: Compiled) -> list[Ints]:
+    """Vertices of the parts of a mesh, those that are tied to each other together."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    rows = [p.vertices for p in constraints.parts]
+    first = np.concatenate([np.repeat(v[:, 0], v.shape[1]) for v in rows])
+    a, b = mesh.components[first], mesh.components[np.concatenate([v.ravel() for v in rows])]
+    count = int(mesh.components.max()) + 1
+    links = coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
+    label = connected_components(links, directed=False)[1]
+    out: dict[int, list[Ints]] = {}
+    for ids in parts(mesh):
+        out.setdefault(int(label[mesh.components[ids[0]]]), []).append(ids)
+    return [np.concatenate(group) for group in out.values()]
+
+
+def _turn(flat: Array, k: int) -> Array:
+    angle = 2.0 * np.pi * k / _TURNS
+    c, s = np.cos(angle), np.sin(angle)
+    return flat @ np.array([[c, s], [-s, c]])
+
+
+def _closer(image: Array, ids: Ints, flat: Array, held: Compiled) -> tuple[float, Array]:
+    """What is left to the constraints after the closest motion of one part, and its image."""
+    whole = flat.copy()
+    left = np.inf
+    for _ in range(_STEPS):
+        whole[ids] = image
+        here, there = _targets(whole, held)
+        inside = np.isin(here, ids)
+        p, q = whole[here[inside]], there[inside]
+        if not len(p):
+            return 0.0, image
+        before, left = left, float(((p - q) ** 2).sum())
+        if left >= (1.0 - 1e-6) * before:
+            break
+        image = _moved(image, p, q)
+    return left, image
+
+
+def _moved(image: Array, p: Array, q: Array) -> Array:
+    """An image under the motion that brings points p closest to q."""
+    number = np.array([1.0, 1j])
+    here, there = p.mean(axis=0), q.mean(axis=0)
+    turn = ((p - here) @ number).conj() @ ((q - there) @ number)
+    turn = turn / abs(turn) if abs(turn) > 0 else 1.0
+    z = ((image - here) @ number) * turn
+    return np.stack([z.real, z.imag], axis=1) + there
+
+
+def _targets(flat: Array, held: Compiled) -> tuple[Ints, Array]:
+    """Vertices with a place to go, and the nearest such place, (k,) and (k, 2)."""
+    ids, there = [], []
+    reduction = reduce(held.parts)
+    if reduction is not None:
+        projection, _, offset = reduction.maps(0, flat.size)
+        ids.append(reduction.ids)
+        there.append((offset + projection @ flat.ravel()).reshape(-1, 2)[reduction.ids])
+    for part in held.parts:
+        if isinstance(part, OnLines):
+            ids.append(part.ids)
+            there.append(part.lines.nearest(flat[part.ids]).points)
+        elif isinstance(part, Pins) and not part.hard:
+            ids.append(part.ids)
+            there.append(part.positions)
+    return np.concatenate(ids), np.concatenate(there)

@@ -1,0 +1,78 @@
+"""The shape operator of a face, from tangents and how the normal turns along them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gso.geometry import ops
+from gso.geometry.strain import rest_frame
+from gso.geometry.vector import Vec, cross, dot, norm
+
+_ORIGIN = (0.0, 0.0, 0.0)
+
+#: Rows of a 2 x 2 matrix.
+Matrix = tuple[tuple[Any, Any], tuple[Any, Any]]
+
+
+def tangent_frame(a: Vec, b: Vec) -> tuple[Vec, Vec, Vec]:
+    """Orthonormal vectors ``(e, f, n)``: `e` along `a`, `f` towards `b`, `n` along ``a x b``.
+
+    `a` and `b` must span an area.
+    """
+    normal = cross(a, b)
+    length, area = norm(a), norm(normal)
+    e = tuple(x / length for x in a)
+    n = tuple(x / area for x in normal)
+    return e, cross(n, e), n
+
+
+def shape_matrix(a: Vec, b: Vec, da: Vec, db: Vec) -> Matrix:
+    """Shape operator of a face in the tangent frame of `a` and `b`, 1 / length.
+
+    The linear map that takes the tangents `a` and `b` to the changes `da` and `db` of the
+    normal along them, projected to their plane. For a quad these are the diagonals of the
+    face and of its Gauss image (Jiang et al. 2020); for a triangle two sides, and the map
+    is the derivative of the normal interpolated from the corners.
+
+    It is the derivative of the normal itself, not its negative: positive where the surface
+    bends away from its normal. The determinant is Jiang's discrete Gaussian curvature
+    ``det(da, db, n) / det(a, b, n)``, half the trace the mean curvature. The matrix is
+    symmetric up to the error of discretisation.
+
+    Examples
+    --------
+    On a sphere of radius 2 the normal is half the position:
+
+    >>> s = shape_matrix((1., 0., 0.), (1., 1., 0.), (.5, 0., 0.), (.5, .5, 0.))
+    >>> float(determinant(s)), float(half_trace(s))
+    (0.25, 0.5)
+    """
+    e, f, _ = tangent_frame(a, b)
+    m11, m12, m22 = rest_frame(_ORIGIN, a, b)
+    first = tuple(p * m11 for p in da)
+    second = tuple(p * m12 + q * m22 for p, q in zip(da, db, strict=True))
+    return (dot(first, e), dot(second, e)), (dot(first, f), dot(second, f))
+
+
+def determinant(s: Matrix) -> Any:
+    """Gaussian curvature of a shape operator, 1 / length^2."""
+    return s[0][0] * s[1][1] - s[0][1] * s[1][0]
+
+
+def half_trace(s: Matrix) -> Any:
+    """Mean curvature of a shape operator, 1 / length."""
+    return 0.5 * (s[0][0] + s[1][1])
+
+
+def eigen(p: Any, q: Any, r: Any) -> tuple[Any, Any, Any]:
+    """Eigenvalues of the symmetric matrix ``((p, q), (q, r))``, and where the first one lies.
+
+    Returns ``(high, low, angle)``: `high` >= `low`, and the eigenvector of `high` is
+    (cos, sin) of `angle`, radians. Equal eigenvalues have the angle 0.
+
+    >>> [float(x) for x in eigen(0.0, 1.0, 0.0)]
+    [1.0, -1.0, 0.785]
+    """
+    middle, half = 0.5 * (p + r), 0.5 * (p - r)
+    spread = ops.sqrt(half * half + q * q)
+    return middle + spread, middle - spread, 0.5 * ops.atan2(q, half)

@@ -1,0 +1,40 @@
+"""Stretches of a face between two surfaces, from inner products of its diagonals or sides."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gso.geometry import ops
+from gso.geometry.cells import diagonals
+from gso.geometry.vector import Vec, dot, norm2, sub
+
+
+def first_form(*corners: Vec) -> tuple[Any, Any, Any]:
+    """``(E, F, G)`` of a face: squared lengths and inner product of two vectors that span it.
+
+    The diagonals of a quad, whose midpoints' parallelogram is what it is measured by (Jiang et
+    al. 2020); the sides at the first corner of a triangle.
+    """
+    if len(corners) == 4:
+        a, b = diagonals(*corners)
+    else:
+        a, b = sub(corners[1], corners[0]), sub(corners[2], corners[0])
+    return norm2(a), dot(a, b), norm2(b)
+
+
+def principal_stretches(rest: tuple[Any, Any, Any], image: tuple[Any, Any, Any]) -> tuple[Any, Any]:
+    """Largest and smallest ratio ``(s1, s2)`` of lengths, image over rest.
+
+    Both surfaces may lie in space. Their product is the ratio of areas, their quotient what a
+    conformal map keeps at one. Takes two :func:`first_form`; that of the rest needs an area.
+
+    >>> [round(float(s), 12) for s in principal_stretches((1.0, 0.0, 1.0), (4.0, 0.0, 9.0))]
+    [3.0, 2.0]
+    """
+    e, f, g = rest
+    area2 = e * g - f * f
+    m11 = image[0] / e
+    m12 = (image[1] - f * m11) / ops.sqrt(area2)
+    m22 = (image[2] * e - 2.0 * f * image[1] + f * f * m11) / area2
+    middle, half = 0.5 * (m11 + m22), ops.sqrt(0.25 * (m11 - m22) * (m11 - m22) + m12 * m12)
+    return ops.sqrt(middle + half), ops.sqrt(middle - half)

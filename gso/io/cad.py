@@ -1,0 +1,108 @@
+"""B-spline surfaces as CAD files."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from os import PathLike
+from typing import Any, NamedTuple
+
+from gso.io.atomic import check_writable, replacing
+from gso.io.svg import MILLIMETRES
+from gso.spline import BSplineSurface
+from gso.status import GSOError, MeshError, OptionError
+
+
+class _Format(NamedTuple):
+    """Module and function that write a format, and the package they need."""
+
+    module: str
+    write: str
+    package: str
+    name: str
+
+
+_STEP = _Format("opencascade", "step", "OCP", "OpenCASCADE (cadquery-ocp-novtk)")
+_IGES = _STEP._replace(write="iges")
+_RHINO = _Format("rhino", "write", "rhino3dm", "rhino3dm")
+_FORMATS = {".step": _STEP, ".stp": _STEP, ".iges": _IGES, ".igs": _IGES, ".3dm": _RHINO}
+
+SPLINE_SUFFIXES = tuple(_FORMATS)
+"""Suffixes of the CAD files that are written."""
+
+
+def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
+    """Refuse a CAD file that cannot be written, before anything is computed.
+
+    Raises
+    ------
+    MeshError
+        Unknown suffix, no such folder, no permission.
+    OptionError
+        Unknown unit.
+    GSOError
+        The package that writes the format is not there, or lacks a library of the system
+        (OpenCASCADE: libGL); the message says which.
+    """
+    check_writable(path, SPLINE_SUFFIXES)
+    if unit not in MILLIMETRES:
+        raise OptionError(f"unknown unit {unit!r}; use {', '.join(MILLIMETRES)}")
+    form = _FORMATS[_suffix(path)]
+    try:
+        importlib.import_module(form.package)
+    except ImportError as error:
+        missing = isinstance(error, ModuleNotFoundError)
+        what = 'pip install "gso[cad]"' if missing else f"it is there but cannot be loaded: {error}"
+        raise GSOError(
+            f"{os.fsdecode(path)}: {_suffix(path)} files need {form.name}: {what}"
+        ) from None
+
+
+def save_spline(spline: BSplineSurface, path: str | PathLike[str], *, unit: str = "mm") -> None:
+    """Write a B-spline surface to a CAD file: the same control net, knots and degrees.
+
+    An existing file is replaced only when the new one is complete.
+
+    Parameters
+    ----------
+    spline : BSplineSurface
+        From :func:`gso.fit_spline`, or the `spline` of a result.
+    path : str or PathLike
+        A .step, .stp, .iges, .igs or .3dm file.
+    unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
+        Unit of the control points, which is written into the file. STEP and IGES do not know
+        "dm" and "yd": the surface is then written in millimetres.
+
+    Raises
+    ------
+    MeshError
+        Unknown suffix, a path that cannot be written, or a surface that the format cannot
+        hold. The message names the file.
+    OptionError
+        Unknown unit, or `spline` is none.
+    GSOError
+        The package that writes the format is not installed: ``pip install "gso[cad]"``.
+
+    Examples
+    --------
+    >>> import gso, numpy as np
+    >>> u, v = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9), indexing="ij")
+    >>> spline = gso.fit_spline(np.stack([u, v, 0.3 * u * v], axis=-1), controls=4)
+    >>> gso.save_spline(spline, "panel.step", unit="m")              # doctest: +SKIP
+    """
+    if not isinstance(spline, BSplineSurface):
+        raise OptionError(
+            f"a spline is needed, not {type(spline).__name__}; gso.fit_spline makes one of a grid"
+        )
+    check_spline(path, unit)
+    form = _FORMATS[_suffix(path)]
+    write: Any = getattr(importlib.import_module(f"gso.io.{form.module}"), form.write)
+    with replacing(path) as file:
+        try:
+            file.write(write(spline, unit))
+        except MeshError as error:
+            raise MeshError(f"{os.fsdecode(path)}: {error}") from None
+
+
+def _suffix(path: str | PathLike[str]) -> str:
+    return os.path.splitext(os.fsdecode(path))[1].lower()

@@ -1,0 +1,138 @@
+"""STEP (AP214) and IGES (5.3), through OpenCASCADE."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from gso.io.svg import MILLIMETRES
+from gso.spline import BSplineSurface
+from gso.status import MeshError
+
+#: OpenCASCADE's names of the units that both formats know; IGES has another one for inches.
+_UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
+
+#: All digits of a double. The writers' own formats keep ten, and cut exponents off when they
+#: are asked for more.
+_FORMAT = "%.16E"
+
+#: OpenCASCADE's smallest distance between points, in the unit of the file.
+_TOLERANCE = 1e-7
+
+
+def step(spline: BSplineSurface, unit: str) -> bytes:
+    """Contents of a STEP file with one face, bounded by the edges of the surface."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
+    from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
+    from OCP.StepData import StepData_StepWriter
+
+    kind = STEPControl_StepModelType.STEPControl_ShellBasedSurfaceModel
+    surface, name = _converted(spline, unit)
+    with _quiet(), _settings({"write.step.unit": name, "xstep.cascade.unit": name}):
+        session = STEPControl_Writer()
+        session.Transfer(BRepBuilderAPI_MakeFace(surface, _TOLERANCE).Shape(), kind)
+        writer = StepData_StepWriter(session.Model())
+        writer.FloatWriter().SetFormat(_FORMAT, True)
+        writer.SendModel(session.WS().Protocol())
+    content = _printed(writer)
+    if b"B_SPLINE_SURFACE_WITH_KNOTS" not in content:
+        raise MeshError(
+            f"the surface has a side shorter than {_TOLERANCE:g} {unit}, which STEP takes for a "
+            "point; is the unit right?"
+        )
+    return content
+
+
+def iges(spline: BSplineSurface, unit: str) -> bytes:
+    """Contents of an IGES file with one B-spline surface, entity 128."""
+    from OCP.GeomToIGES import GeomToIGES_GeomSurface
+    from OCP.IGESControl import IGESControl_Writer
+    from OCP.IGESData import IGESData_IGESWriter
+    from OCP.IGESSelect import IGESSelect_WorkLibrary
+
+    surface, name = _converted(spline, unit)
+    with _quiet():
+        session = IGESControl_Writer("IN" if name == "INCH" else name, 0)
+        maker = GeomToIGES_GeomSurface()
+        maker.SetModel(session.Model())
+        maker.SetUnit(1.0)
+        ends = [k[i] for k in (spline.knots_u, spline.knots_v) for i in (0, -1)]
+        session.AddEntity(maker.TransferSurface(surface, *ends))
+        writer = IGESData_IGESWriter(session.Model())
+        writer.FloatWriter().SetFormat(_FORMAT, True)
+        writer.SendModel(IGESSelect_WorkLibrary.DefineProtocol_s())
+    return _printed(writer)
+
+
+def _converted(spline: BSplineSurface, unit: str) -> tuple[Any, str]:
+    """OpenCASCADE's surface in a unit that it knows, and the name of the unit."""
+    from OCP import collections
+    from OCP.Geom import Geom_BSplineSurface
+    from OCP.gp import gp_Pnt
+
+    known = unit in _UNITS
+    net = spline.net if known else spline.net * MILLIMETRES[unit]
+    n, m = net.shape[:2]
+    poles = collections.Array2_gp_Pnt(1, n, 1, m)
+    for i, row in enumerate(net.tolist(), 1):
+        for j, point in enumerate(row, 1):
+            poles.SetValue(i, j, gp_Pnt(*point))
+    knots, multiplicities = [], []
+    for every in (spline.knots_u, spline.knots_v):
+        different, count = np.unique(every, return_counts=True)
+        knots.append(_array(collections.Array1_double, different))
+        multiplicities.append(_array(collections.Array1_int, count))
+    surface = Geom_BSplineSurface(poles, *knots, *multiplicities, *spline.degrees)
+    return surface, _UNITS[unit if known else "mm"]
+
+
+def _array(kind: Any, values: Any) -> Any:
+    out = kind(1, len(values))
+    for k, value in enumerate(values.tolist(), 1):
+        out.SetValue(k, value)
+    return out
+
+
+def _printed(writer: Any) -> bytes:
+    """What a writer has to say."""
+    text = io.BytesIO()
+    if not writer.Print(text):
+        raise MeshError("OpenCASCADE could not write the surface")
+    return text.getvalue()
+
+
+@contextmanager
+def _settings(wanted: dict[str, str]) -> Iterator[None]:
+    """Set global parameters of OpenCASCADE for the time of a block."""
+    from OCP.Interface import Interface_Static
+    from OCP.STEPControl import STEPControl_Controller
+
+    STEPControl_Controller.Init_s()
+    before = {name: Interface_Static.CVal_s(name) for name in wanted}
+    try:
+        for name, value in wanted.items():
+            Interface_Static.SetCVal_s(name, value)
+        yield
+    finally:
+        for name, value in before.items():
+            Interface_Static.SetCVal_s(name, value)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep OpenCASCADE's reports of success off the standard output."""
+    from OCP.Message import Message, Message_Gravity
+
+    printers: Iterable[Any] = list(Message.DefaultMessenger_s().Printers())
+    levels = [printer.GetTraceLevel() for printer in printers]
+    try:
+        for printer in printers:
+            printer.SetTraceLevel(Message_Gravity.Message_Fail)
+        yield
+    finally:
+        for printer, level in zip(printers, levels, strict=True):
+            printer.SetTraceLevel(level)

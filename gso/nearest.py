@@ -1,0 +1,79 @@
+"""The point of a surface that is nearest to a given one."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+
+class Feet(NamedTuple):
+    """Nearest points of a surface.
+
+    Attributes
+    ----------
+    points : ndarray, (k, 3)
+        Where they are.
+    normals : ndarray, (k, 3)
+        Unit normals of the surface there, interpolated from its vertices.
+    distances : ndarray, (k,)
+        How far they are away.
+    """
+
+    points: Array
+    normals: Array
+    distances: Array
+
+
+class Nearest:
+    """Nearest points of a triangulated surface, by a tree of boxes that is built once.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The surface; cells are split as everywhere in the package.
+    normals : ndarray, (n, 3), optional
+        Unit normals at its vertices; only :meth:`feet` needs them.
+    """
+
+    def __init__(self, mesh: Mesh, normals: Array | None = None):
+        import igl
+
+        self._vertices = np.ascontiguousarray(mesh.vertices, np.float64)
+        self._triangles = np.ascontiguousarray(mesh.triangles, np.int64)
+        self._normals = normals
+        self._tree = igl.AABB()
+        self._tree.init(self._vertices, self._triangles)
+
+    def distances(self, points: Array) -> Array:
+        """Distance of every point (k, 3) from the surface, (k,)."""
+        return np.sqrt(self._query(points)[0])
+
+    def feet(self, points: Array) -> Feet:
+        """Nearest points, and the surface's normals there."""
+        assert self._normals is not None
+        squared, triangle, foot = self._query(points)
+        corner = self._triangles[triangle]
+        a, b, c = (self._vertices[corner[:, k]] for k in range(3))
+        opposite = [np.cross(c - b, foot - b), np.cross(a - c, foot - c), np.cross(b - a, foot - a)]
+        face = np.cross(b - a, c - a)
+        # Areas opposite to the corners, signed by the triangle's own normal.
+        share = np.stack([np.einsum("kd,kd->k", x, face) for x in opposite])
+        share = np.maximum(share, 0.0)
+        normals = np.einsum("jk,jkd->kd", share, self._normals[corner.T])
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        first = self._normals[corner[:, 0]]
+        normals = np.divide(normals, length, out=first.copy(), where=length > 1e-12 * length.max())
+        return Feet(foot, normals, np.sqrt(squared))
+
+    def _query(self, points: Array) -> tuple[Array, NDArray[np.int64], Array]:
+        queries = np.ascontiguousarray(points, np.float64)
+        squared, triangle, foot = self._tree.squared_distance(
+            self._vertices, self._triangles, queries
+        )
+        return np.maximum(squared, 0.0), np.asarray(triangle).ravel(), np.asarray(foot)

@@ -1,0 +1,77 @@
+"""Histograms of numbers per surface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.plot.draw import write
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+_BARS = 40
+_WIDTH, _HEIGHT = 3.4, 2.6
+
+
+def plot_histograms(
+    values: Mapping[str, Mapping[str, Array]],
+    limits: Mapping[str, tuple[float, float]],
+    *,
+    path: str | PathLike[str] | None = None,
+) -> Figure:
+    """Draw a histogram per quantity, a line per group.
+
+    Parameters
+    ----------
+    values : dict of dict of ndarray, (n,)
+        Numbers by quantity and group; each group's shares sum to one.
+    limits : dict of (float, float)
+        Range of each quantity; what lies beyond is in the last bar.
+    path : str or PathLike, optional
+        A .png, .pdf or .svg file to write.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    GSOError
+        Matplotlib is not installed.
+    MeshError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> figure = plot_histograms({"K": {"train": np.ones(3), "test": np.zeros(2)}}, {"K": (0, 1)})
+    >>> [len(axes.patches) for axes in figure.axes]
+    [2]
+    """
+    from gso.plot import require
+
+    require()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(_WIDTH * len(values), _HEIGHT), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    for axes, (name, groups) in zip(
+        figure.subplots(1, len(values), squeeze=False)[0], values.items(), strict=True
+    ):
+        low, high = limits[name]
+        for label, numbers in groups.items():
+            inside = np.clip(numbers, low, high)
+            share = np.full(len(inside), 1.0 / max(len(inside), 1))
+            axes.hist(inside, _BARS, range=(low, high), weights=share, histtype="step", label=label)
+        axes.set_xlabel(name)
+        axes.set_yticks([])
+        axes.spines[["top", "left", "right"]].set_visible(False)
+    figure.axes[0].legend(frameon=False, fontsize=8)
+    return write(figure, path)

@@ -1,0 +1,91 @@
+"""Which of many lines to keep so that they cover a surface evenly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.mesh import Mesh
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Rounds in which lines move to the middle of what is nearest to them.
+_ROUNDS = 10
+
+
+def spread(points: Array, count: int) -> Ints:
+    """Numbers of `count` points (n, 3) far from each other, fewer if there are not as many.
+
+    The first is the one farthest from the centroid, each other one the farthest from those
+    before it (Gonzalez 1985).
+
+    >>> spread(np.array([[0.0, 0, 0], [1, 0, 0], [5, 0, 0], [9, 0, 0]]), 3)
+    array([3, 0, 2])
+    """
+    if not len(points):
+        return np.empty(0, np.int64)
+    at = int(((points - points.mean(axis=0)) ** 2).sum(axis=1).argmax())
+    nearest = np.full(len(points), np.inf)
+    found = []
+    for _ in range(min(count, len(points))):
+        found.append(at)
+        np.minimum(nearest, ((points - points[at]) ** 2).sum(axis=1), out=nearest)
+        at = int(nearest.argmax())
+    return np.array(found)
+
+
+def region_areas(mesh: Mesh, points: Array, triangles: Ints) -> Array:
+    """Area of the triangles (numbers) whose middles are nearest to each of the points (s, 3)."""
+    from scipy.spatial import cKDTree
+
+    if not len(points):
+        return np.empty(0)
+    p = mesh.vertices[mesh.triangles[triangles]]
+    area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
+    owner = cKDTree(points).query(p.mean(axis=1))[1]
+    return np.asarray(np.bincount(owner, area, len(points)), float)
+
+
+def chosen(points: Array, lines: Sequence[Array], count: int, weights: Array) -> Ints:
+    """Numbers of `count` lines from which all points are near, in ascending order.
+
+    The weighted sum of the points' squared distances to the nearest line is made small by
+    k-medoids (Kaufman and Rousseeuw 1990): lines are taken one by one, the best each time;
+    then each gives way to the best one through the points that are nearest to it.
+
+    Parameters
+    ----------
+    points : ndarray, (s, 3)
+        What is to be covered.
+    lines : sequence of ndarray, (k_i, 3)
+        A polyline through each of them, finely divided.
+    count : int
+        How many to keep.
+    weights : ndarray, (s,)
+        What each point counts.
+    """
+    from scipy.spatial import cKDTree
+
+    if len(lines) <= count:
+        return np.arange(len(lines))
+    cost = np.stack([cKDTree(line).query(points)[0] for line in lines], axis=1) ** 2
+    cost *= weights[:, None]
+    kept: list[int] = []
+    nearest = np.full(len(lines), np.inf)
+    while len(kept) < count:
+        kept.append(int(np.minimum(cost, nearest[:, None]).sum(axis=0).argmin()))
+        nearest = np.minimum(nearest, cost[:, kept[-1]])
+    for _ in range(_ROUNDS):
+        owner = cost[:, kept].argmin(axis=1)
+        groups = [np.flatnonzero(owner == k) for k in range(count)]
+        better = [
+            int(g[cost[np.ix_(g, g)].sum(axis=0).argmin()]) if g.size else line
+            for g, line in zip(groups, kept, strict=True)
+        ]
+        if better == kept:
+            break
+        kept = better
+    return np.unique(kept)

@@ -1,0 +1,142 @@
+"""Bend a surface by its handles and keep the lengths in it.
+
+The objective, on the design scaled to the unit ball, is
+
+    1/2 mean E_iso + w_edges / 2 mean (change of l^2)^2
+    + w_bending / 2 mean |change of curvature|^2
+
+with E_iso the squared differences of squared diagonals of Jiang et al. 2020, relative to the
+mean one, and l the edges' lengths, likewise. Diagonals alone leave the two checkerboard
+lattices of a quad mesh all but loose, which is what the edges are for; and lengths do not say
+which of many isometric shapes is wanted. The change of bending does, measured in the surface's
+own frame: a design without handles, or with handles that move rigidly, keeps its shape. Like
+their weight of fairness, that of bending falls tenfold from stage to stage: stiff sheets find
+their shape in few steps, pliable ones keep their lengths.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import metrics as measure
+from gso.constraints import Pins
+from gso.handle_start import Spread, follow
+from gso.mesh import Mesh
+from gso.status import OptionError, Status
+from gso.tasks import held
+from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.options import Options as BaseOptions
+from gso.terms import Weighted, bending, congruence
+from gso.variables import Layout, Variables, free
+
+Array = NDArray[np.float64]
+
+FORMULATIONS = ("isometry",)
+
+#: Relative fall of the energy at which a stage that only prepares another one stops.
+_NEARLY = 1e-3
+
+
+@dataclass(frozen=True)
+class Options(BaseOptions):
+    """Settings of the bend task.
+
+    Attributes
+    ----------
+    w_bending : float
+        Weight of the mean squared change of curvature, in units of the design's unit ball.
+        About the strain that is left in a sheet that could bend without any.
+    stiff : float
+        The same in the first stage; it falls tenfold from stage to stage.
+    w_edges : float
+        Weight of the edges' squared lengths, relative to that of the faces' diagonals.
+    """
+
+    PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
+        "fast": {"w_bending": 1e-5, "tolerance": 1e-2},
+        "balanced": {},
+        "accurate": {"w_bending": 1e-8, "tolerance": 1e-8, "iterations": 60},
+    }
+
+    iterations: int = 30
+    tolerance: float = 1e-4
+    method: str = "levenberg-marquardt"
+    w_bending: float = 1e-6
+    stiff: float = 1e-2
+    w_edges: float = 0.1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.w_bending > 0:
+            raise OptionError(
+                f"w_bending is {self.w_bending!r}; without it the shape is not determined: "
+                "it must be positive"
+            )
+
+
+def plan(request: Request) -> Plan:
+    """Stages from a surface that follows its handles smoothly to one that keeps its lengths."""
+    mesh, options = request.mesh, request.options
+    layout = Layout.of(len(mesh.vertices), "surface")
+    if request.constraints.empty and request.start is None:
+        return Plan(layout, mesh.vertices.ravel(), status=Status.ALREADY_GOOD)
+    weights = [options.w_bending]
+    while request.start is None and weights[-1] < 0.3 * options.stiff:
+        weights.append(10.0 * weights[-1])
+    lengths = [Weighted(t, 1.0) for t in congruence.build(mesh, "surface")]
+    lengths.append(Weighted(congruence.edges(mesh, "surface"), options.w_edges))
+    change = bending.build(mesh)
+    pulls = held.pulls(request)
+    stages = [
+        Stage(
+            f"bending {weight:.0e}",
+            layout,
+            [*lengths, *(Weighted(t, weight) for t in change), *pulls],
+            partial(_unknowns, request, layout),
+            iterations=options.iterations,
+            tolerance=_NEARLY,
+        )
+        for weight in weights[::-1]
+    ]
+    stages[-1].tolerance = options.tolerance
+    return Plan(layout, _start(request).ravel(), stages)
+
+
+def _unknowns(request: Request, layout: Layout, coordinates: Array) -> Variables:
+    return held.hold(request, free(layout))
+
+
+def _start(request: Request) -> Array:
+    """Vertices that follow their handles: those of the design, or of the user's start."""
+    mesh = request.mesh
+    pins = [p for hard in (True, False) for p in request.constraints.of(Pins, hard=hard)]
+    every = np.concatenate([np.zeros(0, np.int64), *(p.ids for p in pins)])
+    ids, first = np.unique(every, return_index=True)
+    targets = np.concatenate([np.zeros((0, 3)), *(p.positions for p in pins)])[first]
+    if request.start is not None:
+        mesh = mesh.replaced(request.start)
+        return mesh.vertices + Spread(mesh, ids)(targets - mesh.vertices[ids])
+    return follow(mesh, Spread(mesh, ids), targets)
+
+
+def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict[str, float]:
+    """How well lengths are kept, and how the surface is curved; units: :data:`gso.metrics.INFO`.
+
+    ``loss_iso_cell`` is left out on a mesh without quads.
+    """
+    strain = measure.principal_strains(before, after)
+    out = {
+        "loss_iso_cell": measure.loss_iso_cell(before, after),
+        "edge_length_error": measure.edge_length_error(before, after),
+        "strain_mean": strain.mean,
+        "strain_p99": strain.p99,
+        "strain_max": float(strain.values.max()),
+        "loss_gc_before": measure.loss_gc(before, scale=scale),
+        "loss_gc": measure.loss_gc(after, scale=scale),
+    }
+    return {name: value for name, value in out.items() if not np.isnan(value)}

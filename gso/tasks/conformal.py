@@ -1,0 +1,175 @@
+"""Lay a surface out in the plane with its angles kept.
+
+The objective, on the design scaled to the unit ball, is
+
+    1/2 mean E_conf + w_scale / 2 mean (s - 1)^2 + w_shear / 2 mean |shear|^2
+
+with E_conf the squared differences of squared lengths of Jiang et al. 2020, those of a face in
+space multiplied by its own s, which is unknown too. A disk has many conformal maps: of these,
+the second term takes the one that changes lengths least. The third, of the corner triangles,
+holds the two checkerboard lattices of a quad mesh together. The solve starts from an image
+without flips that is as rigid as possible, which is near that map, and no step turns a
+triangle over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import flat_start, limits
+from gso import metrics as measure
+from gso.mesh import Mesh
+from gso.status import OptionError
+from gso.tasks import held
+from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.options import Options as BaseOptions
+from gso.terms import Weighted, congruence, scale, shear
+from gso.variables import Layout, Variables, free
+
+Array = NDArray[np.float64]
+
+FORMULATIONS = ("isometry",)
+BLOCK = "flat"
+
+#: Weights with which a start is drawn to its constraints, one after the other.
+_DRAWN = (1.0, 30.0)
+
+
+@dataclass(frozen=True)
+class Options(BaseOptions):
+    """Settings of the conformal task.
+
+    Attributes
+    ----------
+    w_scale : float
+        Weight of the faces' squared scales' distance from one: about the angle distortion
+        that is left.
+    w_shear : float
+        Weight of the squared shear of the corner triangles; much above `w_scale`, it is what
+        is minimised.
+    relax_iterations : int
+        Largest number of local and global steps before the solve.
+    """
+
+    PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
+        "fast": {"iterations": 5, "w_scale": 1e-3, "w_shear": 1e-2},
+        "balanced": {},
+        "accurate": {"iterations": 100, "tolerance": 1e-10, "w_scale": 1e-6, "w_shear": 1e-5},
+    }
+
+    iterations: int = 40
+    tolerance: float = 1e-6
+    method: str = "levenberg-marquardt"
+    w_scale: float = 1e-4
+    w_shear: float = 1e-3
+    relax_iterations: int = 100
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (self.w_scale > 0 and self.w_shear > 0):
+            raise OptionError(
+                "w_scale and w_shear must be positive: without them the map is not determined"
+            )
+
+
+def plan(request: Request) -> Plan:
+    """One stage from an image without flips.
+
+    Raises
+    ------
+    MeshError
+        A component is closed or has handles: it must be cut open first.
+    """
+    mesh, options = request.mesh, request.options
+    layout = Layout((("flat", len(mesh.vertices), 2), ("scale", len(mesh.faces), 1)))
+    notes: list[str] = []
+    given = flat_start.given(mesh, request.start, notes)
+    flat = given
+    if flat is None:
+        flat = flat_start.begin(mesh, iterations=options.relax_iterations).flat
+    items = [Weighted(t, 1.0) for t in congruence.build(mesh, "flat", scale="scale")]
+    items += [Weighted(scale.build(mesh), options.w_scale)]
+    items += [Weighted(t, options.w_shear) for t in shear.build(mesh)]
+    stage = Stage(
+        "conformal",
+        layout,
+        items,
+        partial(_unknowns, None, layout),
+        iterations=options.iterations,
+        tolerance=options.tolerance,
+        limits=[limits.orientation(flat_start.upward(mesh), layout)],
+    )
+    stages = [stage]
+    if not request.constraints.empty:
+        if given is None:
+            flat = flat_start.align(mesh, flat, request.constraints)
+        stages = _bound(request, stage)
+    return Plan(
+        layout,
+        layout.pack({"flat": flat, "scale": _area_ratios(mesh, flat)}),
+        stages,
+        notes=notes,
+        finish=partial(_finish, request, layout, given),
+    )
+
+
+def _bound(request: Request, stage: Stage) -> list[Stage]:
+    """A stage under constraints: first the image is drawn to them, then it keeps them."""
+    steps = [
+        replace(stage, name="approach", items=stage.items + held.drawn(request, weight))
+        for weight in _DRAWN
+    ]
+    holding = partial(_unknowns, request, stage.layout)
+    return [*steps, replace(stage, items=stage.items + held.pulls(request), variables=holding)]
+
+
+def _unknowns(request: Request | None, layout: Layout, coordinates: Array) -> Variables:
+    return free(layout) if request is None else held.hold(request, free(layout))
+
+
+def _area_ratios(mesh: Mesh, flat: Array) -> Array:
+    """Area of every face in an image over that on the surface; one where there is none."""
+    large, small = measure.stretches(mesh, flat)
+    return np.where(np.isnan(large), 1.0, large * small)
+
+
+def _finish(request: Request, layout: Layout, given: Array | None, coordinates: Array) -> Array:
+    """The image with the surface's area, in its place; as it is when it is tied to one.
+
+    The scales are those of lengths from here on: image over surface.
+    """
+    blocks = layout.split(coordinates)
+    flat, ratio = blocks["flat"], blocks["scale"]
+    if not request.constraints.empty:
+        flat = flat_start.settle(request.mesh, flat, request.constraints)
+    else:
+        factor = _area(request.mesh, request.mesh.vertices) / _area(request.mesh, flat)
+        flat = flat_start.place(request.mesh, flat * np.sqrt(factor), given)
+        ratio = ratio * factor
+    return layout.pack({"flat": flat, "scale": np.sqrt(np.maximum(ratio, 0.0))})
+
+
+def _area(mesh: Mesh, points: Array) -> float:
+    """Area of a surface (n, 3) or of its image (n, 2), doubled."""
+    p, q, r = (np.pad(points[k], ((0, 0), (0, 3 - points.shape[1]))) for k in mesh.triangles.T)
+    return float(np.linalg.norm(np.cross(q - p, r - p), axis=1).sum())
+
+
+def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[str, float]:
+    """Metrics of a conformal image (n, 2) of `mesh`; units: :data:`gso.metrics.INFO`."""
+    distortion = measure.quasi_conformal(mesh, flat) - 1.0
+    distortion = distortion[~np.isnan(distortion)]
+    lengths = np.sqrt(np.prod(measure.stretches(mesh, flat), axis=0))
+    return {
+        "angle_distortion_mean": float(distortion.mean()),
+        "angle_distortion_p99": float(np.percentile(distortion, 99)),
+        "scale_min": float(np.nanmin(lengths)),
+        "scale_max": float(np.nanmax(lengths)),
+        "area_error": measure.area_error(mesh, flat),
+        "flipped_cells": float(measure.flips(mesh, flat)),
+    }

@@ -1,0 +1,296 @@
+"""Developable by isometry: the surface and its flat image are solved for together.
+
+The objective of Jiang et al. 2020, on the design scaled to the unit ball, is
+
+    w_isometry / 2 mean E_iso + w_mapping / 2 mean E_reg + w_fairness / 2 (mean E_fair
+    + w_flat mean E_fair') + w_closest / 2 mean d_n^2 + w_place / 2 mean |u|^2
+
+with E_iso the squared differences of the faces' squared diagonals and their product between
+surface and plane, relative to the mean one, E_reg the regulariser of the mapping, E_fair and
+E_fair' the squared second derivatives of both, d_n the distance from the tangent plane at the
+closest point of the design, and u the displacement of a vertex from its own place, which
+keeps the mesh from sliding. Fairness starts strong and falls tenfold until E_iso is small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import flat_start, limits
+from gso import metrics as measure
+from gso.mesh import Mesh
+from gso.resample import coarser, resample
+from gso.status import OptionError, Status
+from gso.tasks import held, splined
+from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.options import Options as BaseOptions
+from gso.terms import Weighted, christoffel, congruence, fairness, proximity
+from gso.variables import Layout, Variables, free, vertex_normals
+
+Array = NDArray[np.float64]
+
+#: Fairness falls by this factor from stage to stage.
+_FALL = 10.0
+#: Relative fall of the energy at which a stage that only prepares another one stops.
+_NEARLY = 1e-3
+#: Iterations of the flat image alone, where the design needs no change.
+_UNROLL = 100
+
+
+@dataclass(frozen=True)
+class Options(BaseOptions):
+    """Settings of the developable task's formulation "isometry"; lengths in the unit ball.
+
+    Attributes
+    ----------
+    w_isometry : float
+        Weight of the mean squared isometry defect of the faces.
+    w_mapping : float
+        Weight of the mean squared difference of the polylines' second differences, seen in
+        the mesh itself, between surface and flat image.
+    w_fairness : float
+        Smallest weight of the mean squared second derivative.
+    stiff : float
+        Its weight at the start, which falls tenfold from stage to stage.
+    w_flat : float
+        Weight of the flat image's second derivative, relative to that of the surface's.
+    w_closest : float
+        Weight of the squared distance from the tangent plane at the closest point of the
+        design.
+    w_place : float
+        Weight of the squared displacement from where a vertex was.
+    enough : float
+        Fairness falls no further when the mean squared isometry defect is this small.
+    begin : {"curvature", "design"}
+        Start from the result of the formulation "curvature", or from the design itself.
+    variables : {"free", "surface"}
+        Free vertices, or (on grids) a last stage in the control points of a bicubic B-spline
+        surface, which the result then is: its `spline`.
+    controls : int
+        "surface": control points along each side; fewer on small grids.
+    coarse_size : int
+        "design": largest side of the coarsest grid; 0 for the design's own alone.
+    coarse_iterations : int
+        "design": iterations of each stage on coarser grids.
+    developable_below : float
+        A design whose mean |K| is below this is developable already: it comes back
+        untouched, with its flat image.
+    """
+
+    PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
+        "fast": {"iterations": 6},
+        "balanced": {},
+        "accurate": {"iterations": 40, "tolerance": 1e-5},
+        "jiang2020": {"begin": "design", "iterations": 15},
+    }
+
+    iterations: int = 15
+    tolerance: float = 1e-3
+    method: str = "levenberg-marquardt"
+    w_isometry: float = 100.0
+    w_mapping: float = 3.0
+    w_fairness: float = 1e-4
+    stiff: float = 1e-3
+    w_flat: float = 0.01
+    w_closest: float = 0.5
+    w_place: float = 0.5
+    enough: float = 1e-8
+    begin: str = "curvature"
+    variables: str = "free"
+    controls: int = 16
+    coarse_size: int = 32
+    coarse_iterations: int = 12
+    developable_below: float = 1e-3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.begin not in ("curvature", "design"):
+            raise OptionError(f"begin is {self.begin!r}; take 'curvature' or 'design'")
+        if self.variables not in ("free", "surface"):
+            raise OptionError(f"variables is {self.variables!r}; take 'free' or 'surface'")
+        if self.controls < 4:
+            raise OptionError(f"controls is {self.controls}; it must be 4 or more")
+        for name in ("w_isometry", "w_fairness"):
+            if not getattr(self, name) > 0:
+                raise OptionError(f"{name} must be positive")
+        if not self.w_closest + self.w_place > 0:
+            raise OptionError("w_closest or w_place must be positive, or nothing stays in place")
+
+
+def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
+    """Stages of the joint solve.
+
+    Parameters
+    ----------
+    request : Request
+        What is wanted; its options are those of this formulation.
+    curvature : callable
+        Makes the plan of the formulation "curvature", for the start.
+
+    Raises
+    ------
+    MeshError
+        A component is closed or has handles: it has no flat image.
+    OptionError
+        A bound on the displacement, which this formulation does not know.
+    """
+    mesh, options = request.mesh, request.options
+    if request.max_deviation is not None:
+        raise OptionError(
+            "max_deviation belongs to the formulation 'curvature'; leave it out, or raise w_place"
+        )
+    notes: list[str] = []
+    spline = splined.controls(request)
+    own = spline is None and request.start is None and request.constraints.empty
+    if own and measure.loss_gc(mesh, scale=1.0) <= options.developable_below:
+        return _unrolling(request, notes)
+    climb = own and options.begin == "design" and mesh.grid_index is not None
+    levels = coarser(mesh, options.coarse_size) if climb and options.coarse_size else []
+    before: list[Stage] = []
+    start = mesh.vertices if request.start is None else request.start
+    if not request.constraints.empty:
+        before = [held.approach(request, start)]
+    elif request.start is None and options.begin == "curvature":
+        first = curvature(request)
+        before, start, notes = first.stages, first.start.reshape(-1, 3), first.notes
+    stages = _chain(request, [*levels, mesh])
+    if levels:
+        start = levels[0].vertices
+    stages[0].enter = partial(_with_flat, levels[0] if levels else mesh)
+    stages = [*before, *stages]
+    if spline is not None:
+        stages.append(splined.stage(stages[-1], mesh, spline))
+    return Plan(
+        _layout(mesh),
+        start.ravel(),
+        stages,
+        notes=notes,
+        finish=partial(_place, mesh),
+        spline=spline,
+    )
+
+
+def _layout(mesh: Mesh) -> Layout:
+    return Layout.of(len(mesh.vertices), "surface", "flat")
+
+
+def _unrolling(request: Request, notes: list[str]) -> Plan:
+    """The design as it is, and its flat image."""
+    mesh, options = request.mesh, request.options
+    flat = flat_start.begin(mesh).flat
+    stage = _stage(request, mesh, 0.0)
+    stage = replace(
+        stage,
+        name="unroll",
+        items=[item for item in stage.items if item.term.name in ("isometry", "mapping")],
+        variables=partial(_flat_only, stage.layout),
+        iterations=max(options.iterations, _UNROLL),
+        tolerance=min(options.tolerance, 1e-8),
+    )
+    start = stage.layout.pack({"surface": mesh.vertices, "flat": flat})
+    place = partial(_place, mesh)
+    return Plan(
+        stage.layout, start, [stage], status=Status.ALREADY_GOOD, notes=notes, finish=place
+    )
+
+
+def _flat_only(layout: Layout, coordinates: Array) -> Variables:
+    from scipy.sparse import identity
+
+    start, count, _ = layout.where("flat")
+    basis = identity(layout.size, format="csc")[:, start : start + 2 * count].tocsr()
+    offset = coordinates.copy()
+    offset[start : start + 2 * count] = 0.0
+    return Variables(layout, basis, offset)
+
+
+def _chain(request: Request, levels: list[Mesh]) -> list[Stage]:
+    """Coarse to fine, on each grid with less and less fairness."""
+    options = request.options
+    weights = [options.w_fairness]
+    if request.start is None and options.begin == "design":
+        while weights[-1] < 0.3 * options.stiff:
+            weights.append(_FALL * weights[-1])
+    stages = []
+    for below, mesh in zip([None, *levels], levels, strict=False):
+        for k, weight in enumerate(weights[::-1]):
+            stage = _stage(request, mesh, weight)
+            if k == 0 and below is not None:
+                stage.enter = partial(_refine, below, mesh)
+            stage.iterations = options.coarse_iterations
+            if mesh is levels[-1]:
+                stage.iterations = options.iterations
+                stage.enough = partial(_isometric, mesh, options.enough)
+            stages.append(stage)
+    stages[-1].tolerance = options.tolerance
+    return stages
+
+
+def _stage(request: Request, mesh: Mesh, w_fairness: float) -> Stage:
+    layout = _layout(mesh)
+    name = "x".join(map(str, mesh.grid_shape or ("isometry",)))
+    return Stage(
+        f"{name}, fairness {w_fairness:.0e}",
+        layout,
+        _objective(request, mesh, w_fairness),
+        partial(_unknowns, request, mesh, layout),
+        tolerance=_NEARLY,
+        limits=[limits.orientation(flat_start.upward(mesh), layout)],
+    )
+
+
+def _objective(request: Request, mesh: Mesh, w_fairness: float) -> list[Weighted]:
+    o = request.options
+    normals = vertex_normals(mesh)
+    both = {"counterpart": "flat"}
+    items = [Weighted(t, o.w_isometry) for t in congruence.build(mesh, "surface", **both)]
+    items += [Weighted(t, o.w_mapping) for t in christoffel.build(mesh, "surface", **both)]
+    items.append(Weighted(fairness.build(mesh), w_fairness))
+    items.append(Weighted(fairness.build(mesh, block="flat"), o.w_flat * w_fairness))
+    if o.w_closest > 0:
+        items.append(Weighted(proximity.closest(mesh, normals), o.w_closest))
+    items.append(Weighted(proximity.build(mesh, normals), o.w_place))
+    return items + (held.pulls(request) if mesh is request.mesh else [])
+
+
+def _unknowns(request: Request, mesh: Mesh, layout: Layout, coordinates: Array) -> Variables:
+    variables = free(layout)
+    return held.hold(request, variables) if mesh is request.mesh else variables
+
+
+def _with_flat(mesh: Mesh, coordinates: Array) -> Array:
+    """A surface (n, 3) and a flat image of it."""
+    points = coordinates[: 3 * len(mesh.vertices)].reshape(-1, 3)
+    flat = flat_start.begin(mesh.replaced(points)).flat
+    return _layout(mesh).pack({"surface": points, "flat": flat})
+
+
+def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
+    """Displacement and flat image of a coarse grid, interpolated to a finer one."""
+    blocks = _layout(coarse).split(coordinates)
+    shape = fine.grid_shape
+    assert shape is not None
+    shift = (blocks["surface"] - coarse.vertices)[coarse.grid_index]
+    points = fine.vertices + resample(shift, *shape).reshape(-1, 3)
+    flat = resample(blocks["flat"][coarse.grid_index], *shape).reshape(-1, 2)
+    if flat_start.flips(fine, flat):
+        return _with_flat(fine, points.ravel())
+    return _layout(fine).pack({"surface": points, "flat": flat})
+
+
+def _isometric(mesh: Mesh, enough: float, coordinates: Array) -> bool:
+    blocks = _layout(mesh).split(coordinates)
+    return measure.isometry_energy(mesh.replaced(blocks["surface"]), blocks["flat"]) <= enough
+
+
+def _place(mesh: Mesh, coordinates: Array) -> Array:
+    blocks = _layout(mesh).split(coordinates)
+    surface = mesh.replaced(blocks["surface"])
+    flat = flat_start.place(surface, blocks["flat"], None)
+    return _layout(mesh).pack({"surface": blocks["surface"], "flat": flat})

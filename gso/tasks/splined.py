@@ -1,0 +1,67 @@
+"""A last stage whose unknowns are the control points of a B-spline surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from gso.fit import fitting_controls, grid_of
+from gso.mesh import Mesh
+from gso.status import OptionError
+from gso.tasks.base import Array, Request, Stage
+from gso.variables import Layout, Variables, spline_surface
+
+
+def controls(request: Request) -> tuple[int, int] | None:
+    """Control points along both sides of the grid; None when no spline is wanted.
+
+    Raises
+    ------
+    MeshError
+        The mesh is no grid.
+    OptionError
+        A bound or a hard constraint, which a spline of few control points cannot keep.
+    """
+    if request.options.variables != "surface":
+        return None
+    shape = grid_of(request.mesh).shape[:2]
+    if request.max_deviation is not None:
+        raise OptionError(
+            "max_deviation cannot be kept with variables='surface'; leave it out, or solve with "
+            "variables='normal' and give the result to gso.fit_spline"
+        )
+    compiled = request.constraints
+    hard = [compiled.names[part.owner] for part in compiled.parts if part.hard]
+    if hard:
+        raise OptionError(
+            f"{hard[0]} is hard, which variables='surface' cannot keep: its control points are "
+            "fewer than the vertices; give a handle with a weight, or solve with other variables "
+            "and give the result to gso.fit_spline"
+        )
+    return fitting_controls(request.options.controls, shape)
+
+
+def stage(before: Stage, mesh: Mesh, wanted: tuple[int, int]) -> Stage:
+    """The stage after one on the design's own vertices, with the same objective.
+
+    Its block "surface" is a B-spline, at first the one closest to where the stage before
+    ended; other blocks stay free.
+    """
+    unknowns = spline_surface(before.layout, grid_of(mesh).shape[:2], wanted)
+    return replace(
+        before,
+        name="surface",
+        variables=lambda _: unknowns,
+        enter=partial(_closest, unknowns),
+        eps=before.eps[-1:],
+        bounds=None,
+    )
+
+
+def closest(layout: Layout, mesh: Mesh, wanted: tuple[int, int], coordinates: Array) -> Array:
+    """Coordinates of the spline that is closest to others."""
+    return _closest(spline_surface(layout, grid_of(mesh).shape[:2], wanted), coordinates)
+
+
+def _closest(unknowns: Variables, coordinates: Array) -> Array:
+    return unknowns.points(unknowns.project(coordinates))

@@ -1,0 +1,109 @@
+"""Change of bending: second differences of a surface in its own moving frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gso import geometry, topology
+from gso.mesh import Mesh
+from gso.terms import fairness
+from gso.terms.base import Array, Term
+
+#: The frame moves with the surface.
+INVARIANT = ("translation", "rotation")
+
+#: Shortest edge, as a share of the typical one, that a curvature is divided by.
+_SHORTEST = 0.2
+
+
+def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """Curvature of a polyline at a vertex, minus what it is wanted to be.
+
+    With d the second difference of the points a, b, c, and e, f the chords along the polyline
+    and across it: d.e, d.f (the regulariser of Jiang et al. 2020, which holds the two
+    checkerboard lattices together), and d.n, with the unit normal n of the chords.
+
+    Points: a, b, c; the ends of f. Constants: a factor for each, then the wanted values.
+    """
+    a, b, c, p, q = points
+    d = geometry.second_difference(a, b, c)
+    return _in_frame(d, geometry.sub(c, a), geometry.sub(p, q), constants)
+
+
+def hinge_residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """The same for two triangles a b c and b a d: d is what their map lacks to be affine.
+
+    Points: a, b, c, d. Constants: their four coefficients, then those of :func:`residual`.
+    """
+    a, b, c, d = points
+    lack = tuple(
+        sum(w * x for w, x in zip(constants[:4], parts, strict=True))
+        for parts in zip(a, b, c, d, strict=True)
+    )
+    return _in_frame(lack, geometry.sub(b, a), geometry.sub(d, c), constants[4:])
+
+
+def _in_frame(d: Any, e: Any, f: Any, constants: Sequence[Any]) -> tuple[Any, ...]:
+    normal = geometry.cross(e, f)
+    along = geometry.dot(d, normal) / geometry.norm(normal)
+    parts = (geometry.dot(d, e), geometry.dot(d, f), along)
+    return tuple(s * x - t for s, x, t in zip(constants[:3], parts, constants[3:], strict=True))
+
+
+def build(mesh: Mesh, *, tangential: float = 1.0) -> list[Term]:
+    """Change of bending of the block "surface", whose own bending in `mesh` is wanted.
+
+    Residuals are differences of curvature, one over the mesh's unit of length; half their
+    mean square, both directions added up, is the energy. On meshes with triangles they
+    belong to the edges of the triangulation.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The surface as it is wanted to bend.
+    tangential : float
+        Factor on the residuals within the tangent plane.
+    """
+    v = mesh.vertices
+    if mesh.has_triangles:
+        stencil, coefficients = fairness.differences(mesh)
+        own, count = hinge_residual, float(len(stencil))
+        a, b, c, d = (v[stencil[:, k]] for k in range(4))
+        along, across, size = b - a, d - c, np.ones(len(stencil))
+    else:
+        stencil = topology.polyline_crosses(mesh.half_edges, mesh.faces)
+        coefficients, own, count = np.empty((0, len(stencil))), residual, len(stencil) / 2.0
+        a, b, c, d, e = (v[stencil[:, k]] for k in range(5))
+        along, across, size = c - a, d - e, _lengths(b - a, c - b) ** -2
+    constants = np.concatenate(
+        [
+            coefficients,
+            [size * tangential / _lengths(along), size * tangential / _lengths(across), size],
+            np.zeros((3, len(stencil))),
+        ]
+    )
+    points = [tuple(v[stencil[:, k]].T) for k in range(stencil.shape[1])]
+    constants[-3:] = own(points, list(constants))
+    return [
+        Term(
+            "bending",
+            own,
+            (("surface", stencil),),
+            weights=np.full(len(stencil), 1.0 / max(count, 1.0)),
+            constants=constants,
+        )
+    ]
+
+
+def _lengths(*vectors: Array) -> Array:
+    """Mean length of vectors (e, 3) by element, not much below the typical one."""
+    length = np.mean([np.linalg.norm(x, axis=1) for x in vectors], axis=0)
+    return np.maximum(length, _SHORTEST * length.mean() if len(length) else 0.0)
+
+
+def examples(mesh: Mesh) -> list[Term]:
+    """Terms for the conformance tests."""
+    return build(mesh, tangential=0.5)

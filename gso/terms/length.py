@@ -1,0 +1,42 @@
+"""Distances between vertices that are given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gso import geometry
+from gso.mesh import Mesh
+from gso.terms.base import Array, Ints, Term
+
+#: Turning or moving a mesh changes no length.
+INVARIANT = ("translation", "rotation")
+
+
+def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """``(l'^2 - l^2) / 2l``, which is ``l' - l`` where that is small, and has no kink at 0.
+
+    Constants: the wanted length, and a shift, 0 for a soft term.
+    """
+    length, shift = constants
+    square = geometry.norm2(geometry.sub(points[1], points[0]))
+    return ((square / length - length) * 0.5 + shift,)
+
+
+def build(pairs: Ints, lengths: Array, *, block: str = "surface", weight: float = 1.0) -> Term:
+    """Pairs of vertices (k, 2) of a block `lengths` (k,) apart, each with a weight."""
+    return Term(
+        "length",
+        residual,
+        ((block, pairs),),
+        weights=np.full(len(pairs), weight),
+        constants=np.stack([lengths, np.zeros(len(pairs))]),
+    )
+
+
+def examples(mesh: Mesh) -> list[Term]:
+    """Terms for the conformance tests."""
+    lengths = np.full(len(mesh.edges), 0.3)
+    return [build(mesh.edges, lengths), build(mesh.edges, lengths, block="flat")]

@@ -1,0 +1,320 @@
+"""Drag the handles of a surface: one or two iterations of the solver a frame."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gso.constraints import Constraint, Handle, Pins
+from gso.handle_start import Spread
+from gso.result import Result
+from gso.status import ConvergenceWarning, OptionError, Status
+from gso.tasks.base import Plan, Request, Stage
+from gso.terms import Weighted
+from gso.tno import linear
+from gso.tno.canonical import Canonical
+from gso.tno.direction import DIRECTIONS
+from gso.tno.optimize import check, judge, packed
+from gso.tno.problem import Problem
+from gso.tno.run import Outcome, Run
+from gso.tno.solver import minimise
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Most iterations of :meth:`Session.settle`.
+_SETTLED = 100
+
+
+class Session:
+    """A task that is solved again and again while its handles move.
+
+    The first solve is that of :func:`gso.tno.optimize`. From then on the last stage of the
+    task goes on from where it is: the pattern of its equations, their symbolic analysis and
+    the shape are kept, so that a frame costs one or two iterations. Hard handles are at
+    their positions after every :meth:`move`, to rounding; the surface catches up with them.
+
+    Parameters
+    ----------
+    mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, or path
+        The design, in any unit of length.
+    task, formulation, options, x0
+        As for :func:`gso.tno.optimize`; a task whose result is a surface.
+    constraints : sequence of Constraint
+        What the surface keeps, and the handles that can be moved.
+
+    Attributes
+    ----------
+    analyses : int
+        How many symbolic analyses there were: one, and one more for each
+        :meth:`constrain` that changes which vertices are held.
+
+    Raises
+    ------
+    MeshError, OptionError, BackendError
+        As for :func:`gso.tno.optimize`.
+
+    Examples
+    --------
+    >>> import numpy as np, gso
+    >>> sheet = np.dstack([*np.mgrid[:9.0, :9.0], np.zeros((9, 9))])
+    >>> fixed, hand = gso.Fixed(np.arange(18)), gso.Handle([76], [[8.0, 4.0, 0.0]])
+    >>> session = gso.tno.Session(sheet, constraints=[fixed, hand])
+    >>> for height in (0.5, 1.0, 1.5, 2.0):
+    ...     session.move([76], [[8.0 - height**2 / 8, 4.0, height]])
+    ...     vertices = session.step()
+    >>> vertices[76]
+    array([7.5, 4. , 2. ])
+    >>> session.settle().metrics["edge_length_error"] < 1e-3
+    True
+    """
+
+    def __init__(
+        self,
+        mesh: Any,
+        *,
+        task: str = "bend",
+        formulation: str | None = None,
+        options: Any = None,
+        constraints: Sequence[Constraint] = (),
+        x0: Any = None,
+    ):
+        from gso.io import as_mesh
+
+        self._design = as_mesh(mesh)
+        self._module, self._formulation, self._options = check(task, formulation, options)
+        if getattr(self._module, "BLOCK", "surface") == "flat":
+            raise OptionError(f"task {task!r} makes no surface that handles could move")
+        self._task = task
+        self._frame = Canonical(self._design)
+        self._run = Run(self._module, None)
+        self.analyses = 0
+        self._constraints: list[Constraint] = []
+        self._spread: Spread | None = None
+        self._solver: Any = None
+        self._problem: Problem | None = None
+        self._direction = DIRECTIONS[self._options.method]()
+        self._plan = self._planned(constraints, self._frame.start(x0, flat=False))
+        self._coordinates = self._solved(self._plan)
+        self._status = self._plan.status or Status.CONVERGED
+        self._pose()
+
+    @property
+    def vertices(self) -> Array:
+        """Where the surface is, (n, 3), in the user's frame and numbering."""
+        return self._frame.frame.to_user(self._frame.back("surface", self._surface))
+
+    def move(self, ids: ArrayLike, positions: ArrayLike) -> None:
+        """Move vertices that have a :class:`gso.Handle`.
+
+        The surface follows them smoothly, before any iteration.
+
+        Parameters
+        ----------
+        ids : array_like of int, (k,)
+            Vertex indices.
+        positions : array_like, (k, 3)
+            Where they go, in the unit of the mesh.
+
+        Raises
+        ------
+        OptionError
+            A vertex has no handle, or the positions are not k finite points.
+        """
+        asked = Handle(ids, positions)
+        self._frame.constraints([asked], flat=False)
+        where = {
+            int(i): p for i, p in zip(np.atleast_1d(ids), np.atleast_2d(positions), strict=True)
+        }
+        moved = [_moved(c, where) for c in self._constraints]
+        held = {int(i) for c in moved if isinstance(c, Handle) for i in np.atleast_1d(c.ids)}
+        loose = sorted(set(where) - held)
+        if loose:
+            raise OptionError(f"vertex {loose[0]} has no handle; name one with constrain()")
+        compiled = self._frame.constraints(moved, flat=False)
+        before = self._pins()[1]
+        self._constraints, self._request.constraints = moved, compiled
+        ids, after = self._pins()
+        self._follow(ids, after - before)
+        self._pose()
+
+    def constrain(self, constraints: Sequence[Constraint]) -> None:
+        """Take other constraints, handles among them; the surface stays where it is.
+
+        Raises
+        ------
+        OptionError
+            They contradict each other, or something in them is wrong.
+        """
+        previous = self._plan.layout, self._coordinates
+        self._plan = self._planned(constraints, self._surface)
+        if self._plan.layout == previous[0]:
+            self._coordinates = previous[1]
+        else:
+            self._coordinates = self._plan.start
+        c = self._request.constraints
+        if self._stage is not None:
+            self._follow(c.hard_ids, c.hard_positions - self._surface[c.hard_ids])
+        self._pose()
+
+    def step(self, iterations: int = 1) -> Array:
+        """Go on with the solve.
+
+        Parameters
+        ----------
+        iterations : int
+            Most iterations; fewer when nothing is left to gain.
+
+        Returns
+        -------
+        ndarray, (n, 3)
+            :attr:`vertices`.
+        """
+        self._iterate(iterations, 0.0)
+        return self.vertices
+
+    def settle(self) -> Result:
+        """Iterate until the task's tolerance is met, and return the :meth:`result`."""
+        stage = self._stage
+        if stage is not None:
+            self._iterate(_SETTLED, stage.tolerance)
+            if self._status is Status.MAX_ITERATIONS:
+                warnings.warn(str(self._status), ConvergenceWarning, stacklevel=2)
+        return self.result()
+
+    def result(self) -> Result:
+        """The surface as it is, as a result of :func:`gso.tno.optimize`."""
+        plan, stage = self._plan, self._stage
+        finished = plan.finish(self._coordinates)
+        outcome = Outcome(
+            plan.layout.split(finished), self._status, {"objective": 0.0}, notes=tuple(plan.notes)
+        )
+        outcome.details, outcome.spline = dict(plan.details), plan.spline
+        if stage is not None and self._problem is not None:
+            outcome.energy = self._problem.by_term(self._x)
+            outcome.backend = self._solver.name
+        judge(self._request, self._frame, outcome)
+        result = packed(
+            self._task, self._formulation, self._design, self._frame, outcome, self._run
+        )
+        result.warm_start = "session"
+        return result
+
+    @property
+    def _surface(self) -> Array:
+        """Vertices (n, 3) in the solver's frame and numbering."""
+        return self._plan.layout.split(self._coordinates)["surface"]
+
+    @property
+    def _stage(self) -> Stage | None:
+        return self._plan.stages[-1] if self._plan.stages else None
+
+    def _solved(self, plan: Plan) -> Array:
+        """Coordinates of the last stage after all stages."""
+        coordinates, enough = plan.start, False
+        for number, stage in enumerate(plan.stages):
+            place = number, len(plan.stages)
+            coordinates = stage.enter(coordinates)
+            if not enough:
+                coordinates, _ = self._run.solve(self._options, place, stage, coordinates)
+                enough = stage.enough is not None and stage.enough(coordinates)
+        return coordinates
+
+    def _planned(self, constraints: Sequence[Constraint], start: Array | None) -> Plan:
+        """What the task makes of constraints; they are checked first."""
+        compiled = self._frame.constraints(constraints, flat=False)
+        given = (constraints,) if isinstance(constraints, Constraint) else constraints
+        request = Request(self._frame.mesh, self._options, self._formulation, compiled, start)
+        plan = self._module.plan(request)
+        if not plan.stages and plan.status is not Status.ALREADY_GOOD:
+            raise OptionError(f"task {self._task!r} has no iterations to go on with")
+        self._request, self._constraints, self._spread = request, list(given), None
+        return plan
+
+    def _follow(self, ids: Ints, displacement: Array) -> None:
+        """Take the surface along with vertices (k,) that are displaced (k, 3)."""
+        if self._stage is None or not len(ids):
+            return
+        if self._spread is None or not np.array_equal(self._spread.ids, ids):
+            self._spread = Spread(self._frame.mesh, ids)
+        start, count, dim = self._stage.layout.where("surface")
+        self._coordinates = self._coordinates.copy()
+        surface = self._coordinates[start : start + count * dim].reshape(count, dim)
+        surface += self._spread(displacement)
+
+    def _pins(self) -> tuple[Ints, Array]:
+        """Vertices with a place, each once, and where that is."""
+        c = self._request.constraints
+        pins = [p for hard in (True, False) for p in c.of(Pins, hard=hard)]
+        every = np.concatenate([np.zeros(0, np.int64), *(p.ids for p in pins)])
+        ids, first = np.unique(every, return_index=True)
+        return ids, np.concatenate([np.zeros((0, 3)), *(p.positions for p in pins)])[first]
+
+    def _pose(self) -> None:
+        """Make the problem of the constraints and coordinates at hand."""
+        stage = self._stage
+        if stage is None:
+            self._problem = None
+            return
+        before = self._problem
+        variables = stage.variables(self._coordinates)
+        items = [self._aimed(item) for item in stage.items]
+        self._problem = Problem(items, variables, stage.limits, like=before)
+        if before is None or self._problem.pattern is not before.pattern:
+            self._solver = linear.choose(self._problem.pattern, self._options.backend)
+            self.analyses += 1
+        self._x = variables.project(self._coordinates)
+        self._coordinates = variables.points(self._x)
+
+    def _aimed(self, item: Weighted) -> Weighted:
+        """A term of the last stage, that of soft handles with their targets of now."""
+        if item.term.name != "position":
+            return item
+        wanted = np.full((len(self._design.vertices), 3), np.nan)
+        for pin in self._request.constraints.of(Pins, hard=False):
+            wanted[pin.ids] = pin.positions
+        targets = wanted[item.term.stencil[0][1][:, 0]].T.copy()
+        return replace(item, term=replace(item.term, constants=targets))
+
+    def _iterate(self, iterations: int, tolerance: float) -> None:
+        stage, problem = self._stage, self._problem
+        if stage is None or problem is None:
+            return
+        solution = minimise(
+            problem,
+            self._x,
+            iterations=iterations,
+            tolerance=tolerance,
+            eps=stage.eps[-1:],
+            robust=stage.robust,
+            bounds=None if stage.bounds is None else stage.bounds(self._coordinates),
+            solver=self._solver,
+            direction=self._direction,
+            threads=self._options.threads,
+            name=stage.name,
+            timings=self._run.timings,
+        )
+        self._x, self._status = solution.x, solution.status
+        self._coordinates = problem.variables.points(solution.x)
+        self._run.iterations += solution.iterations
+        self._run.history += solution.history
+        for item in stage.items:
+            if item.term.multipliers is not None:
+                item.term.multipliers.push(self._coordinates)
+
+
+def _moved(constraint: Constraint, where: dict[int, Array]) -> Constraint:
+    """A handle whose vertices, where they are named, have other positions."""
+    if not isinstance(constraint, Handle):
+        return constraint
+    ids = np.atleast_1d(constraint.ids)
+    positions = np.array(np.atleast_2d(constraint.positions), float)
+    for k, i in enumerate(ids):
+        if int(i) in where:
+            positions[k] = where[int(i)]
+    return replace(constraint, positions=positions)

@@ -1,0 +1,149 @@
+"""Sessions: handles move exactly, analyses are kept, the end is that of a solve at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gso
+from gso.mesh import Mesh
+from tests.conftest import saddle, shuffled
+from tests.test_bend import ends, rolled, sheet
+
+N = 15
+FIXED, HAND = ends(N)[: 2 * N], ends(N)[2 * N :]
+
+
+def bending(weight: float | None = None, **more) -> gso.tno.Session:
+    """A sheet with one end fixed and the other in hand."""
+    flat = sheet(N).reshape(-1, 3)
+    return gso.tno.Session(
+        sheet(N), constraints=[gso.Fixed(FIXED), gso.Handle(HAND, flat[HAND], weight)], **more
+    )
+
+
+def target(angle: float) -> np.ndarray:
+    """Where the end in hand goes when the sheet rolls up, its other end fixed."""
+    points = rolled(N, angle).reshape(-1, 3)
+    here, there = points[FIXED], sheet(N).reshape(-1, 3)[FIXED]
+    p, q = here - here.mean(axis=0), there - there.mean(axis=0)
+    u, _, vt = np.linalg.svd(q.T @ p)
+    turn = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
+    return (points[HAND] - here.mean(axis=0)) @ turn.T + there.mean(axis=0)
+
+
+def test_dragging_reuses_the_analysis_and_keeps_handles_exactly():
+    session = bending()
+    assert session.analyses == 1
+    for angle in np.linspace(0.1, 1.5, 15):
+        session.move(HAND, target(angle))
+        np.testing.assert_allclose(session.vertices[HAND], target(angle), atol=1e-12)
+        vertices = session.step()
+        np.testing.assert_allclose(vertices[HAND], target(angle), atol=1e-12)
+        np.testing.assert_allclose(vertices[FIXED], sheet(N).reshape(-1, 3)[FIXED], atol=1e-12)
+        bent = Mesh.from_grid(vertices.reshape(N, N, 3))
+        assert gso.metrics.edge_length_error(sheet(N), bent) < 2e-3
+    assert session.analyses == 1
+
+
+@pytest.mark.parametrize("weight", [None, 1.0])
+def test_a_settled_session_is_a_solve_at_once(weight):
+    session = bending(weight)
+    for angle in np.linspace(0.15, 1.5, 10):
+        session.move(HAND, target(angle))
+        session.step()
+    result = session.settle()
+    at_once = gso.tno.optimize(
+        sheet(N),
+        task="bend",
+        constraints=[gso.Fixed(FIXED), gso.Handle(HAND, target(1.5), weight)],
+    )
+    np.testing.assert_allclose(result.mesh.vertices, at_once.mesh.vertices, atol=5e-4)
+    assert sum(result.energy.values()) == pytest.approx(sum(at_once.energy.values()), rel=1e-3)
+    assert result.metrics.keys() == at_once.metrics.keys()
+    assert result.warm_start == "session" and result.backend == at_once.backend
+
+
+def test_a_surface_lags_less_than_a_frame_behind():
+    session = bending()
+    for angle in np.linspace(0.05, 1.0, 20):
+        session.move(HAND, target(angle))
+        vertices = session.step(2)
+    frame = np.linalg.norm(target(1.0) - target(0.95), axis=1).max()
+    lag = np.linalg.norm(session.settle().mesh.vertices - vertices, axis=1)
+    assert lag.max() < frame
+
+
+def test_constraints_can_change_and_only_then_are_analysed_again():
+    session = bending()
+    session.move(HAND, target(0.5))
+    session.step(3)
+    before = session.vertices
+    corner = HAND[-1]
+    session.constrain([gso.Fixed(FIXED), gso.Handle([corner], before[[corner]])])
+    assert session.analyses == 2
+    np.testing.assert_allclose(session.vertices, before, atol=1e-9)
+    session.move([corner], before[[corner]] + [0.0, 0.0, 0.1])
+    session.step()
+    assert session.analyses == 2
+    with pytest.raises(gso.OptionError, match=f"vertex {HAND[0]} has no handle"):
+        session.move([HAND[0]], before[[HAND[0]]])
+    free = session.settle()
+    assert free.metrics["edge_length_error"] < 1e-3
+
+
+def test_vertices_are_in_the_users_numbering_and_unit():
+    mesh = Mesh.from_grid(200.0 * saddle(9) + [1000.0, 0.0, 0.0])
+    mixed = shuffled(mesh, seed=2)
+    order = np.argsort(np.random.default_rng(2).permutation(len(mesh.vertices)))
+    ids = np.array([0, 8, 80])
+    goal = mesh.vertices[ids] + [[0, 0, 0], [0, 0, 0], [-10.0, 0, 20.0]]
+    sessions = []
+    for surface, own in ((mesh, ids), (mixed, order[ids])):
+        session = gso.tno.Session(
+            surface, constraints=[gso.Handle(own, surface.vertices[own])], options="accurate"
+        )
+        session.move(own, goal)
+        np.testing.assert_allclose(session.vertices[own], goal, atol=1e-9)
+        sessions.append(session.settle().mesh.vertices)
+    np.testing.assert_allclose(sessions[0], sessions[1][order], atol=0.05)
+
+
+def test_developable_surfaces_are_dragged_too():
+    grid = saddle(17, strength=0.2)
+    v = grid.reshape(-1, 3)
+    ids, soft = [0, 16, 288], [144]
+    session = gso.tno.Session(
+        grid,
+        task="developable",
+        constraints=[gso.Handle(ids, v[ids]), gso.Handle(soft, v[soft], weight=0.5)],
+    )
+    start = session.result()
+    for k in range(1, 6):
+        session.move([288], v[[288]] + [0, 0, 0.01 * k])
+        session.move(soft, v[soft] - [0, 0, 0.01 * k])
+        vertices = session.step()
+        np.testing.assert_allclose(vertices[ids[:2]], v[ids[:2]], atol=1e-12)
+    assert session.analyses == 1
+    end = session.settle()
+    assert end.metrics["loss_gc"] < 0.6 * start.metrics["loss_gc_before"]
+    assert vertices[144, 2] < v[144, 2] - 0.02
+
+
+def test_without_constraints_nothing_moves():
+    session = gso.tno.Session(saddle(9))
+    np.testing.assert_allclose(session.step(3), saddle(9).reshape(-1, 3), atol=1e-15)
+    assert session.result().status is gso.Status.ALREADY_GOOD
+
+
+def test_refusals():
+    with pytest.raises(gso.OptionError, match="flatten"):
+        gso.tno.Session(saddle(9), task="flatten")
+    with pytest.raises(gso.OptionError, match="denoise"):
+        gso.tno.Session(saddle(9), task="denoise")
+    session = bending()
+    for ids, positions in (([0], [[0, 0, np.nan]]), ([0], [[0, 0]]), ([999], [[0, 0, 0]])):
+        with pytest.raises(gso.OptionError):
+            session.move(ids, positions)
+    with pytest.raises(gso.OptionError, match="no handle"):
+        session.move([0], [[0.0, 0.0, 0.0]])
