@@ -122,6 +122,8 @@ class Plan:
     finish : callable
         What is done to the coordinates after the last stage without changing the
         objective: a flat image is put in its place.
+    remark : callable, optional
+        What the user should know of the coordinates of the result.
     spline : (int, int), optional
         Control points along both sides, where the last stage makes the surface a B-spline.
     """
@@ -134,6 +136,7 @@ class Plan:
     details: dict[str, Any] = field(default_factory=dict)
     finish: Callable[[Array], Array] = same
     fallback: Array | None = None
+    remark: Callable[[Array], list[str]] | None = None
     spline: tuple[int, int] | None = None
 
 

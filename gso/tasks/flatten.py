@@ -2,8 +2,9 @@
 
 ``strain`` minimises the membrane strain of all corner triangles: the sheet to cut.
 ``lengths`` minimises the published isometry defect of the cells, which is blind to some
-shear: a figure to compare. Both start from an image without flips, and no step turns a
-triangle over. Grids are solved coarse to fine.
+shear: a figure to compare. ``isometry`` minimises the squared defect of Jiang et al. 2020
+with their regulariser of the mapping: what the developable task's isometry does, with the
+surface as it is. All start from an image without flips, and no step turns a triangle over. Grids are solved coarse to fine.
 """
 
 from __future__ import annotations
@@ -22,14 +23,17 @@ from gso.resample import coarser
 from gso.status import OptionError
 from gso.tasks import held
 from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.joint import lengths_remark
 from gso.tasks.options import Options as BaseOptions
-from gso.terms import Weighted, collapse, edges, fairness, isometry, shear, stretch
+from gso.terms import Weighted, christoffel, collapse, congruence, edges, fairness, isometry, shear, stretch
 from gso.terms.losses import Absolute
 from gso.variables import Layout, Variables, free
 
 Array = NDArray[np.float64]
 
-FORMULATIONS = ("strain", "lengths")
+FORMULATIONS = ("strain", "lengths", "isometry")
+#: The formulation that a preset belongs to.
+IMPLIES = {"jiang2020": "isometry"}
 BLOCK = "flat"
 
 #: Strains below it are rounding errors, and are not told apart.
@@ -71,6 +75,9 @@ class Options(BaseOptions):
     w_fairness : float
         Weight of the mean squared second derivative of the flat image, in units of the
         surface's unit ball.
+    w_mapping : float
+        ``isometry``: weight of the mean squared difference of the polylines' second
+        differences, seen in the mesh itself, between surface and image.
     eps : float
         ``lengths``: differences of length below this share of the cells' diagonals count
         squared.
@@ -84,6 +91,7 @@ class Options(BaseOptions):
         "fast": {"iterations": 2, "tolerance": 5e-2},
         "balanced": {},
         "accurate": {"iterations": 100, "tolerance": 1e-8},
+        "jiang2020": {"iterations": 60, "tolerance": 1e-4},
     }
 
     iterations: int = 40
@@ -93,6 +101,7 @@ class Options(BaseOptions):
     knee: float = 2.2
     w_shear: float = 1e-2
     w_fairness: float = 0.0
+    w_mapping: float = 0.03
     eps: float = 3e-4
     coarse_size: int = 40
     relax_iterations: int = 100
@@ -143,7 +152,12 @@ def plan(request: Request) -> Plan:
         notes=notes,
         details={"strain_level": start.level},
         finish=finish,
+        remark=partial(_remark, mesh) if request.formulation == "isometry" else None,
     )
+
+
+def _remark(mesh: Mesh, coordinates: Array) -> list[str]:
+    return lengths_remark(mesh, coordinates.reshape(-1, 2))
 
 
 def _bound(request: Request, stages: list[Stage]) -> list[Stage]:
@@ -201,6 +215,8 @@ def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
             # What comes from a coarser grid is near enough.
             lengths.enter = stages.pop().enter
         stages.append(lengths)
+    elif request.formulation == "isometry":
+        stages.append(_isometry_stage(options, mesh))
     elif options.norm == "l1":
         stages.append(_strain_stage(options, mesh, level))
     # Without a coarser grid before it, the last stage has farther to go.
@@ -241,6 +257,13 @@ def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:
     eps = options.eps * size
     stage = _stage("lengths", mesh, items + [Weighted(t, size, Absolute(eps)) for t in terms])
     return replace(stage, eps=(10.0 * eps, eps), robust="isometry")
+
+
+def _isometry_stage(options: Options, mesh: Mesh) -> Stage:
+    items = _fair(mesh, options.w_fairness)
+    items += [Weighted(t, 1.0) for t in congruence.build(mesh, "flat")]
+    items += [Weighted(t, options.w_mapping) for t in christoffel.build(mesh, "flat")]
+    return _stage("isometry", mesh, items)
 
 
 def _fair(mesh: Mesh, weight: float) -> list[Weighted]:

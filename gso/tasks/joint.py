@@ -39,6 +39,8 @@ Array = NDArray[np.float64]
 _FALL = 10.0
 #: Relative fall of the energy at which a stage that only prepares another one stops.
 _NEARLY = 1e-3
+#: Root mean square strain up to which a flat image counts as isometric.
+_KEPT = 2e-3
 #: Iterations of the flat image alone, where the design needs no change.
 _UNROLL = 100
 
@@ -172,6 +174,7 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
         stages,
         notes=notes,
         finish=partial(_place, mesh),
+        remark=partial(_remark, mesh),
         spline=spline,
     )
 
@@ -214,7 +217,7 @@ def _chain(request: Request, levels: list[Mesh]) -> list[Stage]:
     """Coarse to fine, on each grid with less and less fairness."""
     options = request.options
     weights = [options.w_fairness]
-    if request.start is None and options.begin == "design":
+    if request.start is None:
         while weights[-1] < 0.3 * options.stiff:
             weights.append(_FALL * weights[-1])
     stages = []
@@ -287,6 +290,22 @@ def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
 def _isometric(mesh: Mesh, enough: float, coordinates: Array) -> bool:
     blocks = _layout(mesh).split(coordinates)
     return measure.isometry_energy(mesh.replaced(blocks["surface"]), blocks["flat"]) <= enough
+
+
+def lengths_remark(surface: Mesh, flat: Array) -> list[str]:
+    """That a flat image (n, 2) does not keep the lengths of its surface, where it does not."""
+    off = 0.5 * measure.isometry_energy(surface, flat) ** 0.5
+    if off <= _KEPT:
+        return []
+    return [
+        f"the flat image keeps lengths only to {off:.1%} (root mean square): the surface is not "
+        "developable, or it closes around itself and must be cut open"
+    ]
+
+
+def _remark(mesh: Mesh, coordinates: Array) -> list[str]:
+    blocks = _layout(mesh).split(coordinates)
+    return lengths_remark(mesh.replaced(blocks["surface"]), blocks["flat"])
 
 
 def _place(mesh: Mesh, coordinates: Array) -> Array:

@@ -39,7 +39,7 @@ def optimize(
     x0: Any = None,
     callback: Callback | None = None,
 ) -> Result:
-    """Make a surface developable, flatten it, or denoise it.
+    """Make a surface developable, flatten it, denoise it, bend it, or map it to the plane.
 
     Parameters
     ----------

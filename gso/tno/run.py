@@ -89,7 +89,9 @@ class Run:
             if solution.status is Status.CANCELLED:
                 stage = plan.stages[-1]
             coordinates, outcome.energy = self.guard(plan, stage, coordinates)
-            outcome.blocks = plan.layout.split(plan.finish(coordinates))
+            coordinates = plan.finish(coordinates)
+            outcome.blocks = plan.layout.split(coordinates)
+            outcome.notes += tuple(plan.remark(coordinates)) if plan.remark is not None else ()
             outcome.backend = solution.backend
             if plan.status is None or solution.status is Status.CANCELLED:
                 outcome.status = solution.status
