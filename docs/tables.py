@@ -23,7 +23,11 @@ def tables() -> dict[str, str]:
     found = {"metrics": metric_table(), "options": option_table(Options, shared={})}
     shared = {f.name: f.default for f in fields(Options)}
     for task in tasks.names():
-        found[f"options-{task}"] = option_table(tasks.get(task).Options, shared=shared)
+        module = tasks.get(task)
+        found[f"options-{task}"] = option_table(module.Options, shared=shared)
+        for formulation, options in getattr(module, "OPTIONS", {}).items():
+            if options is not module.Options:
+                found[f"options-{task}-{formulation}"] = option_table(options, shared=shared)
     return found
 
 

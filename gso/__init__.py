@@ -42,12 +42,13 @@ _NAMES = {
 }
 _OPTIONS = {
     "DevelopableOptions": "gso.tasks.developable",
+    "IsometryOptions": "gso.tasks.joint",
     "FlattenOptions": "gso.tasks.flatten",
     "DenoiseOptions": "gso.tasks.denoise",
     "BendOptions": "gso.tasks.bend",
     "ConformalOptions": "gso.tasks.conformal",
 }
-_MODULES = ("constraints", "tno", "metrics", "topology", "io", "dataset", "plot", "rulings")
+_MODULES = ("constraints", "tno", "metrics", "topology", "io", "dataset", "net", "plot", "rulings")
 
 __all__ = [*_NAMES, *_OPTIONS, *_MODULES, "__version__"]
 

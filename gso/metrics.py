@@ -123,10 +123,7 @@ def unit(surface: Any) -> float:
 
 def curvature_grid(points: Array) -> Array:
     """Discrete Gaussian curvature (H-2, W-2) of the interior vertices of a grid, 1/length^2."""
-    p = np.asarray(points, float)
-    centre = p[1:-1, 1:-1]
-    ring = (p[:-2, 1:-1], p[:-2, :-2], p[1:-1, :-2], p[2:, 1:-1], p[2:, 2:], p[1:-1, 2:])
-    return geometry.gaussian_curvature(components(centre), [components(r) for r in ring])
+    return geometry.gaussian_curvature(*geometry.grid_star(components(np.asarray(points, float))))
 
 
 def curvature(surface: Any) -> Array:

@@ -38,7 +38,7 @@ class Nearest:
     mesh : Mesh
         The surface; cells are split as everywhere in the package.
     normals : ndarray, (n, 3), optional
-        Unit normals at its vertices; only :meth:`feet` needs them.
+        Unit normals at its vertices, for :meth:`feet`; zero when not given.
     """
 
     def __init__(self, mesh: Mesh, normals: Array | None = None):
@@ -46,7 +46,7 @@ class Nearest:
 
         self._vertices = np.ascontiguousarray(mesh.vertices, np.float64)
         self._triangles = np.ascontiguousarray(mesh.triangles, np.int64)
-        self._normals = normals
+        self._normals = np.zeros_like(self._vertices) if normals is None else normals
         self._tree = igl.AABB()
         self._tree.init(self._vertices, self._triangles)
 
@@ -56,7 +56,6 @@ class Nearest:
 
     def feet(self, points: Array) -> Feet:
         """Nearest points, and the surface's normals there."""
-        assert self._normals is not None
         squared, triangle, foot = self._query(points)
         corner = self._triangles[triangle]
         a, b, c = (self._vertices[corner[:, k]] for k in range(3))
@@ -68,7 +67,8 @@ class Nearest:
         normals = np.einsum("jk,jkd->kd", share, self._normals[corner.T])
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         first = self._normals[corner[:, 0]]
-        normals = np.divide(normals, length, out=first.copy(), where=length > 1e-12 * length.max())
+        straight = length > 1e-12 * length.max(initial=0.0)
+        normals = np.divide(normals, length, out=first.copy(), where=straight)
         return Feet(foot, normals, np.sqrt(squared))
 
     def _query(self, points: Array) -> tuple[Array, NDArray[np.int64], Array]:

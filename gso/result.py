@@ -136,7 +136,8 @@ class Result:
                 raise MeshError(
                     f"{path}: this result has no flat image to write as SVG; use task='flatten'"
                 )
-            io.save_flat(self.flat, self.design, path, unit=unit)
+            surface = self.mesh if self.task == "developable" else self.design
+            io.save_flat(self.flat, surface, path, unit=unit)
         elif f".{suffix}" in io.SPLINE_SUFFIXES:
             if self.spline is None:
                 raise MeshError(

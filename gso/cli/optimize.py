@@ -42,8 +42,12 @@ class Job:
         from gso import io
 
         if out.lower().endswith(".svg"):
-            if getattr(tasks.get(self.keywords["task"]), "BLOCK", "surface") != "flat":
-                raise OptionError(f"{out}: only a flat pattern is drawn as SVG; use --task flatten")
+            block = getattr(tasks.get(self.keywords["task"]), "BLOCK", "surface")
+            if block != "flat" and self.keywords["formulation"] != "isometry":
+                raise OptionError(
+                    f"{out}: only a flat pattern is drawn as SVG; use --task flatten, or "
+                    "--formulation isometry"
+                )
             io.check_writable(out)
         elif _is_cad(out):
             if self.keywords["task"] != "developable":
@@ -99,10 +103,10 @@ class Job:
 @click.option(
     "--options",
     "preset",
-    type=click.Choice(["fast", "balanced", "accurate"]),
+    type=click.Choice(["fast", "balanced", "accurate", "jiang2020"]),
     default="balanced",
     show_default=True,
-    help="How much work to do.",
+    help="How much work to do; jiang2020: the classical reference, by isometry.",
 )
 @click.option(
     "--max-deviation",
@@ -187,19 +191,22 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
     """Keywords of :func:`gso.tno.optimize`, checked as far as that needs no mesh."""
     from gso.tno import check
 
-    settings: Any = given["preset"]
+    formulation, kind = tasks.choose(
+        tasks.get(given["task"]), given["formulation"], given["preset"]
+    )
+    settings: Any = kind.coerce(given["preset"])
     if given["backend"] is not None:
-        module = tasks.get(given["task"])
-        settings = replace(module.Options.coerce(settings), backend=given["backend"])
+        settings = replace(settings, backend=given["backend"])
     # What a spline cannot keep is solved as a mesh, and the spline fitted to the result.
     apart = given["max_deviation"] is not None or given["fix_boundary"]
+    apart |= given["constraints"] is not None
     if _is_cad(out) and given["task"] == "developable" and not apart:
-        settings = replace(tasks.get("developable").Options.coerce(settings), variables="surface")
+        settings = replace(settings, variables="surface")
     questions = {k: given[k] for k in ("max_deviation", "target_curvature")}
-    check(given["task"], given["formulation"], settings, **questions)
+    check(given["task"], formulation, settings, **questions)
     keywords = {
         "task": given["task"],
-        "formulation": given["formulation"],
+        "formulation": formulation,
         "options": settings,
         **questions,
     }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -19,15 +18,20 @@ def pack(arrays: dict[str, np.ndarray]) -> bytes:
     """Arrays of equal length as an HDF5 file, the same bytes for the same arrays."""
     import h5py
 
-    buffer = BytesIO()
-    with h5py.File(buffer, "w", libver=("v110", "v110")) as file:
+    # In the library's own memory, every dataset open until the end: with a Python object as
+    # the file, or datasets closed on the way, the layout depends on when other threads run.
+    with h5py.File(
+        "memory", "w", driver="core", backing_store=False, libver=("v110", "v110")
+    ) as file:
+        opened = []
         for name, values in arrays.items():
             # A surface is a chunk of its own; numbers per surface stand in one piece.
             chunked: dict[str, Any] = {}
             if values.ndim > 1 and len(values):
                 chunked = {"chunks": (1, *values.shape[1:]), "compression": 1, "shuffle": True}
-            file.create_dataset(name, data=values, track_times=False, **chunked)
-    return buffer.getvalue()
+            opened.append(file.create_dataset(name, data=values, track_times=False, **chunked))
+        file.flush()
+        return file.id.get_file_image()
 
 
 def contents(path: str | os.PathLike[str]) -> dict[str, tuple[tuple[int, ...], np.dtype]]:

@@ -13,7 +13,7 @@ from gso.geometry.cells import (
     face_products,
     isometry_defect,
 )
-from gso.geometry.curvature import gaussian_curvature, star_area, star_defect
+from gso.geometry.curvature import gaussian_curvature, grid_star, star_area, star_defect
 from gso.geometry.differences import second_difference
 from gso.geometry.parametric import smooth_gaussian_curvature
 from gso.geometry.shape import (
@@ -41,6 +41,7 @@ __all__ = [
     "face_products",
     "first_form",
     "gaussian_curvature",
+    "grid_star",
     "half_trace",
     "isometry_defect",
     "norm",

@@ -32,6 +32,23 @@ def star_area(centre: Vec, ring: Sequence[Vec]) -> Any:
     return 0.5 * _star(centre, ring)[1]
 
 
+def grid_star(points: Vec) -> tuple[Vec, list[Vec]]:
+    """Interior vertices of grids and their rings of six, of components (..., H, W).
+
+    >>> import numpy as np
+    >>> centre, ring = grid_star((np.zeros((2, 5, 4)),) * 3)
+    >>> centre[0].shape, len(ring)
+    ((2, 3, 2), 6)
+    """
+
+    def moved(i: int, j: int) -> Vec:
+        rows, columns = slice(1 + i, (i - 1) or None), slice(1 + j, (j - 1) or None)
+        return tuple(c[..., rows, columns] for c in points)
+
+    around = ((-1, 0), (-1, -1), (0, -1), (1, 0), (1, 1), (0, 1))
+    return moved(0, 0), [moved(i, j) for i, j in around]
+
+
 def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
     """Gaussian curvature of a vertex star, 1 / length^2.
 

@@ -146,9 +146,10 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
     """Draw a result beside its design.
 
     `developable`: the curvature before and after in one scale, and the distance between
-    the two; `bend`: the stretch instead. `flatten`: the strain on the surface and on the flat
-    pattern; `conformal`: the scale of the faces. `denoise`: both
-    surfaces in a light that grazes them, and the distance between the two.
+    the two, and the strain of the flat pattern if it has one; `bend`: the stretch instead.
+    `flatten`: the strain on the surface and on the flat pattern; `conformal`: the scale of the
+    faces. `denoise`: both surfaces in a light that grazes them, and the distance between the
+    two.
 
     Parameters
     ----------
@@ -170,7 +171,8 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
     """
     require()
     design, mesh = result.design, result.mesh
-    if result.flat is not None:
+    surface_too = result.task == "developable"
+    if result.flat is not None and not surface_too:
         return write(draw(_flattened(design, result.flat, result.cell_scale)), path)
     before, after, apart = panels = _plain([design, mesh, mesh])
     bent = result.task == "bend"
@@ -184,6 +186,8 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
         before.heat, after.heat = curvatures([design, mesh])
         before.title = f"input: mean |K| {metrics.loss_gc(design, scale=size):.2g}"
         after.title = f"result: mean |K| {metrics.loss_gc(mesh, scale=size):.2g}"
+    if result.flat is not None:
+        panels.append(_flattened(mesh, result.flat)[1])
     return write(draw(panels), path)
 
 

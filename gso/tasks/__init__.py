@@ -9,10 +9,12 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gso.status import OptionError
-from gso.tasks.options import Options
+
+if TYPE_CHECKING:
+    from gso.tasks.options import Options
 
 _SUPPORT = ("base", "held", "joint", "options", "splined")
 
@@ -22,9 +24,7 @@ def names() -> list[str]:
     return sorted(info.name for info in pkgutil.iter_modules(__path__) if info.name not in _SUPPORT)
 
 
-def choose(
-    module: ModuleType, formulation: str | None, options: Any
-) -> tuple[str, type[Options]]:
+def choose(module: ModuleType, formulation: str | None, options: Any) -> tuple[str, type[Options]]:
     """Formulation that is meant, and the class of its settings.
 
     Without a name it is the one that the preset or the settings belong to.

@@ -233,7 +233,18 @@ def _own_bending(mesh: Mesh) -> Array:
         inner = grid[1:-1, 1:-1]
         k[grid] = np.pad(k[inner], 1, mode="edge")
     k = np.where(np.isnan(k), np.inf, k)
-    return 1.0 / (1.0 + (k / FLAT_CURVATURE) ** 2)
+    return kept_bending(k)
+
+
+def kept_bending(curvature: Any) -> Any:
+    """Share of its own bending that a vertex of some Gaussian curvature should keep."""
+    return 1.0 / (1.0 + (curvature / FLAT_CURVATURE) ** 2)
+
+
+def adapted_weights(options: Options, curved: Any, bending: Any) -> tuple[Any, Any]:
+    """Weights of curvature and fairness for a design's mean |K| and mean squared bending."""
+    curvature = options.w_curvature * (TYPICAL_CURVATURE / curved) ** 0.2
+    return curvature, options.w_fairness * (TYPICAL_BENDING / (bending + 1.0)) ** 0.5
 
 
 def _nothing_inside(mesh: Mesh) -> MeshError:
@@ -256,9 +267,8 @@ def _objective(
 ) -> list[Weighted]:
     """Terms on the design or on a coarser copy of it."""
     o = request.options
-    w_curvature = o.w_curvature * request.curvature_weight
-    w_curvature *= (TYPICAL_CURVATURE / max(curved, 1e-3)) ** 0.2
-    w_fairness = o.w_fairness * (TYPICAL_BENDING / (bending + 1.0)) ** 0.5
+    w_curvature, w_fairness = adapted_weights(o, max(curved, 1e-3), bending)
+    w_curvature *= request.curvature_weight
     w_proximity = o.w_proximity
     if request.max_deviation is not None:
         # The bound keeps the result close; the terms may ask for more.

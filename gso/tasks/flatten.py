@@ -4,7 +4,8 @@
 ``lengths`` minimises the published isometry defect of the cells, which is blind to some
 shear: a figure to compare. ``isometry`` minimises the squared defect of Jiang et al. 2020
 with their regulariser of the mapping: what the developable task's isometry does, with the
-surface as it is. All start from an image without flips, and no step turns a triangle over. Grids are solved coarse to fine.
+surface as it is. All start from an image without flips, and no step turns a triangle over.
+Grids are solved coarse to fine.
 """
 
 from __future__ import annotations
@@ -25,7 +26,17 @@ from gso.tasks import held
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.joint import lengths_remark
 from gso.tasks.options import Options as BaseOptions
-from gso.terms import Weighted, christoffel, collapse, congruence, edges, fairness, isometry, shear, stretch
+from gso.terms import (
+    Weighted,
+    christoffel,
+    collapse,
+    congruence,
+    edges,
+    fairness,
+    isometry,
+    shear,
+    stretch,
+)
 from gso.terms.losses import Absolute
 from gso.variables import Layout, Variables, free
 
@@ -233,16 +244,16 @@ def _strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
         loss = stretch.Spread(level, knee=np.inf, eps=0.03)
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
     else:
-        loss = stretch.Spread(level, knee=options.knee * _bent(level))
+        loss = stretch.Spread(level, knee=options.knee * float(bent(np.float64(level))))
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
         # Level times the size is what `Spread` costs at small strains, too.
         items.append(Weighted(edges.build(mesh), options.w_edges * level, Absolute(0.1 * level)))
     return _stage("strain", mesh, items)
 
 
-def _bent(level: float) -> float:
+def bent(level: Any) -> Any:
     """Share of the knee: less where the strain is so large that peaks must be held down."""
-    return float(np.clip((_LARGE_STRAIN / level) ** (1 / 3), 0.68, 1.0))
+    return ((_LARGE_STRAIN / level) ** (1 / 3)).clip(0.68, 1.0)
 
 
 def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:

@@ -198,9 +198,7 @@ def _unrolling(request: Request, notes: list[str]) -> Plan:
     )
     start = stage.layout.pack({"surface": mesh.vertices, "flat": flat})
     place = partial(_place, mesh)
-    return Plan(
-        stage.layout, start, [stage], status=Status.ALREADY_GOOD, notes=notes, finish=place
-    )
+    return Plan(stage.layout, start, [stage], status=Status.ALREADY_GOOD, notes=notes, finish=place)
 
 
 def _flat_only(layout: Layout, coordinates: Array) -> Variables:
@@ -277,8 +275,7 @@ def _with_flat(mesh: Mesh, coordinates: Array) -> Array:
 def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
     """Displacement and flat image of a coarse grid, interpolated to a finer one."""
     blocks = _layout(coarse).split(coordinates)
-    shape = fine.grid_shape
-    assert shape is not None
+    shape = (len(fine.grid_index), len(fine.grid_index[0]))  # type: ignore[arg-type, index]
     shift = (blocks["surface"] - coarse.vertices)[coarse.grid_index]
     points = fine.vertices + resample(shift, *shape).reshape(-1, 3)
     flat = resample(blocks["flat"][coarse.grid_index], *shape).reshape(-1, 2)

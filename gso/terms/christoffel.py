@@ -40,7 +40,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 def _products(a: Any, b: Any, c: Any, p: Any, q: Any) -> tuple[Any, Any, Any]:
     d = geometry.second_difference(a, b, c)
     edges = (geometry.sub(c, a), geometry.sub(p, b), geometry.sub(q, b))
-    return tuple(geometry.dot(d, e) for e in edges)  # type: ignore[return-value]
+    return tuple(geometry.dot(d, e) for e in edges)
 
 
 def build(mesh: Mesh, block: str, *, counterpart: str | None = None) -> list[Term]:

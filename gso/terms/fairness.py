@@ -60,11 +60,19 @@ def differences(mesh: Mesh) -> tuple[Ints, Array]:
 def _spacing(grid: Array) -> tuple[float, float]:
     """Spacing of the samples along both directions of a grid."""
     side = [np.linalg.norm(np.diff(grid, axis=a), axis=-1).sum(axis=a).mean() for a in (0, 1)]
-    mean = np.sqrt(side[0] * side[1])
+    return spacing(side[0], side[1], grid.shape)
+
+
+def spacing(along: Any, across: Any, shape: Sequence[int]) -> tuple[Any, Any]:
+    """Spacing of a grid's samples from the mean lengths of its sides; arrays or tensors.
+
+    Sides less than a factor of two apart count as equally long.
+    """
+    mean = (along * across) ** 0.5
     # Beyond a factor of two, what exceeds it counts.
-    ratio = side[0] / side[1]
-    excess = np.sqrt(ratio / np.clip(ratio, 0.5, 2.0))
-    return mean * excess / (grid.shape[0] - 1), mean / excess / (grid.shape[1] - 1)
+    ratio = along / across
+    excess = (ratio / ratio.clip(0.5, 2.0)) ** 0.5
+    return mean * excess / (shape[0] - 1), mean / excess / (shape[1] - 1)
 
 
 def _hinge_differences(mesh: Mesh) -> tuple[Ints, Array]:

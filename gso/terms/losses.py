@@ -1,4 +1,7 @@
-"""What a residual costs: squared, absolute, or bounded."""
+"""What a residual costs: squared, absolute, or bounded.
+
+Values are made of any kind of number, as the residuals are; training uses them on tensors.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,8 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gso.geometry import ops
 
 Array = NDArray[np.float64]
 
@@ -42,7 +47,7 @@ class Absolute:
     eps: float
 
     def value(self, r: Array) -> Array:
-        return np.sqrt(r * r + self.eps**2) - self.eps
+        return ops.sqrt(r * r + self.eps**2) - self.eps
 
     def weights(self, r: Array) -> tuple[Array, Array]:
         w = 1.0 / np.sqrt(r * r + self.eps**2)
@@ -60,7 +65,7 @@ class Distance:
     eps: float
 
     def _root(self, r: Array) -> Array:
-        return np.sqrt((r * r).sum(axis=0, keepdims=True) + self.eps**2)
+        return ops.sqrt((r * r).sum(axis=0, keepdims=True) + self.eps**2)
 
     def value(self, r: Array) -> Array:
         return self.eps * (self._root(r) - self.eps)

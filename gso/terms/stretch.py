@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gso import geometry, topology
+from gso.geometry import ops
 from gso.mesh import Mesh
 from gso.terms.base import Array, Ints, Residual, Term
 
@@ -91,14 +92,14 @@ class Spread:
 
     def _squares(self, r: Array) -> tuple[Array, Array]:
         parts = r.reshape(3, -1, r.shape[1])
-        return parts, 0.5 / self.level**2 * np.einsum("kce,kce->ce", parts, parts)
+        return parts, 0.5 / self.level**2 * (parts * parts).sum(axis=0)
 
     def value(self, r: Array) -> Array:
         """Cost of each corner."""
         y = self._squares(r)[1]
         e = self.eps**2
         low = 2.0 / self.p * ((y + e) ** (0.5 * self.p) - e ** (0.5 * self.p))
-        held = np.minimum(y, (_STEEPEST * self.knee) ** 2)
+        held = ops.minimum(y, (_STEEPEST * self.knee) ** 2)
         rise = self.peak * held ** (0.5 * self.q - 1.0)
         return self.level**2 * (low + rise * (2.0 / self.q * held + y - held))
 

@@ -1,0 +1,84 @@
+"""``gso train``: nets from a configuration and a set of surfaces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gso.cli import progress
+
+if TYPE_CHECKING:
+    from gso.net.train import Report
+
+#: Figures that are shown beside the bar, by task.
+_SHOWN = ("loss_gc", "K_A_r", "d_H", "strain_mean", "loss_iso_cell", "theta")
+
+
+@click.command(short_help="Train a net.")
+@click.argument("config", type=click.Path())
+@click.option("--data", metavar="DIR", required=True, type=click.Path(), help="Set of surfaces.")
+@click.option("--out", metavar="RUN", required=True, type=click.Path(), help="Folder of the run.")
+@click.option("--minutes", metavar="M", type=float, help="Length of the run, instead of its steps.")
+@click.option("--steps", metavar="N", type=int, help="Steps of the run.")
+@click.option("--seed", metavar="N", type=int, help="Seed of all random numbers.")
+@click.option("--fresh", metavar="N", type=int, help="Surfaces to draw beside those of the set.")
+@click.option("--init", metavar="NET", help="Net to begin with.")
+@click.option("--through", metavar="NET", help="Net whose results are learnt from.")
+@click.option("--device", metavar="NAME", help="cpu, cuda ...; the GPU when there is one.")
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+def train(
+    config: str,
+    data: str,
+    out: str,
+    minutes: float | None,
+    device: str | None,
+    quiet: bool,
+    **changes: Any,
+) -> None:
+    """Train the net that CONFIG describes, a .toml or .json file or a name.
+
+    The same command goes on with a run that was ended. With torchrun, several processes:
+    torchrun --nproc-per-node 2 -m gso.cli train CONFIG ...
+    """
+    from gso.net.config import read
+    from gso.net.train import MODEL
+    from gso.net.train import train as run
+
+    made = read(config, **changes)
+    with progress.counts() as bars, _Bar() as bar:
+        card = run(
+            made, data, out, minutes=minutes, device=device, show=bar.show, tick=bars.tick
+        )
+    if not quiet and card:
+        found = ", ".join(f"{name} {value:.4g}" for name, value in card["validation"].items())
+        click.echo(f"{out}/{MODEL}: {card['steps']} steps, {card['hours']} hours; {found}")
+
+
+class _Bar:
+    """A bar over the share of a run that is done, with the time that is left."""
+
+    def __init__(self) -> None:
+        self._bar: Any = None
+
+    def __enter__(self) -> _Bar:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def show(self, report: Report) -> None:
+        """Show how a run is going."""
+        if self._bar is None:
+            from tqdm import tqdm
+
+            line = "{percentage:5.1f}%|{bar}| [{elapsed}{postfix}]"
+            self._bar = tqdm(total=1.0, disable=not progress.watched(), bar_format=line)
+        self._bar.n = report.progress
+        hours, minutes = divmod(round(report.left / 60), 60)
+        shown = "".join(
+            f", {n} {v:.4g}" for n, v in report.figures.items() if n in _SHOWN
+        )
+        text = f"{hours}:{minutes:02d} left, step {report.step}, loss {report.loss:.4g}{shown}"
+        self._bar.set_postfix_str(text)

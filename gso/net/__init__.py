@@ -1,0 +1,31 @@
+"""GSO-Net: networks that do in one forward pass what the optimiser does by iteration."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+# Looked up at first use, so that torch is loaded only when a net is.
+_NAMES = {
+    "CoarseNet": "gso.net.coarse",
+    "GSONet": "gso.net.gsonet",
+    "available": "gso.net.weights",
+    "load": "gso.net.weights",
+    "predict": "gso.net.predict",
+    "save": "gso.net.weights",
+    "train": "gso.net.train",
+}
+
+__all__ = list(_NAMES)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _NAMES:
+        raise AttributeError(f"module 'gso.net' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_NAMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,66 @@
+"""What all nets have in common."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from gso.net.grids import planes, rectangle
+from gso.status import OptionError
+
+#: Tasks that there are nets for, and the components of what comes out.
+TASKS = {"developable": 3, "flatten": 2, "denoise": 3}
+#: Samples along each side that nets are trained at.
+SIZE = 64
+
+
+class Net(nn.Module):
+    """A net that moves the points of grids (B, H, W, 3) of the unit ball.
+
+    Attributes
+    ----------
+    task : {"developable", "flatten", "denoise"}
+        What it was made for.
+    settings : dict
+        What it is made of again, with its class.
+    half : bool
+        Convolutions run in bfloat16; what goes in and comes out, curvature above all, is in
+        single precision all the same.
+    """
+
+    def __init__(self, task: str, **settings: Any):
+        super().__init__()
+        if task not in TASKS:
+            raise OptionError(f"no task {task!r} for a net; there are {', '.join(TASKS)}")
+        self.task, self.settings, self.half = task, {"task": task, **settings}, False
+
+    @abstractmethod
+    def displacements(self, surface: Tensor, sigma: Tensor | None = None) -> list[Tensor]:
+        """Displacements (B, H, W, d) from the start, one per pass, the last one the best.
+
+        Parameters
+        ----------
+        surface : Tensor, (B, H, W, 3)
+            Grids of the unit ball.
+        sigma : Tensor, (B,), optional
+            Standard deviation of the noise, for nets that are told.
+        """
+
+    @abstractmethod
+    def carried(self, surface: Tensor, fine: Tensor, sigma: Tensor | None = None) -> Tensor:
+        """Displacements (B, h, w, d) of the grids `fine`, which are `surface` resampled."""
+
+    def start(self, surface: Tensor) -> Tensor:
+        """Return what is moved: the surface, or for flat images Flatten-init."""
+        return rectangle(planes(surface)) if self.task == "flatten" else surface
+
+    def forward(self, surface: Tensor, sigma: Tensor | None = None) -> Tensor:
+        """Grids (B, H, W, 3), or flat images (B, H, W, 2), of grids (B, H, W, 3)."""
+        return self.start(surface) + self.displacements(surface, sigma)[-1]
+
+    def autocast(self, device: torch.device) -> torch.autocast:
+        """Context for convolutions."""
+        return torch.autocast(device.type, torch.bfloat16, enabled=self.half)

@@ -1,0 +1,58 @@
+"""Building blocks of the nets; all work on (B, C, H, W)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import silu
+
+#: Channels that are normalised together.
+_GROUP = 16
+
+
+class IMDB(nn.Module):
+    """Information multi-distillation block (Hui et al. 2019), without biases.
+
+    Three convolutions with LeakyReLU(0.05) each hand a quarter of their channels to the end
+    and the rest on; a fourth makes the last quarter. The quarters are mixed by a 1 x 1
+    convolution and added to the input.
+
+    >>> sum(p.numel() for p in IMDB(16).parameters())
+    6448
+    """
+
+    def __init__(self, channels: int):
+        super().__init__()
+        kept, rest = channels // 4, channels - channels // 4
+        self.kept = kept
+        self.steps = nn.ModuleList(
+            nn.Conv2d(n, channels, 3, padding=1, bias=False) for n in (channels, rest, rest)
+        )
+        self.last = nn.Conv2d(rest, kept, 3, padding=1, bias=False)
+        self.mix = nn.Conv2d(channels, channels, 1, bias=False)
+        self.active = nn.LeakyReLU(0.05)
+
+    def forward(self, x: Tensor) -> Tensor:
+        rest, parts = x, []
+        for step in self.steps:
+            y = self.active(step(rest))
+            parts.append(y[:, : self.kept])
+            rest = y[:, self.kept :]
+        parts.append(self.last(rest))
+        return x + self.mix(torch.cat(parts, dim=1))
+
+
+class Residual(nn.Module):
+    """Two normalised convolutions beside the identity; the mean over the grid joins between."""
+
+    def __init__(self, channels: int):
+        super().__init__()
+        groups = max(channels // _GROUP, 1)
+        self.before, self.between = (nn.GroupNorm(groups, channels) for _ in range(2))
+        self.first, self.second = (nn.Conv2d(channels, channels, 3, padding=1) for _ in range(2))
+        self.everywhere = nn.Linear(channels, channels)
+
+    def forward(self, x: Tensor) -> Tensor:
+        y = self.first(silu(self.before(x)))
+        y = y + self.everywhere(y.mean(dim=(2, 3)))[:, :, None, None]
+        return x + self.second(silu(self.between(y)))

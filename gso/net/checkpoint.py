@@ -1,0 +1,66 @@
+"""The state of a run in one file, which appears when it is complete."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from gso.io import replacing
+from gso.net.base import Net
+from gso.status import WeightsError
+
+
+def save(
+    path: Path, net: Net, average: Net, optimiser: torch.optim.Optimizer, state: dict[str, Any]
+) -> None:
+    """Write nets, the optimiser's moments, and numbers."""
+    from safetensors.torch import save as packed
+
+    tensors: dict[str, Tensor] = {}
+    for prefix, module in (("net", net), ("average", average)):
+        tensors |= {f"{prefix}.{k}": v for k, v in module.state_dict().items()}
+    for k, moments in optimiser.state_dict()["state"].items():
+        tensors |= {f"optimiser.{k}.{name}": value for name, value in moments.items()}
+    tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
+    data = packed(tensors, metadata={"state": json.dumps(state)})
+    with replacing(path) as file:
+        file.write(data)
+
+
+def load(
+    path: Path, net: Net, average: Net, optimiser: torch.optim.Optimizer
+) -> dict[str, Any]:
+    """Take up what :func:`save` wrote; returns the numbers.
+
+    Raises
+    ------
+    WeightsError
+        The file is damaged, or of another net.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(path, framework="pt") as file:
+            state = json.loads((file.metadata() or {})["state"])
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        for prefix, module in (("net", net), ("average", average)):
+            module.load_state_dict(_part(tensors, prefix))
+        moments: dict[int, dict[str, Tensor]] = {}
+        for key, value in _part(tensors, "optimiser").items():
+            number, name = key.split(".")
+            moments.setdefault(int(number), {})[name] = value
+        optimiser.load_state_dict({**optimiser.state_dict(), "state": moments})
+    except (OSError, SafetensorError, KeyError, ValueError, RuntimeError) as error:
+        raise WeightsError(
+            f"{path} is no checkpoint of this run ({error}); remove it to begin anew"
+        ) from None
+    return state
+
+
+def _part(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:
+    start = f"{prefix}."
+    return {k.removeprefix(start): v for k, v in tensors.items() if k.startswith(start)}

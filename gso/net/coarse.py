@@ -1,0 +1,155 @@
+"""The default nets: coarse spline fields of displacements, refined in passes."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import interpolate
+
+from gso.net import inputs
+from gso.net.base import TASKS, Net
+from gso.net.blocks import Residual
+from gso.net.grids import Frame, planes
+from gso.net.resampling import spline_field
+from gso.status import OptionError
+
+#: What one means in the coefficients, in radii of the unit ball: a typical displacement.
+_UNIT = {"developable": 0.01, "flatten": 0.03, "denoise": 0.01}
+
+
+class CoarseNet(Net):
+    """Displacements as bicubic B-splines with few coefficients: smooth by construction.
+
+    The net sees how the surface bends and lies, in channels that its pose does not change, and
+    what its own last pass made of it; each pass adds to the coefficients. A U-Net, its finest
+    level at half the vertices' resolution, predicts two fields, a coarser and a finer one.
+    Coefficients are along the surface's own normals and grid lines (for flat images, along
+    the axes of the rectangle), so the result turns with the input.
+
+    Parameters
+    ----------
+    task : {"developable", "flatten"}
+        What is moved: the surface, or the rectangle of Flatten-init.
+    widths : sequence of 3 int
+        Channels at a half, a quarter and an eighth of the resolution.
+    depths : sequence of 3 int
+        Residual blocks there; at the first two on the way down and on the way up.
+    passes : int
+        How often the net is applied, with the same weights.
+
+    Raises
+    ------
+    OptionError
+        A setting is out of range.
+
+    Examples
+    --------
+    >>> net = CoarseNet(widths=(8, 8, 8), depths=(1, 1, 1))
+    >>> flat = torch.stack(torch.meshgrid(*[torch.linspace(-0.7, 0.7, 64)] * 2, indexing="ij"))
+    >>> surface = torch.cat([flat, 0 * flat[:1]]).movedim(0, -1)[None]
+    >>> net(surface).shape, bool((net(surface) == surface).all())  # it begins with no change
+    (torch.Size([1, 64, 64, 3]), True)
+    """
+
+    def __init__(
+        self,
+        task: str = "developable",
+        *,
+        widths: tuple[int, int, int] = (32, 64, 128),
+        depths: tuple[int, int, int] = (1, 1, 4),
+        passes: int = 2,
+    ):
+        sound = len(widths) == len(depths) == 3 and all(4 <= w <= 512 for w in widths)
+        if not sound or not all(0 <= d <= 32 for d in depths) or not 1 <= passes <= 8:
+            raise OptionError(
+                f"widths {widths}, depths {depths}, passes {passes}: take three widths from 4 to "
+                "512, three depths up to 32, 1 to 8 passes"
+            )
+        if task == "denoise":
+            raise OptionError("a coarse field cannot follow noise; take kind 'gsonet'")
+        super().__init__(task, widths=list(widths), depths=list(depths), passes=passes)
+        self.passes, self.unit = passes, _UNIT[task]
+        dim = TASKS[task]
+        state = inputs.STRETCHING if task == "flatten" else inputs.BENDING
+        w, d = widths, depths
+
+        def blocks(width: int, depth: int) -> nn.Sequential:
+            return nn.Sequential(*(Residual(width) for _ in range(depth)))
+
+        seen = inputs.SHAPE + inputs.BENDING + state + dim
+        self.stem = nn.Conv2d(seen, w[0], 4, stride=2, padding=1)
+        self.fine_in = blocks(w[0], d[0])
+        self.to_middle = nn.Conv2d(w[0], w[1], 2, stride=2)
+        self.middle_in = blocks(w[1], d[1])
+        self.to_body = nn.Conv2d(w[1], w[2], 2, stride=2)
+        self.body = blocks(w[2], d[2])
+        self.from_body = nn.Conv2d(w[2], w[1], 1)
+        self.middle_out = blocks(w[1], d[1] + 1)
+        self.from_middle = nn.Conv2d(w[1], w[0], 1)
+        self.fine_out = blocks(w[0], d[0] + 1)
+        self.coarse_head, self.fine_head = (nn.Conv2d(n, dim, 3, padding=1) for n in (w[1], w[0]))
+        for head in (self.coarse_head, self.fine_head):
+            nn.init.zeros_(head.weight)
+            nn.init.zeros_(head.bias)  # type: ignore[arg-type]
+
+    def coefficients(self, surface: Tensor) -> list[tuple[Tensor, Tensor]]:
+        """Coefficients (B, d, n, m) of both fields after each pass."""
+        p = planes(surface)
+        frame = Frame.of(p)
+        bent = inputs.bending(p, frame)
+        known = torch.stack([*inputs.shape(p, frame), *bent], dim=1)
+        start = self.start(surface)
+        state = inputs.stretching(frame, planes(start)) if self.task == "flatten" else bent
+        moved = known.new_zeros(len(known), TASKS[self.task], *known.shape[2:])
+        fields: list[tuple[Tensor, Tensor]] = []
+        for k in range(self.passes):
+            if k:
+                image = planes(start + self._vectors(moved, frame))
+                # What is differentiated is the result of each pass, not what the next one sees.
+                image = tuple(c.detach() for c in image)
+                if self.task == "flatten":
+                    state = inputs.stretching(frame, image)
+                else:
+                    state = inputs.bending(image, Frame.of(image))
+            seen = torch.cat([known, torch.stack(state, dim=1), moved.detach() / self.unit], dim=1)
+            coarse, fine = self._fields(seen)
+            if fields:
+                coarse, fine = coarse + fields[-1][0], fine + fields[-1][1]
+            fields.append((coarse, fine))
+            moved = self._shares(coarse, fine, *known.shape[2:])
+        return fields
+
+    def displacements(self, surface: Tensor, sigma: Tensor | None = None) -> list[Tensor]:
+        frame = Frame.of(planes(surface))
+        shape = surface.shape[1:3]
+        return [
+            self._vectors(self._shares(*fields, *shape), frame)
+            for fields in self.coefficients(surface)
+        ]
+
+    def carried(self, surface: Tensor, fine: Tensor, sigma: Tensor | None = None) -> Tensor:
+        fields = (c.to(fine.dtype) for c in self.coefficients(surface)[-1])
+        return self._vectors(self._shares(*fields, *fine.shape[1:3]), Frame.of(planes(fine)))
+
+    def _fields(self, seen: Tensor) -> tuple[Tensor, Tensor]:
+        x = seen.contiguous(memory_format=torch.channels_last)
+        with self.autocast(x.device):
+            fine = self.fine_in(self.stem(x))
+            middle = self.middle_in(self.to_middle(fine))
+            body = self.body(self.to_body(middle))
+            middle = self.middle_out(middle + _enlarged(self.from_body(body), middle))
+            fine = self.fine_out(fine + _enlarged(self.from_middle(middle), fine))
+            fields = self.coarse_head(middle), self.fine_head(fine)
+        return fields[0].to(seen.dtype), fields[1].to(seen.dtype)
+
+    def _shares(self, coarse: Tensor, fine: Tensor, height: int, width: int) -> Tensor:
+        """Displacement (B, d, height, width) along the axes of the frames."""
+        both = spline_field(coarse, height, width) + spline_field(fine, height, width)
+        return self.unit * both
+
+    def _vectors(self, shares: Tensor, frame: Frame) -> Tensor:
+        return shares.movedim(1, -1) if self.task == "flatten" else frame.combine(shares)
+
+
+def _enlarged(x: Tensor, target: Tensor) -> Tensor:
+    return interpolate(x, size=target.shape[2:], mode="nearest")

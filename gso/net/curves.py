@@ -1,0 +1,65 @@
+"""What happened in a run, by step: a file of JSON lines, and TensorBoard where it is installed."""
+
+from __future__ import annotations
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from gso.io import replacing
+
+NAME = "curves.jsonl"
+
+
+class Curves:
+    """Numbers by step, appended to a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Gets ``curves.jsonl``, and event files for TensorBoard where ``tensorboard`` is
+        installed.
+    step : int
+        Step at which the run is taken up: what was written from there on is dropped.
+    """
+
+    def __init__(self, folder: Path, step: int = 0):
+        self.path = folder / NAME
+        kept = [row for row in read(folder) if row["step"] < step]
+        with replacing(self.path) as file:
+            file.write("".join(json.dumps(row) + "\n" for row in kept).encode())
+        self._writer: Any = None
+        if find_spec("tensorboard") is not None:
+            from torch.utils.tensorboard import SummaryWriter
+
+            self._writer = SummaryWriter(str(folder), purge_step=step)
+
+    def add(self, step: int, seconds: float, **values: float) -> None:
+        """Write numbers of a step, so many seconds into the run."""
+        row = {"step": step, "seconds": round(seconds, 3), **values}
+        with self.path.open("a") as file:
+            file.write(json.dumps(row) + "\n")
+        if self._writer is not None:
+            for name, value in values.items():
+                self._writer.add_scalar(name, value, step)
+
+    def close(self) -> None:
+        """Finish the event files."""
+        if self._writer is not None:
+            self._writer.close()
+
+
+def read(folder: Path) -> list[dict[str, float]]:
+    """Rows of a run; a last line that was cut off is left out."""
+    rows = []
+    try:
+        lines = (folder / NAME).read_text().splitlines()
+    except OSError:
+        return []
+    for line in lines:
+        try:
+            rows.append(json.loads(line))
+        except ValueError:
+            continue
+    return rows

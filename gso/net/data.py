@@ -1,0 +1,186 @@
+"""Batches: a pure function of the step, so that a run can be taken up anywhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from gso import dataset
+from gso.dataset import bezier
+from gso.io import replacing
+from gso.net import augment
+from gso.net.config import Config, Phase
+from gso.status import DatasetError
+
+#: Seeds of the run's streams of random numbers.
+_ORDER, _CHANGES, _FRESH = 0, 1, 2
+#: Surfaces that are drawn with one seed.
+_DRAWN = 256
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Surfaces of one step on one process.
+
+    Attributes
+    ----------
+    surface : Tensor, (B, H, W, 3)
+        What the net sees, in the unit ball.
+    target : Tensor, (B, H, W, d), or None
+        What it is to make of it, where that is known.
+    sigma : Tensor, (B,), or None
+        Noise of the surfaces.
+    """
+
+    surface: Tensor
+    target: Tensor | None = None
+    sigma: Tensor | None = None
+
+
+@dataclass
+class Source:
+    """Surfaces in memory; those without labels come last.
+
+    Attributes
+    ----------
+    surfaces : Tensor, (n, H, W, 3)
+    labels : Tensor, (m, H, W, d), or None
+        Of the first m.
+    """
+
+    surfaces: Tensor
+    labels: Tensor | None = None
+
+    def batch(
+        self,
+        config: Config,
+        phase: Phase,
+        step: int,
+        *,
+        rank: int = 0,
+        world: int = 1,
+        device: torch.device | str = "cpu",
+    ) -> Batch:
+        """What process `rank` of `world` takes in a step.
+
+        The surfaces of a step are the same whatever the number of processes.
+        """
+        use_labels = phase.loss == "label"
+        if use_labels and self.labels is None:
+            raise DatasetError(f"there are no labels {config.label!r} to learn")
+        count = len(self.labels) if use_labels and self.labels is not None else len(self.surfaces)
+        rows = _rows(count, phase.batch, step, config.seed)
+        generator = torch.Generator().manual_seed(_seed(config.seed, _CHANGES, step))
+        chosen = [self.surfaces[rows]]
+        if use_labels and self.labels is not None:
+            chosen.append(self.labels[rows])
+        if config.augment == "symmetries":
+            chosen = augment.symmetries(chosen, generator)
+        elif config.augment == "shear":
+            chosen = [augment.shear(chosen[0], generator)]
+        surface, target = chosen[0], chosen[1] if len(chosen) > 1 else None
+        sigma = None
+        if config.task == "denoise":
+            surface, target, sigma = noisy(surface, config.sigma, generator)
+        mine = slice(rank, None, world)
+        return Batch(
+            *(None if x is None else x[mine].to(device, torch.float32) for x in (surface, target, sigma))  # type: ignore[arg-type]
+        )
+
+
+def noisy(
+    clean: Tensor, levels: tuple[float, float], generator: torch.Generator
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Surfaces with noise, what they were, and the standard deviation, in the noisy unit ball."""
+    low, high = np.log(levels[0]), np.log(levels[1])
+    sigma = torch.exp(low + (high - low) * torch.rand(len(clean), generator=generator)).to(clean)
+    noise = torch.randn(clean.shape, generator=generator).to(clean)
+    return normalised_together(clean + sigma[:, None, None, None] * noise, clean, sigma)
+
+
+def normalised_together(
+    surface: Tensor, target: Tensor, sigma: Tensor
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Surfaces in the unit ball, and what belongs to them in the same frame."""
+    centre = surface.mean(dim=(1, 2), keepdim=True)
+    moved = surface - centre
+    scale = moved.square().sum(dim=-1).amax(dim=(1, 2)).sqrt()
+    wide = scale[:, None, None, None]
+    return moved / wide, (target - centre) / wide, sigma / scale
+
+
+def _seed(seed: int, *key: int) -> int:
+    """A seed for each item of a stream."""
+    return int(np.random.SeedSequence(seed, spawn_key=key).generate_state(1, np.uint64)[0] >> 1)
+
+
+def _rows(count: int, batch: int, step: int, seed: int) -> Tensor:
+    """Rows of a step: epoch after epoch, each in an order of its own."""
+    places = np.arange(step * batch, (step + 1) * batch)
+    epochs, within = np.divmod(places, count)
+    return torch.from_numpy(
+        np.array([_order(count, int(e), seed)[w] for e, w in zip(epochs, within, strict=True)])
+    )
+
+
+@lru_cache(maxsize=4)
+def _order(count: int, epoch: int, seed: int) -> Any:
+    return np.random.default_rng(_seed(seed, _ORDER, epoch)).permutation(count)
+
+
+def open_source(config: Config, folder: str | Path, cache: Path, tick: Any = None) -> Source:
+    """Surfaces for a run: those of the train split, then fresh ones.
+
+    Parameters
+    ----------
+    config : Config
+    folder : path
+        The set.
+    cache : Path
+        File for the fresh surfaces, which are drawn once.
+    tick : callable, optional
+        Told what is counted, how many there are, and how many there will be.
+    """
+    split = dataset.open(folder)["train"]
+    surfaces = torch.from_numpy(split["surface"][:]).float()
+    labels = None
+    if any(phase.loss == "label" for phase in config.phases):
+        labels = torch.from_numpy(split[config.label][:]).float()
+        # Surfaces that the solver refused have no label.
+        sound = labels.isfinite().all(dim=(1, 2, 3))
+        surfaces = torch.cat([surfaces[sound], surfaces[~sound]])
+        labels = labels[sound]
+    more = fresh(config.fresh, config.seed, surfaces.shape[1], cache, tick)
+    return Source(torch.cat([surfaces, more]), labels)
+
+
+def fresh(count: int, seed: int, size: int, cache: Path, tick: Any = None) -> Tensor:
+    """Surfaces (count, size, size, 3) by the recipe, other ones than any set has.
+
+    They are kept in a file, which is made anew when it holds anything else.
+    """
+    shape = (count, size, size, 3)
+    if not count:
+        return torch.zeros(shape)
+    try:
+        kept = np.load(cache, allow_pickle=False)
+        if kept.shape == shape and kept.dtype == np.float32:
+            return torch.from_numpy(kept)
+    except (OSError, ValueError, EOFError):
+        pass
+    drawn = np.empty(shape, np.float32)
+    for start in range(0, count, _DRAWN):
+        some = min(_DRAWN, count - start)
+        surfaces = bezier.generate(some, seed=_seed(seed, _FRESH, start))
+        drawn[start : start + some] = bezier.sample_many(surfaces, size)
+        if tick is not None:
+            tick("surfaces drawn", start + some, count)
+    with replacing(cache) as file:
+        np.save(file, drawn, allow_pickle=False)
+    return torch.from_numpy(drawn)

@@ -1,0 +1,159 @@
+"""Quantities of batches of grids, (B, H, W, 3) tensors, by the package's one definition of each.
+
+Inside they are component tuples of planes (B, H, W), on which :mod:`gso.geometry` works.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn.functional import pad
+
+from gso import geometry
+
+Planes = tuple[Tensor, ...]
+
+#: Shortest vector that is divided by: lengths of the unit ball are far above it.
+_SHORTEST = 1e-12
+
+
+def planes(points: Tensor) -> Planes:
+    """Contiguous components, (B, H, W) each, of points (B, H, W, d)."""
+    return tuple(points.movedim(-1, 0).contiguous())
+
+
+def points(components: Planes) -> Tensor:
+    """Points (B, H, W, d) of their components."""
+    return torch.stack(components, dim=-1)
+
+
+def normalise(grids: Tensor) -> Tensor:
+    """Grids (B, H, W, 3) moved and scaled to the unit ball, each by itself."""
+    centred = grids - grids.mean(dim=(1, 2), keepdim=True)
+    far = centred.square().sum(dim=-1).amax(dim=(1, 2)).sqrt()
+    return centred / far.clamp_min(_SHORTEST)[:, None, None, None]
+
+
+def curvature(p: Planes) -> Tensor:
+    """Gaussian curvature (B, H-2, W-2) of the interior vertices, 1 / length^2."""
+    return geometry.gaussian_curvature(*geometry.grid_star(p))
+
+
+def to_border(inner: Tensor) -> Tensor:
+    """Values (B, H-2, W-2) of interior vertices, and of the nearest one on the border."""
+    return pad(inner[:, None], (1, 1, 1, 1), mode="replicate")[:, 0]
+
+
+def unit(v: Planes) -> Planes:
+    """Vectors of length one; zero where there is none."""
+    scale = 1.0 / geometry.norm(v).clamp_min(_SHORTEST)
+    return tuple(c * scale for c in v)
+
+
+def corners(p: Planes) -> tuple[Planes, Planes, Planes, Planes]:
+    """The corners (i, j), (i+1, j), (i+1, j+1), (i, j+1) of all cells."""
+    low, high = slice(None, -1), slice(1, None)
+    where = ((low, low), (high, low), (high, high), (low, high))
+    v0, v1, v2, v3 = (tuple(c[:, i, j] for c in p) for i, j in where)
+    return v0, v1, v2, v3
+
+
+def normals(p: Planes) -> Planes:
+    """Area-weighted unit normals of the vertices, as :func:`gso.variables.vertex_normals`."""
+    v0, v1, v2, v3 = corners(p)
+    diagonal = geometry.sub(v2, v0)
+    lower = geometry.cross(geometry.sub(v1, v0), diagonal)
+    upper = geometry.cross(diagonal, geometry.sub(v3, v0))
+    total = []
+    for a, b in zip(lower, upper, strict=True):
+        both = a + b
+        total.append(
+            pad(both, (0, 1, 0, 1))
+            + pad(both, (1, 0, 1, 0))
+            + pad(a, (0, 1, 1, 0))
+            + pad(b, (1, 0, 0, 1))
+        )
+    return unit(tuple(total))
+
+
+def _slope(x: Tensor, axis: int) -> Tensor:
+    """Derivative along an axis whose ends are one apart."""
+    return torch.gradient(x, dim=axis, spacing=1.0 / (x.shape[axis] - 1))[0]
+
+
+def _bend(x: Tensor, axis: int) -> Tensor:
+    """Second derivative along an axis; at the ends that of their neighbours."""
+    n = x.shape[axis]
+    inner = torch.diff(x, n=2, dim=axis) * (n - 1) ** 2
+    first, last = inner.narrow(axis, 0, 1), inner.narrow(axis, n - 3, 1)
+    return torch.cat([first, inner, last], dim=axis)
+
+
+class Frame(NamedTuple):
+    """Derivatives of grids by their parameters in [0, 1]^2, and vectors to measure along.
+
+    `along` and `across` are unit tangents of the grid lines, `normal` the unit normal: they
+    turn with the surface, so that what is measured along them does not depend on its pose.
+    """
+
+    du: Planes
+    dv: Planes
+    along: Planes
+    across: Planes
+    normal: Planes
+
+    @classmethod
+    def of(cls, p: Planes) -> Frame:
+        """Frame of grids."""
+        du, dv = tuple(_slope(c, 1) for c in p), tuple(_slope(c, 2) for c in p)
+        return cls(du, dv, unit(du), unit(dv), normals(p))
+
+    def combine(self, shares: Tensor) -> Tensor:
+        """Vectors (B, H, W, 3) with shares (B, 3, H, W) of normal, along and across."""
+        n, a, b = shares.unbind(1)
+        axes = zip(self.normal, self.along, self.across, strict=True)
+        return points(tuple(n * x + a * y + b * z for x, y, z in axes))
+
+
+def first_form(frame: Frame) -> Planes:
+    """Logarithms of the parameter lines' lengths, and the cosine between them."""
+    lengths = [geometry.norm(d).clamp_min(1e-6).log() for d in (frame.du, frame.dv)]
+    return (*lengths, geometry.dot(frame.along, frame.across))
+
+
+def normal_curvatures(p: Planes, frame: Frame) -> Planes:
+    """Curvature along both parameter lines, and the twist between them, 1 / length."""
+    suu, svv = tuple(_bend(c, 1) for c in p), tuple(_bend(c, 2) for c in p)
+    suv = tuple(_slope(c, 2) for c in frame.du)
+    u, v = (geometry.norm(d).clamp_min(1e-6) for d in (frame.du, frame.dv))
+    scales = (u * u, v * v, u * v)
+    return tuple(
+        geometry.dot(s, frame.normal) / scale
+        for s, scale in zip((suu, svv, suv), scales, strict=True)
+    )
+
+
+def side_lengths(p: Planes) -> tuple[Tensor, Tensor]:
+    """Mean polyline lengths (B,) along both grid directions."""
+    return tuple(  # type: ignore[return-value]
+        geometry.norm(tuple(torch.diff(c, dim=axis) for c in p)).sum(dim=axis).mean(dim=1)
+        for axis in (1, 2)
+    )
+
+
+def rectangle(p: Planes) -> Tensor:
+    """Flatten-init (B, H, W, 2): regular rectangles with the grids' mean side lengths.
+
+    As :func:`gso.flat_start.rectangle`, but with the centre at the origin.
+    """
+    along, across = side_lengths(p)
+    count, height, width = p[0].shape
+    x, y = (
+        torch.linspace(-0.5, 0.5, n, dtype=along.dtype, device=along.device)
+        for n in (height, width)
+    )
+    rows = (along[:, None] * x)[:, :, None].expand(count, height, width)
+    columns = (across[:, None] * y)[:, None, :].expand(count, height, width)
+    return torch.stack([rows, columns], dim=-1)

@@ -1,0 +1,107 @@
+"""The published net: a U-Net of multi-distillation blocks on all vertices."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from gso.net.base import TASKS, Net
+from gso.net.blocks import IMDB
+from gso.net.resampling import resampled
+from gso.status import OptionError
+
+_LEVELS = 3
+
+
+class GSONet(Net):
+    """GSO-Net (Wang et al. 2024): absolute positions in, displacements out.
+
+    Three levels of `blocks` multi-distillation blocks with additive skips, no biases, no
+    normalisation. 16 channels and 4 blocks are the published setting: 2,820,832 parameters,
+    2,820,688 for flat images.
+
+    Parameters
+    ----------
+    task : {"developable", "flatten", "denoise"}
+        The net moves the surface; for "flatten" the rectangle of Flatten-init.
+    channels : int
+        Channels at full resolution (NC), a multiple of 4; they double at each level.
+    blocks : int
+        Blocks per level (NB).
+    tanh : bool
+        Whether displacements pass a hyperbolic tangent, as the paper says and its figures'
+        code does not.
+    sigma : bool
+        Whether the net is told the noise, as a constant fourth channel.
+
+    Raises
+    ------
+    OptionError
+        A setting is out of range.
+
+    Examples
+    --------
+    >>> sum(p.numel() for p in GSONet().parameters())
+    2820832
+    >>> GSONet("flatten", channels=8, blocks=2)(torch.zeros(1, 16, 16, 3)).shape
+    torch.Size([1, 16, 16, 2])
+    """
+
+    def __init__(
+        self,
+        task: str = "developable",
+        *,
+        channels: int = 16,
+        blocks: int = 4,
+        tanh: bool = False,
+        sigma: bool = False,
+    ):
+        if channels % 4 or not 4 <= channels <= 256 or not 1 <= blocks <= 64:
+            raise OptionError(
+                f"channels {channels}, blocks {blocks}: take a multiple of 4 up to 256, and 1 to 64"
+            )
+        super().__init__(task, channels=channels, blocks=blocks, tanh=tanh, sigma=sigma)
+        self.tanh, self.sigma = tanh, sigma
+        widths = [channels << k for k in range(_LEVELS + 1)]
+        steps = list(zip(widths, widths[1:], strict=False))
+
+        def level(width: int) -> list[nn.Module]:
+            return [IMDB(width) for _ in range(blocks)]
+
+        def conv(inside: int, outside: int) -> nn.Module:
+            return nn.Conv2d(inside, outside, 3, padding=1, bias=False)
+
+        self.head = conv(3 + sigma, channels)
+        self.down = nn.ModuleList(
+            nn.Sequential(*level(a), nn.Conv2d(a, b, 2, stride=2, bias=False)) for a, b in steps
+        )
+        self.body = nn.Sequential(*level(widths[-1]))
+        self.up = nn.ModuleList(
+            nn.Sequential(nn.ConvTranspose2d(b, a, 2, stride=2, bias=False), *level(a))
+            for a, b in reversed(steps)
+        )
+        self.tail = conv(channels, TASKS[task])
+
+    def displacements(self, surface: Tensor, sigma: Tensor | None = None) -> list[Tensor]:
+        x = surface.movedim(-1, 1)
+        if self.sigma:
+            if sigma is None:
+                raise OptionError("this net must be told sigma")
+            # In hundredths, where the values of interest are near one.
+            level = (100.0 * sigma)[:, None, None, None].expand(-1, 1, *x.shape[2:])
+            x = torch.cat([x, level.to(x.dtype)], dim=1)
+        x = x.contiguous(memory_format=torch.channels_last)
+        with self.autocast(x.device):
+            y = self.head(x)
+            skips = [y]
+            for step in self.down:
+                skips.append(step(skips[-1]))
+            y = self.body(skips[-1])
+            for step, skip in zip(self.up, reversed(skips[1:]), strict=True):
+                y = step(y + skip)
+            y = self.tail(y + skips[0])
+        y = y.to(surface.dtype)
+        return [(torch.tanh(y) if self.tanh else y).movedim(1, -1)]
+
+    def carried(self, surface: Tensor, fine: Tensor, sigma: Tensor | None = None) -> Tensor:
+        return resampled(self.displacements(surface, sigma)[-1], fine.shape[1], fine.shape[2])

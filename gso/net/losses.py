@@ -1,0 +1,69 @@
+"""The published losses (Wang et al. 2024), from the package's own geometry.
+
+All take grids (B, H, W, d) and return one number per surface, (B,); the published loss is
+their mean over the batch. None runs in less than single precision.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from gso import geometry
+from gso.net import grids
+from gso.net.grids import Planes, planes
+
+
+def inside(result: Tensor, target: Tensor) -> Tensor:
+    """``in``: sum of the squared distances between vertices."""
+    return (result - target).square().sum(dim=(1, 2, 3))
+
+
+def fair(result: Tensor) -> Tensor:
+    """``fair``: sum of the squared second differences in both directions."""
+    x = planes(result)
+    total = torch.zeros(len(result), device=result.device)
+    for axis in (1, 2):
+        n = x[0].shape[axis] - 2
+        triple = [tuple(c.narrow(axis, k, n) for c in x) for k in range(3)]
+        total = total + geometry.norm2(geometry.second_difference(*triple)).sum(dim=(1, 2))
+    return total
+
+
+def gc(result: Tensor) -> Tensor:
+    """``gc``: mean absolute Gaussian curvature, ``loss_gc``."""
+    return grids.curvature(planes(result)).abs().mean(dim=(1, 2))
+
+
+def iso(surface: Tensor, flat: Tensor, weights: Tensor | None = None) -> Tensor:
+    """``iso``: mean over cells of the squared isometry defect.
+
+    With `weights` (B, H-1, W-1) of the cells, Eq. 13, which makes Net-W: their weighted sum.
+    """
+    (a, b), (a2, b2) = (geometry.diagonals(*grids.corners(planes(x))) for x in (surface, flat))
+    cells = sum(r * r for r in geometry.isometry_defect(a, b, a2, b2))
+    return cells.mean(dim=(1, 2)) if weights is None else (weights * cells).sum(dim=(1, 2))
+
+
+def iso_weights(surface: Tensor) -> Tensor:
+    """``w_iso`` (B, H-1, W-1): one minus the curvature of a cell over the largest one.
+
+    The curvature of a cell is the mean of \\|K\\| over its corners inside the surface.
+    """
+    p = planes(surface)
+    k = grids.curvature(p).abs()
+    ones = torch.ones_like(k)
+    total, count = (
+        sum(corner for (corner,) in grids.corners((torch.nn.functional.pad(x, (1, 1, 1, 1)),)))
+        for x in (k, ones)
+    )
+    mean = total / count.clamp_min(1.0)
+    return 1.0 - mean / mean.amax(dim=(1, 2), keepdim=True).clamp_min(1e-12)
+
+
+def normal_angles(clean: Planes, result: Planes) -> Tensor:
+    """Mean angle (B,) between the normals of the cells, radians."""
+    first, second = (
+        geometry.cross(*geometry.diagonals(*grids.corners(p))) for p in (clean, result)
+    )
+    return geometry.angle(first, second).mean(dim=(1, 2))

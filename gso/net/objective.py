@@ -1,0 +1,118 @@
+"""What a phase of training minimises."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import torch
+from torch import Tensor, nn
+
+from gso.net import energy, losses
+from gso.net.base import Net
+from gso.net.config import Phase
+from gso.net.data import Batch
+from gso.net.grids import planes
+from gso.tasks import developable, flatten
+
+#: Weight of what comes before the last pass of a net.
+_EARLIER = 0.3
+#: Least size of a label's displacement that its misfit is divided by.
+_LEAST = 3e-3
+#: Least energy of a design that results are compared with.
+_LEAST_ENERGY = 3e-5
+
+Cost = Callable[[Tensor], Tensor]
+
+
+class Objective(nn.Module):
+    """A net and its loss as one module, so that several processes share the backward pass."""
+
+    def __init__(self, net: Net):
+        super().__init__()
+        self.net = net
+
+    def forward(self, batch: Batch, phase: Phase, progress: float) -> Tensor:
+        """Mean loss of a batch; `progress` runs from 0 to 1 within the phase."""
+        start = self.net.start(batch.surface)
+        steps = self.net.displacements(batch.surface, batch.sigma)
+        cost = _COSTS[phase.loss](self.net.task, batch, start, phase, progress)
+        values = [cost(start + moved).mean() for moved in steps]
+        return values[-1] + _EARLIER * sum(values[:-1])  # type: ignore[return-value]
+
+
+def _published(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
+    w = phase.weights
+    fade = math.exp(-phase.decay * progress)
+    surface = batch.surface
+
+    def cost(result: Tensor) -> Tensor:
+        total = torch.zeros(len(result), device=result.device)
+        if w.get("in"):
+            total = total + fade * w["in"] * losses.inside(result, surface)
+        if w.get("fair"):
+            total = total + w["fair"] * losses.fair(result)
+        if w.get("gc"):
+            total = total + w["gc"] * losses.gc(result)
+        if w.get("iso"):
+            total = total + w["iso"] * losses.iso(surface, result)
+        if w.get("iso_w"):
+            total = total + w["iso_w"] * losses.iso(surface, result, losses.iso_weights(surface))
+        return total
+
+    return cost
+
+
+def _label(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
+    """Root mean square misfit over that of the start."""
+    if batch.target is None:
+        raise ValueError("a batch without labels")
+    target = aligned(batch.target, start) if task == "flatten" else batch.target
+    size = (target - start).square().sum(dim=-1).mean(dim=(1, 2))
+
+    def cost(result: Tensor) -> Tensor:
+        miss = (result - target).square().sum(dim=-1).mean(dim=(1, 2))
+        return ((miss + 1e-10) / (size + _LEAST**2)).sqrt()
+
+    return cost
+
+
+def _energy(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
+    if task == "flatten":
+        return energy.Strain(batch.surface, flatten.Options())
+    w = dict(phase.weights)
+    balance = w.pop("balance", 0.5)
+    whole = energy.Developable(batch.surface, replace(developable.Options(), **w))
+    first, last = phase.eps
+    eps = last * (first / last) ** max(1.0 - 2.0 * progress, 0.0)
+    before = whole.at_start.clamp_min(_LEAST_ENERGY)
+    typical = phase.weights.get("w_curvature", 1e-3) * developable.TYPICAL_CURVATURE
+    scale = before**balance * typical ** (1.0 - balance)
+    return lambda result: whole(result, eps) / scale
+
+
+def _clean(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
+    if batch.target is None or batch.sigma is None:
+        raise ValueError("a batch without clean surfaces")
+    target, sigma = batch.target, batch.sigma
+    exact = planes(target)
+    factor = phase.weights.get("angle", 0.1)
+
+    def cost(result: Tensor) -> Tensor:
+        miss = (result - target).square().sum(dim=-1).mean(dim=(1, 2))
+        angle = torch.rad2deg(losses.normal_angles(exact, planes(result)))
+        return (miss + 1e-12).sqrt() / sigma + factor * angle
+
+    return cost
+
+
+_COSTS = {"published": _published, "label": _label, "energy": _energy, "clean": _clean}
+
+
+def aligned(flat: Tensor, start: Tensor) -> Tensor:
+    """Flat images (B, H, W, 2), turned, mirrored and moved to lie closest to others."""
+    a, b = (x - x.mean(dim=(1, 2), keepdim=True) for x in (flat, start))
+    middle = start.mean(dim=(1, 2), keepdim=True)
+    u, _, vt = torch.linalg.svd(torch.einsum("bhwi,bhwj->bij", a, b))
+    return torch.einsum("bhwi,bij->bhwj", a, u @ vt) + middle

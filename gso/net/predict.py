@@ -1,0 +1,193 @@
+"""Nets at work: surfaces in their own unit and position in, results out."""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from gso.net.base import SIZE, Net
+from gso.net.weights import cached, chain
+from gso.resample import resample
+from gso.status import MeshError, OptionError
+
+Array = NDArray[np.float64]
+
+#: Smallest side of a grid that is resampled to the size of the nets.
+SMALLEST = 4
+#: Surfaces that go through a net together.
+_BATCH = 64
+
+
+def predict(
+    surface: Any,
+    *,
+    task: str = "developable",
+    model: str | PathLike[str] | Net | None = None,
+    repeat: int = 1,
+    sigma: float | None = None,
+    device: str | None = None,
+) -> Array:
+    """Let a net make surfaces developable, flatten or denoise them.
+
+    Surfaces are moved and scaled to the unit ball and back. The nets are trained on 64 x 64
+    vertices; other grids are resampled to that by cubic splines, and the displacements are
+    carried back to the grid's own vertices: by evaluating their spline there (the default
+    nets), or by cubic interpolation.
+
+    Parameters
+    ----------
+    surface : array_like, (H, W, 3) or (B, H, W, 3)
+        A grid or a batch of grids of one size, from 4 x 4 up, in any unit of length.
+    task : {"developable", "flatten", "denoise"}
+        What to do.
+    model : str, path or Net, optional
+        Name of a net that comes with the package (:func:`gso.net.available`), a
+        .safetensors file, or a net; the task's default when not given.
+    repeat : int
+        How often the last net is applied, each time to what it made before; surfaces are
+        normalised anew. Only where surfaces come out.
+    sigma : float, optional
+        "denoise": standard deviation of the noise, in the unit of the input; estimated for
+        each surface when not given. Nets that are not told ignore it.
+    device : str, optional
+        "cpu", "cuda" ...; where there is a GPU, that when not given.
+
+    Returns
+    -------
+    ndarray of float64
+        (..., H, W, 3), or (..., H, W, 2) for "flatten": in the unit of the input, with its
+        centre at the origin.
+
+    Raises
+    ------
+    MeshError
+        Grids are too small, not finite, or have no extent.
+    OptionError
+        An option is unknown or out of range.
+    WeightsError
+        There is no such net, or its file is damaged.
+
+    Examples
+    --------
+    >>> u, v = np.meshgrid(np.linspace(0, 2, 20), np.linspace(0, 1, 30), indexing="ij")
+    >>> panel = np.stack([u, v, 0.1 * u * v], axis=-1)
+    >>> from gso.net import CoarseNet
+    >>> predict(panel, task="flatten", model=CoarseNet("flatten")).shape
+    (20, 30, 2)
+    """
+    points = _checked(surface)
+    batch = points[None] if points.ndim == 3 else points
+    where = _device(device)
+    nets = _nets(model, task, where)
+    if isinstance(repeat, bool) or not isinstance(repeat, int) or not 1 <= repeat <= 100:
+        raise OptionError(f"repeat is {repeat!r}; take a whole number from 1 to 100")
+    if repeat > 1 and task == "flatten":
+        raise OptionError("a flat image cannot be flattened again; leave repeat out")
+    nets += [nets[-1]] * (repeat - 1)
+    blocks = [
+        _predicted(batch[k : k + _BATCH], nets, sigma, where)
+        for k in range(0, len(batch), _BATCH)
+    ]
+    out = np.concatenate(blocks) if blocks else np.empty((*batch.shape[:3], 2 + (task != "flatten")))
+    return out[0] if points.ndim == 3 else out
+
+
+def _predicted(batch: Array, nets: list[Net], sigma: float | None, device: str) -> Array:
+    out = batch
+    for net in nets:
+        unit, centre, scale = _normalised(out)
+        noise = _sigma(net, unit, scale, sigma, device)
+        coarse = torch.as_tensor(_resampled(unit), dtype=torch.float32, device=device)
+        with torch.inference_mode():
+            if unit.shape[1:3] == (SIZE, SIZE):
+                moved = net.displacements(coarse, noise)[-1]
+            else:
+                fine = torch.as_tensor(unit, dtype=torch.float32, device=device)
+                moved = net.carried(coarse, fine, noise)
+            start = net.start(torch.as_tensor(unit))
+        out = scale * (start.numpy() + moved.double().cpu().numpy())
+        if net.task == "flatten":
+            return out
+        out = out + centre
+    return out
+
+
+def _nets(model: Any, task: str, device: str) -> list[Net]:
+    if isinstance(model, Net):
+        nets = [model.to(device)]
+    else:
+        nets = [cached(path, device) for path in chain(model, task)]
+    for net in nets:
+        if net.task != task:
+            raise OptionError(f"the net is for task {net.task!r}, not {task!r}")
+    return nets
+
+
+def _device(device: str | None) -> str:
+    name = device or ("cuda" if torch.cuda.is_available() else "cpu")
+    try:
+        torch.empty(0, device=name)
+    except (RuntimeError, AssertionError):
+        raise OptionError(f"there is no device {name!r}; take 'cpu'") from None
+    return name
+
+
+def _checked(surface: Any) -> Array:
+    """Grids as an array, or a message that says what is wrong with them."""
+    try:
+        points = np.asarray(surface, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise MeshError("the surface must be an array of numbers (H, W, 3)") from None
+    if points.ndim not in (3, 4) or points.shape[-1] != 3:
+        raise MeshError(f"expected a grid (H, W, 3) or a batch (B, H, W, 3), not {points.shape}")
+    height, width = points.shape[-3:-1]
+    if min(height, width) < SMALLEST:
+        raise MeshError(f"a grid {height} x {width} is too small for a net; use gso.tno.optimize")
+    if not np.isfinite(points).all():
+        *which, i, j, _ = np.argwhere(~np.isfinite(points))[0]
+        of = f" of surface {which[0]}" if which else ""
+        raise MeshError(f"grid vertex ({i}, {j}){of} is not finite")
+    return points
+
+
+def _normalised(batch: Array) -> tuple[Array, Array, Array]:
+    """Grids of the unit ball, their centroids (B, 1, 1, 3) and radii (B, 1, 1, 1)."""
+    # About the first vertex, so that grids far from the origin lose no digits.
+    origin = batch[:, :1, :1]
+    local = batch - origin
+    middle = local.mean(axis=(1, 2), keepdims=True)
+    local = local - middle
+    size = np.abs(local).max(axis=(1, 2, 3), keepdims=True)
+    if not np.isfinite(size).all() or not (size > 0).all():
+        k = int(np.argmin(np.isfinite(size) & (size > 0)))
+        raise MeshError(f"surface {k}: all vertices are at one point, or too far apart for numbers")
+    scale = size * np.sqrt(((local / size) ** 2).sum(axis=-1).max(axis=(1, 2)))[:, None, None, None]
+    return local / scale, origin + middle, scale
+
+
+def _resampled(unit: Array) -> Array:
+    """Grids at the size of the nets."""
+    if unit.shape[1:3] == (SIZE, SIZE):
+        return unit
+    return np.stack([resample(grid, SIZE, SIZE) for grid in unit])
+
+
+def _sigma(
+    net: Net, unit: Array, scale: Array, sigma: float | None, device: str
+) -> torch.Tensor | None:
+    """Noise of each surface in the unit ball, (B,)."""
+    if not getattr(net, "sigma", False):
+        return None
+    if sigma is not None and not (np.isfinite(sigma) and sigma >= 0):
+        raise OptionError(f"sigma is {sigma!r}; it must be zero or more")
+    if sigma is not None:
+        noise = sigma / scale.ravel()
+    else:
+        from gso.smoothing import smooth_grid
+
+        noise = np.array([smooth_grid(grid).sigma for grid in unit])
+    return torch.as_tensor(noise, dtype=torch.float32, device=device)

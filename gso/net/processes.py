@@ -1,0 +1,78 @@
+"""The processes of a run, as torchrun starts them; one without it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import torch
+from torch import distributed
+
+from gso.status import OptionError
+
+
+@dataclass(frozen=True)
+class Processes:
+    """This process among those of a run.
+
+    Attributes
+    ----------
+    rank, world : int
+        Its number, and how many there are.
+    device : torch.device
+        What it computes on.
+    """
+
+    rank: int
+    world: int
+    device: torch.device
+
+    @property
+    def first(self) -> bool:
+        """Whether it is the one that writes files."""
+        return self.rank == 0
+
+    def agreed(self, value: float) -> float:
+        """A number of the first process, in all of them."""
+        if self.world == 1:
+            return value
+        shared = torch.tensor([value], dtype=torch.float64, device=self.device)
+        distributed.broadcast(shared, 0)
+        return float(shared)
+
+    def wait(self) -> None:
+        """Until all are here."""
+        if self.world > 1:
+            distributed.barrier()
+
+
+@contextmanager
+def processes(device: str | None = None) -> Iterator[Processes]:
+    """Join the other processes for the length of a run.
+
+    Raises
+    ------
+    OptionError
+        There is no such device.
+    """
+    world, rank = (int(os.environ.get(n, d)) for n, d in (("WORLD_SIZE", "1"), ("RANK", "0")))
+    name = device or ("cuda" if torch.cuda.is_available() else "cpu")
+    if name == "cuda" and world > 1:
+        name = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
+    try:
+        where = torch.device(name)
+        torch.empty(0, device=where)
+    except (RuntimeError, AssertionError):
+        raise OptionError(f"there is no device {name!r}; take 'cpu'") from None
+    if world == 1:
+        yield Processes(0, 1, where)
+        return
+    if where.type == "cuda":
+        torch.cuda.set_device(where)
+    distributed.init_process_group("nccl" if where.type == "cuda" else "gloo")
+    try:
+        yield Processes(rank, world, where)
+    finally:
+        distributed.destroy_process_group()

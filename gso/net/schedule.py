@@ -1,0 +1,42 @@
+"""Where a run is: which phase, how far into it, at what learning rate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from gso.net.config import Phase
+
+#: Share of the run over which the rate rises in the beginning.
+_WARM_UP = 0.01
+
+
+class Place(NamedTuple):
+    """A phase, its number, the progress within it from 0 to 1, and the learning rate."""
+
+    number: int
+    phase: Phase
+    progress: float
+    rate: float
+
+
+def place(phases: Sequence[Phase], progress: float) -> Place:
+    """Where a run is at a progress from 0 to 1.
+
+    >>> at = place([Phase(weights={"gc": 1.0}), Phase("energy", share=3.0, rate=0.5)], 0.25)
+    >>> at.number, at.progress, at.rate
+    (1, 0.0, 0.5)
+    """
+    total = sum(phase.share for phase in phases)
+    begin = 0.0
+    for number, phase in enumerate(phases):
+        share = phase.share / total
+        if progress < begin + share or number == len(phases) - 1:
+            break
+        begin += share
+    within = min(max((progress - begin) / share, 0.0), 1.0)
+    fall = 0.5 * (1.0 + math.cos(math.pi * within))
+    rate = phase.final_rate + (phase.rate - phase.final_rate) * fall
+    warm = min(1.0, (progress + 1e-4) / _WARM_UP)
+    return Place(number, phase, within, rate * warm)

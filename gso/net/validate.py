@@ -1,0 +1,75 @@
+"""Figures of a net on surfaces that it was not trained on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from gso import metrics
+from gso.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+#: What a net is judged by while it is trained; lower is better.
+SCORE = {"developable": "score", "flatten": "strain_mean", "denoise": "theta"}
+
+
+def figures(task: str, before: Array, result: Array) -> dict[str, float]:
+    """Metrics of one result; for "denoise" `before` is the surface without noise.
+
+    "score" weighs what is left of the curvature against the distance as the published
+    figures of Net-CF do: each counts as much as a tenth of its own figure.
+    """
+    if task == "denoise":
+        return {"theta": metrics.normal_angle(before, result)}
+    if task == "flatten":
+        mesh = Mesh.from_grid(before, weld=False)
+        strain = metrics.principal_strains(before, result)
+        return {
+            "loss_iso_cell": metrics.loss_iso_cell(before, result),
+            "edge_length_error": metrics.edge_length_error(mesh, result),
+            "strain_mean": strain.mean,
+            "strain_p99": strain.p99,
+            "flipped_cells": float(metrics.flipped_cells(result, surface=before)),
+        }
+    was = metrics.fairness(before, scale=1.0)
+    found = {
+        "loss_gc": metrics.loss_gc(result, scale=1.0),
+        "K_A_r": metrics.K_A_r(before, result),
+        "d_H": metrics.d_H(before, result),
+        "fairness_ratio": metrics.fairness(result, scale=1.0) / was if was > 0 else 1.0,
+    }
+    left = 1.0 - found["K_A_r"]
+    return found | {"score": left / 0.1232 + found["d_H"] / 0.517 + found["loss_gc"] / 0.0291}
+
+
+def mean_figures(
+    task: str, befores: Array, results: Array, tick: Callable[[int], Any] | None = None
+) -> dict[str, float]:
+    """Means of :func:`figures` over surfaces; for "flatten" also the share without flips."""
+    rows = []
+    for k, (before, result) in enumerate(zip(befores, results, strict=True)):
+        rows.append(figures(task, before, result))
+        if tick is not None:
+            tick(k)
+    out = {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
+    if task == "flatten":
+        out["unflipped"] = float(np.mean([row["flipped_cells"] == 0 for row in rows]))
+    return out
+
+
+@torch.no_grad()
+def applied(
+    net: Any, surfaces: torch.Tensor, sigma: torch.Tensor | None = None, *, batch: int = 32
+) -> Array:
+    """Results (n, H, W, d) of a net for surfaces of the unit ball, on its own device."""
+    device = next(net.parameters()).device
+    out = []
+    for k in range(0, len(surfaces), batch):
+        noise = None if sigma is None else sigma[k : k + batch].to(device)
+        out.append(net(surfaces[k : k + batch].to(device), noise).double().cpu().numpy())
+    return np.concatenate(out)

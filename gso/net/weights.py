@@ -1,0 +1,241 @@
+"""Nets in files: safetensors beside a JSON card that says what it is and where it is from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from functools import lru_cache
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from gso.io import replacing
+from gso.net.base import TASKS, Net
+from gso.net.coarse import CoarseNet
+from gso.net.gsonet import GSONet
+from gso.status import GSOError, OptionError, WeightsError
+
+#: Nets that come with the package: NAME.safetensors and NAME.json.
+FOLDER = Path(__file__).parent / "weights"
+#: Version of the card.
+FORMAT = 1
+#: Kinds of nets, as cards and configurations name them.
+KINDS: dict[str, type[Net]] = {"coarse": CoarseNet, "gsonet": GSONet}
+#: Nets that are applied one after the other: each sees what the one before made.
+CHAINS = {"net-cf": ("net-c", "net-f")}
+#: The net of a task when none is named.
+DEFAULTS = {"developable": "developable", "flatten": "flatten-strain", "denoise": "denoise"}
+#: Largest file that is read: far more than any net of this package has.
+_LARGEST = 1 << 30
+
+
+def make(settings: dict[str, Any]) -> Net:
+    """A new net from ``{"kind": ..., "task": ..., ...}``.
+
+    Raises
+    ------
+    OptionError
+        The kind or a setting is unknown, or out of range.
+
+    Examples
+    --------
+    >>> make({"kind": "gsonet", "task": "flatten", "channels": 8}).settings["channels"]
+    8
+    """
+    rest = dict(settings)
+    kind = rest.pop("kind", None)
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise OptionError(f"no kind {kind!r} of net; there are {', '.join(KINDS)}")
+    try:
+        return KINDS[kind](**rest)
+    except (TypeError, AttributeError) as error:
+        raise OptionError(f"settings of the net: {error}") from None
+
+
+def kind_of(net: Net) -> str:
+    """Kind of a net, as cards name it."""
+    return next(name for name, cls in KINDS.items() if type(net) is cls)
+
+
+def save(
+    net: Net,
+    path: str | PathLike[str],
+    card: dict[str, Any] | None = None,
+    *,
+    dtype: torch.dtype = torch.float16,
+) -> dict[str, Any]:
+    """Write a net and its card.
+
+    Parameters
+    ----------
+    net : Net
+        The net; what is written is on the CPU.
+    path : path
+        The .safetensors file; the card is beside it, with the suffix .json.
+    card : dict, optional
+        What else the card says: data, configuration, hardware, metrics.
+    dtype : torch.dtype
+        Type of the numbers in the file.
+
+    Returns
+    -------
+    dict
+        The card.
+    """
+    from safetensors.torch import save as packed
+
+    tensors = {k: v.detach().to("cpu", dtype).contiguous() for k, v in net.state_dict().items()}
+    data = packed(tensors)
+    record = {
+        **(card or {}),
+        "format": FORMAT,
+        "model": {"kind": kind_of(net), **net.settings},
+        "parameters": sum(p.numel() for p in net.parameters()),
+        "sha256": hashlib.sha256(data).hexdigest(),
+    }
+    target = Path(path)
+    with replacing(target) as file:
+        file.write(data)
+    write_card(target.with_suffix(".json"), record)
+    return record
+
+
+def write_card(path: Path, card: dict[str, Any]) -> None:
+    """Write a card."""
+    with replacing(path) as file:
+        file.write((json.dumps(card, indent=1) + "\n").encode())
+
+
+def read_card(path: str | PathLike[str]) -> dict[str, Any]:
+    """Card of a .safetensors file.
+
+    Raises
+    ------
+    WeightsError
+        It is missing, or no card of this package.
+    """
+    place = Path(path).with_suffix(".json")
+    try:
+        card = json.loads(place.read_bytes())
+    except OSError as error:
+        raise WeightsError(f"{place} cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise WeightsError(f"{place} is no card of a net: {error}") from None
+    if not isinstance(card, dict) or card.get("format") != FORMAT:
+        raise WeightsError(f"{place} is no card of a net in format {FORMAT}; get the file anew")
+    if not isinstance(card.get("model"), dict) or not isinstance(card.get("sha256"), str):
+        raise WeightsError(f"{place} does not say which net it belongs to; get the file anew")
+    return card
+
+
+def load(model: str | PathLike[str], *, device: str | torch.device = "cpu") -> Net:
+    """A net, ready to be used; files are never executed.
+
+    Parameters
+    ----------
+    model : str or path
+        Name of a net that comes with the package (see :func:`available`), or a
+        .safetensors file with its card beside it.
+    device : str or torch.device
+        Where it is to be.
+
+    Raises
+    ------
+    WeightsError
+        The file is missing, damaged, not the one that its card belongs to, or holds
+        another net.
+    """
+    path = located(model)
+    card = read_card(path)
+    try:
+        size = path.stat().st_size
+        if size > _LARGEST:
+            raise WeightsError(f"{path} has {size} bytes: no net of this package")
+        data = path.read_bytes()
+    except OSError as error:
+        raise WeightsError(f"{path} cannot be read: {error.strerror}") from None
+    if hashlib.sha256(data).hexdigest() != card["sha256"]:
+        raise WeightsError(f"{path} is damaged: it is not the file that its card describes")
+    net = _filled(card["model"], data, path)
+    return net.to(device, memory_format=torch.channels_last).eval()
+
+
+def _filled(settings: dict[str, Any], data: bytes, path: Path) -> Net:
+    """A net with the numbers of a file."""
+    from safetensors import SafetensorError
+    from safetensors.torch import load as unpacked
+
+    try:
+        # Without memory: what the card claims is compared with the file before any is taken.
+        with torch.device("meta"):
+            shapes = {k: v.shape for k, v in make(settings).state_dict().items()}
+        tensors = unpacked(data)
+    except (GSOError, SafetensorError, ValueError, TypeError, RuntimeError, MemoryError) as error:
+        raise WeightsError(f"{path} holds no net of this package: {error}") from None
+    if {k: v.shape for k, v in tensors.items()} != shapes:
+        raise WeightsError(f"{path} holds other tensors than the net of its card")
+    tensors = {k: v.float() for k, v in tensors.items()}
+    if not all(bool(v.isfinite().all()) for v in tensors.values()):
+        raise WeightsError(f"{path} has weights that are not finite")
+    net = make(settings)
+    net.load_state_dict(tensors)
+    return net
+
+
+def available(task: str | None = None) -> list[str]:
+    """Names of the nets that come with the package, all or those of a task.
+
+    >>> set(available("flatten")) <= set(available())
+    True
+    """
+    found = sorted(path.stem for path in FOLDER.glob("*.safetensors"))
+    found += [name for name, parts in CHAINS.items() if set(parts) <= set(found)]
+    if task is None:
+        return found
+    first = {name: CHAINS.get(name, (name,))[0] for name in found}
+    return [n for n in found if read_card(located(first[n]))["model"].get("task") == task]
+
+
+def located(model: str | PathLike[str]) -> Path:
+    """The file of a net.
+
+    Raises
+    ------
+    WeightsError
+        No net of this name comes with the package, and there is no such file.
+    """
+    name = str(model)
+    if Path(name).suffix == ".safetensors":
+        return Path(name)
+    path = FOLDER / f"{name}.safetensors"
+    if Path(name).name != name or not path.exists():
+        known = ", ".join(available()) or "none"
+        raise WeightsError(
+            f"no net {name!r}; with the package come: {known}; or give a .safetensors file"
+        )
+    return path
+
+
+def chain(model: str | PathLike[str] | None, task: str) -> tuple[Path, ...]:
+    """Files of the nets that a name stands for, in the order in which they are applied."""
+    if task not in TASKS:
+        raise OptionError(f"no task {task!r} for a net; there are {', '.join(TASKS)}")
+    name = DEFAULTS[task] if model is None else model
+    parts = CHAINS.get(name, (name,)) if isinstance(name, str) else (name,)
+    return tuple(located(part) for part in parts)
+
+
+def cached(path: Path, device: str) -> Net:
+    """:func:`load`, once for each version of a file."""
+    try:
+        stamp = path.stat().st_mtime_ns
+    except OSError:
+        stamp = 0
+    return _cached(path, device, stamp)
+
+
+@lru_cache(maxsize=8)
+def _cached(path: Path, device: str, stamp: int) -> Net:
+    return load(path, device=device)

@@ -1,0 +1,293 @@
+"""Nets: their sizes, invariances, files, and what predict makes of a surface."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import gso
+from gso.flat_start import rectangle
+from gso.status import MeshError, OptionError, WeightsError
+from tests.conftest import cylinder, saddle
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("safetensors")
+
+from gso.net import CoarseNet, GSONet, available, load, predict, save, weights  # noqa: E402
+from gso.net.base import TASKS  # noqa: E402
+
+
+def shaken(net, seed=0, size=0.05):
+    """The same net with random numbers where it begins with zeros."""
+    generator = torch.Generator().manual_seed(seed)
+    with torch.no_grad():
+        for p in net.parameters():
+            p.add_(size * torch.randn(p.shape, generator=generator))
+    return net.eval()
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    return shaken(CoarseNet(widths=(16, 16, 16), depths=(1, 1, 1)))
+
+
+@pytest.fixture(scope="module")
+def flatten():
+    return shaken(CoarseNet("flatten", widths=(16, 16, 16), depths=(1, 1, 1)))
+
+
+@pytest.fixture(scope="module")
+def published():
+    return shaken(GSONet(channels=8, blocks=1), size=0.01)
+
+
+@pytest.mark.parametrize(
+    ("task", "count"), [("developable", 2_820_832), ("denoise", 2_820_832), ("flatten", 2_820_688)]
+)
+def test_published_size(task, count):
+    assert sum(p.numel() for p in GSONet(task).parameters()) == count
+
+
+def test_published_net_has_no_biases():
+    assert all(p.ndim == 4 for p in GSONet(channels=8).parameters())
+
+
+def test_tanh_bounds_displacements():
+    net = shaken(GSONet(channels=8, blocks=1, tanh=True), size=0.2)
+    points = torch.randn(1, 16, 16, 3)
+    assert float((net(points) - points).detach().abs().max()) <= 1.0 + 1e-6
+
+
+@pytest.mark.parametrize("kind", ["coarse", "published"])
+@pytest.mark.parametrize("shape", [(64, 64), (20, 33), (4, 5)])
+def test_unit_position_and_size_of_the_grid_do_not_matter(kind, shape, request):
+    net = request.getfixturevalue(kind)
+    points = saddle(*shape)
+    result = predict(points, model=net)
+    assert result.shape == points.shape and np.isfinite(result).all()
+    assert np.abs(result - points).max() > 1e-4
+    far = predict(1000.0 * points + [5e4, 0, -3e4], model=net)
+    np.testing.assert_allclose((far - [5e4, 0, -3e4]) / 1000.0, result, atol=2e-6)
+
+
+def test_coarse_net_turns_with_the_surface(coarse, flatten):
+    rng = np.random.default_rng(1)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    points = saddle(64)
+    np.testing.assert_allclose(
+        predict(points @ turn, model=coarse), predict(points, model=coarse) @ turn, atol=2e-5
+    )
+    flat = predict(points, task="flatten", model=flatten)
+    np.testing.assert_allclose(
+        predict(points @ turn, task="flatten", model=flatten), flat, atol=2e-5
+    )
+
+
+def test_coarse_net_is_one_surface_at_every_resolution(coarse):
+    fine = predict(saddle(127), model=coarse)
+    np.testing.assert_allclose(fine[::2, ::2], predict(saddle(64), model=coarse), atol=2e-3)
+
+
+def test_batches_are_single_surfaces(coarse):
+    batch = np.stack([saddle(64), cylinder(64)])
+    together = predict(batch, model=coarse)
+    for points, result in zip(batch, together, strict=True):
+        np.testing.assert_allclose(predict(points, model=coarse), result, atol=1e-5)
+    assert predict(batch[:0], model=coarse).shape == (0, 64, 64, 3)
+
+
+def test_new_flatten_net_gives_the_rectangle():
+    points = saddle(30, 40)
+    start = rectangle(points)
+    flat = predict(points, task="flatten", model=CoarseNet("flatten"))
+    np.testing.assert_allclose(flat, start - start.mean(axis=(0, 1)), atol=1e-6)
+
+
+def test_repeat_is_the_same_net_again(coarse):
+    points = saddle(64)
+    twice = predict(predict(points, model=coarse), model=coarse)
+    np.testing.assert_allclose(predict(points, model=coarse, repeat=2), twice, atol=1e-6)
+
+
+def test_noise_is_told_in_the_unit_of_the_input():
+    net = shaken(GSONet("denoise", channels=8, blocks=1, sigma=True), size=0.02)
+    points = saddle(64)
+    noisy = points + 0.01 * np.random.default_rng(0).normal(size=points.shape)
+    told = predict(noisy, task="denoise", model=net, sigma=0.01)
+    larger = predict(10 * noisy, task="denoise", model=net, sigma=0.1)
+    np.testing.assert_allclose(larger / 10, told, atol=1e-5)
+    estimated = predict(noisy, task="denoise", model=net)
+    assert np.abs(estimated - told).max() < 0.1 * np.abs(told - noisy).max()
+
+
+@pytest.mark.parametrize(
+    ("points", "says"),
+    [
+        (np.zeros((8, 8)), "expected a grid"),
+        (np.zeros((8, 8, 2)), "expected a grid"),
+        (np.zeros((3, 8, 3)), "too small"),
+        (np.zeros((8, 8, 3)), "one point"),
+        (np.full((8, 8, 3), np.nan), r"vertex \(0, 0\) is not finite"),
+        ("surface", "array of numbers"),
+    ],
+)
+def test_bad_surfaces(points, says, coarse):
+    with pytest.raises(MeshError, match=says):
+        predict(points, model=coarse)
+
+
+def test_bad_options(coarse):
+    points = saddle(16)
+    for keywords, says in [
+        ({"task": "bend"}, "no task"),
+        ({"task": "flatten", "model": coarse}, "is for task"),
+        ({"model": coarse, "repeat": 0}, "repeat"),
+        ({"model": coarse, "device": "abacus"}, "no device"),
+    ]:
+        with pytest.raises(OptionError, match=says):
+            predict(points, **keywords)
+    for make in (lambda: GSONet(channels=6), lambda: CoarseNet(widths=(1, 2)), lambda: GSONet("bend")):
+        with pytest.raises(OptionError):
+            make()
+    with pytest.raises(WeightsError, match="with the package come"):
+        predict(points, model="net-x")
+
+
+def test_surfaces_without_area_are_survived(coarse, flatten):
+    line = np.zeros((16, 16, 3))
+    line[..., 0] = np.arange(16)[:, None]
+    for net in (coarse, flatten):
+        assert np.isfinite(predict(line, task=net.task, model=net)).all()
+
+
+class TestFiles:
+    @pytest.fixture
+    def path(self, tmp_path, coarse):
+        save(coarse, tmp_path / "net.safetensors", {"name": "small"}, dtype=torch.float32)
+        return tmp_path / "net.safetensors"
+
+    def test_round_trip(self, path, coarse):
+        again = load(path)
+        assert again.settings == coarse.settings
+        points = saddle(64)
+        np.testing.assert_array_equal(predict(points, model=path), predict(points, model=coarse))
+        card = json.loads(path.with_suffix(".json").read_text())
+        assert card["name"] == "small" and card["parameters"] > 0
+
+    def test_half_precision_changes_little(self, tmp_path, coarse):
+        save(coarse, tmp_path / "half.safetensors")
+        points = saddle(64)
+        moved = predict(points, model=coarse) - points
+        half = predict(points, model=tmp_path / "half.safetensors") - points
+        assert np.abs(half - moved).max() < 0.02 * np.abs(moved).max()
+
+    def test_a_new_file_is_seen(self, path, coarse):
+        before = predict(saddle(64), model=path)
+        save(shaken(CoarseNet(widths=(8, 8, 8), depths=(1, 1, 1)), seed=5), path)
+        assert np.abs(predict(saddle(64), model=path) - before).max() > 1e-6
+
+    @pytest.mark.parametrize("cut", [0, 7, 100, -1])
+    def test_truncated(self, path, cut):
+        path.write_bytes(path.read_bytes()[:cut])
+        with pytest.raises(WeightsError, match="damaged"):
+            load(path)
+
+    def test_flipped_bit(self, path):
+        data = bytearray(path.read_bytes())
+        data[-5] ^= 1
+        path.write_bytes(data)
+        with pytest.raises(WeightsError, match="damaged"):
+            load(path)
+
+    def test_missing_card(self, path):
+        path.with_suffix(".json").unlink()
+        with pytest.raises(WeightsError, match="cannot be read"):
+            load(path)
+
+    @pytest.mark.parametrize("text", ["", "[]", "{}", "[" * 100_000, '{"format": 1}', "\xff"])
+    def test_foreign_card(self, path, text):
+        path.with_suffix(".json").write_text(text, encoding="latin-1")
+        with pytest.raises(WeightsError, match="card|which net"):
+            load(path)
+
+    @pytest.mark.parametrize(
+        "model",
+        [
+            {"kind": "os.system", "task": "developable"},
+            {"kind": "coarse", "task": "developable", "widths": [4096, 4096, 4096]},
+            {"kind": "coarse", "task": "developable", "widths": "abc"},
+            {"kind": "coarse", "task": "flatten", "widths": [16, 16, 16], "depths": [1, 1, 1]},
+            {"kind": "gsonet", "task": "developable"},
+            {"kind": "gsonet", "task": "developable", "channels": 10**9},
+            {"kind": ["coarse"]},
+            {"task": 3},
+        ],
+    )
+    def test_card_of_another_net(self, path, model):
+        self.pretend(path, path.read_bytes(), model)
+        with pytest.raises(WeightsError, match="holds"):
+            load(path)
+
+    @pytest.mark.parametrize(
+        "data", [b"", b"\x80\x04N.", b"\xff" * 64, b"PK\x03\x04" * 20, (2**40).to_bytes(8, "little")]
+    )
+    def test_no_tensors(self, path, data):
+        self.pretend(path, data)
+        with pytest.raises(WeightsError, match="holds no net"):
+            load(path)
+
+    def test_not_finite(self, path, coarse):
+        from safetensors.torch import save as packed
+
+        tensors = {k: v.clone() for k, v in coarse.state_dict().items()}
+        tensors["stem.bias"][0] = float("nan")
+        self.pretend(path, packed(tensors))
+        with pytest.raises(WeightsError, match="not finite"):
+            load(path)
+
+    def pretend(self, path, data, model=None):
+        """Write a file whose card has its checksum."""
+        import hashlib
+
+        card = json.loads(path.with_suffix(".json").read_text())
+        card["sha256"] = hashlib.sha256(data).hexdigest()
+        if model is not None:
+            card["model"] = model
+        path.write_bytes(data)
+        path.with_suffix(".json").write_text(json.dumps(card))
+
+
+@pytest.mark.parametrize("name", [n for n in available() if n not in weights.CHAINS])
+def test_shipped_weights_load(name):
+    net = load(name)
+    assert net.task in TASKS
+    card = weights.read_card(weights.located(name))
+    assert card["parameters"] == sum(p.numel() for p in net.parameters())
+    result = predict(saddle(16), task=net.task, model=name)
+    assert np.isfinite(result).all()
+
+
+def test_shipped_weights_are_small():
+    assert sum(p.stat().st_size for p in weights.FOLDER.glob("*")) < 60e6
+
+
+def test_neither_casadi_nor_the_solver_is_loaded():
+    code = (
+        "import sys, numpy as np, gso\n"
+        "from gso.net import CoarseNet, predict\n"
+        "u, v = np.mgrid[:8.0, :8.0]\n"
+        "predict(np.dstack([u, v, u * v / 9]), model=CoarseNet(widths=(8, 8, 8)))\n"
+        "import gso.net.train\n"
+        "print([m for m in ('casadi', 'gso.tno') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_public_names():
+    assert gso.net.predict is predict

@@ -1,0 +1,139 @@
+"""Training's losses and energies are those of the metrics and of the solver."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gso import metrics, tasks
+from gso.flat_start import rectangle
+from gso.constraints.compiled import compile_constraints
+from gso.mesh import Mesh
+from gso.tasks import developable, flatten
+from gso.tasks.base import Request
+from gso.terms import edges, stretch
+from gso.terms.losses import Absolute
+from gso.topology import grid_faces
+from gso.variables import vertex_normals
+from tests.conftest import cylinder, saddle
+
+torch = pytest.importorskip("torch")
+
+from gso.net import energy, grids, losses  # noqa: E402
+
+
+def batch(*surfaces):
+    return torch.from_numpy(np.stack(surfaces))
+
+
+@pytest.fixture(scope="module")
+def pair(surfaces):
+    """Two designs and two results."""
+    rng = np.random.default_rng(0)
+    designs = np.stack(surfaces[:2])
+    return designs, designs + 1e-3 * rng.standard_normal(designs.shape)
+
+
+def total(items, points):
+    """Value of weighted terms at the vertices (n, d)."""
+    out = {}
+    for item in items:
+        term = item.term
+        ((_, stencil),) = term.stencil
+        corners = [tuple(points[stencil[:, k]].T) for k in range(stencil.shape[1])]
+        r = np.stack(np.broadcast_arrays(*term.residual(corners, term.constants)))
+        value = item.weight * (item.loss.value(r).sum(axis=0) * term.weights).sum()
+        out[term.name] = out.get(term.name, 0.0) + value
+    return out
+
+
+def request(points):
+    mesh = Mesh.from_grid(points, weld=False)
+    return Request(mesh, developable.Options(), "curvature", compile_constraints((), mesh))
+
+
+def test_developable_energy_is_the_solvers(pair):
+    designs, results = pair
+    fast = energy.Developable(batch(*designs), developable.Options())
+    parts = fast.parts(batch(*results))
+    for k, (design, result) in enumerate(zip(designs, results, strict=True)):
+        last = tasks.get("developable").plan(request(design)).stages[-1]
+        solver = total(last.items, result.reshape(-1, 3))
+        # The solver smooths the design before it looks how much bending is its own.
+        for name, value in solver.items():
+            assert float(parts[name][k]) == pytest.approx(
+                value, rel=1e-3 if name == "fairness" else 1e-9
+            )
+
+
+def test_strain_energy_is_the_solvers(pair):
+    designs, _ = pair
+    rng = np.random.default_rng(1)
+    flats = [rectangle(p) + 3e-3 * rng.standard_normal((*p.shape[:2], 2)) for p in designs]
+    strain = energy.Strain(batch(*designs), flatten.Options())
+    values, levels = strain(batch(*flats)), strain.level(strain.residuals(batch(*flats)))
+    for k, (design, flat) in enumerate(zip(designs, flats, strict=True)):
+        mesh, level = Mesh.from_grid(design, weld=False), float(levels[k])
+        items = flatten._strain_stage(flatten.Options(), mesh, level).items
+        solver = sum(total(items, flat.reshape(-1, 2)).values()) / level
+        assert float(values[k]) == pytest.approx(solver, rel=1e-9)
+
+
+def test_losses_are_the_metrics(pair):
+    designs, results = pair
+    gc, fair = losses.gc(batch(*results)), losses.fair(batch(*results))
+    for k, result in enumerate(results):
+        assert float(gc[k]) == pytest.approx(metrics.loss_gc(result, scale=1.0), rel=1e-12)
+        assert float(fair[k]) == pytest.approx(metrics.fairness(result, scale=1.0), rel=1e-6)
+
+
+def test_iso_is_the_squared_defect():
+    surface = saddle(9, 8)
+    flat = rectangle(surface)
+    defect = losses.iso(batch(surface), batch(flat))
+    by_hand = metrics.isometry_defect(surface, flat, scale=1.0)
+    assert float(defect) <= (by_hand**2).mean() <= 3 * float(defect)
+    bent = cylinder(9)
+    assert float(losses.iso(batch(bent), batch(bent))) == 0.0
+
+
+def test_curvature_weights():
+    surface = saddle(9, 8)
+    weights = losses.iso_weights(batch(surface))[0].numpy()
+    assert weights.shape == (8, 7)
+    assert weights.min() == pytest.approx(0.0, abs=1e-12) and weights.max() < 1.0
+    k = np.abs(metrics.curvature_grid(surface))
+    # The corner cell has one corner inside the surface.
+    largest = max(k[i : i + 2, j : j + 2].mean() for i in range(6) for j in range(5))
+    assert weights[0, 0] == pytest.approx(
+        1
+        - k[0, 0]
+        / max(
+            largest,
+            k.max(initial=0, where=np.zeros_like(k, bool)),
+            *(k[0, 0], k[-1, -1], k[0, -1], k[-1, 0]),
+        ),
+        abs=0.2,
+    )
+
+
+def test_normals_and_rectangle_are_the_packages(pair):
+    designs, _ = pair
+    p = grids.planes(batch(*designs))
+    normals = grids.points(grids.normals(p)).numpy()
+    flat = grids.rectangle(p).numpy()
+    for k, design in enumerate(designs):
+        expected = vertex_normals(Mesh.from_grid(design, weld=False)).reshape(design.shape)
+        np.testing.assert_allclose(normals[k], expected, atol=1e-12)
+        start = rectangle(design)
+        np.testing.assert_allclose(flat[k], start - start.mean(axis=(0, 1)), atol=1e-12)
+
+
+def test_degenerate_surfaces_have_finite_gradients():
+    point = torch.zeros(1, 8, 8, 3, requires_grad=True)
+    value = (
+        losses.gc(point).sum()
+        + energy.Strain(point.detach(), flatten.Options())(point[..., :2]).sum()
+    )
+    value.backward()
+    assert torch.isfinite(value) and torch.isfinite(point.grad).all()
