@@ -231,17 +231,19 @@ def fairness(surface: Any, *, scale: float | None = None) -> float:
 def _flat(surface: Any, flat: Any) -> Array:
     """Flat image as (n, 2), or another surface as (n, 3), in the order of the mesh's vertices."""
     if hasattr(flat, "vertices"):
-        return flat.vertices
-    image = np.asarray(flat, float)
-    if image.ndim == 3:
-        index = None if not hasattr(surface, "grid_index") else surface.grid_index
+        out = flat.vertices
+    else:
+        image = np.asarray(flat, float)
         out = image.reshape(-1, image.shape[-1])[:, :2]
-        if index is not None:
-            ordered = np.empty_like(out)
-            ordered[index.ravel()] = out
-            return ordered
+    count = len(_points(surface))
+    if len(out) != count:
+        raise MeshError(f"the image has {len(out)} vertices and the surface {count}")
+    index = getattr(surface, "grid_index", None)
+    if hasattr(flat, "vertices") or image.ndim != 3 or index is None:
         return out
-    return image[:, :2]
+    ordered = np.empty_like(out)
+    ordered[index.ravel()] = out
+    return ordered
 
 
 def _cells(surface: Any) -> NDArray[np.int64]:
@@ -326,12 +328,21 @@ def principal_strains(surface: Any, flat: Any) -> Strains:
 
     Four corner triangles per quad, one per triangle; those without area are left out.
     """
+    values = corner_strains(surface, flat)
+    values = values[~np.isnan(values)]
+    return Strains(float(values.mean()), float(np.percentile(values, 99)), values)
+
+
+def corner_strains(surface: Any, flat: Any) -> Array:
+    """Larger principal strain max |s - 1| (4 q + t,) of every corner triangle.
+
+    In the order of :func:`gso.topology.corner_triangles`; NaN where one has no area.
+    """
     tri = topology.corner_triangles(_faces(surface))
     p, q = _points(surface), _flat(surface, flat)
     area = _space_areas(p, tri)
     keep = area > 1e-12 * area.max()
-    tri = tri[keep]
-    here, there = ([components(x[k]) for k in tri.T] for x in (p, q))
+    here, there = ([components(x[k]) for k in tri[keep].T] for x in (p, q))
     if q.shape[1] == 2:
         a, b, c = there
         s1, s2 = geometry.singular_values(a, b, c, geometry.rest_frame(*here))
@@ -339,8 +350,9 @@ def principal_strains(surface: Any, flat: Any) -> Strains:
         s1, s2 = geometry.principal_stretches(
             geometry.first_form(*here), geometry.first_form(*there)
         )
-    values = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0))
-    return Strains(float(values.mean()), float(np.percentile(values, 99)), values)
+    values = np.full(len(tri), np.nan)
+    values[keep] = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0))
+    return values
 
 
 def stretches(surface: Any, flat: Any) -> tuple[Array, Array]:
@@ -351,7 +363,7 @@ def stretches(surface: Any, flat: Any) -> tuple[Array, Array]:
     """
     faces, p, q = _faces(surface), _points(surface), _flat(surface, flat)
     out = np.full((2, len(faces)), np.nan)
-    quad = faces[:, -1] >= 0 if faces.shape[1] == 4 else np.zeros(len(faces), bool)
+    quad = topology.are_quads(faces)
     for which, some in zip((quad, ~quad), topology.by_size(faces), strict=True):
         rest, image = (geometry.first_form(*(components(x[k]) for k in some.T)) for x in (p, q))
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -207,7 +208,7 @@ class Result:
                 record["formulation"],
                 design,
                 design.replaced(data["vertices"]),
-                data.get("flat"),
+                _checked(data, "flat", (len(design.vertices), 2)),
                 Status[record["status"]],
                 record["iterations"],
                 record["energy"],
@@ -219,7 +220,7 @@ class Result:
                 tuple(record["notes"]),
                 record["details"],
                 spline=BSplineSurface.from_arrays(data),
-                cell_scale=data.get("cell_scale"),
+                cell_scale=_checked(data, "cell_scale", (len(design.faces),)),
             )
             result.__dict__["metrics"] = record["metrics"]
         except (KeyError, TypeError, ValueError) as error:
@@ -227,3 +228,11 @@ class Result:
                 raise
             raise MeshError(f"{path} is no result of gso: {error}") from None
         return result
+
+
+def _checked(data: Mapping[str, Array], name: str, shape: tuple[int, ...]) -> Array | None:
+    """An array of a file, None where there is none."""
+    array = data.get(name)
+    if array is not None and array.shape != shape:
+        raise ValueError(f"{name} is an array {array.shape}, not {shape}")
+    return array

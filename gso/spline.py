@@ -138,18 +138,33 @@ class BSplineSurface:
         Raises
         ------
         OptionError
-            A parameter is outside the knots.
+            A parameter is outside the knots, `u` and `v` do not broadcast, or an order is no
+            integer, 0 or more.
         """
-        a, b = np.broadcast_arrays(
-            _parameter("u", u, self.knots_u), _parameter("v", v, self.knots_v)
-        )
+        _check_count("du", du, 0)
+        _check_count("dv", dv, 0)
+        u, v = _parameter("u", u, self.knots_u), _parameter("v", v, self.knots_v)
+        try:
+            a, b = np.broadcast_arrays(u, v)
+        except ValueError:
+            raise OptionError(
+                f"u is an array {u.shape} and v an array {v.shape}, which do not broadcast"
+            ) from None
         n, m = self.net.shape[:2]
         rows = np.tensordot(basis(self.knots_u, n, a.ravel(), du), self.net, axes=1)
         points = np.einsum("pj,pjk->pk", basis(self.knots_v, m, b.ravel(), dv), rows)
         return points.reshape(*a.shape, 3)
 
     def sample(self, height: int, width: int) -> Array:
-        """Points at uniform parameters, both ends included, (height, width, 3)."""
+        """Points at uniform parameters, both ends included, (height, width, 3).
+
+        Raises
+        ------
+        OptionError
+            A number of points is no integer, 1 or more.
+        """
+        _check_count("height", height, 1)
+        _check_count("width", width, 1)
         u, v = self.knots_u, self.knots_v
         return self._lattice(np.linspace(u[0], u[-1], height), np.linspace(v[0], v[-1], width))
 
@@ -171,7 +186,13 @@ class BSplineSurface:
 
         By Gauss quadrature with so many points in every interval between knots. Compare
         it with ``K_A_meyer`` of a mesh, which is the same for a fine one.
+
+        Raises
+        ------
+        OptionError
+            `per_span` is no integer, 1 or more.
         """
+        _check_count("per_span", per_span, 1)
         (u, wu), (v, wv) = (_quadrature(k, per_span) for k in (self.knots_u, self.knots_v))
         d = [self._lattice(u, v, *order) for order in _ORDERS]
         area = np.linalg.norm(np.cross(d[0], d[1]), axis=-1) * wu[:, None] * wv
@@ -227,6 +248,11 @@ def _parameter(name: str, given: ArrayLike, knots: Array) -> Array:
     if not ((t >= knots[0]) & (t <= knots[-1])).all():
         raise OptionError(f"{name} must be between {knots[0]:g} and {knots[-1]:g}")
     return t
+
+
+def _check_count(name: str, given: int, least: int) -> None:
+    if isinstance(given, bool) or not isinstance(given, int | np.integer) or given < least:
+        raise OptionError(f"{name} is {given!r}; it must be an integer, {least} or more")
 
 
 def _check_knots(name: str, knots: Array, count: int) -> None:

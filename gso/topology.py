@@ -261,11 +261,16 @@ def check_vertices(he: HalfEdges) -> None:
     )
 
 
+def are_quads(faces: Ints) -> NDArray[np.bool_]:
+    """Which faces (m, 3) or (m, 4) have four corners, (m,)."""
+    return faces[:, 3] >= 0 if faces.shape[1] == 4 else np.zeros(len(faces), bool)
+
+
 def by_size(faces: Ints) -> tuple[Ints, Ints]:
     """The quads (q, 4) and the triangles (t, 3) among faces."""
     if faces.shape[1] == 3:
         return np.empty((0, 4), np.int64), faces
-    quad = faces[:, 3] >= 0
+    quad = are_quads(faces)
     return faces[quad], faces[~quad, :3]
 
 
@@ -334,10 +339,9 @@ def corner_triangles(faces: Ints) -> Ints:
     """
     if faces.shape[1] == 3:
         return faces
-    quad = faces[:, 3] >= 0
-    q = faces[quad]
+    q, triangles = by_size(faces)
     corners = [q[:, [k, (k + 1) % 4, (k + 3) % 4]] for k in range(4)]
-    return np.concatenate([*corners, faces[~quad, :3]])
+    return np.concatenate([*corners, triangles])
 
 
 def vertex_stars(he: HalfEdges) -> list[tuple[Ints, Ints]]:

@@ -189,6 +189,7 @@ def test_denoises(run):
         (["-o", "no/such/out.obj"], ["no/such", "create it"]),
         (["-o", "out.doc"], [".doc", ".obj"]),
         (["-o", "out.svg"], ["--task flatten"]),
+        (["-o", "out.svg", "--task", "bend"], ["--task flatten"]),
         (["-o", "out.obj", "--plot", "out.jpg"], [".jpg", ".png"]),
         (["-o", "out.obj", "--metrics", "no/such/out.json"], ["no/such"]),
         (["-o", "out.obj", "--backend", "abacus"], ["abacus", "superlu"]),
@@ -462,8 +463,15 @@ def test_choices_are_those_of_the_library():
 
     assert choices("optimize", "unit") == set(MILLIMETRES)
     assert choices("plot", "colour") == set(gso.plot.COLOURS)
-    for options in (gso.DevelopableOptions, gso.FlattenOptions, gso.DenoiseOptions):
-        assert choices("optimize", "preset") <= set(options.PRESETS)
+    of_tasks = [gso.DevelopableOptions, gso.IsometryOptions, gso.FlattenOptions]
+    of_tasks += [gso.DenoiseOptions, gso.BendOptions, gso.ConformalOptions]
+    assert choices("optimize", "preset") == {name for o in of_tasks for name in o.PRESETS}
+
+
+@pytest.mark.parametrize("task", ["bend", "conformal", "denoise"])
+def test_a_preset_that_the_task_lacks_is_refused(run, small, never, task):
+    done = run("optimize", small, "-o", "out.npz", "--task", task, "--options", "jiang2020")
+    assert refused(done, "jiang2020", "balanced")
 
 
 def test_numbers_in_json():

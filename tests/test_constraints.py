@@ -216,6 +216,47 @@ def test_given_lengths_are_reached():
     assert np.linalg.norm(v[0] - v[80]) == pytest.approx(2.5, abs=TIGHT)
 
 
+def test_hard_constraints_are_no_part_of_the_energy():
+    result = gso.tno.optimize(GRID, constraints=[gso.FixedLengths(GRID.edges[::5])])
+    assert set(result.energy) == {"curvature", "proximity", "fairness"}
+    soft = gso.tno.optimize(GRID, constraints=[gso.FixedLengths(GRID.edges[::5], weight=1.0)])
+    assert soft.energy["length"] > 0
+
+
+def test_a_solve_can_be_stopped_while_constraints_are_tightened():
+    constraints = [gso.FixedLengths(GRID.edges[::5])]
+    seen = []
+    gso.tno.optimize(GRID, constraints=constraints, callback=seen.append)
+    count = len(seen)
+    with pytest.warns(gso.ConvergenceWarning, match="callback"):
+        result = gso.tno.optimize(
+            GRID,
+            constraints=constraints,
+            callback=lambda progress: seen.append(progress) or len(seen) < 2 * count,
+        )
+    assert result.status is gso.Status.CANCELLED
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "more", [{}, {"max_deviation": 0.1}, {"task": "bend"}, {"task": "denoise"}]
+)
+def test_nothing_left_to_move(more):
+    held = gso.Fixed(np.ones(len(V), bool))
+    result = gso.tno.optimize(GRID, constraints=[held], **more)
+    assert result.converged and result.iterations == 0
+    np.testing.assert_allclose(result.mesh.vertices, V, atol=1e-12)
+
+
+def test_one_constraint_or_a_generator_will_do():
+    for given in (gso.Fixed([0]), (c for c in [gso.Fixed([0])])):
+        result = gso.tno.optimize(GRID, constraints=given, options="fast")
+        np.testing.assert_allclose(result.mesh.vertices[0], V[0], atol=1e-12)
+    given = (c for c in [gso.Fixed([0])])
+    for item in gso.tno.optimize_many([GRID, GRID], workers=0, constraints=given, options="fast"):
+        np.testing.assert_allclose(item.result.mesh.vertices[0], V[0], atol=1e-12)
+
+
 def test_denoising_keeps_what_is_known():
     clean = sphere_cap(24, radius=1.0)
     noisy = clean + 0.004 * np.random.default_rng(0).standard_normal(clean.shape)
@@ -319,6 +360,11 @@ V = GRID.vertices
         ([gso.OnCurve([0], [[0, 0], [1, 0]])], r"\(k, 3\), got \(2, 2\)"),
         ([gso.Handle([0], [["a", 0, 0]])], "finite numbers"),
         ([gso.Fixed([0.5])], "vertex indices"),
+        ([gso.Fixed([1, [2]])], "vertex indices"),
+        ([gso.PlanarFaces([1, [2]])], "face indices"),
+        ([gso.OnCurve([0], [[0, 0, 0], [1, 0, 0]], closed="false")], "closed 'false'"),
+        ([gso.Handle([0, 1], [[0, 0, 0], [0, np.nan, 0]])], "row 1 is not"),
+        ([gso.SlidingBoundary(corner=400)], "at most 180"),
         ([gso.Fixed], "none of those"),
         (7, "must be a list"),
     ],
@@ -443,6 +489,8 @@ def test_files_of_constraints(tmp_path):
         "[": "no JSON",
         "{}": "a list",
         '[{"type": "Pink"}]': "Fixed, FixedBoundary",
+        '[{"type": []}]': "entry 0 needs",
+        '[{"type": "FixedBoundary", "ids": [0]}]': "it has none",
         '[{"type": "Fixed", "id": [3]}]': "no parameter 'id'",
         '[{"type": "Glue"}]': "pairs",
     }.items():

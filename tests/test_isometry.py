@@ -138,6 +138,13 @@ class TestTruths:
         assert result.metrics["distance_max"] > 2.0
         assert result.metrics["loss_gc"] < 0.3 * result.metrics["loss_gc_before"]
 
+    def test_edges_that_the_diagonals_do_not_hold_are_remarked(self):
+        narrow = bezier.generate(3, seed=5)[2].sample(65)[:, ::8]
+        pattern = gso.tno.optimize(narrow, **FLAT)
+        assert metrics.isometry_energy(narrow, pattern.flat_grid) < (2 * 2e-3) ** 2
+        assert pattern.metrics["edge_length_error"] > 0.01
+        assert any("not developable" in note for note in pattern.notes)
+
     def test_a_ring_is_told_to_be_cut(self, irregular):
         result = gso.tno.optimize(irregular.with_hole(), options="fast", **JOINT)
         assert any("cut open" in note for note in result.notes)
@@ -222,6 +229,22 @@ class TestJoint:
         last = [p.name for p in often.history][-1], [p.name for p in once.history][-1]
         assert last == ("24x24, fairness 1e-04", "24x24, fairness 1e-03")
 
+    def test_nothing_is_promised_that_only_the_start_keeps(self):
+        noise = 1e-3 * np.random.default_rng(0).standard_normal((15, 15))
+        sheet = np.dstack([*square(15, 15), noise])
+        assert any("but for noise" in note for note in gso.tno.optimize(sheet).notes)
+        assert gso.tno.optimize(sheet, **JOINT).notes == ()
+
+    def test_a_spline_is_the_result_although_fairness_need_not_fall(self, curved):
+        options = gso.IsometryOptions(variables="surface", controls=6, enough=1.0)
+        result = gso.tno.optimize(curved, options=options)
+        np.testing.assert_allclose(result.spline.sample(*curved.shape[:2]), result.grid, atol=1e-9)
+
+    @pytest.mark.parametrize("kept", [[0, 0, 0], [1, 0, 0]])
+    def test_a_start_without_area_is_refused(self, curved, kept):
+        with pytest.raises(gso.MeshError, match=r"area.*x0"):
+            gso.tno.optimize(curved, options="jiang2020", x0=curved * kept)
+
     def test_warm_start(self, curved):
         cold = gso.tno.optimize(curved, options="jiang2020")
         options = replace(gso.IsometryOptions.preset("jiang2020"), stiff=1e-4)
@@ -238,6 +261,13 @@ class TestJoint:
         result.save(tmp_path / "pattern.svg")
         result.save(tmp_path / "panel.obj")
         assert np.ptp(gso.load(tmp_path / "panel.obj").vertices[:, 2]) > 0
+
+    def test_a_file_whose_flat_image_does_not_fit_is_refused(self, curved, tmp_path):
+        gso.tno.optimize(curved[:4, :4], options="jiang2020").save(tmp_path / "panel.npz")
+        arrays = dict(np.load(tmp_path / "panel.npz"))
+        np.savez(tmp_path / "panel.npz", **{**arrays, "flat": arrays["flat"][:3]})
+        with pytest.raises(gso.MeshError, match=r"panel\.npz .*flat is an array \(3, 2\)"):
+            gso.Result.load(tmp_path / "panel.npz")
 
 
 class TestOptions:
@@ -259,7 +289,10 @@ class TestOptions:
         ("keywords", "message"),
         [
             ({"formulation": "curvature", "options": "jiang2020"}, "those of the formulation"),
-            ({"formulation": "isometry", "options": gso.DevelopableOptions()}, "Options"),
+            (
+                {"formulation": "isometry", "options": gso.DevelopableOptions()},
+                r"gso\.tasks\.joint\.Options.*not gso\.tasks\.developable\.Options",
+            ),
             ({"formulation": "isometry", "max_deviation": 0.1}, "curvature"),
             ({"options": "jiang2020", "target_curvature": 0.1}, "curvature"),
             ({"formulation": "isometrie"}, "no formulation"),

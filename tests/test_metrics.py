@@ -120,3 +120,7 @@ def test_every_metric_of_a_result_is_explained():
 def test_wrong_input_is_named():
     with pytest.raises(MeshError, match="grid array"):
         metrics.loss_gc(np.zeros((4, 3)))
+    grid = np.dstack([*np.mgrid[:4.0, :5.0], np.zeros((4, 5))])
+    for measure in (metrics.isometry_energy, metrics.stretches, metrics.principal_strains):
+        with pytest.raises(MeshError, match="12 vertices and the surface 20"):
+            measure(grid, grid[:, :3, :2])

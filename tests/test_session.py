@@ -136,14 +136,104 @@ def test_without_constraints_nothing_moves():
     assert session.result().status is gso.Status.ALREADY_GOOD
 
 
+@pytest.mark.parametrize(
+    "constraint",
+    [
+        gso.FixedLengths(),
+        gso.PlanarFaces(),
+        gso.SlidingBoundary(),
+        gso.OnCurve(np.arange(9), [[-1, -1, 0], [-1, 1, 0.2]]),
+    ],
+    ids=lambda c: type(c).__name__,
+)
+def test_a_settled_surface_keeps_all_that_is_hard(constraint):
+    v = saddle(9, strength=0.3).reshape(-1, 3)
+    session = gso.tno.Session(
+        saddle(9, strength=0.3),
+        task="developable",
+        constraints=[constraint, gso.Handle([40], v[[40]])],
+    )
+    assert session.result().usable
+    for height in (0.05, 0.1):
+        session.move([40], v[[40]] + [0.0, 0.0, height])
+        session.step(2)
+        result = session.settle()
+        assert max(result.details["constraints"].values()) <= 1e-6 * result.design.frame.scale
+        assert result.usable
+        np.testing.assert_allclose(result.mesh.vertices[40], v[40] + [0, 0, height], atol=1e-12)
+
+
+def test_handles_may_be_masks_numbers_and_generators():
+    v = saddle(9).reshape(-1, 3)
+    mask = np.zeros(81, bool)
+    mask[[72, 80]] = True
+    up = [0.0, 0.0, 0.1]
+    handles = (gso.Handle(ids, v[ids]) for ids in (mask, 40, [0]))
+    session = gso.tno.Session(saddle(9), constraints=handles)
+    session.move([80], v[[80]] + up)
+    session.move(40, v[40] + up)
+    session.move([], [])
+    np.testing.assert_allclose(
+        session.step()[[0, 40, 72, 80]] - v[[0, 40, 72, 80]],
+        [[0, 0, 0], up, [0, 0, 0], up],
+        atol=1e-12,
+    )
+    session.move(mask, v[mask])
+    np.testing.assert_allclose(session.step()[mask], v[mask], atol=1e-12)
+
+
+def test_the_status_is_that_of_the_surface_as_it_is():
+    session = bending()
+    assert session.result().converged
+    session.move(HAND, target(0.3))
+    assert not session.result().converged
+    assert session.settle().converged
+    session.constrain([gso.Fixed(FIXED)])
+    assert not session.result().converged
+    # What was good as it came is not, once a handle is put elsewhere.
+    v = saddle(9).reshape(-1, 3)
+    good = gso.tno.Session(saddle(9))
+    good.constrain([gso.Handle([0, 80], v[[0, 80]] + [[0, 0, 0], [0, 0, 0.5]])])
+    result = good.result()
+    assert result.status is not gso.Status.ALREADY_GOOD
+    np.testing.assert_allclose(result.mesh.vertices[80], v[80] + [0, 0, 0.5], atol=1e-12)
+
+
+def test_soft_handles_of_one_vertex_agree_on_the_middle():
+    v = saddle(9).reshape(-1, 3)
+    handles = [gso.Handle([80], v[[80]] + shift, weight=1.0) for shift in (0.1, -0.1)]
+    session = gso.tno.Session(saddle(9), constraints=[gso.Fixed(np.arange(9)), *handles])
+    np.testing.assert_allclose(session.settle().mesh.vertices, v, atol=1e-6)
+
+
+def test_a_bound_holds_frame_after_frame():
+    u, w = np.meshgrid(np.linspace(-1, 1, 30), np.linspace(-1, 1, 30), indexing="ij")
+    noise = 5e-4 * np.random.default_rng(0).standard_normal((30, 30, 3))
+    panel = np.stack([u, w, 0.2 * u * u], axis=-1) + noise
+    session = gso.tno.Session(panel, task="developable")
+    first = np.linalg.norm(session.vertices - panel.reshape(-1, 3), axis=1).max()
+    for _ in range(4):
+        away = np.linalg.norm(session.step() - panel.reshape(-1, 3), axis=1).max()
+        assert away <= first * (1 + 1e-6)
+
+
 def test_refusals():
     with pytest.raises(gso.OptionError, match="flatten"):
         gso.tno.Session(saddle(9), task="flatten")
     with pytest.raises(gso.OptionError, match="denoise"):
         gso.tno.Session(saddle(9), task="denoise")
     session = bending()
-    for ids, positions in (([0], [[0, 0, np.nan]]), ([0], [[0, 0]]), ([999], [[0, 0, 0]])):
-        with pytest.raises(gso.OptionError):
+    for ids, positions, message in (
+        ([0], [[0, 0, np.nan]], r"move\(\) needs 1 positions"),
+        ([0], [[0, 0]], r"\(1, 3\), got \(1, 2\)"),
+        ([999], [[0, 0, 0]], "vertex 999"),
+        ([0, [1]], [[0, 0, 0]], "vertex indices"),
+        ([HAND[0]] * 2, [[0, 0, 0], [1, 1, 1]], f"contradicts itself at vertex {HAND[0]}"),
+    ):
+        with pytest.raises(gso.OptionError, match=message):
             session.move(ids, positions)
+    for iterations in (0, -1, 1.5, "a", None):
+        with pytest.raises(gso.OptionError, match="1 or more"):
+            session.step(iterations)
     with pytest.raises(gso.OptionError, match="no handle"):
         session.move([0], [[0.0, 0.0, 0.0]])

@@ -102,6 +102,15 @@ def test_bad_splines_are_refused(spline):
     for outside in (1.1, np.nan, "a"):
         with pytest.raises(gso.OptionError, match="u must be"):
             spline.evaluate(outside, 0.5)
+    for ask, what in (
+        (lambda: spline.evaluate([0.1, 0.2], [0.1, 0.2, 0.3]), "broadcast"),
+        (lambda: spline.evaluate(0.5, 0.5, du=-1), "du is -1"),
+        (lambda: spline.sample(0, 3), "height is 0"),
+        (lambda: spline.sample(3, 2.5), "width is 2.5"),
+        (lambda: spline.mean_gaussian_curvature(0), "per_span is 0"),
+    ):
+        with pytest.raises(gso.OptionError, match=what):
+            ask()
 
 
 # Fits

@@ -308,3 +308,10 @@ def test_one_sided_surfaces_are_named():
     strip[-1] = [4, 10, 0, 6]
     with pytest.raises(MeshError, match="one-sided"):
         topology.orient(strip, 12)
+
+
+def test_quads_are_told_from_triangles():
+    mixed = np.array([[0, 1, 2, 3], [3, 2, 4, -1], [5, 6, 7, 8]])
+    assert topology.are_quads(mixed).tolist() == [True, False, True]
+    assert not topology.are_quads(mixed[:, :3]).any()
+    assert [f.shape for f in topology.by_size(mixed)] == [(2, 4), (1, 3)]

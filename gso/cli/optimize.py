@@ -42,11 +42,12 @@ class Job:
         from gso import io
 
         if out.lower().endswith(".svg"):
-            block = getattr(tasks.get(self.keywords["task"]), "BLOCK", "surface")
-            if block != "flat" and self.keywords["formulation"] != "isometry":
+            task, formulation = self.keywords["task"], self.keywords["formulation"]
+            block = getattr(tasks.get(task), "BLOCK", "surface")
+            if block != "flat" and (task, formulation) != ("developable", "isometry"):
                 raise OptionError(
                     f"{out}: only a flat pattern is drawn as SVG; use --task flatten, or "
-                    "--formulation isometry"
+                    "--task developable --formulation isometry"
                 )
             io.check_writable(out)
         elif _is_cad(out):

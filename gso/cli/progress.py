@@ -109,3 +109,18 @@ def counts() -> Iterator[Counts]:
         yield bars
     finally:
         bars.close()
+
+
+@contextmanager
+def share() -> Iterator[Callable[[float, str], None]]:
+    """A bar over the share of some work that is done, and what is said beside it."""
+    from tqdm import tqdm
+
+    line = "{percentage:5.1f}%|{bar}| [{elapsed}{postfix}]"
+    with tqdm(total=1.0, disable=not watched(), bar_format=line) as bar:
+
+        def show(done: float, text: str) -> None:
+            bar.n = done
+            bar.set_postfix_str(text)
+
+        yield show

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -41,44 +42,30 @@ def train(
     The same command goes on with a run that was ended. With torchrun, several processes:
     torchrun --nproc-per-node 2 -m gso.cli train CONFIG ...
     """
+    # Read when torch is loaded: threads that wait busily slow each other on shared cores.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     from gso.net.config import read
     from gso.net.train import MODEL
     from gso.net.train import train as run
 
     made = read(config, **changes)
-    with progress.counts() as bars, _Bar() as bar:
+    with progress.counts() as bars, progress.share() as show:
         card = run(
-            made, data, out, minutes=minutes, device=device, show=bar.show, tick=bars.tick
+            made,
+            data,
+            out,
+            minutes=minutes,
+            device=device,
+            show=lambda report: show(report.progress, _text(report)),
+            tick=bars.tick,
         )
     if not quiet and card:
         found = ", ".join(f"{name} {value:.4g}" for name, value in card["validation"].items())
         click.echo(f"{out}/{MODEL}: {card['steps']} steps, {card['hours']} hours; {found}")
 
 
-class _Bar:
-    """A bar over the share of a run that is done, with the time that is left."""
-
-    def __init__(self) -> None:
-        self._bar: Any = None
-
-    def __enter__(self) -> _Bar:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
-
-    def show(self, report: Report) -> None:
-        """Show how a run is going."""
-        if self._bar is None:
-            from tqdm import tqdm
-
-            line = "{percentage:5.1f}%|{bar}| [{elapsed}{postfix}]"
-            self._bar = tqdm(total=1.0, disable=not progress.watched(), bar_format=line)
-        self._bar.n = report.progress
-        hours, minutes = divmod(round(report.left / 60), 60)
-        shown = "".join(
-            f", {n} {v:.4g}" for n, v in report.figures.items() if n in _SHOWN
-        )
-        text = f"{hours}:{minutes:02d} left, step {report.step}, loss {report.loss:.4g}{shown}"
-        self._bar.set_postfix_str(text)
+def _text(report: Report) -> str:
+    """How a run is going."""
+    hours, minutes = divmod(round(report.left / 60), 60)
+    shown = "".join(f", {n} {v:.4g}" for n, v in report.figures.items() if n in _SHOWN)
+    return f"{hours}:{minutes:02d} left, step {report.step}, loss {report.loss:.4g}{shown}"

@@ -1,7 +1,7 @@
 """What a result must keep: one kind of constraint per class, and all of them checked together."""
 
 from gso.constraints.base import Constraint
-from gso.constraints.compiled import TIGHT, Compiled, compile_constraints
+from gso.constraints.compiled import TIGHT, Compiled, compile_constraints, listed
 from gso.constraints.curve import OnCurve, SlidingBoundary
 from gso.constraints.glue import Glue
 from gso.constraints.linear import Reduction
@@ -33,5 +33,6 @@ __all__ = [
     "SlidingBoundary",
     "SymmetryPlane",
     "compile_constraints",
+    "listed",
     "read_constraints",
 ]

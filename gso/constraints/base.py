@@ -65,7 +65,7 @@ class Subject:
 
     def ids(self, given: ArrayLike) -> Ints:
         """Vertex indices (k,), from a list or a mask."""
-        ids = np.atleast_1d(np.asarray(given))
+        ids = np.atleast_1d(_array(given))
         count = len(self.mesh.vertices)
         if ids.dtype == bool:
             if ids.shape != (count,):
@@ -81,7 +81,7 @@ class Subject:
 
     def faces(self, given: ArrayLike) -> Ints:
         """Face indices (k,), from a list or a mask."""
-        ids, count = np.atleast_1d(np.asarray(given)), len(self.mesh.faces)
+        ids, count = np.atleast_1d(_array(given)), len(self.mesh.faces)
         if ids.dtype == bool and ids.shape == (count,):
             ids = np.flatnonzero(ids)
         return self._indices(ids, 1, "a list of face indices", count, "face")
@@ -106,7 +106,11 @@ class Subject:
         """Finite positions (count, dim)."""
         points = np.atleast_2d(numbers(given))
         wanted = len(points) if count is None else count
-        if points.shape != (wanted, self.dim) or not np.isfinite(points).all():
+        if points.shape == (wanted, self.dim):
+            wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
+            if wrong.size:
+                raise self.refuse(f"needs {what} as finite numbers; row {wrong[0]} is not")
+        else:
             number = "k" if count is None else count
             got = np.shape(_array(given))
             raise self.refuse(f"needs {what} as finite numbers ({number}, {self.dim}), got {got}")

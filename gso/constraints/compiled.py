@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, TypeVar
@@ -81,17 +81,12 @@ class Compiled:
         return self._pins(True)[1]
 
     @property
-    def soft_ids(self) -> Ints:
-        """Vertices drawn to a place, each once."""
-        return self._pins(False)[0]
+    def places(self) -> tuple[Ints, Array]:
+        """Vertices with a place, be they only drawn there, each once; and where, (k, dim)."""
+        return self._pins(True, False)
 
-    @property
-    def soft_positions(self) -> Array:
-        """Where to, (k, dim)."""
-        return self._pins(False)[1]
-
-    def _pins(self, hard: bool) -> tuple[Ints, Array]:
-        pins = self.of(Pins, hard=hard)
+    def _pins(self, *hard: bool) -> tuple[Ints, Array]:
+        pins = [p for kind in hard for p in self.of(Pins, hard=kind)]
         if not pins:
             return np.zeros(0, np.int64), np.zeros((0, 2 if self.flat else 3))
         ids, at = np.unique(np.concatenate([p.ids for p in pins]), return_index=True)
@@ -123,14 +118,39 @@ def is_glue(part: Part) -> bool:
     return isinstance(part, Relations) and bool((part.matrix == np.eye(len(part.matrix))).all())
 
 
+def listed(constraints: Iterable[Constraint] | Constraint) -> list[Constraint]:
+    """The constraints that a user gave, be it a single one, as a list.
+
+    Raises
+    ------
+    OptionError
+        They are no list, or one of them is no constraint.
+    """
+    if isinstance(constraints, Constraint):
+        return [constraints]
+    try:
+        given = list(constraints)
+    except TypeError:
+        raise OptionError(f"constraints is {constraints!r}; it must be a list of them") from None
+    for number, c in enumerate(given):
+        if not isinstance(c, Constraint):
+            name = _name(number, c)
+            raise OptionError(f"{name} is none of those in gso.constraints, such as gso.Fixed")
+    return given
+
+
+def _name(number: int, constraint: object) -> str:
+    return f"constraint {number} ({type(constraint).__name__})"
+
+
 def compile_constraints(
-    constraints: Sequence[Constraint], mesh: Mesh, *, flat: bool = False
+    constraints: Iterable[Constraint] | Constraint, mesh: Mesh, *, flat: bool = False
 ) -> Compiled:
     """Check constraints against a mesh and against each other, and gather them.
 
     Parameters
     ----------
-    constraints : sequence of Constraint, or one
+    constraints : iterable of Constraint, or one
         As the user gave them.
     mesh : Mesh
         The design.
@@ -143,19 +163,10 @@ def compile_constraints(
         An index or a shape is wrong, a constraint means nothing for this task, or hard
         linear ones contradict each other; the message names them and a vertex.
     """
-    if isinstance(constraints, Constraint):
-        constraints = [constraints]
     parts: list[Part] = []
     names = []
-    try:
-        given = list(constraints)
-    except TypeError:
-        raise OptionError(f"constraints is {constraints!r}; it must be a list of them") from None
-    for number, c in enumerate(given):
-        name = f"constraint {number} ({type(c).__name__})"
-        names.append(name)
-        if not isinstance(c, Constraint):
-            raise OptionError(f"{name} is none of those in gso.constraints, such as gso.Fixed")
-        parts += c.parts(Subject(mesh, flat, number, name))
+    for number, c in enumerate(listed(constraints)):
+        names.append(_name(number, c))
+        parts += c.parts(Subject(mesh, flat, number, names[-1]))
     check(parts, names, mesh)
     return Compiled(tuple(p for p in parts if p.count), tuple(names), flat)

@@ -49,6 +49,8 @@ class OnCurve(Constraint):
     weight: float | None = None
 
     def parts(self, subject: Subject) -> list[Part]:
+        if not isinstance(self.closed, bool | np.bool_):
+            raise subject.refuse(f"has closed {self.closed!r}; it must be True or False")
         ids = subject.ids(self.ids)
         points = subject.points(self.points, "the points of a polyline")
         size = float(np.ptp(points, axis=0).max(initial=0.0))
@@ -84,6 +86,8 @@ class SlidingBoundary(Constraint):
     def parts(self, subject: Subject) -> list[Part]:
         subject.in_space("give OnCurve(ids, points) with points (m, 2)")
         corner, weight = subject.positive(self.corner, "corner"), subject.weight(self.weight)
+        if corner > 180:
+            raise subject.refuse(f"has corner {self.corner!r}; it is at most 180 degrees")
         vertices = subject.mesh.vertices
         lines, held, sliding = [], [], []
         for loop in subject.mesh.boundary_loops:

@@ -58,15 +58,16 @@ def read_constraints(path: str | PathLike[str]) -> list[Constraint]:
 
 
 def _constraint(entry: Any, where: str) -> Constraint:
-    if not isinstance(entry, dict) or entry.get("type") not in KINDS:
+    if not isinstance(entry, dict) or entry.get("type") not in list(KINDS):
         raise OptionError(f'{where} needs a "type": {", ".join(KINDS)}')
     kind = KINDS[entry["type"]]
     given = {name: value for name, value in entry.items() if name != "type"}
     known = [f.name for f in fields(kind)]  # type: ignore[arg-type]
     for name in given:
         if name not in known:
+            others = ", ".join(known) or "none"
             raise OptionError(
-                f"{where}: {kind.__name__} has no parameter {name!r}; it has {', '.join(known)}"
+                f"{where}: {kind.__name__} has no parameter {name!r}; it has {others}"
             )
     try:
         return kind(**given)

@@ -11,6 +11,7 @@ from gso.flat_start.grid import rectangle
 from gso.flat_start.relax import Relaxed, relax, strain_level
 from gso.mesh import Mesh
 from gso.resample import resample
+from gso.status import MeshError
 from gso.terms.stretch import cells, pieces
 from gso.topology import corner_triangles
 
@@ -19,8 +20,20 @@ Ints = NDArray[np.int64]
 
 
 def carrying(mesh: Mesh) -> Ints:
-    """Triangles that carry strain."""
-    return np.concatenate([corner_triangles(f) for f in pieces(mesh)])
+    """Triangles that carry strain.
+
+    Raises
+    ------
+    MeshError
+        There are none.
+    """
+    faces = pieces(mesh)
+    if not faces:
+        raise MeshError(
+            f"no face of {mesh!r} has an area, so there is nothing to lay out; where x0 makes it "
+            "so, give another one"
+        )
+    return np.concatenate([corner_triangles(f) for f in faces])
 
 
 def upward(mesh: Mesh) -> Ints:

@@ -26,16 +26,16 @@ class Net(nn.Module):
         What it was made for.
     settings : dict
         What it is made of again, with its class.
-    half : bool
-        Convolutions run in bfloat16; what goes in and comes out, curvature above all, is in
-        single precision all the same.
+    bf16 : bool
+        Convolutions run in bfloat16; what goes in and comes out, curvature above all, is in single
+        precision all the same.
     """
 
     def __init__(self, task: str, **settings: Any):
         super().__init__()
         if task not in TASKS:
             raise OptionError(f"no task {task!r} for a net; there are {', '.join(TASKS)}")
-        self.task, self.settings, self.half = task, {"task": task, **settings}, False
+        self.task, self.settings, self.bf16 = task, {"task": task, **settings}, False
 
     @abstractmethod
     def displacements(self, surface: Tensor, sigma: Tensor | None = None) -> list[Tensor]:
@@ -63,4 +63,4 @@ class Net(nn.Module):
 
     def autocast(self, device: torch.device) -> torch.autocast:
         """Context for convolutions."""
-        return torch.autocast(device.type, torch.bfloat16, enabled=self.half)
+        return torch.autocast(device.type, torch.bfloat16, enabled=self.bf16)

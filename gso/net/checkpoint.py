@@ -31,9 +31,7 @@ def save(
         file.write(data)
 
 
-def load(
-    path: Path, net: Net, average: Net, optimiser: torch.optim.Optimizer
-) -> dict[str, Any]:
+def load(path: Path, net: Net, average: Net, optimiser: torch.optim.Optimizer) -> dict[str, Any]:
     """Take up what :func:`save` wrote; returns the numbers.
 
     Raises

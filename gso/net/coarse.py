@@ -128,8 +128,9 @@ class CoarseNet(Net):
         ]
 
     def carried(self, surface: Tensor, fine: Tensor, sigma: Tensor | None = None) -> Tensor:
-        fields = (c.to(fine.dtype) for c in self.coefficients(surface)[-1])
-        return self._vectors(self._shares(*fields, *fine.shape[1:3]), Frame.of(planes(fine)))
+        first, second = (c.to(fine.dtype) for c in self.coefficients(surface)[-1])
+        shares = self._shares(first, second, fine.shape[1], fine.shape[2])
+        return self._vectors(shares, Frame.of(planes(fine)))
 
     def _fields(self, seen: Tensor) -> tuple[Tensor, Tensor]:
         x = seen.contiguous(memory_format=torch.channels_last)

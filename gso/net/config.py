@@ -23,7 +23,7 @@ TERMS = ("in", "fair", "gc", "iso", "iso_w")
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of training with one loss.
+    r"""A stretch of training with one loss.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Phase:
     decay : float
         "published": the weight of "in" falls as exp(-decay t), with t from 0 to 1.
     eps : tuple of 2 float
-        "energy" (developable): smoothing of \\|K\\| at the start and from the middle on.
+        "energy" (developable): smoothing of \|K\| at the start and from the middle on.
     """
 
     loss: str = "published"
@@ -101,6 +101,8 @@ class Config:
         Steps of the whole run; a limit in minutes replaces it.
     seed : int
         Seed of all random numbers.
+    limit : int
+        Surfaces of the train split that are used; 0 for all.
     fresh : int
         Surfaces that are drawn by the recipe, beside those of the set, for phases that need
         no labels.
@@ -119,7 +121,7 @@ class Config:
         Decay of the moving average of the weights, which is what is kept in the end.
     weight_decay : float
         Of AdamW.
-    half : bool or None
+    bf16 : bool or None
         Convolutions in bfloat16; None where the processor has it.
     validate_every, checkpoint_every : float
         Seconds between two of them.
@@ -133,6 +135,7 @@ class Config:
     phases: tuple[Phase, ...]
     steps: int = 10_000
     seed: int = 0
+    limit: int = 0
     fresh: int = 0
     label: str = "developable"
     augment: str = "symmetries"
@@ -141,7 +144,7 @@ class Config:
     through: str = ""
     ema: float = 0.999
     weight_decay: float = 1e-2
-    half: bool | None = None
+    bf16: bool | None = None
     validate_every: float = 300.0
     checkpoint_every: float = 180.0
     validate: int = 128
@@ -151,6 +154,7 @@ class Config:
         _choice("augment", self.augment, AUGMENTATIONS)
         _number("steps", self.steps, 1, whole=True)
         _number("validate", self.validate, 1, whole=True)
+        _number("limit", self.limit, 0, whole=True)
         _number("fresh", self.fresh, 0, whole=True)
         _number("seed", self.seed, 0, whole=True)
         for name in ("ema", "weight_decay", "validate_every", "checkpoint_every"):
@@ -236,7 +240,9 @@ def _made(cls: Any, given: Mapping[str, Any]) -> Any:
     names = {f.name for f in fields(cls)}
     unknown = set(given) - names
     if unknown:
-        raise OptionError(f"unknown: {', '.join(sorted(unknown))}; there are {', '.join(sorted(names))}")
+        raise OptionError(
+            f"unknown: {', '.join(sorted(unknown))}; there are {', '.join(sorted(names))}"
+        )
     values = {k: tuple(v) if k in ("eps", "sigma") else v for k, v in given.items()}
     try:
         return cls(**values)

@@ -90,7 +90,10 @@ class Source:
             surface, target, sigma = noisy(surface, config.sigma, generator)
         mine = slice(rank, None, world)
         return Batch(
-            *(None if x is None else x[mine].to(device, torch.float32) for x in (surface, target, sigma))  # type: ignore[arg-type]
+            *(
+                None if x is None else x[mine].to(device, torch.float32)
+                for x in (surface, target, sigma)
+            )  # type: ignore[arg-type]
         )
 
 
@@ -148,10 +151,11 @@ def open_source(config: Config, folder: str | Path, cache: Path, tick: Any = Non
         Told what is counted, how many there are, and how many there will be.
     """
     split = dataset.open(folder)["train"]
-    surfaces = torch.from_numpy(split["surface"][:]).float()
+    rows = slice(config.limit or None)
+    surfaces = torch.from_numpy(split["surface"][rows]).float()
     labels = None
     if any(phase.loss == "label" for phase in config.phases):
-        labels = torch.from_numpy(split[config.label][:]).float()
+        labels = torch.from_numpy(split[config.label][rows]).float()
         # Surfaces that the solver refused have no label.
         sound = labels.isfinite().all(dim=(1, 2, 3))
         surfaces = torch.cat([surfaces[sound], surfaces[~sound]])

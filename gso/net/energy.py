@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -79,11 +80,13 @@ class Developable:
         x = planes(result)
         centre, ring = geometry.grid_star(x)
         (k,) = curvature.residual([centre, *ring], ())
-        bent = Absolute(o.eps if eps is None else eps).value(k).mean(dim=(1, 2))
+        absolute: Any = Absolute(o.eps if eps is None else eps)
+        bent = absolute.value(k).mean(dim=(1, 2))
         fair = self._fairness(x)
         ones = torch.full_like(x[0], o.tangential)
         moved = proximity.residual([x], [*self.points, *self.normals, ones])
-        near = Distance(o.near).value(torch.stack(moved))[0].mean(dim=(1, 2))
+        distance: Any = Distance(o.near)
+        near = distance.value(torch.stack(moved))[0].mean(dim=(1, 2))
         return {
             "curvature": self.w_curvature * bent,
             "fairness": self.w_fairness * fair,
@@ -162,16 +165,16 @@ class Strain:
         r = self.residuals(flat)
         level = self.level(r.detach()).clamp_min(_LEAST_STRAIN)[:, None, None].expand_as(r[0])
         knee = o.knee * flatten.bent(level)
-        flattened = r.reshape(12, -1)
-        spread = stretch.Spread(level.reshape(-1), knee=knee.reshape(-1))  # type: ignore[arg-type]
-        cost = spread.value(flattened).reshape(4, *r.shape[1:]).mean(dim=(0, 2, 3))  # type: ignore
+        # The terms' losses know elements by one axis.
+        spread: Any = stretch.Spread(level.reshape(-1), knee=knee.reshape(-1))  # type: ignore[arg-type]
+        cost = spread.value(r.reshape(12, -1)).reshape(4, *r.shape[1:]).mean(dim=(0, 2, 3))
         typical = level[:, 0, 0]
+        absolute: Any = Absolute((0.1 * typical)[:, None, None])  # type: ignore[arg-type]
         total, count = torch.zeros_like(cost), 0
         for d, inverse in zip(_edges(planes(flat)), self.lengths, strict=True):
             origin = tuple(torch.zeros_like(c) for c in d)
             (change,) = edges.residual([origin, d], [inverse])
-            eps = (0.1 * typical)[:, None, None]
-            total = total + Absolute(eps).value(change).sum(dim=(1, 2))  # type: ignore[arg-type]
+            total = total + absolute.value(change).sum(dim=(1, 2))
             count += change[0].numel()
         return cost / typical + o.w_edges * total / count
 

@@ -137,7 +137,7 @@ def normal_curvatures(p: Planes, frame: Frame) -> Planes:
 
 def side_lengths(p: Planes) -> tuple[Tensor, Tensor]:
     """Mean polyline lengths (B,) along both grid directions."""
-    return tuple(  # type: ignore[return-value]
+    return tuple(
         geometry.norm(tuple(torch.diff(c, dim=axis) for c in p)).sum(dim=axis).mean(dim=1)
         for axis in (1, 2)
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import torch
 from torch import Tensor, nn
 
@@ -63,12 +65,12 @@ class GSONet(Net):
         super().__init__(task, channels=channels, blocks=blocks, tanh=tanh, sigma=sigma)
         self.tanh, self.sigma = tanh, sigma
         widths = [channels << k for k in range(_LEVELS + 1)]
-        steps = list(zip(widths, widths[1:], strict=False))
+        steps = list(pairwise(widths))
 
         def level(width: int) -> list[nn.Module]:
             return [IMDB(width) for _ in range(blocks)]
 
-        def conv(inside: int, outside: int) -> nn.Module:
+        def conv(inside: int, outside: int) -> nn.Conv2d:
             return nn.Conv2d(inside, outside, 3, padding=1, bias=False)
 
         self.head = conv(3 + sigma, channels)
@@ -81,6 +83,8 @@ class GSONet(Net):
             for a, b in reversed(steps)
         )
         self.tail = conv(channels, TASKS[task])
+        # It begins with no change, where random displacements would crumple the surface.
+        nn.init.zeros_(self.tail.weight)
 
     def displacements(self, surface: Tensor, sigma: Tensor | None = None) -> list[Tensor]:
         x = surface.movedim(-1, 1)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor
+from torch.nn.functional import pad
 
 from gso import geometry
 from gso.net import grids
@@ -46,15 +47,15 @@ def iso(surface: Tensor, flat: Tensor, weights: Tensor | None = None) -> Tensor:
 
 
 def iso_weights(surface: Tensor) -> Tensor:
-    """``w_iso`` (B, H-1, W-1): one minus the curvature of a cell over the largest one.
+    r"""``w_iso`` (B, H-1, W-1): one minus the curvature of a cell over the largest one.
 
-    The curvature of a cell is the mean of \\|K\\| over its corners inside the surface.
+    The curvature of a cell is the mean of \|K\| over its corners inside the surface.
     """
     p = planes(surface)
     k = grids.curvature(p).abs()
     ones = torch.ones_like(k)
     total, count = (
-        sum(corner for (corner,) in grids.corners((torch.nn.functional.pad(x, (1, 1, 1, 1)),)))
+        torch.stack([c for (c,) in grids.corners((pad(x, (1, 1, 1, 1)),))]).sum(dim=0)
         for x in (k, ones)
     )
     mean = total / count.clamp_min(1.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -39,7 +40,7 @@ class Objective(nn.Module):
         steps = self.net.displacements(batch.surface, batch.sigma)
         cost = _COSTS[phase.loss](self.net.task, batch, start, phase, progress)
         values = [cost(start + moved).mean() for moved in steps]
-        return values[-1] + _EARLIER * sum(values[:-1])  # type: ignore[return-value]
+        return values[-1] + _EARLIER * sum(values[:-1])
 
 
 def _published(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
@@ -81,7 +82,7 @@ def _label(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float
 def _energy(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
     if task == "flatten":
         return energy.Strain(batch.surface, flatten.Options())
-    w = dict(phase.weights)
+    w: dict[str, Any] = dict(phase.weights)
     balance = w.pop("balance", 0.5)
     whole = energy.Developable(batch.surface, replace(developable.Options(), **w))
     first, last = phase.eps

@@ -89,10 +89,11 @@ def predict(
         raise OptionError("a flat image cannot be flattened again; leave repeat out")
     nets += [nets[-1]] * (repeat - 1)
     blocks = [
-        _predicted(batch[k : k + _BATCH], nets, sigma, where)
-        for k in range(0, len(batch), _BATCH)
+        _predicted(batch[k : k + _BATCH], nets, sigma, where) for k in range(0, len(batch), _BATCH)
     ]
-    out = np.concatenate(blocks) if blocks else np.empty((*batch.shape[:3], 2 + (task != "flatten")))
+    out = (
+        np.concatenate(blocks) if blocks else np.empty((*batch.shape[:3], 2 + (task != "flatten")))
+    )
     return out[0] if points.ndim == 3 else out
 
 

@@ -15,7 +15,7 @@ from gso.status import OptionError
 
 @dataclass(frozen=True)
 class Processes:
-    """This process among those of a run.
+    """A process among those of a run.
 
     Attributes
     ----------

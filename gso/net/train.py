@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import copy
-import os
-import platform
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,25 +12,17 @@ import torch
 from torch import Tensor
 from torch.nn.parallel import DistributedDataParallel
 
-from gso import dataset
-from gso.net import checkpoint, weights
-from gso.net.base import Net
 from gso.net.config import Config
-from gso.net.curves import Curves
-from gso.net.data import Source, noisy, open_source
-from gso.net.grids import normalise
 from gso.net.objective import Objective
-from gso.net.processes import Processes, processes
+from gso.net.processes import processes
+from gso.net.run import MODEL, Run, Tick, begin
 from gso.net.schedule import place
-from gso.net.validate import applied, mean_figures
 from gso.status import OptionError
 
-#: Files of a run.
-CHECKPOINT, MODEL = "checkpoint.safetensors", "model.safetensors"
+__all__ = ["MODEL", "Report", "train"]
+
 #: Steps between two entries of the loss.
 _REPORT = 20
-#: Seeds of the noise that validation adds.
-_NOISE = 7
 
 
 class Report(NamedTuple):
@@ -70,7 +57,7 @@ def train(
     minutes: float | None = None,
     device: str | None = None,
     show: Callable[[Report], None] | None = None,
-    tick: Callable[[str, int, int], None] | None = None,
+    tick: Tick | None = None,
 ) -> dict[str, Any]:
     """Train a net, or go on with a run that was ended.
 
@@ -115,7 +102,7 @@ def train(
         for phase in config.phases:
             if phase.batch % here.world:
                 raise OptionError(f"batch {phase.batch} is no multiple of {here.world} processes")
-        run = _begin(config, Path(data), Path(out), minutes, here, tick)
+        run = begin(config, Path(data), Path(out), minutes, here, tick)
         try:
             _loop(run, show)
         except KeyboardInterrupt:
@@ -126,140 +113,7 @@ def train(
     return run.card
 
 
-@dataclass
-class _Run:
-    """Everything of a run that changes."""
-
-    config: Config
-    folder: Path
-    here: Processes
-    limit: float | None
-    source: Source
-    check: tuple[Tensor, Tensor, Tensor | None]
-    net: Net
-    average: Net
-    optimiser: torch.optim.Optimizer
-    origin: dict[str, Any]
-    step: int = 0
-    spent: float = 0.0
-    figures: dict[str, float] = field(default_factory=dict)
-    card: dict[str, Any] = field(default_factory=dict)
-    curves: Curves | None = None
-
-    @property
-    def progress(self) -> float:
-        """Share of the run that is done; the same in all processes."""
-        if self.limit is None:
-            return self.step / self.config.steps
-        return self.here.agreed(self.spent / self.limit)
-
-    def follow(self) -> None:
-        """Take the moving average of the weights a step on."""
-        decay = min(self.config.ema, (1 + self.step) / (10 + self.step))
-        with torch.no_grad():
-            pairs = zip(self.average.parameters(), self.net.parameters(), strict=True)
-            for mean, value in pairs:
-                mean.lerp_(value, 1.0 - decay)
-
-    def keep(self) -> None:
-        """Write a checkpoint."""
-        if self.here.first:
-            state = {
-                "step": self.step,
-                "spent": self.spent,
-                "figures": self.figures,
-                "config": _kept(self.config),
-            }
-            path = self.folder / CHECKPOINT
-            checkpoint.save(path, self.net, self.average, self.optimiser, state)
-
-    def validate(self) -> None:
-        """Measure the averaged net, and write it with its card."""
-        if self.here.first:
-            surfaces, truths, sigma = self.check
-            results = applied(self.average.eval(), surfaces, sigma)
-            self.figures = mean_figures(self.config.task, truths.double().numpy(), results)
-            if self.curves is not None:
-                self.curves.add(self.step, self.spent, **self.figures)
-            self.card = weights.save(self.average, self.folder / MODEL, self._card())
-        self.here.wait()
-
-    def _card(self) -> dict[str, Any]:
-        return {
-            "name": self.config.name,
-            "config": self.config.as_dict(),
-            "steps": self.step,
-            "hours": round(self.spent / 3600, 3),
-            "validation": self.figures,
-            **self.origin,
-        }
-
-    def close(self) -> None:
-        if self.curves is not None:
-            self.curves.close()
-
-
-def _kept(config: Config) -> dict[str, Any]:
-    """What must be the same when a run is taken up: all but how often it is looked at."""
-    rest = config.as_dict()
-    for name in ("validate_every", "checkpoint_every", "validate"):
-        del rest[name]
-    return rest
-
-
-def _begin(
-    config: Config,
-    data: Path,
-    folder: Path,
-    minutes: float | None,
-    here: Processes,
-    tick: Any,
-) -> _Run:
-    """A new run, or the one that is there."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OptionError(f"{folder} cannot be made: {error.strerror}") from None
-    torch.manual_seed(config.seed)
-    net = weights.make(dict(config.model) | {"task": config.task})
-    if config.init:
-        _take(net, weights.load(config.init), config.init)
-    net = net.to(here.device, memory_format=torch.channels_last)
-    net.half = _half(here.device) if config.half is None else config.half
-    average = copy.deepcopy(net).requires_grad_(False)
-    average.half = False
-    if here.first:
-        # The other processes read what the first one draws.
-        source = open_source(config, data, folder / "fresh.npy", tick)
-    here.wait()
-    if not here.first:
-        source = open_source(config, data, folder / "fresh.npy")
-    run = _Run(
-        config,
-        folder,
-        here,
-        None if minutes is None else 60.0 * minutes,
-        source,
-        _validation(config, data),
-        net,
-        average,
-        torch.optim.AdamW(net.parameters(), weight_decay=config.weight_decay),
-        _origin(data, here),
-    )
-    if config.through:
-        _pass_through(run)
-    path = folder / CHECKPOINT
-    if path.exists():
-        state = checkpoint.load(path, net, average, run.optimiser)
-        if state.get("config") != _kept(config):
-            raise OptionError(f"{folder} holds a run with another configuration; take another folder")
-        run.step, run.spent, run.figures = state["step"], state["spent"], state["figures"]
-    if here.first:
-        run.curves = Curves(folder, run.step)
-    return run
-
-
-def _loop(run: _Run, show: Callable[[Report], None] | None) -> None:
+def _loop(run: Run, show: Callable[[Report], None] | None) -> None:
     config, here = run.config, run.here
     objective: Any = Objective(run.net)
     if here.world > 1:
@@ -285,7 +139,7 @@ def _loop(run: _Run, show: Callable[[Report], None] | None) -> None:
         run.follow()
         losses.append(loss.detach())
         run.spent = before + time.monotonic() - start
-        if len(losses) == _REPORT:
+        if run.step % _REPORT == 0:
             mean = float(torch.stack(losses).mean())
             losses.clear()
             if run.curves is not None:
@@ -301,58 +155,3 @@ def _loop(run: _Run, show: Callable[[Report], None] | None) -> None:
             kept = run.spent
     run.validate()
     run.keep()
-
-
-def _take(net: Net, other: Net, name: str) -> None:
-    """Begin with the weights of another net."""
-    if other.settings.keys() != net.settings.keys() or type(other) is not type(net):
-        raise OptionError(f"init: {name} is a net of another kind")
-    try:
-        net.load_state_dict(other.state_dict())
-    except RuntimeError as error:
-        raise OptionError(f"init: {name} does not fit: {error}") from None
-
-
-def _pass_through(run: _Run) -> None:
-    """What another net makes of the surfaces takes their place, normalised anew."""
-    net = weights.load(run.config.through, device=run.here.device)
-
-    def done(surfaces: Tensor) -> Tensor:
-        return normalise(torch.from_numpy(applied(net, surfaces))).float()
-
-    run.source = Source(done(run.source.surfaces))
-    surfaces = done(run.check[0])
-    run.check = surfaces, surfaces, None
-
-
-def _validation(config: Config, data: Path) -> tuple[Tensor, Tensor, Tensor | None]:
-    """Surfaces that a net sees, what they are compared with, and their noise."""
-    split = dataset.open(data)["validation"]
-    clean = torch.from_numpy(split["surface"][: config.validate]).float()
-    if config.task != "denoise":
-        return clean, clean, None
-    return noisy(clean, config.sigma, torch.Generator().manual_seed(_NOISE))
-
-
-def _half(device: torch.device) -> bool:
-    """Whether bfloat16 is fast on a device."""
-    if device.type == "cuda":
-        return torch.cuda.is_bf16_supported()
-    known = getattr(torch.cpu, "_is_avx512_bf16_supported", lambda: False)
-    return device.type == "cpu" and bool(known())
-
-
-def _origin(data: Path, here: Processes) -> dict[str, Any]:
-    """Data, packages and hardware, for the card."""
-    manifest = dataset.open(data).manifest
-    hardware = platform.processor() or platform.machine()
-    if here.device.type == "cuda":
-        hardware = torch.cuda.get_device_name(here.device)
-    return {
-        "data": {k: v for k, v in manifest.get("recipe", {}).items() if k != "options"},
-        "versions": {
-            "python": platform.python_version(),
-            **{name: version(name) for name in ("gso", "torch", "numpy")},
-        },
-        "hardware": f"{here.world} x {hardware}, {os.cpu_count()} cores, {torch.get_num_threads()} threads",
-    }

@@ -159,7 +159,12 @@ def load(model: str | PathLike[str], *, device: str | torch.device = "cpu") -> N
     if hashlib.sha256(data).hexdigest() != card["sha256"]:
         raise WeightsError(f"{path} is damaged: it is not the file that its card describes")
     net = _filled(card["model"], data, path)
-    return net.to(device, memory_format=torch.channels_last).eval()
+    return placed(net, device).eval()
+
+
+def placed(net: Net, device: str | torch.device) -> Net:
+    """The net on a device, its weights laid out as convolutions like them best."""
+    return net.to(device=device, memory_format=torch.channels_last)  # type: ignore[call-overload]
 
 
 def _filled(settings: dict[str, Any], data: bytes, path: Path) -> Net:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gso import geometry, metrics, topology
+from gso import metrics, topology
 from gso.mesh import Mesh
 from gso.status import OptionError
 
@@ -102,16 +102,13 @@ def strain(design: Mesh, flat: Array) -> Heat:
             f"the flat pattern has {len(flat)} vertices and the surface {len(design.vertices)}; "
             "strain needs a pattern of this very surface"
         )
-    values = np.full(len(design.faces), np.nan)
-    triangle = design.faces[:, 2:].min(axis=1) < 0 if not design.is_triangles else None
-    groups = [slice(None)] if triangle is None else [triangle, ~triangle]
-    for group in groups:
-        faces = design.faces[group]
-        faces = faces if (faces >= 0).all() else faces[:, :3]
-        if len(faces):
-            values[group] = 100.0 * _face_strain(design.vertices, flat, faces)
-    pooled = metrics.principal_strains(design, flat)
-    summary = f"strain mean {100 * pooled.mean:.2g} %, largest {100 * pooled.values.max():.2g} %"
+    quad = topology.are_quads(design.faces)
+    corners = 100.0 * metrics.corner_strains(design, flat)
+    of_quads, of_triangles = np.split(corners, [4 * quad.sum()])
+    values = np.empty(len(quad))
+    values[quad] = np.fmax.reduce(of_quads.reshape(4, -1), axis=0)
+    values[~quad] = of_triangles
+    summary = f"strain mean {np.nanmean(corners):.2g} %, largest {np.nanmax(corners):.2g} %"
     return Heat(values, _rising([values], "principal strain (%)", "PuRd"), summary)
 
 
@@ -130,19 +127,6 @@ def stretch(design: Mesh, mesh: Mesh) -> Heat:
     known = values[np.isfinite(values)]
     summary = f"mean {known.mean():.2g} %, largest {known.max():.2g} %"
     return Heat(values, _rising([values], "stretch (%)", "PuRd", top=100.0), summary)
-
-
-def _face_strain(vertices: Array, flat: Array, faces: NDArray[np.int64]) -> Array:
-    corners = topology.corner_triangles(faces)
-    p, q, r = (vertices[corners[:, k]] for k in range(3))
-    area = np.linalg.norm(np.cross(q - p, r - p), axis=1)
-    rest = geometry.rest_frame(*(metrics.components(c) for c in (p, q, r)))
-    image = [metrics.components(flat[corners[:, k]]) for k in range(3)]
-    s1, s2 = geometry.singular_values(image[0], image[1], image[2], rest)
-    strains = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0))
-    # As in the metric, a corner without area has no strain.
-    strains[area <= 1e-12 * area.max()] = np.nan
-    return np.fmax.reduce(strains.reshape(-1, len(faces)), axis=0)
 
 
 def numbers(mesh: Mesh, values: Array, label: str) -> Heat:

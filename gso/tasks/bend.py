@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import metrics as measure
-from gso.constraints import Pins
 from gso.handle_start import Spread, follow
 from gso.mesh import Mesh
 from gso.status import OptionError, Status
@@ -32,7 +31,7 @@ from gso.tasks import held
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, bending, congruence
-from gso.variables import Layout, Variables, free
+from gso.variables import Layout
 
 Array = NDArray[np.float64]
 
@@ -97,7 +96,7 @@ def plan(request: Request) -> Plan:
             f"bending {weight:.0e}",
             layout,
             [*lengths, *(Weighted(t, weight) for t in change), *pulls],
-            partial(_unknowns, request, layout),
+            partial(held.unknowns, request, layout),
             iterations=options.iterations,
             tolerance=_NEARLY,
         )
@@ -107,17 +106,10 @@ def plan(request: Request) -> Plan:
     return Plan(layout, _start(request).ravel(), stages)
 
 
-def _unknowns(request: Request, layout: Layout, coordinates: Array) -> Variables:
-    return held.hold(request, free(layout))
-
-
 def _start(request: Request) -> Array:
     """Vertices that follow their handles: those of the design, or of the user's start."""
     mesh = request.mesh
-    pins = [p for hard in (True, False) for p in request.constraints.of(Pins, hard=hard)]
-    every = np.concatenate([np.zeros(0, np.int64), *(p.ids for p in pins)])
-    ids, first = np.unique(every, return_index=True)
-    targets = np.concatenate([np.zeros((0, 3)), *(p.positions for p in pins)])[first]
+    ids, targets = request.constraints.places
     if request.start is not None:
         mesh = mesh.replaced(request.start)
         return mesh.vertices + Spread(mesh, ids)(targets - mesh.vertices[ids])

@@ -29,7 +29,7 @@ from gso.tasks import held
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, congruence, scale, shear
-from gso.variables import Layout, Variables, free
+from gso.variables import Layout, free
 
 Array = NDArray[np.float64]
 
@@ -99,7 +99,7 @@ def plan(request: Request) -> Plan:
         "conformal",
         layout,
         items,
-        partial(_unknowns, None, layout),
+        lambda _: free(layout),
         iterations=options.iterations,
         tolerance=options.tolerance,
         limits=[limits.orientation(flat_start.upward(mesh), layout)],
@@ -124,12 +124,8 @@ def _bound(request: Request, stage: Stage) -> list[Stage]:
         replace(stage, name="approach", items=stage.items + held.drawn(request, weight))
         for weight in _DRAWN
     ]
-    holding = partial(_unknowns, request, stage.layout)
+    holding = partial(held.unknowns, request, stage.layout)
     return [*steps, replace(stage, items=stage.items + held.pulls(request), variables=holding)]
-
-
-def _unknowns(request: Request | None, layout: Layout, coordinates: Array) -> Variables:
-    return free(layout) if request is None else held.hold(request, free(layout))
 
 
 def _area_ratios(mesh: Mesh, flat: Array) -> Array:

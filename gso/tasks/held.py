@@ -30,6 +30,11 @@ def hold(request: Request, variables: Variables) -> Variables:
     return variables.following(*reduction.maps(start, layout.size))
 
 
+def unknowns(request: Request, layout: Layout, coordinates: Array) -> Variables:
+    """Free coordinates, as far as the hard linear constraints allow; for a stage."""
+    return hold(request, free(layout))
+
+
 def approach(request: Request, points: Array, *, iterations: int = 10) -> Stage:
     """The smallest and smoothest change of a surface (n, 3) that satisfies the constraints.
 
@@ -44,7 +49,7 @@ def approach(request: Request, points: Array, *, iterations: int = 10) -> Stage:
         Weighted(fairness.build(mesh, reference=points), _REACH**4),
         *pulls(request),
     ]
-    variables = partial(_free, request, layout)
+    variables = partial(unknowns, request, layout)
     return Stage("approach", layout, items, variables, iterations=iterations)
 
 
@@ -66,10 +71,6 @@ def drawn(request: Request, weight: float) -> list[Weighted]:
             continue
         out.append(Weighted(term, weight))
     return out
-
-
-def _free(request: Request, layout: Layout, coordinates: Array) -> Variables:
-    return hold(request, free(layout))
 
 
 def pulls(request: Request) -> list[Weighted]:

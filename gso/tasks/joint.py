@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 _FALL = 10.0
 #: Relative fall of the energy at which a stage that only prepares another one stops.
 _NEARLY = 1e-3
-#: Root mean square strain up to which a flat image counts as isometric.
+#: Error of lengths up to which a flat image counts as isometric.
 _KEPT = 2e-3
 #: Iterations of the flat image alone, where the design needs no change.
 _UNROLL = 100
@@ -70,7 +70,8 @@ class Options(BaseOptions):
     enough : float
         Fairness falls no further when the mean squared isometry defect is this small.
     begin : {"curvature", "design"}
-        Start from the result of the formulation "curvature", or from the design itself.
+        Start from the result of the formulation "curvature", or from the design itself;
+        `x0` and constraints have a start of their own.
     variables : {"free", "surface"}
         Free vertices, or (on grids) a last stage in the control points of a bicubic B-spline
         surface, which the result then is: its `spline`.
@@ -147,11 +148,10 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
         raise OptionError(
             "max_deviation belongs to the formulation 'curvature'; leave it out, or raise w_place"
         )
-    notes: list[str] = []
     spline = splined.controls(request)
     own = spline is None and request.start is None and request.constraints.empty
     if own and measure.loss_gc(mesh, scale=1.0) <= options.developable_below:
-        return _unrolling(request, notes)
+        return _unrolling(request)
     climb = own and options.begin == "design" and mesh.grid_index is not None
     levels = coarser(mesh, options.coarse_size) if climb and options.coarse_size else []
     before: list[Stage] = []
@@ -160,19 +160,20 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
         before = [held.approach(request, start)]
     elif request.start is None and options.begin == "curvature":
         first = curvature(request)
-        before, start, notes = first.stages, first.start.reshape(-1, 3), first.notes
+        before, start = first.stages, first.start.reshape(-1, 3)
     stages = _chain(request, [*levels, mesh])
     if levels:
         start = levels[0].vertices
     stages[0].enter = partial(_with_flat, levels[0] if levels else mesh)
-    stages = [*before, *stages]
     if spline is not None:
+        # The spline comes after all of them.
+        stages = [replace(stage, enough=None) for stage in stages]
         stages.append(splined.stage(stages[-1], mesh, spline))
+    stages = [*before, *stages]
     return Plan(
         _layout(mesh),
         start.ravel(),
         stages,
-        notes=notes,
         finish=partial(_place, mesh),
         remark=partial(_remark, mesh),
         spline=spline,
@@ -183,7 +184,7 @@ def _layout(mesh: Mesh) -> Layout:
     return Layout.of(len(mesh.vertices), "surface", "flat")
 
 
-def _unrolling(request: Request, notes: list[str]) -> Plan:
+def _unrolling(request: Request) -> Plan:
     """The design as it is, and its flat image."""
     mesh, options = request.mesh, request.options
     flat = flat_start.begin(mesh).flat
@@ -198,7 +199,7 @@ def _unrolling(request: Request, notes: list[str]) -> Plan:
     )
     start = stage.layout.pack({"surface": mesh.vertices, "flat": flat})
     place = partial(_place, mesh)
-    return Plan(stage.layout, start, [stage], status=Status.ALREADY_GOOD, notes=notes, finish=place)
+    return Plan(stage.layout, start, [stage], status=Status.ALREADY_GOOD, finish=place)
 
 
 def _flat_only(layout: Layout, coordinates: Array) -> Variables:
@@ -216,7 +217,7 @@ def _chain(request: Request, levels: list[Mesh]) -> list[Stage]:
     options = request.options
     weights = [options.w_fairness]
     if request.start is None:
-        while weights[-1] < 0.3 * options.stiff:
+        while weights[-1] < 0.999 * options.stiff:
             weights.append(_FALL * weights[-1])
     stages = []
     for below, mesh in zip([None, *levels], levels, strict=False):
@@ -275,13 +276,17 @@ def _with_flat(mesh: Mesh, coordinates: Array) -> Array:
 def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
     """Displacement and flat image of a coarse grid, interpolated to a finer one."""
     blocks = _layout(coarse).split(coordinates)
-    shape = (len(fine.grid_index), len(fine.grid_index[0]))  # type: ignore[arg-type, index]
     shift = (blocks["surface"] - coarse.vertices)[coarse.grid_index]
-    points = fine.vertices + resample(shift, *shape).reshape(-1, 3)
-    flat = resample(blocks["flat"][coarse.grid_index], *shape).reshape(-1, 2)
+    points = fine.vertices + _finer(shift, fine)
+    flat = _finer(blocks["flat"][coarse.grid_index], fine)
     if flat_start.flips(fine, flat):
         return _with_flat(fine, points.ravel())
     return _layout(fine).pack({"surface": points, "flat": flat})
+
+
+def _finer(values: Array, mesh: Mesh) -> Array:
+    """Values (H, W, d) on a coarse grid, interpolated to the vertices of a finer one."""
+    return resample(values, *mesh.grid_shape).reshape(-1, values.shape[-1])  # type: ignore[misc]
 
 
 def _isometric(mesh: Mesh, enough: float, coordinates: Array) -> bool:
@@ -291,11 +296,13 @@ def _isometric(mesh: Mesh, enough: float, coordinates: Array) -> bool:
 
 def lengths_remark(surface: Mesh, flat: Array) -> list[str]:
     """That a flat image (n, 2) does not keep the lengths of its surface, where it does not."""
-    off = 0.5 * measure.isometry_energy(surface, flat) ** 0.5
+    # The faces' diagonals may keep their lengths while the edges do not.
+    faces = 0.5 * measure.isometry_energy(surface, flat) ** 0.5
+    off = max(faces, measure.edge_length_error(surface, flat))
     if off <= _KEPT:
         return []
     return [
-        f"the flat image keeps lengths only to {off:.1%} (root mean square): the surface is not "
+        f"the flat image keeps lengths only to {off:.1%} on average: the surface is not "
         "developable, or it closes around itself and must be cut open"
     ]
 

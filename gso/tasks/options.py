@@ -63,9 +63,13 @@ class Options:
         if not isinstance(given, cls):
             raise OptionError(
                 f"this task takes {cls.__module__}.{cls.__name__} or one of "
-                f"{', '.join(cls.PRESETS)}, not {type(given).__name__}"
+                f"{', '.join(cls.PRESETS)}, not {_named(type(given))}"
             )
         return given
+
+
+def _named(kind: type) -> str:
+    return kind.__name__ if kind.__module__ == "builtins" else f"{kind.__module__}.{kind.__name__}"
 
 
 def _check_number(name: str, kind: str, value: Any) -> None:

@@ -58,7 +58,7 @@ def build(
     """
     size = typical_length(mesh) ** -2
     terms = []
-    quad = mesh.faces[:, -1] >= 0 if mesh.faces.shape[1] == 4 else np.zeros(len(mesh.faces), bool)
+    quad = topology.are_quads(mesh.faces)
     for which, faces in zip((quad, ~quad), topology.by_size(mesh.faces), strict=True):
         if not len(faces):
             continue

@@ -56,6 +56,7 @@ def build(mesh: Mesh, normals: Array, *, tangential: float = 1.0) -> Term:
 def closest(mesh: Mesh, normals: Array, *, tangential: float = 0.0) -> Term:
     """Proximity of the block "surface" to the surface `mesh`, wherever its vertices slide.
 
+    The block must be the first of the layout.
     Before every linearisation each vertex gets the point of the surface that is closest to
     it then, and the tangent plane there (Jiang et al. 2020; as iterated closest points do).
 

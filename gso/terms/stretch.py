@@ -155,7 +155,7 @@ def corner_shares(vertices: Array, quads: Ints) -> Array:
     normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     corners = [_corner(vertices, quads, c) for c in _CORNERS]
-    return np.stack([(area * normal).sum(axis=1) / edges for area, edges in corners])
+    return np.stack([(a * normal).sum(axis=1) / np.maximum(s, 1e-300) for a, s in corners])
 
 
 def rest_constants(vertices: Array, faces: Ints) -> Array:

@@ -63,6 +63,9 @@ def optimize_many(
     [0]
     """
     keywords.pop("callback", None)
+    if isinstance(keywords.get("constraints"), Iterator):
+        # Every surface needs all of them.
+        keywords["constraints"] = list(keywords["constraints"])
     with closing(spread(partial(_one, keywords), meshes, workers=workers)) as results:
         for done in results:
             yield Item(done.index, done.value, done.error)

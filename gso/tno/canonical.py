@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from functools import cached_property
 from typing import Any
 
@@ -55,7 +55,7 @@ class Canonical:
         points = points if ordered else points[self.order]
         return points[:, :2] / self.frame.scale if flat else self.frame.to_unit(points)
 
-    def constraints(self, given: Sequence[Constraint], *, flat: bool) -> Compiled:
+    def constraints(self, given: Iterable[Constraint], *, flat: bool) -> Compiled:
         """Constraints checked against the design, in this numbering and frame."""
         frame = Frame(np.zeros(2), self.frame.scale) if flat else self.frame
         return compile_constraints(given, self.design, flat=flat).mapped(frame, self.new_index)

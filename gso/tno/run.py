@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, field
 from functools import partial
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,25 @@ class Outcome:
         return self.blocks["surface"] if "surface" in self.blocks else self.blocks["flat"]
 
 
+class End(NamedTuple):
+    """Where the stages of a plan ended.
+
+    The coordinates are those of `stage`, which was solved last, or is the plan's last where
+    the solve was cancelled; `given` are those before the plan's last stage, where it was solved.
+    """
+
+    coordinates: Array
+    given: Array | None
+    stage: Stage
+    solution: Solution
+
+
+def objective(stage: Stage) -> Problem:
+    """What a stage minimises over its coordinates; what must hold is no part of it."""
+    items = [item for item in stage.items if item.term.multipliers is None]
+    return Problem(items, free(stage.layout))
+
+
 class Run:
     """Solves requests of one task, keeping history and time across several of them."""
 
@@ -59,43 +78,50 @@ class Run:
         clock = time.perf_counter()
         plan: Plan = self.module.plan(request)
         self.timings.setup += time.perf_counter() - clock
-        coordinates, solution, stage = plan.start, None, None
-        given, number = coordinates, 0
-        for number, stage in enumerate(plan.stages):
-            clock = time.perf_counter()
-            given, coordinates = coordinates, stage.enter(coordinates)
-            self.timings.setup += time.perf_counter() - clock
-            place = number, len(plan.stages)
-            coordinates, solution = self.solve(request.options, place, stage, coordinates)
-            if solution.status is Status.CANCELLED:
-                coordinates = self._finish(plan, number, coordinates)
-                break
-            if stage.enough is not None and stage.enough(coordinates):
-                break
-        if solution is not None and stage is not None:
-            solve = partial(self.solve, request.options, place)
-            coordinates, solution = tighten(stage, coordinates, solution, solve)
         outcome = Outcome(
-            plan.layout.split(coordinates),
+            {},
             plan.status or Status.CONVERGED,
             {"objective": 0.0},
             notes=tuple(plan.notes),
             details=plan.details,
             spline=plan.spline,
         )
-        if plan.spline is not None and number == len(plan.stages) - 1:
-            outcome.fitted = plan.layout.split(given)
-        if solution is not None and stage is not None:
-            if solution.status is Status.CANCELLED:
-                stage = plan.stages[-1]
-            coordinates, outcome.energy = self.guard(plan, stage, coordinates)
-            coordinates = plan.finish(coordinates)
-            outcome.blocks = plan.layout.split(coordinates)
-            outcome.notes += tuple(plan.remark(coordinates)) if plan.remark is not None else ()
-            outcome.backend = solution.backend
-            if plan.status is None or solution.status is Status.CANCELLED:
-                outcome.status = solution.status
+        if not plan.stages:
+            outcome.blocks = plan.layout.split(plan.start)
+            return outcome
+        end = self.through(plan, request.options)
+        coordinates, outcome.energy = self.guard(plan, end.stage, end.coordinates)
+        coordinates = plan.finish(coordinates)
+        outcome.blocks = plan.layout.split(coordinates)
+        if plan.spline is not None and end.given is not None:
+            outcome.fitted = plan.layout.split(end.given)
+        outcome.notes += tuple(plan.remark(coordinates)) if plan.remark is not None else ()
+        outcome.backend = end.solution.backend
+        if plan.status is None or end.solution.status is Status.CANCELLED:
+            outcome.status = end.solution.status
         return outcome
+
+    def through(self, plan: Plan, options: Options) -> End:
+        """Solve the stages of a plan that has some, the last one until its constraints hold."""
+        coordinates, given = plan.start, None
+        for number, stage in enumerate(plan.stages):
+            clock = time.perf_counter()
+            given, coordinates = coordinates, stage.enter(coordinates)
+            self.timings.setup += time.perf_counter() - clock
+            solve = partial(self.solve, options, (number, len(plan.stages)))
+            coordinates, solution = solve(stage, coordinates)
+            if solution.status is Status.CANCELLED:
+                break
+            if stage.enough is not None and stage.enough(coordinates):
+                break
+        after = plan.stages[number + 1 :]
+        if solution.status is Status.CANCELLED:
+            # They are carried to the last stage.
+            for stage in after:
+                coordinates = stage.enter(coordinates)
+        else:
+            coordinates, solution = tighten(stage, coordinates, solution, solve)
+        return End(coordinates, None if after else given, stage, solution)
 
     def solve(
         self, options: Options, place: tuple[int, int], stage: Stage, coordinates: Array
@@ -128,16 +154,9 @@ class Run:
         return variables.points(solution.x), solution
 
     @staticmethod
-    def _finish(plan: Plan, number: int, coordinates: Array) -> Array:
-        """Carry a cancelled solve to the last stage's coordinates."""
-        for stage in plan.stages[number + 1 :]:
-            coordinates = stage.enter(coordinates)
-        return coordinates
-
-    @staticmethod
     def guard(plan: Plan, stage: Stage, coordinates: Array) -> tuple[Array, dict[str, float]]:
         """The result, unless what it must not be worse than has less of the objective."""
-        problem = Problem(stage.items, free(stage.layout))
+        problem = objective(stage)
         energy = problem.by_term(coordinates)
         if plan.fallback is not None and not sum(energy.values()) <= problem.energy(plan.fallback):
             return plan.fallback, problem.by_term(plan.fallback)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gso.constraints import Constraint, Handle, Pins
+from gso.constraints import Constraint, Handle, Pins, listed
 from gso.handle_start import Spread
 from gso.result import Result
 from gso.status import ConvergenceWarning, OptionError, Status
@@ -19,10 +20,12 @@ from gso.terms import Weighted
 from gso.tno import linear
 from gso.tno.canonical import Canonical
 from gso.tno.direction import DIRECTIONS
+from gso.tno.handles import moved, pinned
 from gso.tno.optimize import check, judge, packed
 from gso.tno.problem import Problem
-from gso.tno.run import Outcome, Run
-from gso.tno.solver import minimise
+from gso.tno.run import Outcome, Run, objective
+from gso.tno.solver import Solution, minimise
+from gso.tno.tighten import tighten
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -51,7 +54,7 @@ class Session:
     Attributes
     ----------
     analyses : int
-        How many symbolic analyses there were: one, and one more for each
+        How many symbolic analyses the frames took: one, and one more for each
         :meth:`constrain` that changes which vertices are held.
 
     Raises
@@ -100,8 +103,8 @@ class Session:
         self._problem: Problem | None = None
         self._direction = DIRECTIONS[self._options.method]()
         self._plan = self._planned(constraints, self._frame.start(x0, flat=False))
-        self._coordinates = self._solved(self._plan)
         self._status = self._plan.status or Status.CONVERGED
+        self._coordinates = self._solved(self._plan)
         self._pose()
 
     @property
@@ -126,22 +129,15 @@ class Session:
         OptionError
             A vertex has no handle, or the positions are not k finite points.
         """
-        asked = Handle(ids, positions)
-        self._frame.constraints([asked], flat=False)
-        where = {
-            int(i): p for i, p in zip(np.atleast_1d(ids), np.atleast_2d(positions), strict=True)
-        }
-        moved = [_moved(c, where) for c in self._constraints]
-        held = {int(i) for c in moved if isinstance(c, Handle) for i in np.atleast_1d(c.ids)}
-        loose = sorted(set(where) - held)
-        if loose:
-            raise OptionError(f"vertex {loose[0]} has no handle; name one with constrain()")
-        compiled = self._frame.constraints(moved, flat=False)
-        before = self._pins()[1]
-        self._constraints, self._request.constraints = moved, compiled
-        ids, after = self._pins()
-        self._follow(ids, after - before)
+        asked = pinned(Handle(ids, positions), self._design, "move()")
+        constraints = moved(self._constraints, self._design, asked)
+        compiled = self._frame.constraints(constraints, flat=False)
+        before = self._request.constraints.places[1]
+        self._constraints, self._request.constraints = constraints, compiled
+        held, after = compiled.places
+        self._follow(held, after - before)
         self._pose()
+        self._left_to_do()
 
     def constrain(self, constraints: Sequence[Constraint]) -> None:
         """Take other constraints, handles among them; the surface stays where it is.
@@ -151,16 +147,11 @@ class Session:
         OptionError
             They contradict each other, or something in them is wrong.
         """
-        previous = self._plan.layout, self._coordinates
         self._plan = self._planned(constraints, self._surface)
-        if self._plan.layout == previous[0]:
-            self._coordinates = previous[1]
-        else:
-            self._coordinates = self._plan.start
         c = self._request.constraints
-        if self._stage is not None:
-            self._follow(c.hard_ids, c.hard_positions - self._surface[c.hard_ids])
+        self._follow(c.hard_ids, c.hard_positions - self._surface[c.hard_ids])
         self._pose()
+        self._left_to_do()
 
     def step(self, iterations: int = 1) -> Array:
         """Go on with the solve.
@@ -168,24 +159,48 @@ class Session:
         Parameters
         ----------
         iterations : int
-            Most iterations; fewer when nothing is left to gain.
+            Most iterations, 1 or more; fewer when nothing is left to gain.
 
         Returns
         -------
         ndarray, (n, 3)
             :attr:`vertices`.
+
+        Raises
+        ------
+        OptionError
+            `iterations` is no such number.
         """
-        self._iterate(iterations, 0.0)
+        if not isinstance(iterations, int | np.integer) or iterations < 1:
+            raise OptionError(f"iterations is {iterations!r}; it must be 1 or more")
+        if self._stage is not None:
+            self._iterate(self._stage, int(iterations), 0.0)
+            for item in self._stage.items:
+                if item.term.multipliers is not None:
+                    item.term.multipliers.push(self._coordinates)
         return self.vertices
 
     def settle(self) -> Result:
-        """Iterate until the task's tolerance is met, and return the :meth:`result`."""
+        """Iterate until the task's tolerance is met and all constraints hold.
+
+        Returns
+        -------
+        Result
+            The :meth:`result`; with a `ConvergenceWarning` where that was not reached.
+        """
         stage = self._stage
         if stage is not None:
-            self._iterate(_SETTLED, stage.tolerance)
-            if self._status is Status.MAX_ITERATIONS:
-                warnings.warn(str(self._status), ConvergenceWarning, stacklevel=2)
-        return self.result()
+            solution = self._iterate(stage, _SETTLED, stage.tolerance)
+            solve = partial(self._run.solve, self._options, (0, 1))
+            aimed = replace(stage, items=self._aimed(stage))
+            before = self._coordinates
+            self._coordinates, _ = tighten(aimed, before, solution, solve)
+            if self._coordinates is not before:
+                self._pose()
+        result = self.result()
+        if not result.converged:
+            warnings.warn(str(result.status), ConvergenceWarning, stacklevel=2)
+        return result
 
     def result(self) -> Result:
         """The surface as it is, as a result of :func:`gso.tno.optimize`."""
@@ -196,7 +211,8 @@ class Session:
         )
         outcome.details, outcome.spline = dict(plan.details), plan.spline
         if stage is not None and self._problem is not None:
-            outcome.energy = self._problem.by_term(self._x)
+            aimed = replace(stage, items=self._aimed(stage))
+            outcome.energy = objective(aimed).by_term(self._coordinates)
             outcome.backend = self._solver.name
         judge(self._request, self._frame, outcome)
         result = packed(
@@ -215,25 +231,27 @@ class Session:
         return self._plan.stages[-1] if self._plan.stages else None
 
     def _solved(self, plan: Plan) -> Array:
-        """Coordinates of the last stage after all stages."""
-        coordinates, enough = plan.start, False
-        for number, stage in enumerate(plan.stages):
-            place = number, len(plan.stages)
-            coordinates = stage.enter(coordinates)
-            if not enough:
-                coordinates, _ = self._run.solve(self._options, place, stage, coordinates)
-                enough = stage.enough is not None and stage.enough(coordinates)
-        return coordinates
+        """Coordinates after all stages."""
+        if not plan.stages:
+            return plan.start
+        end = self._run.through(plan, self._options)
+        self._status = plan.status or end.solution.status
+        return end.coordinates
+
+    def _left_to_do(self) -> None:
+        """The surface has not been solved for since what it keeps was changed."""
+        if self._stage is not None:
+            self._status = Status.MAX_ITERATIONS
 
     def _planned(self, constraints: Sequence[Constraint], start: Array | None) -> Plan:
         """What the task makes of constraints; they are checked first."""
-        compiled = self._frame.constraints(constraints, flat=False)
-        given = (constraints,) if isinstance(constraints, Constraint) else constraints
+        given = listed(constraints)
+        compiled = self._frame.constraints(given, flat=False)
         request = Request(self._frame.mesh, self._options, self._formulation, compiled, start)
         plan = self._module.plan(request)
         if not plan.stages and plan.status is not Status.ALREADY_GOOD:
             raise OptionError(f"task {self._task!r} has no iterations to go on with")
-        self._request, self._constraints, self._spread = request, list(given), None
+        self._request, self._constraints, self._spread = request, given, None
         return plan
 
     def _follow(self, ids: Ints, displacement: Array) -> None:
@@ -247,14 +265,6 @@ class Session:
         surface = self._coordinates[start : start + count * dim].reshape(count, dim)
         surface += self._spread(displacement)
 
-    def _pins(self) -> tuple[Ints, Array]:
-        """Vertices with a place, each once, and where that is."""
-        c = self._request.constraints
-        pins = [p for hard in (True, False) for p in c.of(Pins, hard=hard)]
-        every = np.concatenate([np.zeros(0, np.int64), *(p.ids for p in pins)])
-        ids, first = np.unique(every, return_index=True)
-        return ids, np.concatenate([np.zeros((0, 3)), *(p.positions for p in pins)])[first]
-
     def _pose(self) -> None:
         """Make the problem of the constraints and coordinates at hand."""
         stage = self._stage
@@ -263,28 +273,28 @@ class Session:
             return
         before = self._problem
         variables = stage.variables(self._coordinates)
-        items = [self._aimed(item) for item in stage.items]
-        self._problem = Problem(items, variables, stage.limits, like=before)
+        self._problem = Problem(self._aimed(stage), variables, stage.limits, like=before)
         if before is None or self._problem.pattern is not before.pattern:
             self._solver = linear.choose(self._problem.pattern, self._options.backend)
             self.analyses += 1
         self._x = variables.project(self._coordinates)
         self._coordinates = variables.points(self._x)
+        self._bounds = None if stage.bounds is None else stage.bounds(self._coordinates)
 
-    def _aimed(self, item: Weighted) -> Weighted:
-        """A term of the last stage, that of soft handles with their targets of now."""
-        if item.term.name != "position":
-            return item
-        wanted = np.full((len(self._design.vertices), 3), np.nan)
-        for pin in self._request.constraints.of(Pins, hard=False):
-            wanted[pin.ids] = pin.positions
-        targets = wanted[item.term.stencil[0][1][:, 0]].T.copy()
-        return replace(item, term=replace(item.term, constants=targets))
+    def _aimed(self, stage: Stage) -> list[Weighted]:
+        """Terms of a stage, those of soft handles with their targets of now."""
+        pins = iter(self._request.constraints.of(Pins, hard=False))
+        items = []
+        for item in stage.items:
+            if item.term.name == "position":
+                targets = next(pins).positions.T.copy()
+                item = replace(item, term=replace(item.term, constants=targets))
+            items.append(item)
+        return items
 
-    def _iterate(self, iterations: int, tolerance: float) -> None:
-        stage, problem = self._stage, self._problem
-        if stage is None or problem is None:
-            return
+    def _iterate(self, stage: Stage, iterations: int, tolerance: float) -> Solution:
+        """Go on with a stage, the one that the problem at hand is of."""
+        problem: Any = self._problem
         solution = minimise(
             problem,
             self._x,
@@ -292,7 +302,7 @@ class Session:
             tolerance=tolerance,
             eps=stage.eps[-1:],
             robust=stage.robust,
-            bounds=None if stage.bounds is None else stage.bounds(self._coordinates),
+            bounds=self._bounds,
             solver=self._solver,
             direction=self._direction,
             threads=self._options.threads,
@@ -303,18 +313,4 @@ class Session:
         self._coordinates = problem.variables.points(solution.x)
         self._run.iterations += solution.iterations
         self._run.history += solution.history
-        for item in stage.items:
-            if item.term.multipliers is not None:
-                item.term.multipliers.push(self._coordinates)
-
-
-def _moved(constraint: Constraint, where: dict[int, Array]) -> Constraint:
-    """A handle whose vertices, where they are named, have other positions."""
-    if not isinstance(constraint, Handle):
-        return constraint
-    ids = np.atleast_1d(constraint.ids)
-    positions = np.array(np.atleast_2d(constraint.positions), float)
-    for k, i in enumerate(ids):
-        if int(i) in where:
-            positions[k] = where[int(i)]
-    return replace(constraint, positions=positions)
+        return solution

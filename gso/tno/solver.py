@@ -142,6 +142,9 @@ def minimise(
     best, best_energy = x, final_energy(x)
     timings.search += time.perf_counter() - clock
     status = Status.MAX_ITERATIONS
+    if not len(x):
+        # Constraints hold every vertex.
+        status, iterations = Status.CONVERGED, 0
     done = 0
     try:
         report(0, best_energy, 0.0)

@@ -49,11 +49,11 @@ def tighten(
     hard = [i.term.multipliers for i in stage.items if i.term.multipliers is not None]
     if not hard:
         return coordinates, solution
-    before, share, first = np.inf, 1.0, solution
+    if solution.status is Status.CANCELLED:
+        return coordinates, solution
+    before, share, end = np.inf, 1.0, solution
     stage = replace(stage, eps=stage.eps[-1:])
     for _ in range(ROUNDS):
-        if solution.status is Status.CANCELLED:
-            return coordinates, solution
         left = max(m.push(coordinates) for m in hard)
         if left <= ENOUGH:
             break
@@ -63,7 +63,13 @@ def tighten(
                 m.scale(_SOFTER)
         before = left
         coordinates, solution = solve(_softer(stage, share), coordinates)
-    return coordinates, first
+        if solution.status is Status.CANCELLED:
+            end = solution
+            break
+    for m in hard:
+        # The stage itself may go on from here, with its own weights.
+        m.scale(1.0 / share)
+    return coordinates, end
 
 
 def _softer(stage: Stage, share: float) -> Stage:

@@ -1,0 +1,224 @@
+"""Figures of the nets on the surfaces that none was trained on, and what they cost.
+
+    python bench/net.py DIR                    the table of all nets (DIR: a set of surfaces)
+    python bench/net.py DIR --cards            the same, and writes it into the nets' cards
+    python bench/net.py DIR --model RUN/model.safetensors    one net
+    python bench/net.py DIR --others           the splits that are no Bezier surfaces, too
+    python bench/net.py --curve RUN...  --plot FILE          quality against training time
+    python bench/net.py DIR --grid FILE        figure 5: loss against parameters (hours)
+
+Figures are means over the test split; times are medians for one surface, from array to
+array, on the CPU, with the threads that OMP_NUM_THREADS allows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+# Threads that wait for each other busily slow each other down where cores are shared.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+os.environ.setdefault("OMP_NUM_THREADS", "2")
+
+import numpy as np
+from tqdm import tqdm
+
+from gso import dataset, net
+from gso.dataset.noise import LEVELS
+from gso.net import weights
+from gso.net.config import from_dict
+from gso.net.curves import read
+from gso.net.validate import SCORE, figures
+
+#: Published figures (Wang et al. 2024, Tables 1 to 3), by net.
+PUBLISHED = {
+    "net-s": {"loss_gc": 0.0273, "K_A_r": 0.8776, "d_H": 0.608},
+    "net-c": {"loss_gc": 0.0417, "K_A_r": 0.8300, "d_H": 0.414},
+    "net-cf": {"loss_gc": 0.0291, "K_A_r": 0.8768, "d_H": 0.517},
+    "developable": {"loss_gc": 0.0291, "K_A_r": 0.8768, "d_H": 0.517},
+    "flatten": {"loss_iso_cell": 2.94e-4},
+    "flatten-w": {"loss_iso_cell": 2.46e-4},
+}
+THETA = dict(zip(LEVELS, (0.633, 1.502, 2.505, 3.544), strict=True))
+OTHERS = (
+    "hard",
+    "enneper",
+    "monkey_saddle",
+    "catenoid",
+    "helicoid",
+    "sphere",
+    "torus",
+    "teapot",
+    "terrain",
+)
+#: Figure 5: blocks per level, channels, surfaces, epochs.
+BLOCKS, CHANNELS, SURFACES, EPOCHS = (2, 4, 6), (8, 16, 32), 2000, 10
+
+
+def watched(items: Any, text: str) -> Any:
+    """A progress bar when a person is watching."""
+    return tqdm(items, desc=text, leave=False, disable=not sys.stderr.isatty())
+
+
+def measured(task: str, model: Any, split: Any, count: int | None = None) -> dict[str, float]:
+    """Mean figures of a net over a split."""
+    if task == "denoise":
+        card = {} if model is None else weights.read_card(weights.chain(model, task)[-1])
+        low, high = card.get("config", {}).get("sigma", (0.0, 1.0))
+        levels = [s for s in LEVELS if low <= s <= high]
+        found = {}
+        for level in levels:
+            rows = over(task, model, split, f"noisy_{level:.3f}", count)
+            found[f"theta_{level:g}"] = float(np.mean([r["theta"] for r in rows]))
+        return found
+    rows = over(task, model, split, "surface", count)
+    out = {name: float(np.mean([r[name] for r in rows])) for name in rows[0] if name != "score"}
+    if task == "flatten":
+        out["unflipped"] = float(np.mean([r["flipped_cells"] == 0 for r in rows]))
+    return out
+
+
+def over(
+    task: str, model: Any, split: Any, array: str, count: int | None
+) -> list[dict[str, float]]:
+    """Figures of every surface of a split."""
+    rows = []
+    total = min(len(split), count or len(split))
+    for k in watched(range(0, total, 32), f"{model or 'default'} {split.name} {array}"):
+        block = slice(k, min(k + 32, total))
+        clean = split["surface"][block]
+        given = clean if array == "surface" else split[array][block]
+        results = net.predict(given, task=task, model=model)
+        rows += [figures(task, a, b) for a, b in zip(clean, results, strict=True)]
+    return rows
+
+
+def milliseconds(task: str, model: Any, surface: np.ndarray, times: int = 30) -> float:
+    """Median time of one surface, from array to array."""
+    spent = []
+    for _ in range(times + 3):
+        start = time.perf_counter()
+        net.predict(surface, task=task, model=model)
+        spent.append(time.perf_counter() - start)
+    return 1e3 * float(np.median(spent[3:]))
+
+
+def line(name: str, found: dict[str, float], published: dict[str, float]) -> str:
+    """One net in one line, published figures in brackets."""
+    parts = []
+    for key, value in found.items():
+        beside = f" ({published[key]:.4g})" if key in published else ""
+        parts.append(f"{key} {value:.4g}{beside}")
+    return f"{name:16s} " + "  ".join(parts)
+
+
+def rows(arguments: argparse.Namespace) -> None:
+    """Print the table of nets, and write it into their cards."""
+    data = dataset.open(arguments.data)
+    names = [arguments.model] if arguments.model else net.available()
+    if not names:
+        print("no net comes with the package yet; give --model RUN/model.safetensors")
+    for name in names:
+        first = weights.CHAINS.get(name, (name,))[0]
+        task = weights.read_card(weights.located(first))["model"]["task"]
+        found = measured(task, name, data["test"], arguments.n)
+        found["ms"] = milliseconds(task, name, data["test"]["surface"][0])
+        published = PUBLISHED.get(name, {})
+        if task == "denoise":
+            published = {f"theta_{s:g}": v for s, v in THETA.items()}
+        print(line(Path(name).stem, found, published), flush=True)
+        if arguments.others and task != "denoise":
+            for other in OTHERS:
+                if other in data:
+                    print(line(f"  {other}", measured(task, name, data[other], arguments.n), {}))
+        if arguments.cards:
+            path = weights.located(weights.CHAINS.get(name, (name,))[-1])
+            key = "test" if name not in weights.CHAINS else f"test of {name}"
+            count = min(len(data["test"]), arguments.n or len(data["test"]))
+            card = weights.read_card(path) | {key: found | {"surfaces": count}}
+            weights.write_card(path.with_suffix(".json"), card)
+
+
+def curve(runs: list[Path], target: str) -> None:
+    """Plot what validation showed against the hours of training."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(7, 4.5), constrained_layout=True)
+    for run in runs:
+        card = weights.read_card(run / "model.safetensors")
+        name = SCORE[card["model"]["task"]]
+        seen = [(r["seconds"] / 3600, r[name]) for r in read(run) if name in r]
+        axes.plot(*np.array(seen).reshape(-1, 2).T, marker=".", label=f"{card['name']}: {name}")
+    axes.set(xlabel="hours", ylabel="validation, lower is better", yscale="log")
+    axes.legend()
+    figure.savefig(target)
+
+
+def grid(arguments: argparse.Namespace) -> None:
+    """Figure 5: nets of several sizes, supervised on the optimiser's results."""
+    table = []
+    for blocks in BLOCKS:
+        for channels in CHANNELS:
+            config = from_dict(
+                {
+                    "name": f"nb{blocks}-nc{channels}",
+                    "task": "developable",
+                    "augment": "none",
+                    "steps": EPOCHS * SURFACES // 20,
+                    "limit": SURFACES,
+                    "model": {"kind": "gsonet", "channels": channels, "blocks": blocks},
+                    "phase": [{"loss": "label", "batch": 20, "rate": 1e-3}],
+                    "validate_every": 1e9,
+                }
+            )
+            with tempfile.TemporaryDirectory() as run:
+                card = net.train(config, arguments.data, run)
+                losses = [r["loss"] for r in read(Path(run)) if "loss" in r]
+            row = {
+                "blocks": blocks,
+                "channels": channels,
+                "parameters": card["parameters"],
+                "loss": float(np.mean(losses[-5:])),
+                **card["validation"],
+            }
+            table.append(row)
+            print(line(config.name, {k: v for k, v in row.items() if k[0] != "b"}, {}), flush=True)
+    record = {"command": f"python bench/net.py DIR --grid {arguments.grid}", "rows": table}
+    Path(arguments.grid).write_text(json.dumps(record, indent=1) + "\n")
+
+
+def main() -> None:
+    """Run what was asked for."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("data", nargs="?", metavar="DIR", help="set of surfaces")
+    parser.add_argument("--model", metavar="NET", help="a name or a .safetensors file")
+    parser.add_argument("-n", type=int, metavar="N", help="only so many surfaces of each split")
+    parser.add_argument("--others", action="store_true", help="splits that are no Bezier surfaces")
+    parser.add_argument("--cards", action="store_true", help="write the figures into the cards")
+    parser.add_argument("--grid", metavar="FILE", help="figure 5, as JSON")
+    parser.add_argument("--curve", nargs="+", type=Path, metavar="RUN", help="plot runs")
+    parser.add_argument("--plot", default="curves.png", metavar="FILE", help="for --curve")
+    arguments = parser.parse_args()
+    if arguments.curve:
+        curve(arguments.curve, arguments.plot)
+    elif arguments.data is None:
+        parser.error("give a set of surfaces")
+    elif arguments.grid:
+        grid(arguments)
+    else:
+        rows(arguments)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,229 @@
+"""A run: everything that changes in it, how it begins, what it leaves in its folder."""
+
+from __future__ import annotations
+
+import copy
+import os
+import platform
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from gso import dataset
+from gso.net import checkpoint, weights
+from gso.net.base import Net
+from gso.net.config import Config
+from gso.net.curves import Curves
+from gso.net.data import Source, noisy, open_source
+from gso.net.grids import normalise
+from gso.net.processes import Processes
+from gso.net.validate import applied, mean_figures
+from gso.status import OptionError
+
+#: Files of a run.
+CHECKPOINT, MODEL = "checkpoint.safetensors", "model.safetensors"
+#: Seed of the noise that validation adds.
+_NOISE = 7
+#: Told what is counted, how many there are, and how many there will be.
+Tick = Callable[[str, int, int], None]
+
+
+@dataclass
+class Run:
+    """Everything of a run that changes."""
+
+    config: Config
+    folder: Path
+    here: Processes
+    limit: float | None
+    source: Source
+    check: tuple[Tensor, Tensor, Tensor | None]
+    net: Net
+    average: Net
+    optimiser: torch.optim.Optimizer
+    origin: dict[str, Any]
+    step: int = 0
+    spent: float = 0.0
+    figures: dict[str, float] = field(default_factory=dict)
+    card: dict[str, Any] = field(default_factory=dict)
+    curves: Curves | None = None
+
+    @property
+    def progress(self) -> float:
+        """Share of the run that is done; the same in all processes."""
+        if self.limit is None:
+            return self.step / self.config.steps
+        return self.here.agreed(self.spent / self.limit)
+
+    def follow(self) -> None:
+        """Take the moving average of the weights a step on."""
+        decay = min(self.config.ema, (1 + self.step) / (10 + self.step))
+        with torch.no_grad():
+            pairs = zip(self.average.parameters(), self.net.parameters(), strict=True)
+            for mean, value in pairs:
+                mean.lerp_(value, 1.0 - decay)
+
+    def keep(self) -> None:
+        """Write a checkpoint."""
+        if self.here.first:
+            state = {
+                "step": self.step,
+                "spent": self.spent,
+                "figures": self.figures,
+                "config": _kept(self.config),
+            }
+            path = self.folder / CHECKPOINT
+            checkpoint.save(path, self.net, self.average, self.optimiser, state)
+
+    def validate(self) -> None:
+        """Measure the averaged net, and write it with its card."""
+        if self.here.first:
+            surfaces, truths, sigma = self.check
+            results = applied(self.average.eval(), surfaces, sigma)
+            self.figures = mean_figures(self.config.task, truths.double().numpy(), results)
+            if self.curves is not None:
+                self.curves.add(self.step, self.spent, **self.figures)
+            self.card = weights.save(self.average, self.folder / MODEL, self._card())
+        self.here.wait()
+
+    def _card(self) -> dict[str, Any]:
+        return {
+            "name": self.config.name,
+            "config": self.config.as_dict(),
+            "steps": self.step,
+            "hours": round(self.spent / 3600, 3),
+            "validation": self.figures,
+            **self.origin,
+        }
+
+    def close(self) -> None:
+        """Finish the curves."""
+        if self.curves is not None:
+            self.curves.close()
+
+
+def _kept(config: Config) -> dict[str, Any]:
+    """What must be the same when a run is taken up: all but how often it is looked at."""
+    rest = config.as_dict()
+    for name in ("validate_every", "checkpoint_every", "validate"):
+        del rest[name]
+    return rest
+
+
+def begin(
+    config: Config,
+    data: Path,
+    folder: Path,
+    minutes: float | None,
+    here: Processes,
+    tick: Tick | None,
+) -> Run:
+    """A new run, or the one that is there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OptionError(f"{folder} cannot be made: {error.strerror}") from None
+    torch.manual_seed(config.seed)
+    net = weights.make(dict(config.model) | {"task": config.task})
+    if config.init:
+        _take(net, weights.load(config.init), config.init)
+    net = weights.placed(net, here.device)
+    net.bf16 = _fast(here.device) if config.bf16 is None else config.bf16
+    average = copy.deepcopy(net).requires_grad_(False)
+    average.bf16 = False
+    if here.first:
+        # The other processes read what the first one draws.
+        source = open_source(config, data, folder / "fresh.npy", tick)
+    here.wait()
+    if not here.first:
+        source = open_source(config, data, folder / "fresh.npy")
+    run = Run(
+        config,
+        folder,
+        here,
+        None if minutes is None else 60.0 * minutes,
+        source,
+        _validation(config, data),
+        net,
+        average,
+        torch.optim.AdamW(net.parameters(), weight_decay=config.weight_decay),
+        _origin(data, here),
+    )
+    if config.through:
+        _pass_through(run)
+    path = folder / CHECKPOINT
+    if path.exists():
+        state = checkpoint.load(path, net, average, run.optimiser)
+        if state.get("config") != _kept(config):
+            raise OptionError(
+                f"{folder} holds a run with another configuration; take another folder"
+            )
+        run.step, run.spent, run.figures = state["step"], state["spent"], state["figures"]
+    if here.first:
+        run.curves = Curves(folder, run.step)
+    return run
+
+
+def _take(net: Net, other: Net, name: str) -> None:
+    """Begin with the weights of another net."""
+    if other.settings.keys() != net.settings.keys() or type(other) is not type(net):
+        raise OptionError(f"init: {name} is a net of another kind")
+    try:
+        net.load_state_dict(other.state_dict())
+    except RuntimeError as error:
+        raise OptionError(f"init: {name} does not fit: {error}") from None
+
+
+def _pass_through(run: Run) -> None:
+    """What another net makes of the surfaces takes their place, normalised anew."""
+    net = weights.load(run.config.through, device=run.here.device)
+
+    def done(surfaces: Tensor) -> Tensor:
+        return normalise(torch.from_numpy(applied(net, surfaces))).float()
+
+    run.source = Source(done(run.source.surfaces))
+    surfaces = done(run.check[0])
+    run.check = surfaces, surfaces, None
+
+
+def _validation(config: Config, data: Path) -> tuple[Tensor, Tensor, Tensor | None]:
+    """Surfaces that a net sees, what they are compared with, and their noise."""
+    split = dataset.open(data)["validation"]
+    clean = torch.from_numpy(split["surface"][: config.validate]).float()
+    if config.task != "denoise":
+        return clean, clean, None
+    return noisy(clean, config.sigma, torch.Generator().manual_seed(_NOISE))
+
+
+def _fast(device: torch.device) -> bool:
+    """Whether bfloat16 is fast on a device."""
+    if device.type == "cuda":
+        return torch.cuda.is_bf16_supported()
+    known = getattr(torch.cpu, "_is_avx512_bf16_supported", lambda: False)
+    return device.type == "cpu" and bool(known())
+
+
+def _origin(data: Path, here: Processes) -> dict[str, Any]:
+    """Data, packages and hardware, for the card."""
+    manifest = dataset.open(data).manifest
+    hardware = platform.processor() or platform.machine()
+    if here.device.type == "cuda":
+        hardware = torch.cuda.get_device_name(here.device)
+    return {
+        "data": {k: v for k, v in manifest.get("recipe", {}).items() if k != "options"},
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("gso", "torch", "numpy")},
+        },
+        "hardware": {
+            "processes": here.world,
+            "device": hardware,
+            "cores": os.cpu_count(),
+            "threads": torch.get_num_threads(),
+        },
+    }

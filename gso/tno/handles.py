@@ -1,0 +1,51 @@
+"""Handles of a session: however they are given, as arrays; and moved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from gso.constraints import Constraint, Handle, Pins
+from gso.constraints.base import Subject
+from gso.constraints.conflicts import check
+from gso.mesh import Mesh
+from gso.status import OptionError
+
+
+def pinned(handle: Handle, mesh: Mesh, name: str) -> Pins:
+    """Indices (k,) and positions (k, 3) of a handle, in the user's numbering and unit.
+
+    Raises
+    ------
+    OptionError
+        They make no sense; the message begins with the name.
+    """
+    parts = handle.parts(Subject(mesh, False, 0, name))
+    check(parts, [name], mesh)
+    pins = [p for p in parts if isinstance(p, Pins)]
+    return pins[0] if pins else Pins(0, np.zeros(0, np.int64), np.zeros((0, 3)))
+
+
+def moved(constraints: list[Constraint], mesh: Mesh, asked: Pins) -> list[Constraint]:
+    """Constraints whose handles are at the places that are asked for.
+
+    Raises
+    ------
+    OptionError
+        A vertex has no handle.
+    """
+    loose = np.ones(len(asked.ids), bool)
+    out = []
+    for c in constraints:
+        if isinstance(c, Handle):
+            pins = pinned(c, mesh, "a handle")
+            at, which = np.nonzero(pins.ids[:, None] == asked.ids)
+            pins.positions[at] = asked.positions[which]
+            loose[which] = False
+            c = replace(c, ids=pins.ids, positions=pins.positions)
+        out.append(c)
+    if loose.any():
+        vertex = asked.ids[loose].min()
+        raise OptionError(f"vertex {vertex} has no handle; name one with constrain()")
+    return out

@@ -1,0 +1,315 @@
+"""Training: configurations, batches, and runs that are killed, shared, and taken up."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from itertools import chain, pairwise
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from gso.cli import main
+from gso.status import DatasetError, OptionError, WeightsError
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("safetensors")
+
+from gso.net import GSONet, augment, checkpoint, load, losses, save, train  # noqa: E402
+from gso.net.config import FOLDER, Config, Phase, from_dict, read  # noqa: E402
+from gso.net.curves import read as read_curves  # noqa: E402
+from gso.net.data import Source, fresh, noisy, open_source  # noqa: E402
+from gso.net.grids import normalise  # noqa: E402
+from gso.net.objective import aligned  # noqa: E402
+from gso.net.schedule import place  # noqa: E402
+
+SMALL = {"kind": "coarse", "widths": [8, 8, 8], "depths": [0, 0, 1]}
+PUBLISHED = {"kind": "gsonet", "channels": 4, "blocks": 1}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder of .npy files with a few surfaces."""
+    from gso.dataset import bezier
+
+    path = tmp_path_factory.mktemp("surfaces")
+    for split, count, seed in (("train", 8, 1), ("validation", 2, 2)):
+        (path / split).mkdir()
+        for k, surface in enumerate(bezier.generate(count, seed=seed)):
+            np.save(path / split / f"{k:03d}.npy", surface.sample(32))
+    return path
+
+
+def config(task="developable", model=None, **more):
+    phase = more.pop("phase", [{"loss": "energy", "batch": 4, "eps": [0.1, 0.05]}])
+    given = {"task": task, "model": model or SMALL, "phase": phase, "steps": 6, "validate": 2}
+    return from_dict({**given, "bf16": False, "ema": 0.5, **more})
+
+
+def tensors(path):
+    return load(path).state_dict()
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.toml")), ids=lambda p: p.stem)
+def test_shipped_configurations(path):
+    made = read(path)
+    assert made.name == path.stem
+    assert from_dict(made.as_dict()) == made
+    from gso.net.weights import make
+
+    with torch.device("meta"):
+        net = make({**made.model, "task": made.task})
+    assert sum(p.numel() for p in net.parameters()) < 3e6
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"task": "bend"}, "task is 'bend'"),
+        ({"colour": 3}, "unknown: colour"),
+        ({"phase": []}, "phase"),
+        ({"phase": 3}, "phase"),
+        ({"phase": [{"loss": "l2"}]}, "loss is 'l2'"),
+        ({"phase": [{"weights": {"gcc": 1}}]}, "'gcc'"),
+        ({"phase": [{"weights": {"iso": 1}}]}, "do not go with task"),
+        ({"phase": [{"loss": "clean"}]}, "does not go with task"),
+        ({"phase": [{"loss": "label"}], "augment": "shear"}, "do not follow"),
+        ({"phase": [{"loss": "energy", "rate": 0}]}, "positive"),
+        ({"phase": [{"loss": "energy", "batch": 1.5}]}, "batch is 1.5"),
+        ({"model": {"kind": "mlp"}}, "no kind 'mlp'"),
+        ({"model": {"kind": "coarse", "depth": 3}}, "settings of the net"),
+        ({"model": 3}, "needs task"),
+        ({"name": "a/b"}, "no file name"),
+        ({"steps": 0}, "steps is 0"),
+        ({"sigma": [1, 0]}, "sigma"),
+    ],
+)
+def test_bad_configurations(change, says, folder, tmp_path):
+    with pytest.raises(OptionError, match=says):
+        train(config(**change), folder, tmp_path)
+
+
+def test_unreadable_configurations(tmp_path):
+    with pytest.raises(OptionError, match=r"developable.*flatten"):
+        read(tmp_path / "none.toml")
+    for name, text in (("a.toml", "= 3"), ("a.json", "{"), ("b.json", "[]")):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(OptionError):
+            read(tmp_path / name)
+    (tmp_path / "c.json").write_text(json.dumps(config().as_dict()))
+    assert read(tmp_path / "c.json") == config()
+
+
+def test_schedule_falls_and_reaches_every_phase():
+    phases = [Phase("energy", share=1.0, rate=1.0), Phase("energy", share=3.0, rate=0.5)]
+    places = [place(phases, t) for t in np.linspace(0, 1, 101)]
+    assert {p.number for p in places[:25]} == {0} and {p.number for p in places[26:]} == {1}
+    rates = [p.rate for p in places]
+    assert rates[0] < 0.02 and rates[1] > 0.9 and rates[-1] == pytest.approx(1e-5)
+    for stretch in (rates[1:25], rates[26:]):
+        assert all(a >= b for a, b in pairwise(stretch))
+
+
+def test_batches_are_functions_of_the_step():
+    made = config(augment="none")
+    source = Source(torch.arange(7.0)[:, None, None, None].expand(7, 4, 4, 3))
+    rows = [source.batch(made, made.phases[0], s).surface[:, 0, 0, 0].tolist() for s in range(7)]
+    again = source.batch(made, made.phases[0], 3).surface[:, 0, 0, 0].tolist()
+    assert again == rows[3]
+    # Every surface is seen once in each epoch.
+    seen = list(chain.from_iterable(rows))
+    assert all(sorted(seen[k : k + 7]) == list(range(7)) for k in (0, 7, 14, 21))
+    halves = [
+        source.batch(made, made.phases[0], 3, rank=r, world=2).surface[:, 0, 0, 0].tolist()
+        for r in range(2)
+    ]
+    assert sorted(chain.from_iterable(halves)) == sorted(rows[3])
+
+
+def test_augmentation_keeps_what_it_should():
+    generator = torch.Generator().manual_seed(0)
+    surfaces = normalise(torch.randn(40, 8, 8, 3, generator=generator))
+    first, second = augment.symmetries([surfaces, 2 * surfaces], generator)
+    assert torch.equal(2 * first, second)
+    same = (first == surfaces).all(dim=(1, 2, 3)).float().mean()
+    assert 0 < same < 0.4
+    assert torch.allclose(losses.fair(first), losses.fair(surfaces), rtol=1e-5)
+    sheared = augment.shear(surfaces, generator)
+    assert torch.allclose(sheared.square().sum(-1).amax((1, 2)), torch.ones(40), atol=1e-5)
+    assert not torch.allclose(sheared, surfaces, atol=0.1)
+
+
+def test_noise_has_its_size():
+    clean = normalise(torch.randn(3, 64, 64, 3, generator=torch.Generator().manual_seed(0)))
+    surface, target, sigma = noisy(clean, (0.01, 0.01), torch.Generator().manual_seed(1))
+    assert torch.allclose((surface - target).std((1, 2, 3)), sigma, rtol=0.02)
+    assert torch.allclose(surface.square().sum(-1).amax((1, 2)), torch.ones(3), atol=1e-5)
+
+
+def test_alignment_finds_turned_images():
+    image = torch.randn(2, 5, 6, 2, dtype=torch.float64)
+    turn = torch.tensor([[0.6, 0.8], [0.8, -0.6]], dtype=torch.float64)
+    assert torch.allclose(aligned(image @ turn + 3.0, image), image)
+
+
+def test_fresh_surfaces_are_kept(tmp_path):
+    cache = tmp_path / "fresh.npy"
+    first = fresh(3, 0, 16, cache)
+    assert first.shape == (3, 16, 16, 3) and torch.equal(fresh(3, 0, 16, cache), first)
+    cache.write_bytes(b"broken")
+    assert torch.equal(fresh(3, 0, 16, cache), first)
+    assert not torch.equal(fresh(3, 1, 16, tmp_path / "other.npy"), first)
+
+
+RUNS = {
+    "developable": config(),
+    "flatten": config("flatten"),
+    "published": config(
+        model=PUBLISHED,
+        augment="shear",
+        phase=[{"batch": 4, "weights": {"in": 1, "fair": 1, "gc": 1}, "decay": 3.0}],
+    ),
+    "flatten published": config(
+        "flatten", PUBLISHED, phase=[{"batch": 4, "weights": {"iso_w": 1e6, "iso": 1, "fair": 1}}]
+    ),
+    "denoise": config(
+        "denoise", {**PUBLISHED, "sigma": True}, phase=[{"loss": "clean", "batch": 4}]
+    ),
+    "bfloat16": replace(config(), bf16=True),
+}
+
+
+@pytest.mark.parametrize("made", RUNS.values(), ids=list(RUNS))
+def test_runs(made, folder, tmp_path):
+    card = train(made, folder, tmp_path)
+    assert card["steps"] == 6 and all(np.isfinite(v) for v in card["validation"].values())
+    assert load(tmp_path / "model.safetensors").task == made.task
+    rows = read_curves(tmp_path)
+    assert rows[-1]["step"] == 6
+
+
+def test_loss_falls(folder, tmp_path):
+    made = config(steps=60, phase=[{"loss": "energy", "batch": 8, "rate": 5e-3}], augment="none")
+    card = train(made, folder, tmp_path)
+    rows = [r["loss"] for r in read_curves(tmp_path) if "loss" in r]
+    assert rows[-1] < 0.9 * rows[0]
+    assert card["validation"]["K_A_r"] > 0.02
+
+
+def test_labels_are_learnt(tmp_path, folder):
+    import gso
+
+    recipe = gso.dataset.Recipe(n=10, size=16, labels=("developable", "strain"), extras=False)
+    gso.dataset.build(tmp_path / "set", recipe, workers=0)
+    for task, label in (("developable", "developable"), ("flatten", "strain")):
+        phase = [{"loss": "label", "batch": 8, "rate": 5e-3}]
+        made = config(task, label=label, phase=phase, steps=60, augment="none", fresh=2)
+        assert len(open_source(made, tmp_path / "set", tmp_path / "fresh.npy").surfaces) == 10
+        train(made, tmp_path / "set", tmp_path / task)
+        rows = [r["loss"] for r in read_curves(tmp_path / task) if "loss" in r]
+        assert rows[-1] < 0.9 * rows[0]
+    with pytest.raises(DatasetError, match="no array"):
+        train(config(label="lengths", phase=phase), tmp_path / "set", tmp_path / "run")
+
+
+class _Killed(Exception):
+    pass
+
+
+def test_a_killed_run_ends_with_the_same_weights(folder, tmp_path):
+    made = config(steps=50, augment="symmetries", checkpoint_every=0.0)
+    train(made, folder, tmp_path / "whole")
+
+    def kill(report):
+        raise _Killed
+
+    with pytest.raises(_Killed):
+        train(made, folder, tmp_path / "killed", show=kill)
+    assert 0 < len(read_curves(tmp_path / "killed")) < 4
+    card = train(made, folder, tmp_path / "killed")
+    whole, again = (tensors(tmp_path / n / "model.safetensors") for n in ("whole", "killed"))
+    assert all(torch.equal(whole[k], again[k]) for k in whole)
+    assert [r["step"] for r in read_curves(tmp_path / "killed")] == [20, 40, 50]
+    assert train(made, folder, tmp_path / "killed")["sha256"] == card["sha256"]
+
+
+def test_what_a_folder_holds_is_respected(folder, tmp_path):
+    train(config(), folder, tmp_path)
+    with pytest.raises(OptionError, match="another configuration"):
+        train(config(seed=5), folder, tmp_path)
+    train(config(validate_every=1.0), folder, tmp_path)
+    path = tmp_path / "checkpoint.safetensors"
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(WeightsError, match="remove it"):
+        train(config(), folder, tmp_path)
+
+
+def test_checkpoint_of_another_net(tmp_path):
+    small, large = (GSONet(channels=c, blocks=1) for c in (4, 8))
+    checkpoint.save(
+        tmp_path / "c", small, copy.deepcopy(small), torch.optim.AdamW(small.parameters()), {}
+    )
+    with pytest.raises(WeightsError):
+        checkpoint.load(tmp_path / "c", large, large, torch.optim.AdamW(large.parameters()))
+
+
+def test_minutes_end_a_run(folder, tmp_path):
+    card = train(config(steps=10**9), folder, tmp_path, minutes=0.02)
+    assert 0 < card["steps"] < 10**4
+    with pytest.raises(OptionError, match="minutes"):
+        train(config(), folder, tmp_path, minutes=0.0)
+
+
+def test_begin_with_a_net_and_learn_from_its_results(folder, tmp_path):
+    save(GSONet(channels=4, blocks=1), tmp_path / "net.safetensors")
+    net = str(tmp_path / "net.safetensors")
+    phase = [{"batch": 4, "rate": 1e-6, "final_rate": 1e-6, "weights": {"in": 1, "fair": 1}}]
+    made = config(model=PUBLISHED, phase=phase, init=net, through=net, augment="none", steps=1)
+    train(made, folder, tmp_path / "run")
+    first, last = tensors(net), tensors(tmp_path / "run" / "model.safetensors")
+    assert all(torch.allclose(first[k], last[k], atol=1e-4) for k in first)
+    with pytest.raises(OptionError, match="does not fit"):
+        train(config(model={**PUBLISHED, "channels": 8}, init=net), folder, tmp_path / "other")
+    with pytest.raises(OptionError, match="another kind"):
+        train(config(init=net), folder, tmp_path / "other")
+
+
+def launch(folder, out, path, processes=0):
+    """Run the command, with torchrun if there are to be several processes."""
+    start = [sys.executable, "-m"]
+    if processes:
+        start += ["torch.distributed.run", "--standalone", "--nproc-per-node", str(processes), "-m"]
+    command = [*start, "gso.cli", "train", str(path), "--data", str(folder), "--out", str(out)]
+    command += ["--device", "cpu"]
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=200)
+
+
+def test_two_processes_learn_what_one_learns(folder, tmp_path):
+    path = tmp_path / "config.json"
+    path.write_text(json.dumps(config().as_dict()))
+    for name, processes in (("one", 0), ("two", 2)):
+        done = launch(folder, tmp_path / name, path, processes)
+        assert done.returncode == 0, done.stderr
+    one, two = (tensors(tmp_path / n / "model.safetensors") for n in ("one", "two"))
+    assert all(torch.allclose(one[k], two[k], atol=2e-3) for k in one)
+
+
+def test_command(folder, tmp_path):
+    path = tmp_path / "config.json"
+    path.write_text(json.dumps(config().as_dict()))
+    run = [str(path), "--data", str(folder), "--out", str(tmp_path / "run")]
+    done = CliRunner().invoke(main, ["train", *run, "--steps", "2"])
+    assert done.exit_code == 0 and "2 steps" in done.output
+    assert CliRunner().invoke(main, ["train", *run, "--steps", "3", "-q"]).exit_code == 1
+    failed = CliRunner().invoke(main, ["train", "none.toml", *run[1:]])
+    assert failed.exit_code == 1 and "gso: error" in failed.output
+
+
+def test_configuration_is_a_value():
+    assert config() == config() and isinstance(config(), Config)
