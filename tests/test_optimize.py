@@ -139,3 +139,11 @@ def test_denoise_weight_can_be_given_back():
         for w in (0.01 * weight, 100 * weight)
     )
     assert smooth.metrics["roughness_ratio"] < rough.metrics["roughness_ratio"]
+
+
+@pytest.mark.parametrize("task", ["developable", "bend"])
+def test_a_start_without_area_is_refused(task):
+    points = saddle(7)
+    line = np.linspace(0.0, 1.0, points[..., 0].size)[:, None] * np.ones(3)
+    with pytest.raises(gso.MeshError, match="x0 has no area"):
+        gso.tno.optimize(points, task=task, x0=line)

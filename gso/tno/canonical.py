@@ -52,6 +52,9 @@ class Canonical:
         points = points.reshape(n, -1)
         if not np.isfinite(points).all():
             raise MeshError("x0 has coordinates that are not finite")
+        spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        if not spread[1] > 1e-9 * spread[0]:
+            raise MeshError("x0 has no area: all its vertices are on one line")
         points = points if ordered else points[self.order]
         return points[:, :2] / self.frame.scale if flat else self.frame.to_unit(points)
 

@@ -50,7 +50,8 @@ def optimize(
     formulation : str, optional
         Which energy; the task's first when not given.
     options : str or Options, optional
-        "fast", "balanced" (default), "accurate", or the task's options dataclass.
+        "fast", "balanced" (default), "accurate", or an options dataclass of the task.
+        "jiang2020" (`developable`, `flatten`) is the classical reference, by isometry.
     constraints : sequence of Constraint
         What the result must keep: `Fixed`, `FixedBoundary`, `Handle`, `OnCurve`,
         `SlidingBoundary`, `Glue`, `SymmetryPlane`, `PlanarFaces`, `FixedLengths`. For
