@@ -9,20 +9,17 @@ Times are medians, one process, BLAS on one thread.
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from tno import machine, progress, quality, reference, table, timed
+from tno import progress, quality, reference, run, table, timed
 
 import gso
 from gso import metrics
@@ -301,25 +298,6 @@ def _rated(mesh: Mesh, flat: np.ndarray) -> tuple[float, ...]:
     )
 
 
-SECTIONS: dict[str, Callable[[], dict[str, Any]]] = {
-    f.__name__: f for f in (developable, tradeoff, bend, conformal, interactive)
-}
-
-
-def main() -> None:
-    """Run the sections named on the command line, or all of them."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("sections", nargs="*", choices=[*SECTIONS, []], help="default: all")
-    parser.add_argument("--json", type=Path, help="also write the figures here")
-    arguments = parser.parse_args()
-    figures = {name: SECTIONS[name]() for name in arguments.sections or SECTIONS}
-    if arguments.json:
-        arguments.json.write_text(
-            json.dumps({**figures, "machine": machine()}, indent=1, default=float)
-        )
-
-
 if __name__ == "__main__":
-    main()
+    sections = (developable, tradeoff, bend, conformal, interactive)
+    run({section.__name__: section for section in sections}, __doc__)

@@ -578,15 +578,15 @@ def machine() -> dict[str, Any]:
     }
 
 
-def main() -> None:
+def run(sections: dict[str, Callable[[], dict[str, Any]]], description: str | None) -> None:
     """Run the sections named on the command line, or all of them."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("sections", nargs="*", choices=[*SECTIONS, []], help="default: all")
+    parser.add_argument("sections", nargs="*", choices=[*sections, []], help="default: all")
     parser.add_argument("--json", type=Path, help="also write the figures here")
     arguments = parser.parse_args()
-    figures = {name: SECTIONS[name]() for name in arguments.sections or SECTIONS}
+    figures = {name: sections[name]() for name in arguments.sections or sections}
     if arguments.json:
         arguments.json.write_text(
             json.dumps({**figures, "machine": machine()}, indent=1, default=float)
@@ -594,4 +594,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run(SECTIONS, __doc__)

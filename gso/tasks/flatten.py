@@ -182,12 +182,8 @@ def _bound(request: Request, stages: list[Stage]) -> list[Stage]:
     stages = [_strain_stage(even, request.mesh, 1.0), *stages]
     for stage in stages:
         stage.items = stage.items + held.pulls(request)
-        stage.variables = partial(_holding, request, stage.layout)
+        stage.variables = partial(held.unknowns, request, stage.layout)
     return [*steps, *stages]
-
-
-def _holding(request: Request, layout: Layout, coordinates: Array) -> Variables:
-    return held.hold(request, free(layout))
 
 
 def _settle(request: Request, coordinates: Array) -> Array:

@@ -262,8 +262,8 @@ def _objective(request: Request, mesh: Mesh, w_fairness: float) -> list[Weighted
 
 
 def _unknowns(request: Request, mesh: Mesh, layout: Layout, coordinates: Array) -> Variables:
-    variables = free(layout)
-    return held.hold(request, variables) if mesh is request.mesh else variables
+    own = mesh is request.mesh
+    return held.unknowns(request, layout, coordinates) if own else free(layout)
 
 
 def _with_flat(mesh: Mesh, coordinates: Array) -> Array:
