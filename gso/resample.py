@@ -35,6 +35,12 @@ def resample(values: Array, height: int, width: int) -> Array:
     return np.einsum("ia,jb,abk->ijk", _matrix(h, height), _matrix(w, width), values, optimize=True)
 
 
+def carry(coarse: Mesh, fine: Mesh, points: Array) -> Array:
+    """Points (m, 3) of a coarse grid, their displacement carried over to a finer one, (n, 3)."""
+    shift = (points - coarse.vertices)[coarse.grid_index]
+    return fine.vertices + resample(shift, *fine.grid_shape).reshape(-1, 3)  # type: ignore[misc]
+
+
 def coarser(mesh: Mesh, largest: int) -> list[Mesh]:
     """Copies of a grid of half the resolution, a quarter ..., coarsest first.
 

@@ -14,7 +14,7 @@ triangle over.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
 
@@ -35,9 +35,6 @@ Array = NDArray[np.float64]
 
 FORMULATIONS = ("isometry",)
 BLOCK = "flat"
-
-#: Weights with which a start is drawn to its constraints, one after the other.
-_DRAWN = (1.0, 30.0)
 
 
 @dataclass(frozen=True)
@@ -108,7 +105,7 @@ def plan(request: Request) -> Plan:
     if not request.constraints.empty:
         if given is None:
             flat = flat_start.align(mesh, flat, request.constraints)
-        stages = _bound(request, stage)
+        stages = [*held.drawing(request, stage), held.keeping(request, stage)]
     return Plan(
         layout,
         layout.pack({"flat": flat, "scale": _area_ratios(mesh, flat)}),
@@ -116,16 +113,6 @@ def plan(request: Request) -> Plan:
         notes=notes,
         finish=partial(_finish, request, layout, given),
     )
-
-
-def _bound(request: Request, stage: Stage) -> list[Stage]:
-    """A stage under constraints: first the image is drawn to them, then it keeps them."""
-    steps = [
-        replace(stage, name="approach", items=stage.items + held.drawn(request, weight))
-        for weight in _DRAWN
-    ]
-    holding = partial(held.unknowns, request, stage.layout)
-    return [*steps, replace(stage, items=stage.items + held.pulls(request), variables=holding)]
 
 
 def _area_ratios(mesh: Mesh, flat: Array) -> Array:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from gso import metrics as measure
 from gso.constraints import Pins
 from gso.mesh import Mesh
-from gso.resample import coarser, resample
+from gso.resample import carry, coarser, resample
 from gso.smoothing import smooth_grid
 from gso.status import MeshError, OptionError, Status
 from gso.tasks import held, joint, splined
@@ -391,9 +391,7 @@ def _coarse_stage(request: Request, level: Mesh, make: Any, number: int) -> Stag
 
 def _carry(coarse: Mesh, fine: Mesh, reach: float | None, coordinates: Array) -> Array:
     """Displacement on a coarse grid, interpolated and added to a finer one."""
-    shift = (coordinates.reshape(-1, 3) - coarse.vertices)[coarse.grid_index]
-    moved = fine.vertices + resample(shift, *fine.grid_shape).reshape(-1, 3)  # type: ignore[misc]
-    return _inside(moved, fine, reach).ravel()
+    return _inside(carry(coarse, fine, coordinates.reshape(-1, 3)), fine, reach).ravel()
 
 
 def _bounds(mesh: Mesh, reach: float | None, held: Any = ()) -> Any:

@@ -57,8 +57,6 @@ _LARGE_STRAIN = 0.03
 _NEARLY = 1e-2
 #: Ratio to the level at which a start is strained too much for the powers of `Spread`.
 _STRAINED = 1.5
-#: Weights with which a start is drawn to its constraints, one after the other.
-_DRAWN = (1.0, 30.0)
 #: Weight of the squeezed triangles in ``lengths``.
 _W_COLLAPSE = 3e-3
 
@@ -173,17 +171,9 @@ def _remark(mesh: Mesh, coordinates: Array) -> list[str]:
 
 def _bound(request: Request, stages: list[Stage]) -> list[Stage]:
     """Stages under constraints: first the sheet is drawn to them, then it keeps them."""
-    even = replace(request.options, norm="l2")
-    steps = []
-    for weight in _DRAWN:
-        step = _strain_stage(even, request.mesh, 1.0)
-        step.items += held.drawn(request, weight)
-        steps.append(replace(step, name="approach", iterations=30))
-    stages = [_strain_stage(even, request.mesh, 1.0), *stages]
-    for stage in stages:
-        stage.items = stage.items + held.pulls(request)
-        stage.variables = partial(held.unknowns, request, stage.layout)
-    return [*steps, *stages]
+    even = _strain_stage(replace(request.options, norm="l2"), request.mesh, 1.0)
+    steps = held.drawing(request, replace(even, iterations=30))
+    return [*steps, *(held.keeping(request, stage) for stage in (even, *stages))]
 
 
 def _settle(request: Request, coordinates: Array) -> Array:

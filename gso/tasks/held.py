@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 #: How far round a vertex that is moved others go along, in the unit ball.
 _REACH = 0.3
+#: Weights with which a start is drawn to its constraints, one after the other.
+_DRAWN = (1.0, 30.0)
 
 
 def hold(request: Request, variables: Variables) -> Variables:
@@ -53,7 +55,21 @@ def approach(request: Request, points: Array, *, iterations: int = 10) -> Stage:
     return Stage("approach", layout, items, variables, iterations=iterations)
 
 
-def drawn(request: Request, weight: float) -> list[Weighted]:
+def drawing(request: Request, stage: Stage) -> list[Stage]:
+    """Copies of a stage that bring a start closer to its constraints, one after the other."""
+    return [
+        replace(stage, name="approach", items=stage.items + _drawn(request, weight))
+        for weight in _DRAWN
+    ]
+
+
+def keeping(request: Request, stage: Stage) -> Stage:
+    """A stage of free coordinates, which then keeps the constraints."""
+    variables = partial(unknowns, request, stage.layout)
+    return replace(stage, items=stage.items + pulls(request), variables=variables)
+
+
+def _drawn(request: Request, weight: float) -> list[Weighted]:
     """All constraints as terms of one weight, for a start that only comes closer to them."""
     c = request.constraints
     block = c.block

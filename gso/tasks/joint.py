@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from gso import flat_start, limits
 from gso import metrics as measure
 from gso.mesh import Mesh
-from gso.resample import coarser, resample
+from gso.resample import carry, coarser
 from gso.status import OptionError, Status
 from gso.tasks import held, splined
 from gso.tasks.base import Plan, Request, Stage
@@ -140,14 +140,8 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
     ------
     MeshError
         A component is closed or has handles: it has no flat image.
-    OptionError
-        A bound on the displacement, which this formulation does not know.
     """
     mesh, options = request.mesh, request.options
-    if request.max_deviation is not None:
-        raise OptionError(
-            "max_deviation belongs to the formulation 'curvature'; leave it out, or raise w_place"
-        )
     spline = splined.controls(request)
     own = spline is None and request.start is None and request.constraints.empty
     if own and measure.loss_gc(mesh, scale=1.0) <= options.developable_below:
@@ -276,17 +270,9 @@ def _with_flat(mesh: Mesh, coordinates: Array) -> Array:
 def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
     """Displacement and flat image of a coarse grid, interpolated to a finer one."""
     blocks = _layout(coarse).split(coordinates)
-    shift = (blocks["surface"] - coarse.vertices)[coarse.grid_index]
-    points = fine.vertices + _finer(shift, fine)
-    flat = _finer(blocks["flat"][coarse.grid_index], fine)
-    if flat_start.flips(fine, flat):
-        return _with_flat(fine, points.ravel())
+    points = carry(coarse, fine, blocks["surface"])
+    flat = flat_start.refine(coarse, fine.replaced(points), blocks["flat"])
     return _layout(fine).pack({"surface": points, "flat": flat})
-
-
-def _finer(values: Array, mesh: Mesh) -> Array:
-    """Values (H, W, d) on a coarse grid, interpolated to the vertices of a finer one."""
-    return resample(values, *mesh.grid_shape).reshape(-1, values.shape[-1])  # type: ignore[misc]
 
 
 def _isometric(mesh: Mesh, enough: float, coordinates: Array) -> bool:
