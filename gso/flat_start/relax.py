@@ -25,9 +25,9 @@ class Relaxed(NamedTuple):
 class _Gradients:
     """Derivatives of functions on the triangles of a surface, as a complex matrix.
 
-    With z = x + iy the image of the vertices, ``m @ z`` is twice the part of each
+    With z = x + iy the image of the vertices, ``matrix @ z`` is twice the part of each
     triangle's map that turns and scales (see :mod:`gso.geometry.strain`), and
-    ``conj(m) @ z`` twice the part that shears.
+    ``conjugate @ z`` twice the part that shears.
     """
 
     def __init__(self, vertices: Array, triangles: Ints):
@@ -45,16 +45,19 @@ class _Gradients:
             ),
             shape=(count, len(vertices)),
         )
+        self.conjugate = self.matrix.conj()
 
-    def energy(self, z: Array) -> float:
-        """Mean of ``((s1 - 1)^2 + (s2 - 1)^2) / 2``."""
-        turn, shear = 0.5 * (self.matrix @ z), 0.5 * (self.matrix.conj() @ z)
-        return float(((np.abs(turn) - 1.0) ** 2 + np.abs(shear) ** 2).mean())
+    def energy(self, z: Array) -> tuple[float, Array, Array]:
+        """Mean of ``((s1 - 1)^2 + (s2 - 1)^2) / 2``; ``matrix @ z`` and its size."""
+        turn, shear = self.matrix @ z, self.conjugate @ z
+        size = np.abs(turn)
+        both = (0.5 * size - 1.0) ** 2 + (0.5 * np.abs(shear)) ** 2
+        return float(both.mean()), turn, size
 
 
 def strain_level(vertices: Array, triangles: Ints, flat: Array) -> float:
     """Root-mean-square strain of triangles mapped to the plane: of both principal ones."""
-    return _Gradients(vertices, triangles).energy(flat @ np.array([1.0, 1j])) ** 0.5
+    return _Gradients(vertices, triangles).energy(flat @ np.array([1.0, 1j]))[0] ** 0.5
 
 
 def relax(
@@ -102,14 +105,14 @@ def relax(
     kept = triangles if upward is None else upward
     limit = orientation(kept, Layout((("flat", len(vertices), 2),)))
     z = np.ascontiguousarray(flat) @ np.array([1.0, 1j])
-    energy = gradients.energy(z)
+    energy, turn, size = gradients.energy(z)
     for _ in range(iterations):
-        turn = m @ z
-        rotation = turn / np.maximum(np.abs(turn), 1e-300)
+        rotation = turn / np.maximum(size, 1e-300)
         pull = adjoint @ rotation - laplacian @ z
         step = factor.solve(np.stack([pull.real, pull.imag], axis=1))
         z = z + limit(_pairs(z), step.ravel()) * (step @ np.array([1.0, 1j]))
-        before, energy = energy, gradients.energy(z)
+        before = energy
+        energy, turn, size = gradients.energy(z)
         if before - energy <= tolerance * before:
             break
     return Relaxed(_pairs(z).reshape(-1, 2), float(np.sqrt(energy)))
