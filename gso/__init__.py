@@ -48,7 +48,18 @@ _OPTIONS = {
     "BendOptions": "gso.tasks.bend",
     "ConformalOptions": "gso.tasks.conformal",
 }
-_MODULES = ("constraints", "tno", "metrics", "topology", "io", "dataset", "net", "plot", "rulings")
+_MODULES = (
+    "constraints",
+    "tno",
+    "metrics",
+    "topology",
+    "io",
+    "dataset",
+    "net",
+    "hybrid",
+    "plot",
+    "rulings",
+)
 
 __all__ = [*_NAMES, *_OPTIONS, *_MODULES, "__version__"]
 

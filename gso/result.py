@@ -54,7 +54,7 @@ class Result:
     backend, device : str
         Linear solver of the last stage, and where it ran.
     warm_start : str
-        What started the solve: "cold" or "x0".
+        What started the solve: "cold", "x0", or "net" (:func:`gso.hybrid.solve`).
     notes : tuple of str
         What was repaired in the input or restricted in the run.
     details : dict

@@ -17,8 +17,16 @@ from tests.conftest import cylinder, saddle
 torch = pytest.importorskip("torch")
 pytest.importorskip("safetensors")
 
-from gso.net import CoarseNet, GSONet, available, load, predict, save, weights  # noqa: E402
-from gso.net.base import TASKS  # noqa: E402
+from gso.net import (  # noqa: E402
+    CoarseNet,
+    GSONet,
+    available,
+    catalogue,
+    load,
+    predict,
+    save,
+)
+from gso.net.catalogue import TASKS  # noqa: E402
 
 
 def shaken(net, seed=0, size=0.05):
@@ -270,18 +278,18 @@ class TestFiles:
         path.with_suffix(".json").write_text(json.dumps(card))
 
 
-@pytest.mark.parametrize("name", [n for n in available() if n not in weights.CHAINS])
+@pytest.mark.parametrize("name", [n for n in available() if n not in catalogue.CHAINS])
 def test_shipped_weights_load(name):
     net = load(name)
     assert net.task in TASKS
-    card = weights.read_card(weights.located(name))
+    card = catalogue.read_card(catalogue.located(name))
     assert card["parameters"] == sum(p.numel() for p in net.parameters())
     result = predict(saddle(16), task=net.task, model=name)
     assert np.isfinite(result).all()
 
 
 def test_shipped_weights_are_small():
-    assert sum(p.stat().st_size for p in weights.FOLDER.glob("*")) < 60e6
+    assert sum(p.stat().st_size for p in catalogue.FOLDER.glob("*")) < 60e6
 
 
 def test_neither_casadi_nor_the_solver_is_loaded():
@@ -290,7 +298,7 @@ def test_neither_casadi_nor_the_solver_is_loaded():
         "from gso.net import CoarseNet, predict\n"
         "u, v = np.mgrid[:8.0, :8.0]\n"
         "predict(np.dstack([u, v, u * v / 9]), model=CoarseNet(widths=(8, 8, 8)))\n"
-        "import gso.net.train\n"
+        "import gso.net.prediction\n"
         "print([m for m in ('casadi', 'gso.tno') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -27,8 +27,6 @@ def many(
     workers: int | None,
 ) -> bool:
     """Optimise files into a folder; whether all results are usable."""
-    from gso import tno
-
     outs = _outputs(files, folder, suffix)
     pictures = [None if plots is None else str(Path(plots, f"{Path(o).stem}.png")) for o in outs]
     for path in filter(None, (folder, plots)):
@@ -40,7 +38,7 @@ def many(
         workers = workers if workers > 1 else 0  # a single process is this one
     records: dict[int, dict[str, Any]] = {}
     with progress.files(len(files)) as bar, report.status_only():
-        for item in tno.optimize_many(files, workers=workers, **job.keywords):
+        for item in job.solve_many(files, workers):
             file, out = files[item.index], outs[item.index]
             try:
                 if item.result is None:

@@ -12,8 +12,11 @@ from gso import tasks
 from gso.status import MeshError, OptionError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
     from gso.mesh import Mesh
     from gso.result import Result
+    from gso.tno.batch import Item
 
 #: Units of :func:`gso.io.save_flat`.
 UNITS = ("um", "mm", "cm", "dm", "m", "in", "ft", "yd")
@@ -27,6 +30,10 @@ class Job:
     ----------
     keywords : dict
         For :func:`gso.tno.optimize`.
+    method : {"tno", "net", "hybrid"}
+        Who solves: the optimiser, a net alone, or the optimiser from a net's result.
+    net : str, optional
+        Name or file of the net.
     unit : str
         Unit of the coordinates, for drawings.
     quiet : bool
@@ -34,8 +41,33 @@ class Job:
     """
 
     keywords: dict[str, Any] = field(default_factory=dict)
+    method: str = "tno"
+    net: str | None = None
     unit: str = "mm"
     quiet: bool = False
+
+    def solve(self, mesh: Any, **more: Any) -> Result:
+        """Optimise one surface."""
+        if self.method == "tno":
+            from gso.tno import optimize
+
+            return optimize(mesh, **self.keywords, **more)
+        from gso.hybrid import solve
+
+        return solve(mesh, **self._with_net(), **more)
+
+    def solve_many(self, meshes: Iterable[Any], workers: int | None) -> Iterator[Item]:
+        """Optimise many surfaces in parallel."""
+        if self.method == "tno":
+            from gso.tno import optimize_many
+
+            return optimize_many(meshes, workers=workers, **self.keywords)
+        from gso.hybrid import solve_many
+
+        return solve_many(meshes, workers=workers, **self._with_net())
+
+    def _with_net(self) -> dict[str, Any]:
+        return {**self.keywords, "net": self.net, "polish": self.method == "hybrid"}
 
     def check(self, out: str, plot: str | None = None) -> None:
         """Refuse outputs that cannot be written, before anything is computed."""
@@ -128,6 +160,16 @@ class Job:
     type=click.Path(),
     help='File with what must hold: a list such as [{"type": "Glue", "pairs": [[0, 9]]}].',
 )
+@click.option(
+    "--method",
+    type=click.Choice(["tno", "net", "hybrid"]),
+    default="tno",
+    show_default=True,
+    help="Who solves: the optimiser, a net alone, or the optimiser from a net's result.",
+)
+@click.option(
+    "--net", metavar="NET", help="Name or .safetensors file; the task's own net by default."
+)
 @click.option("--backend", metavar="NAME", help="Linear solver; the fastest installed by default.")
 @click.option("--workers", metavar="N", type=click.IntRange(0), help="Processes for many inputs.")
 @click.option(
@@ -157,7 +199,15 @@ def optimize(files: tuple[str, ...], out: str, **given: Any) -> None:
     when every result is usable: it was computed, reached its target if it had one, and has
     no cell turned over.
     """
-    job = Job(_keywords(given, given["suffix"] or out), given["unit"], given["quiet"])
+    if given["net"] is not None and given["method"] == "tno":
+        raise OptionError("--net goes with --method net or hybrid")
+    job = Job(
+        _keywords(given, given["suffix"] or out),
+        given["method"],
+        given["net"],
+        given["unit"],
+        given["quiet"],
+    )
     if given["table"] is not None:
         from gso.io import check_writable
 
@@ -230,13 +280,12 @@ def _single(job: Job, file: str, out: str, plot: str | None, table: str | None) 
     from gso import io
     from gso.cli import report
     from gso.cli.progress import iterations
-    from gso.tno import optimize as solve
 
     job.check(out, plot)
     mesh = io.load(file)
     _check_grid(mesh, out)
     with iterations() as callback, report.status_only():
-        result = solve(mesh, callback=callback, **job.keywords)
+        result = job.solve(mesh, callback=callback)
     job.write(result, out, plot)
     record = report.record(file, out, result)
     if table is not None:

@@ -10,7 +10,7 @@ import click
 from gso.cli import progress
 
 if TYPE_CHECKING:
-    from gso.net.train import Report
+    from gso.net.training import Report
 
 #: Figures that are shown beside the bar, by task.
 _SHOWN = ("loss_gc", "K_A_r", "d_H", "strain_mean", "loss_iso_cell", "theta")
@@ -45,8 +45,8 @@ def train(
     # Read when torch is loaded: threads that wait busily slow each other on shared cores.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     from gso.net.config import read
-    from gso.net.train import MODEL
-    from gso.net.train import train as run
+    from gso.net.training import MODEL
+    from gso.net.training import train as run
 
     made = read(config, **changes)
     with progress.counts() as bars, progress.share() as show:

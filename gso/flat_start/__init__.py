@@ -2,7 +2,7 @@
 
 from gso.flat_start.align import align, settle
 from gso.flat_start.begin import begin, flips, given, refine, strain, upward
-from gso.flat_start.embed import embed, parts
+from gso.flat_start.embed import embed, parts, spanned
 from gso.flat_start.grid import rectangle
 from gso.flat_start.place import beside, closest_motion, place, upright
 from gso.flat_start.relax import Relaxed, relax, strain_level
@@ -22,6 +22,7 @@ __all__ = [
     "refine",
     "relax",
     "settle",
+    "spanned",
     "strain",
     "strain_level",
     "upright",

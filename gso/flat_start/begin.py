@@ -10,13 +10,16 @@ from gso.flat_start.embed import embed
 from gso.flat_start.grid import rectangle
 from gso.flat_start.relax import Relaxed, relax, strain_level
 from gso.mesh import Mesh
-from gso.resample import resample
+from gso.resample import coarser, resample
 from gso.status import MeshError
 from gso.terms.stretch import cells, pieces
 from gso.topology import corner_triangles
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+#: Sides up to which a grid's image starts from a rectangle.
+_COARSE = 40
 
 
 def carrying(mesh: Mesh) -> Ints:
@@ -57,7 +60,8 @@ def strain(mesh: Mesh, flat: Array) -> float:
 def begin(mesh: Mesh, *, iterations: int = 100) -> Relaxed:
     """Image without flips, close to the least squared strain, and its strain.
 
-    Grids start from their rectangle, other meshes from :func:`gso.flat_start.embed`.
+    Grids start from their rectangle, fine ones from the image of a coarser copy; other meshes
+    from :func:`gso.flat_start.embed`.
 
     Parameters
     ----------
@@ -73,27 +77,39 @@ def begin(mesh: Mesh, *, iterations: int = 100) -> Relaxed:
     """
     strained, kept = carrying(mesh), upward(mesh)
     if mesh.grid is not None:
-        flat = rectangle(mesh.grid).reshape(-1, 2)
+        flat = _grid_image(mesh, mesh.grid, iterations)
     else:
         flat = embed(mesh, strained, kept)
     return relax(mesh.vertices, strained, flat, upward=kept, iterations=iterations)
 
 
-def given(mesh: Mesh, start: Array | None, notes: list[str]) -> Array | None:
-    """The user's start (n, 2) unless it has flips, which the notes then say."""
+def _grid_image(mesh: Mesh, grid: Array, iterations: int) -> Array:
+    levels = coarser(mesh, _COARSE) if max(grid.shape) > _COARSE else []
+    if levels:
+        image = _interpolated(begin(levels[-1], iterations=iterations).flat, levels[-1], mesh)
+        if not flips(mesh, image):
+            return image
+    return rectangle(grid).reshape(-1, 2)
+
+
+def given(mesh: Mesh, start: Array | None) -> tuple[Array | None, str]:
+    """The user's start (n, 2), or none where it has flips, and what there is to say about that."""
     if start is None:
-        return None
+        return None, ""
     flat = np.ascontiguousarray(start[:, :2])
     turned = flips(mesh, flat)
     if turned:
-        notes.append(f"x0 turns {turned} corner triangles over and was not used")
-        return None
-    return flat
+        return None, f"x0 turns {turned} corner triangles over and was not used"
+    return flat, ""
 
 
 def refine(coarse: Mesh, fine: Mesh, flat: Array) -> Array:
     """Image (n, 2) of a coarse grid interpolated to a finer one; where that flips, a new start."""
+    image = _interpolated(flat, coarse, fine)
+    return begin(fine).flat if flips(fine, image) else image
+
+
+def _interpolated(flat: Array, coarse: Mesh, fine: Mesh) -> Array:
     if coarse.grid_shape is None or fine.grid_shape is None:
         raise ValueError("both meshes must be grids")
-    image = resample(flat.reshape(*coarse.grid_shape, 2), *fine.grid_shape).reshape(-1, 2)
-    return begin(fine).flat if flips(fine, image) else image
+    return resample(flat.reshape(*coarse.grid_shape, 2), *fine.grid_shape).reshape(-1, 2)

@@ -60,7 +60,12 @@ def parts(mesh: Mesh) -> list[Ints]:
 
 def _embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:
     outer = max(mesh.boundary_loops, key=lambda loop: _perimeter(mesh.vertices[loop]))
-    images = [_conformal(mesh, outer), _harmonic(mesh, outer), _tutte(mesh, outer)]
+    circle = _circle(mesh.vertices[outer])
+    images = [
+        _conformal(mesh, outer),
+        _harmonic(mesh, outer, circle),
+        _tutte(mesh, outer, circle),
+    ]
     rated = []
     for image in images:
         if image is None or not np.isfinite(image).all():
@@ -129,19 +134,37 @@ def _conformal(mesh: Mesh, loop: Ints) -> Array | None:
         return None
 
 
-def _harmonic(mesh: Mesh, loop: Ints) -> Array | None:
-    """Harmonic map with cotangent weights, the loop on a circle."""
+def spanned(mesh: Mesh, loop: Ints, at: Array) -> Array:
+    """Plane image (n, 2) of one component without handles, its boundary given.
+
+    Harmonic, or Tutte's where that turns triangles over.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    loop : ndarray of int, (b,)
+        Its outer boundary, the surface to the left.
+    at : ndarray, (b, 2)
+        Where that is to be: on a convex curve, anticlockwise.
+    """
+    image = _harmonic(mesh, loop, at)
+    if image is not None and np.isfinite(image).all() and (_areas(image, mesh.triangles) > 0).all():
+        return image
+    return _tutte(mesh, loop, at)
+
+
+def _harmonic(mesh: Mesh, loop: Ints, at: Array) -> Array | None:
+    """Harmonic map with cotangent weights, the loop where it is given."""
     import igl
 
-    circle = _circle(mesh.vertices[loop])
     try:
-        return igl.harmonic(mesh.vertices.copy(), mesh.triangles.copy(), loop.copy(), circle, 1)
+        return igl.harmonic(mesh.vertices.copy(), mesh.triangles.copy(), loop.copy(), at, 1)
     except RuntimeError:
         return None
 
 
-def _tutte(mesh: Mesh, loop: Ints) -> Array:
-    """Every inner vertex in the mean of its neighbours, the loop on a circle (Tutte 1963).
+def _tutte(mesh: Mesh, loop: Ints, at: Array) -> Array:
+    """Every inner vertex in the mean of its neighbours, the loop where it is given (Tutte 1963).
 
     Other loops are filled with a vertex in their middle. On a 3-connected mesh the faces
     come out convex.
@@ -158,7 +181,7 @@ def _tutte(mesh: Mesh, loop: Ints) -> Array:
     links = coo_matrix((np.ones(len(a)), (a, b)), shape=(size, size)).tocsr()
     links = links + links.T
     image = np.zeros((size, 2))
-    image[loop] = _circle(mesh.vertices[loop])
+    image[loop] = at
     inner = np.setdiff1d(np.arange(size), loop)
     if inner.size == 0:
         return image[:n]

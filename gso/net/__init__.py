@@ -9,11 +9,11 @@ from typing import Any
 _NAMES = {
     "CoarseNet": "gso.net.coarse",
     "GSONet": "gso.net.gsonet",
-    "available": "gso.net.weights",
+    "available": "gso.net.catalogue",
     "load": "gso.net.weights",
-    "predict": "gso.net.predict",
+    "predict": "gso.net.prediction",
     "save": "gso.net.weights",
-    "train": "gso.net.train",
+    "train": "gso.net.training",
 }
 
 __all__ = list(_NAMES)

@@ -8,11 +8,10 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from gso.net.catalogue import TASKS
 from gso.net.grids import planes, rectangle
 from gso.status import OptionError
 
-#: Tasks that there are nets for, and the components of what comes out.
-TASKS = {"developable": 3, "flatten": 2, "denoise": 3}
 #: Samples along each side that nets are trained at.
 SIZE = 64
 

@@ -7,8 +7,9 @@ from torch import Tensor, nn
 from torch.nn.functional import interpolate
 
 from gso.net import inputs
-from gso.net.base import TASKS, Net
+from gso.net.base import Net
 from gso.net.blocks import Residual
+from gso.net.catalogue import TASKS
 from gso.net.grids import Frame, planes
 from gso.net.resampling import spline_field
 from gso.status import OptionError

@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from gso.net.base import TASKS
+from gso.net.catalogue import TASKS
 from gso.status import OptionError
 
 #: Configurations that come with the package.

@@ -7,8 +7,9 @@ from itertools import pairwise
 import torch
 from torch import Tensor, nn
 
-from gso.net.base import TASKS, Net
+from gso.net.base import Net
 from gso.net.blocks import IMDB
+from gso.net.catalogue import TASKS
 from gso.net.resampling import resampled
 from gso.status import OptionError
 

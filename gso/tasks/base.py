@@ -126,6 +126,11 @@ class Plan:
         What the user should know of the coordinates of the result.
     spline : (int, int), optional
         Control points along both sides, where the last stage makes the surface a B-spline.
+    unstarted : callable, optional
+        Where a start was given: coordinates of the last stage that a solve without it would
+        begin from.
+    refused : str
+        Why a start that was given is not used.
     """
 
     layout: Layout
@@ -138,6 +143,15 @@ class Plan:
     fallback: Array | None = None
     remark: Callable[[Array], list[str]] | None = None
     spline: tuple[int, int] | None = None
+    unstarted: Callable[[], Array] | None = None
+    refused: str = ""
+
+    def entered(self) -> Array:
+        """Coordinates of the last stage when nothing is solved before it."""
+        coordinates = self.start
+        for stage in self.stages:
+            coordinates = stage.enter(coordinates)
+        return coordinates
 
 
 __all__ = ["Options", "Plan", "Request", "Stage", "same"]

@@ -84,8 +84,7 @@ def plan(request: Request) -> Plan:
     """
     mesh, options = request.mesh, request.options
     layout = Layout((("flat", len(mesh.vertices), 2), ("scale", len(mesh.faces), 1)))
-    notes: list[str] = []
-    given = flat_start.given(mesh, request.start, notes)
+    given, refused = flat_start.given(mesh, request.start)
     flat = given
     if flat is None:
         flat = flat_start.begin(mesh, iterations=options.relax_iterations).flat
@@ -110,8 +109,9 @@ def plan(request: Request) -> Plan:
         layout,
         layout.pack({"flat": flat, "scale": _area_ratios(mesh, flat)}),
         stages,
-        notes=notes,
+        notes=[refused] if refused else [],
         finish=partial(_finish, request, layout, given),
+        refused=refused,
     )
 
 

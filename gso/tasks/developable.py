@@ -188,6 +188,7 @@ def _plan(request: Request) -> Plan:
         notes=notes,
         fallback=fallback if free_to_return else None,
         spline=spline,
+        unstarted=None if request.start is None else mesh.vertices.ravel,
     )
 
 

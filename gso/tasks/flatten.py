@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -138,8 +139,10 @@ def plan(request: Request) -> Plan:
     levels = [*(coarser(mesh, options.coarse_size) if grid else []), mesh]
     start = flat_start.begin(levels[0], iterations=options.relax_iterations)
     notes = _remarks(mesh, start.level)
-    given = flat_start.given(mesh, request.start, notes)
+    given, refused = flat_start.given(mesh, request.start)
+    notes += [refused] if refused else []
     strained = given is not None and flat_start.strain(mesh, given) > _STRAINED * start.level
+    below = levels
     if given is not None:
         levels = [mesh]
     stages = _stages(request, levels, max(start.level, _SMALLEST_LEVEL))
@@ -162,6 +165,8 @@ def plan(request: Request) -> Plan:
         details={"strain_level": start.level},
         finish=finish,
         remark=partial(_remark, mesh) if request.formulation == "isometry" else None,
+        unstarted=None if given is None else partial(_finest, below, start.flat),
+        refused=refused,
     )
 
 
@@ -281,6 +286,13 @@ def _stage(name: str, mesh: Mesh, items: list[Weighted]) -> Stage:
 
 def _unknowns(layout: Layout, coordinates: Array) -> Variables:
     return free(layout)
+
+
+def _finest(levels: list[Mesh], flat: Array) -> Array:
+    """An image of the first grid, interpolated to the last one."""
+    for coarse, fine in pairwise(levels):
+        flat = flat_start.refine(coarse, fine, flat)
+    return flat.ravel()
 
 
 def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:

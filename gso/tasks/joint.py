@@ -171,6 +171,9 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
         finish=partial(_place, mesh),
         remark=partial(_remark, mesh),
         spline=spline,
+        unstarted=None
+        if request.start is None
+        else partial(_with_flat, mesh, mesh.vertices.ravel()),
     )
 
 

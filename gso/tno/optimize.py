@@ -23,6 +23,7 @@ from gso.tno.canonical import Canonical
 from gso.tno.run import Outcome, Run
 from gso.tno.search import reach_target, stay_within
 from gso.tno.solver import Callback
+from gso.tno.start import Start
 
 Array = NDArray[np.float64]
 
@@ -62,9 +63,10 @@ def optimize(
     target_curvature : float, optional
         `developable` only: the mean absolute curvature ``loss_gc`` to reach, with the
         smallest displacement that does.
-    x0 : Mesh or array, optional
+    x0 : Mesh, array or Start, optional
         Where to start: vertices (n, 3) or a grid; (n, 2) or (H, W, 2) for a flat image.
-        Proximity and lengths stay those of `mesh`.
+        Proximity and lengths stay those of `mesh`. A :class:`gso.tno.Start` says more
+        about it.
     callback : callable, optional
         Called with a :class:`gso.Progress` after each iteration; returning False stops
         the solve, and the best iterate so far is returned.
@@ -101,15 +103,16 @@ def optimize(
         task, formulation, options, max_deviation, target_curvature
     )
     frame = Canonical(design)
+    given = x0 if isinstance(x0, Start) else Start(x0)
     flat = getattr(module, "BLOCK", "surface") == "flat"
     request = Request(
         frame.mesh,
         settings,
         formulation,
         frame.constraints(constraints, flat=flat),
-        start=frame.start(x0, flat=flat),
+        start=frame.start(given.points, flat=flat),
     )
-    run = Run(module, callback)
+    run = Run(module, callback, guarded=given.guarded, budget=given.iterations)
     if max_deviation is not None:
         outcome = stay_within(run, request, max_deviation / frame.frame.scale)
     elif target_curvature is not None:
@@ -118,7 +121,10 @@ def optimize(
         outcome = run(request)
     judge(request, frame, outcome)
     result = packed(task, formulation, design, frame, outcome, run)
-    result.warm_start = "cold" if x0 is None else "x0"
+    if run.refused:
+        result.notes += (f"the start ({given.source}) was not used: {run.refused}",)
+    elif given.points is not None:
+        result.warm_start = given.source
     result.seconds["total"] = time.perf_counter() - clock
     if not result.converged and result.status is not Status.MAX_ITERATIONS:
         warnings.warn(str(result.status), ConvergenceWarning, stacklevel=2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -64,11 +64,29 @@ def objective(stage: Stage) -> Problem:
 
 
 class Run:
-    """Solves requests of one task, keeping history and time across several of them."""
+    """Solves requests of one task, keeping history and time across several of them.
 
-    def __init__(self, module: ModuleType, callback: Callback | None):
+    Attributes
+    ----------
+    guarded : bool
+        Starts that are worse than none are dropped; `refused` then says why.
+    budget : int or None
+        Most iterations of all its solves together.
+    """
+
+    def __init__(
+        self,
+        module: ModuleType,
+        callback: Callback | None,
+        *,
+        guarded: bool = False,
+        budget: int | None = None,
+    ):
         self.module = module
         self.callback = callback
+        self.guarded = guarded
+        self.budget = budget
+        self.refused = ""
         self.history: list[Progress] = []
         self.timings = Timings()
         self.iterations = 0
@@ -76,7 +94,7 @@ class Run:
     def __call__(self, request: Request) -> Outcome:
         """Plan and solve the stages."""
         clock = time.perf_counter()
-        plan: Plan = self.module.plan(request)
+        plan = self._plan(request)
         self.timings.setup += time.perf_counter() - clock
         outcome = Outcome(
             {},
@@ -100,6 +118,32 @@ class Run:
         if plan.status is None or end.solution.status is Status.CANCELLED:
             outcome.status = end.solution.status
         return outcome
+
+    def _plan(self, request: Request) -> Plan:
+        """The task's plan, from the start that was given unless there is a better one."""
+        plan: Plan = self.module.plan(request)
+        if not self.guarded or request.start is None:
+            return plan
+        refused = plan.refused or self._worse(plan)
+        if not refused:
+            return plan
+        self.refused = refused
+        return self.module.plan(replace(request, start=None))
+
+    @staticmethod
+    def _worse(plan: Plan) -> str:
+        """Why to begin without the start: it has more of the energy."""
+        if plan.unstarted is None or not plan.stages:
+            return ""
+        problem = objective(plan.stages[-1])
+        energies = []
+        for coordinates in (plan.entered(), plan.unstarted()):
+            problem.refresh(coordinates)
+            energies.append(problem.energy(coordinates))
+        warm, cold = energies
+        if warm <= cold:
+            return ""
+        return f"its energy, {warm:.3g}, is above that of the start without it, {cold:.3g}"
 
     def through(self, plan: Plan, options: Options) -> End:
         """Solve the stages of a plan that has some, the last one until its constraints hold."""
@@ -133,10 +177,13 @@ class Run:
         x = variables.project(coordinates)
         bounds = None if stage.bounds is None else stage.bounds(coordinates)
         self.timings.setup += time.perf_counter() - clock
+        most = stage.iterations
+        if self.budget is not None:
+            most = min(most, max(self.budget - self.iterations, 0))
         solution = minimise(
             problem,
             x,
-            iterations=stage.iterations,
+            iterations=most,
             tolerance=stage.tolerance,
             eps=stage.eps,
             robust=stage.robust,

@@ -10,7 +10,8 @@ import torch
 from numpy.typing import NDArray
 
 from gso.net.base import SIZE, Net
-from gso.net.weights import cached, chain
+from gso.net.catalogue import chain
+from gso.net.weights import cached
 from gso.resample import resample
 from gso.status import MeshError, OptionError
 

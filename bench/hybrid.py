@@ -1,0 +1,227 @@
+"""What a net's start is worth to the optimiser.
+
+    python bench/hybrid.py                    everything (an hour on two cores)
+    python bench/hybrid.py speed -n 16        one section, on fewer surfaces
+    python bench/hybrid.py --plot FILE        the curve of the section "anytime"
+
+Sections: "speed", cold and hybrid on the same surfaces, one after the other; "guard", the
+energy against the cold solve's on the whole test split and the hard one; "general", the
+same on triangulated patches in random order, some with a hole; "anytime", quality against
+time. Surfaces are those of the test split, which no net has seen: they follow from the
+seed, or are read from a set (``--data``).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+# Threads that wait for each other busily slow each other down where cores are shared.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+os.environ.setdefault("OMP_NUM_THREADS", "2")
+
+import numpy as np
+from report.store import Store
+from report.surfaces import Surfaces, opened, screened
+from tqdm import tqdm
+
+import gso
+from gso import hybrid
+from gso.hybrid.prediction import TASKS
+from gso.mesh import Mesh
+from gso.net.catalogue import DEFAULTS, available
+from gso.tno import Start, optimize
+
+#: What is compared: task and keywords.
+CASES = {
+    "balanced": ("developable", {}),
+    "accurate": ("developable", {"options": "accurate"}),
+    "jiang2020": ("developable", {"options": "jiang2020"}),
+    "strain": ("flatten", {}),
+    "lengths": ("flatten", {"formulation": "lengths"}),
+}
+#: Iterations at which the curve has points.
+POINTS = (0, 1, 2, 3, 4, 6, 8, 12, 18, 24)
+#: Holes of the general meshes, as shares of the side; every other one has none.
+HOLES = (0.0, 0.15)
+
+
+def watched(items: Iterable[Any], text: str) -> Any:
+    """A progress bar when a person is watching."""
+    return tqdm(items, desc=text, leave=False, disable=not sys.stderr.isatty())
+
+
+def timed(function: Callable[..., Any], *given: Any, **keywords: Any) -> tuple[Any, float]:
+    """Result and milliseconds of a call."""
+    start = time.perf_counter()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", gso.ConvergenceWarning)
+        value = function(*given, **keywords)
+    return value, 1e3 * (time.perf_counter() - start)
+
+
+def energy(result: gso.Result) -> float:
+    """What the solve minimised."""
+    return sum(result.energy.values())
+
+
+def compared(designs: Iterable[Any], task: str, keywords: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Cold and hybrid on every design: milliseconds, energies, and which were started by a net."""
+    rows = []
+    for design in designs:
+        cold, slow = timed(optimize, design, task=task, **keywords)
+        warm, quick = timed(hybrid.solve, design, task=task, **keywords)
+        net = 1e3 * warm.seconds["net"]
+        ratio = energy(warm) / max(energy(cold), 1e-300)
+        rows.append((slow, quick, net, ratio, warm.warm_start == "net"))
+    names = ("cold", "hybrid", "net", "energy", "started")
+    return dict(zip(names, np.array(rows, float).T, strict=True))
+
+
+def ratios(found: dict[str, np.ndarray]) -> str:
+    """Energies against the cold solve's, in words."""
+    energies = found["energy"]
+    shares = ", ".join(f"{(energies <= most).mean():.2%} <= {most}" for most in (1.01, 1.05))
+    return f"median {np.median(energies):.4f}, {shares}, worst {energies.max():.4f}"
+
+
+def speed(test: Surfaces, count: int) -> None:
+    """Time and energy, cold and from the net's result."""
+    chosen = [test[k] for k in range(min(count, len(test)))]
+    print(
+        f"\nSpeed: medians over {len(chosen)} surfaces, milliseconds; energies over the cold ones"
+    )
+    for name, (task, keywords) in CASES.items():
+        if DEFAULTS[task] not in available(task):
+            print(f"  {name:10s} no net comes with the package")
+            continue
+        compared(chosen[:2], task, keywords)  # what is made at first use only
+        found = compared(watched(chosen, name), task, keywords)
+        share = np.median(found["hybrid"] / found["cold"])
+        print(
+            f"  {name:10s} cold {np.median(found['cold']):6.0f}  hybrid "
+            f"{np.median(found['hybrid']):6.0f} (net {np.median(found['net']):.0f})  "
+            f"{share:.2f} of the time; started {found['started'].mean():.0%}; energy "
+            f"{ratios(found)}",
+            flush=True,
+        )
+    denoised = [timed(optimize, p, task="denoise")[1] for p in chosen]
+    print(f"  denoise    cold {np.median(denoised):6.0f}, in closed form: no start can help")
+    assert "denoise" not in TASKS
+
+
+def guard(splits: dict[str, Surfaces], count: int | None) -> None:
+    """Energies against the cold solve's at "balanced"."""
+    print("\nGuard: energy of the hybrid solve over that of the cold one, balanced")
+    for name, split in splits.items():
+        total = min(count or len(split), len(split))
+        found = compared((split[k] for k in watched(range(total), name)), "developable", {})
+        print(f"  {name:6s} {total:5d} surfaces: {ratios(found)}", flush=True)
+
+
+def general(test: Surfaces, count: int) -> None:
+    """The same on meshes that are no grids."""
+    meshes = [patch(test[k], HOLES[k % len(HOLES)], seed=k) for k in range(count)]
+    found = compared(watched(meshes, "general"), "developable", {})
+    print(f"\nGeneral meshes: {count}, triangulated in random order, half of them with a hole")
+    print(f"  started {found['started'].mean():.0%}; energy {ratios(found)}")
+
+
+def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:
+    """A grid as triangles in random order, with a hole in its middle."""
+    whole = Mesh.from_grid(grid)
+    at = np.stack(np.meshgrid(*(np.linspace(-1, 1, n) for n in grid.shape[:2])), axis=-1)
+    middle = at.reshape(-1, 2)[whole.triangles].mean(axis=1)
+    faces = whole.triangles[np.abs(middle).max(axis=1) >= hole]
+    rng = np.random.default_rng(seed)
+    used = rng.permutation(np.unique(faces))
+    new = np.empty(len(whole.vertices), int)
+    new[used] = np.arange(len(used))
+    return Mesh(whole.vertices[used], new[faces][rng.permutation(len(faces))])
+
+
+def anytime(test: Surfaces, count: int, plot: str) -> None:
+    """Energy over that of the cold solve, against time, for solves that are cut off."""
+    curves: dict[str, list[tuple[float, float]]] = {"TNO": [], "hybrid": []}
+    chosen = [test[k] for k in range(count)]
+    final = [energy(timed(optimize, p)[0]) for p in watched(chosen, "anytime")]
+    for most in watched(POINTS, "anytime"):
+        for name, points in curves.items():
+            rows = []
+            for p, last in zip(chosen, final, strict=True):
+                if name == "TNO":
+                    result, spent = timed(optimize, p, x0=Start(None, iterations=most))
+                else:
+                    result, spent = timed(hybrid.solve, p, polish=most or False)
+                rows.append((spent, energy(result) / last))
+            points.append(tuple(np.median(rows, axis=0)))
+    print(f"\nAnytime: medians over {count} surfaces; energy over that of the whole cold solve")
+    for name, points in curves.items():
+        print(f"  {name:7s}" + "  ".join(f"{e:.3g} in {t:.0f} ms" for t, e in points))
+    print(f"  the net alone is the first point of the hybrid; see {plot}")
+    _draw(curves, plot)
+
+
+def _draw(curves: dict[str, list[tuple[float, float]]], plot: str) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(7, 4.5), constrained_layout=True)
+    for name, points in curves.items():
+        axes.plot(*np.array(points).T, marker=".", label=name)
+    axes.plot(*curves["hybrid"][0], "o", color="black", label="net alone")
+    axes.set(
+        xlabel="milliseconds for one surface",
+        ylabel="energy / that of the cold solve",
+        yscale="log",
+    )
+    axes.legend()
+    figure.savefig(plot)
+
+
+SECTIONS = ("speed", "guard", "general", "anytime")
+
+
+def main() -> None:
+    """Run the sections that were asked for."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("sections", nargs="*", default=SECTIONS, metavar="SECTION")
+    parser.add_argument("-n", type=int, metavar="N", help="surfaces of each section")
+    parser.add_argument("--data", type=Path, metavar="DIR", help="set that has the surfaces")
+    parser.add_argument("--out", type=Path, default=Path("bench/out"), metavar="DIR")
+    parser.add_argument("--plot", default="anytime.png", metavar="FILE")
+    arguments = parser.parse_args()
+    unknown = set(arguments.sections) - set(SECTIONS)
+    if unknown:
+        parser.error(f"no section {', '.join(sorted(unknown))}; there are {', '.join(SECTIONS)}")
+    if DEFAULTS["developable"] not in available("developable"):
+        parser.error("no net comes with the package: gso train developable, then see docs/net.rst")
+    store, n = Store(arguments.out), arguments.n
+    if arguments.data is None:
+        splits = {s: screened(arguments.out, s, store) for s in ("test", "hard")}
+    else:
+        splits = {s: opened(arguments.out, arguments.data, s) for s in ("test", "hard")}
+    test = splits["test"]
+    for section in arguments.sections:
+        if section == "speed":
+            speed(test, n or 64)
+        elif section == "guard":
+            guard(splits, n)
+        elif section == "general":
+            general(test, n or 32)
+        else:
+            anytime(test, n or 16, arguments.plot)
+
+
+if __name__ == "__main__":
+    main()

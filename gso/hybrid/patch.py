@@ -1,0 +1,199 @@
+"""A disk-like mesh as a grid, which is all that a net knows, and the way back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import flat_start
+from gso.mesh import Mesh
+from gso.spline import clamped_knots
+from gso.status import MeshError
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Most control points along each side of the spline through a mesh.
+_CONTROLS = 24
+#: Weight of the control net's second differences: it only decides where there are no vertices.
+_SMOOTH = 1e-6
+#: Largest distance of the mesh from the grid, in radii of the unit ball, for a net to see it.
+_FAR = 0.05
+#: Least distance of two corners, as a share of the boundary's length.
+_APART = 0.1
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A mesh as a grid.
+
+    Attributes
+    ----------
+    grid : ndarray, (size, size, 3)
+        Samples of a bicubic spline through the mesh, in its unit and place.
+    parameters : ndarray, (n, 2)
+        Where the vertices are on it, in [0, 1]^2.
+    """
+
+    grid: Array
+    parameters: Array
+
+    def at_vertices(self, values: Array) -> Array:
+        """Values (size, size, d) on the grid, at the mesh's own vertices (n, d)."""
+        from scipy.interpolate import RectBivariateSpline
+
+        sides = (np.linspace(0.0, 1.0, n) for n in values.shape[:2])
+        u, v = sides
+        columns = [
+            RectBivariateSpline(u, v, values[..., k]).ev(*self.parameters.T)
+            for k in range(values.shape[2])
+        ]
+        return np.stack(columns, axis=1)
+
+
+def as_patch(mesh: Mesh, size: int) -> Patch:
+    """Resample a mesh of one piece on a grid.
+
+    Its outer boundary becomes that of a rectangle, the sharpest corners of the one the
+    corners of the other, and a harmonic map the inside; a spline through the vertices
+    bridges holes.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        One component with a boundary and without handles; it may have holes.
+    size : int
+        Vertices along both sides of the grid.
+
+    Raises
+    ------
+    MeshError
+        The mesh is something else, or far from any spline that a grid can carry.
+
+    Examples
+    --------
+    >>> grid = np.stack(np.meshgrid([0.0, 1, 2, 3], [0.0, 1, 2, 3], [0.0], indexing="ij"), -1)
+    >>> mesh = Mesh(grid.reshape(-1, 3), Mesh.from_grid(grid[:, :, 0]).triangles)
+    >>> patch = as_patch(mesh, 8)
+    >>> bool(np.allclose(patch.at_vertices(patch.grid), mesh.vertices))
+    True
+    """
+    loops = mesh.boundary_loops
+    if not loops or mesh.euler_characteristic != 2 - len(loops) or len(flat_start.parts(mesh)) > 1:
+        raise MeshError("it is not one piece with a boundary and without handles")
+    used = mesh.used
+    loop, at, sides = _boundary(mesh)
+    image = flat_start.spanned(_filled(mesh, loop), loop, at)[: len(used)]
+    parameters = (image / sides).clip(0.0, 1.0)
+    fitted, grid = _spline(mesh.vertices[used], parameters[used], size)
+    far = float(np.linalg.norm(fitted - mesh.vertices[used], axis=1).max())
+    if not far <= _FAR * mesh.frame.scale:
+        raise MeshError("it is no surface that a grid of few vertices follows")
+    return Patch(grid, parameters)
+
+
+def _filled(mesh: Mesh, outer: Ints) -> Mesh:
+    """The mesh as triangles, its holes filled with fans round a vertex in their middle."""
+    points, triangles = [mesh.vertices], [mesh.triangles]
+    for loop in mesh.boundary_loops:
+        if outer[0] in loop:
+            continue
+        # The new faces are on the other side of the loop.
+        edge = loop[::-1] if _surface_on_left(mesh, loop) else loop
+        middle = len(mesh.vertices) + len(points) - 1
+        points.append(mesh.vertices[loop].mean(axis=0, keepdims=True))
+        triangles.append(np.stack([edge, np.roll(edge, -1), np.full(len(edge), middle)], axis=1))
+    return Mesh(np.concatenate(points), np.concatenate(triangles)) if len(points) > 1 else mesh
+
+
+def _boundary(mesh: Mesh) -> tuple[Ints, Array, Array]:
+    """The outer boundary from a corner on, its places on a rectangle, and the sides of that."""
+    loop = max(mesh.boundary_loops, key=lambda ids: _lengths(mesh.vertices[ids]).sum())
+    if not _surface_on_left(mesh, loop):
+        loop = loop[::-1]
+    turning = np.pi - _angles(mesh)[loop]
+    corners = _corners(turning, _lengths(mesh.vertices[loop]))
+    loop = np.roll(loop, -corners[0])
+    ends = np.append(np.array(corners) - corners[0], len(loop))
+    along = np.append(0.0, np.cumsum(_lengths(mesh.vertices[loop])))
+    long = np.diff(along[ends])
+    sides = 0.5 * (long[:2] + long[2:])
+    corner_at = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
+    at = np.stack([np.interp(along[:-1], along[ends], x) for x in corner_at.T], axis=1)
+    return loop, at * sides, sides
+
+
+def _lengths(points: Array) -> Array:
+    """Lengths of a closed polygon's edges, each from its vertex on."""
+    return np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+
+
+def _surface_on_left(mesh: Mesh, loop: Ints) -> bool:
+    t = mesh.triangles
+    edges = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
+    return bool((edges == loop[:2]).all(axis=1).any())
+
+
+def _angles(mesh: Mesh) -> Array:
+    """Sum of the triangles' angles at every vertex, (n,)."""
+    v, t = mesh.vertices, mesh.triangles
+    total = np.zeros(len(v))
+    for k in range(3):
+        a, b = (v[t[:, (k + step) % 3]] - v[t[:, k]] for step in (1, 2))
+        sine = np.linalg.norm(np.cross(a, b), axis=1)
+        total += np.bincount(
+            t[:, k], np.arctan2(sine, np.einsum("ij,ij->i", a, b)), minlength=len(v)
+        )
+    return total
+
+
+def _corners(turning: Array, lengths: Array) -> list[int]:
+    """Places of four vertices of a closed polygon, in order: sharp, and not near each other."""
+    whole = lengths.sum()
+    along = np.cumsum(lengths) - lengths
+    chosen: list[int] = []
+    for k in np.argsort(-turning, kind="stable"):
+        gap = np.abs(along[chosen] - along[k])
+        if (np.minimum(gap, whole - gap) >= _APART * whole).all() and turning[k] > 0.5:
+            chosen.append(int(k))
+        if len(chosen) == 4:
+            return sorted(chosen)
+    # A smooth boundary: split its longest stretches.
+    chosen = chosen or [0]
+    while len(chosen) < 4:
+        chosen.sort()
+        ends = np.append(along[chosen], along[chosen[0]] + whole)
+        widest = int(np.diff(ends).argmax())
+        middle = (0.5 * (ends[widest] + ends[widest + 1])) % whole
+        away = np.abs(along - middle)
+        away = np.minimum(away, whole - away)
+        away[chosen] = np.inf
+        chosen.append(int(away.argmin()))
+    return sorted(chosen)
+
+
+def _spline(points: Array, parameters: Array, size: int) -> tuple[Array, Array]:
+    """A smooth bicubic spline through scattered points: at their parameters, and on a grid."""
+    from scipy.interpolate import BSpline
+    from scipy.sparse import diags, identity, kron
+    from scipy.sparse.linalg import splu
+
+    count = int(np.clip(0.75 * np.sqrt(len(points)), 4, _CONTROLS))
+    knots = clamped_knots(count)
+    u, v = (BSpline.design_matrix(x, knots, 3).tocsr() for x in parameters.T)
+    # Row-wise products of both bases.
+    matrix = kron(u, np.ones((1, count))).multiply(kron(np.ones((1, count)), v)).tocsr()
+    second = diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(count - 2, count))
+    one = identity(count)
+    bent = second.T @ second
+    stiffness = kron(bent, one) + kron(one, bent)
+    centre = points.mean(axis=0)
+    normal = matrix.T @ matrix / len(points) + _SMOOTH * stiffness
+    net = splu(normal.tocsc()).solve(np.asarray(matrix.T @ (points - centre)) / len(points))
+    samples = BSpline.design_matrix(np.linspace(0.0, 1.0, size), knots, 3).toarray()
+    grid = np.einsum(
+        "ia,jb,abk->ijk", samples, samples, net.reshape(count, count, 3), optimize=True
+    )
+    return matrix @ net + centre, grid + centre

@@ -1,0 +1,157 @@
+"""What a net makes of a design, as a start for the optimiser, or why there is nothing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.hybrid.patch import Patch, as_patch
+from gso.mesh import Mesh
+from gso.net.catalogue import DEFAULTS, available
+from gso.status import MeshError, OptionError, WeightsError
+
+Array = NDArray[np.float64]
+
+#: Tasks whose solver starts anywhere; what nets are for besides has a closed form.
+TASKS = ("developable", "flatten")
+#: Vertices along each side of the grid that a mesh is resampled to.
+_SIZE = 64
+#: Shortest side of a grid for which a net is asked.
+_SMALLEST = 8
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A net's result for one design.
+
+    Attributes
+    ----------
+    points : ndarray or None
+        Vertices (n, 3) or their flat image (n, 2), in the design's numbering, unit and place.
+    seconds : float
+        What it took, of a batch each design's share.
+    net : str
+        Which net.
+    refused : str
+        Why there are no points.
+    """
+
+    points: Array | None = None
+    seconds: float = 0.0
+    net: str = ""
+    refused: str = ""
+
+
+def predictions(designs: Sequence[Mesh], task: str, net: Any = None) -> list[Prediction]:
+    """Apply a net to designs, those of one size together.
+
+    Parameters
+    ----------
+    designs : sequence of Mesh
+    task : str
+        A task of :func:`gso.tno.optimize`.
+    net : str, path or Net, optional
+        As in :func:`gso.net.predict`.
+
+    Raises
+    ------
+    OptionError
+        The net is for another task.
+    WeightsError
+        The net that is named does not exist, or its file is damaged.
+    """
+    why = _missing(task, net)
+    if why:
+        return [Prediction(refused=why)] * len(designs)
+    name = _name(task, net)
+    found: list[Prediction] = [Prediction()] * len(designs)
+    sizes: dict[tuple[int, ...], list[tuple[int, Array, Patch | None]]] = {}
+    spent = np.zeros(len(designs))
+    for k, design in enumerate(designs):
+        clock = time.perf_counter()
+        try:
+            grid, patch = _seen(design)
+            sizes.setdefault(grid.shape, []).append((k, grid, patch))
+        except MeshError as error:
+            found[k] = Prediction(refused=str(error), net=name)
+        spent[k] = time.perf_counter() - clock
+    for group in sizes.values():
+        clock = time.perf_counter()
+        moved = _predicted(np.stack([grid for _, grid, _ in group]), task, net)
+        share = (time.perf_counter() - clock) / len(group)
+        for (k, grid, patch), values in zip(group, moved, strict=True):
+            clock = time.perf_counter()
+            if isinstance(values, str):
+                found[k] = Prediction(refused=values, net=name)
+                continue
+            points = _back(designs[k], grid, patch, values)
+            seconds = spent[k] + share + time.perf_counter() - clock
+            found[k] = Prediction(points, seconds, name)
+    return found
+
+
+def _missing(task: str, net: Any) -> str:
+    """Why no net can be asked, whatever the design."""
+    if task not in TASKS:
+        return f"no net makes a start for task {task!r}"
+    if find_spec("torch") is None or find_spec("safetensors") is None:
+        return 'nets need torch and safetensors: pip install "gso[net]"'
+    if net is None and DEFAULTS[task] not in available(task):
+        return f"no net for task {task!r} comes with this version"
+    return ""
+
+
+def _name(task: str, net: Any) -> str:
+    if net is None:
+        return DEFAULTS[task]
+    return type(net).__name__ if hasattr(net, "task") else str(net)
+
+
+def _seen(design: Mesh) -> tuple[Array, Patch | None]:
+    """The grid that a net sees of a design.
+
+    Raises
+    ------
+    MeshError
+        There is none.
+    """
+    if design.grid is not None:
+        if min(design.grid.shape[:2]) < _SMALLEST:
+            height, width = design.grid.shape[:2]
+            raise MeshError(f"a grid {height} x {width} is solved faster than a net sees it")
+        return design.grid, None
+    patch = as_patch(design, _SIZE)
+    return patch.grid, patch
+
+
+def _predicted(grids: Array, task: str, net: Any) -> Sequence[Any]:
+    """Results (H, W, d) for grids, or what is wrong with each of them."""
+    from gso.net import predict
+
+    try:
+        return list(predict(grids, task=task, model=net))
+    except (OptionError, WeightsError):
+        raise
+    except MeshError as error:
+        if len(grids) == 1:
+            return [str(error)]
+        return [_predicted(grid[None], task, net)[0] for grid in grids]
+
+
+def _back(design: Mesh, grid: Array, patch: Patch | None, values: Array) -> Array:
+    """A net's result at the vertices of the design."""
+    if patch is not None and values.shape[-1] == 3:
+        return design.vertices + patch.at_vertices(values - grid)
+    if patch is not None:
+        return patch.at_vertices(values)
+    points = np.zeros((len(design.vertices), values.shape[-1]))
+    if values.shape[-1] == 3:
+        points = design.vertices.copy()
+    points[design.grid_index] = values
+    return points

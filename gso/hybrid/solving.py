@@ -1,0 +1,205 @@
+"""One call: the net predicts, the optimiser checks and finishes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from gso.hybrid.prediction import Prediction, predictions
+from gso.mesh import Mesh
+from gso.result import Result
+from gso.status import GSOError, OptionError
+from gso.tno import Start, check, optimize
+from gso.tno.batch import Item
+from gso.tno.pool import spread
+
+#: Surfaces that go through a net together.
+_BATCH = 64
+
+
+def solve(
+    mesh: Any,
+    *,
+    task: str = "developable",
+    net: Any = None,
+    polish: bool | int = True,
+    **keywords: Any,
+) -> Result:
+    """Let a net make a start, and the optimiser finish it.
+
+    The start is dropped, and the solve is that of :func:`gso.tno.optimize`, where there is
+    no net (none for the task, PyTorch is not installed), where the design is no grid and
+    cannot be resampled to one, and where the net's result turns cells over, is not finite,
+    or has more of the energy than the start without it. The result's `notes` then say so,
+    and its `warm_start` is "cold".
+
+    Parameters
+    ----------
+    mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, or path
+        The design. Grids of any size, and meshes of one piece with a boundary and without
+        handles: those are resampled to a grid, and the displacement is carried back.
+    task : str
+        As for :func:`gso.tno.optimize`; nets make starts for "developable" and "flatten".
+    net : str, path or gso.net.Net, optional
+        As `model` of :func:`gso.net.predict`; the task's default when not given.
+    polish : bool or int
+        True: solve from there. A number: at most so many iterations, also without a net.
+        False: the net's result as it is, measured.
+    **keywords
+        Passed to :func:`gso.tno.optimize`: `formulation`, `options`, `constraints`,
+        `max_deviation`, `target_curvature`, `callback`.
+
+    Returns
+    -------
+    Result
+        Its `warm_start` is "net" or "cold", `seconds` has an entry "net", and `details` the
+        name of the "net".
+
+    Raises
+    ------
+    MeshError
+        The input cannot be used.
+    OptionError
+        An option is unknown or contradictory, or the net is for another task.
+    WeightsError
+        The net that is named does not exist, or its file is damaged.
+
+    Examples
+    --------
+    >>> import gso
+    >>> u, v = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
+    >>> result = solve(np.stack([u, v, 0.3 * u * v], axis=-1), polish=3)
+    >>> result.warm_start in ("net", "cold"), result.usable
+    (True, True)
+    """
+    from gso.io import as_mesh
+
+    clock = time.perf_counter()
+    _checked(task, polish, keywords)
+    design = as_mesh(mesh)
+    (prediction,) = predictions([design], task, net)
+    result = _finished(design, prediction, task, polish, keywords)
+    result.seconds["total"] = time.perf_counter() - clock
+    return result
+
+
+def solve_many(
+    meshes: Iterable[Any],
+    *,
+    task: str = "developable",
+    net: Any = None,
+    polish: bool | int = True,
+    workers: int | None = None,
+    **keywords: Any,
+) -> Iterator[Item]:
+    """:func:`solve` for many surfaces: one forward pass for many, then parallel processes.
+
+    Parameters
+    ----------
+    meshes : iterable
+        Anything :func:`solve` takes; read in blocks, so that a generator of any length fits.
+    task, net, polish, **keywords
+        As for :func:`solve`; a `callback` is left out.
+    workers : int, optional
+        Processes; the number of cores when not given, 0 for none (in this process).
+
+    Yields
+    ------
+    Item
+        In the order of completion; `index` says which input it belongs to. A surface that
+        fails is reported in `error` and does not end the batch.
+
+    Examples
+    --------
+    >>> flat = np.dstack([*np.mgrid[:4.0, :4.0], np.zeros((4, 4))])
+    >>> [item.index for item in solve_many([flat], workers=0)]
+    [0]
+    """
+    keywords.pop("callback", None)
+    if isinstance(keywords.get("constraints"), Iterator):
+        keywords["constraints"] = list(keywords["constraints"])
+    _checked(task, polish, keywords)
+    work = partial(_one, task, polish, keywords)
+    with closing(spread(work, _started(meshes, task, net), workers=workers)) as results:
+        for done in results:
+            yield Item(done.index, done.value, done.error)
+
+
+@dataclass(frozen=True)
+class _Started:
+    """A design with its prediction, or why it is none."""
+
+    design: Mesh | None
+    prediction: Prediction
+    error: GSOError | None = None
+
+
+def _started(meshes: Iterable[Any], task: str, net: Any) -> Iterator[_Started]:
+    """Designs with their predictions, a block at a time."""
+    source = iter(meshes)
+    while block := list(islice(source, _BATCH)):
+        read = [_read(mesh) for mesh in block]
+        designs = [design for design in read if isinstance(design, Mesh)]
+        found = iter(predictions(designs, task, net))
+        for design in read:
+            if isinstance(design, Mesh):
+                yield _Started(design, next(found))
+            else:
+                yield _Started(None, Prediction(), design)
+
+
+def _read(mesh: Any) -> Mesh | GSOError:
+    from gso.io import as_mesh
+
+    try:
+        return as_mesh(mesh)
+    except GSOError as error:
+        return error
+
+
+def _one(task: str, polish: bool | int, keywords: dict[str, Any], started: _Started) -> Result:
+    if started.error is not None or started.design is None:
+        raise started.error or OptionError("there is no design")
+    result = _finished(started.design, started.prediction, task, polish, keywords)
+    result.metrics  # noqa: B018 - computed here, where there is a processor for it
+    return result
+
+
+def _checked(task: str, polish: Any, keywords: dict[str, Any]) -> None:
+    if not isinstance(polish, bool | np.bool_ | int | np.integer) or polish < 0:
+        raise OptionError(f"polish is {polish!r}; take True, False, or a number of iterations")
+    if "x0" in keywords:
+        raise OptionError("the net makes the start; for one of your own call gso.tno.optimize")
+    names = ("formulation", "options", "max_deviation", "target_curvature")
+    check(task, **{name: keywords[name] for name in names if name in keywords})
+
+
+def _finished(
+    design: Mesh,
+    prediction: Prediction,
+    task: str,
+    polish: bool | int,
+    keywords: dict[str, Any],
+) -> Result:
+    """Solve from a prediction, if there is a sound one."""
+    points, refused = prediction.points, prediction.refused
+    if points is not None and not np.isfinite(points).all():
+        points, refused = None, "its result is not finite"
+    most = None if polish is True or (points is None and not polish) else int(polish)
+    # A result that is not polished is what was asked for, whatever it is like.
+    start = Start(points, source="net", guarded=polish is not False, iterations=most)
+    result = optimize(design, task=task, x0=start, **keywords)
+    if points is None:
+        result.notes += (f"solved without a net: {refused}",)
+    result.seconds["net"] = prediction.seconds
+    result.seconds["total"] += prediction.seconds
+    if prediction.net:
+        result.details = {**result.details, "net": prediction.net}
+    return result

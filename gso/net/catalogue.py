@@ -1,0 +1,86 @@
+"""Which nets there are, and what their cards say; this needs no PyTorch."""
+
+from __future__ import annotations
+
+import json
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from gso.status import OptionError, WeightsError
+
+#: Nets that come with the package: NAME.safetensors and NAME.json.
+FOLDER = Path(__file__).parent / "weights"
+#: Version of the card.
+FORMAT = 1
+#: Tasks that there are nets for, and the components of what comes out.
+TASKS = {"developable": 3, "flatten": 2, "denoise": 3}
+#: Nets that are applied one after the other: each sees what the one before made.
+CHAINS = {"net-cf": ("net-c", "net-f")}
+#: The net of a task when none is named.
+DEFAULTS = {"developable": "developable", "flatten": "flatten-strain", "denoise": "denoise"}
+
+
+def read_card(path: str | PathLike[str]) -> dict[str, Any]:
+    """Card of a .safetensors file.
+
+    Raises
+    ------
+    WeightsError
+        It is missing, or no card of this package.
+    """
+    place = Path(path).with_suffix(".json")
+    try:
+        card = json.loads(place.read_bytes())
+    except OSError as error:
+        raise WeightsError(f"{place} cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise WeightsError(f"{place} is no card of a net: {error}") from None
+    if not isinstance(card, dict) or card.get("format") != FORMAT:
+        raise WeightsError(f"{place} is no card of a net in format {FORMAT}; get the file anew")
+    if not isinstance(card.get("model"), dict) or not isinstance(card.get("sha256"), str):
+        raise WeightsError(f"{place} does not say which net it belongs to; get the file anew")
+    return card
+
+
+def available(task: str | None = None) -> list[str]:
+    """Names of the nets that come with the package, all or those of a task.
+
+    >>> set(available("flatten")) <= set(available())
+    True
+    """
+    found = sorted(path.stem for path in FOLDER.glob("*.safetensors"))
+    found += [name for name, parts in CHAINS.items() if set(parts) <= set(found)]
+    if task is None:
+        return found
+    first = {name: CHAINS.get(name, (name,))[0] for name in found}
+    return [n for n in found if read_card(located(first[n]))["model"].get("task") == task]
+
+
+def located(model: str | PathLike[str]) -> Path:
+    """The file of a net.
+
+    Raises
+    ------
+    WeightsError
+        No net of this name comes with the package, and there is no such file.
+    """
+    name = str(model)
+    if Path(name).suffix == ".safetensors":
+        return Path(name)
+    path = FOLDER / f"{name}.safetensors"
+    if Path(name).name != name or not path.exists():
+        known = ", ".join(available()) or "none"
+        raise WeightsError(
+            f"no net {name!r}; with the package come: {known}; or give a .safetensors file"
+        )
+    return path
+
+
+def chain(model: str | PathLike[str] | None, task: str) -> tuple[Path, ...]:
+    """Files of the nets that a name stands for, in the order in which they are applied."""
+    if task not in TASKS:
+        raise OptionError(f"no task {task!r} for a net; there are {', '.join(TASKS)}")
+    name = DEFAULTS[task] if model is None else model
+    parts = CHAINS.get(name, (name,)) if isinstance(name, str) else (name,)
+    return tuple(located(part) for part in parts)

@@ -1,0 +1,333 @@
+"""The net starts the optimiser, and never makes it worse."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import gso
+from gso import hybrid
+from gso.hybrid import prediction, solving
+from gso.hybrid.patch import as_patch
+from gso.mesh import Mesh
+from gso.status import MeshError, OptionError, WeightsError
+from gso.tno import Start, optimize
+from tests.conftest import cylinder, saddle, sphere_cap
+
+try:
+    import torch
+
+    from gso.net import CoarseNet
+except ImportError:
+    torch = None
+
+needs_torch = pytest.mark.skipif(torch is None, reason="no torch")
+
+
+def made(task="developable", size=0.0, seed=0):
+    """A small net whose displacements are about so large; zero: none at all."""
+    torch.manual_seed(seed)
+    net = CoarseNet(task, widths=(8, 8, 8), depths=(1, 1, 1), passes=1)
+    for head in (net.coarse_head, net.fine_head):
+        torch.nn.init.normal_(head.weight, std=size)
+    return net
+
+
+def energy(result):
+    return sum(result.energy.values())
+
+
+def same(a, b):
+    """Whether two results are the same to the last bit."""
+    assert (a.mesh.vertices == b.mesh.vertices).all()
+    assert a.status is b.status
+    return a.energy == b.energy
+
+
+# ---------------------------------------------------------------- starts
+
+
+def test_a_guarded_start_that_is_worse_is_dropped(surfaces):
+    design = surfaces[0]
+    rng = np.random.default_rng(0)
+    start = Start(design + 0.1 * rng.standard_normal(design.shape), source="guess", guarded=True)
+    cold, result = optimize(design), optimize(design, x0=start)
+    assert same(cold, result)
+    assert result.warm_start == "cold"
+    assert "the start (guess) was not used: its energy" in result.notes[-1]
+
+
+def test_a_guarded_start_that_is_better_is_used(surfaces):
+    design = surfaces[0]
+    good = optimize(design)
+    result = optimize(design, x0=Start(good.mesh, source="guess", guarded=True))
+    assert result.warm_start == "guess"
+    assert energy(result) <= energy(good) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("most", [0, 1, 3])
+@pytest.mark.parametrize(
+    "keywords",
+    [{}, {"formulation": "isometry"}, {"task": "flatten"}, {"max_deviation": 0.1}],
+    ids=["curvature", "isometry", "flatten", "bound"],
+)
+def test_iterations_of_a_start_are_counted_over_all_stages(surfaces, keywords, most):
+    design = surfaces[1]
+    start = design
+    if keywords.get("task") == "flatten":
+        start = optimize(design, task="flatten").flat_grid
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", gso.ConvergenceWarning)
+        result = optimize(design, x0=Start(start, iterations=most), **keywords)
+    assert result.iterations <= most
+    assert np.isfinite(result.mesh.vertices).all()
+
+
+def test_a_flat_start_that_turns_over_is_dropped():
+    design = sphere_cap(17)
+    cold = optimize(design, task="flatten")
+    turned = cold.flat_grid[::-1]
+    result = optimize(design, task="flatten", x0=Start(turned, guarded=True))
+    assert same(cold, result)
+    assert "turns" in result.notes[-1]
+
+
+# ---------------------------------------------------------------- with a net
+
+
+@needs_torch
+@pytest.mark.parametrize("formulation", ["curvature", "isometry"])
+def test_a_random_net_costs_time_not_quality(surfaces, formulation):
+    design = surfaces[0]
+    cold = optimize(design, formulation=formulation)
+    result = hybrid.solve(design, net=made(size=0.5), formulation=formulation)
+    assert same(cold, result)
+    assert result.warm_start == "cold"
+    assert result.seconds["net"] > 0
+    assert any("was not used" in note for note in result.notes)
+
+
+@needs_torch
+def test_a_random_net_costs_time_not_quality_flat(surfaces):
+    cold = optimize(surfaces[0], task="flatten")
+    result = hybrid.solve(surfaces[0], task="flatten", net=made("flatten", size=5.0))
+    assert same(cold, result)
+
+
+@needs_torch
+def test_the_net_alone_is_what_predict_gives(surfaces):
+    design, net = surfaces[0], made(size=0.01)
+    result = hybrid.solve(design, net=net, polish=False)
+    assert result.warm_start == "net"
+    assert result.iterations == 0
+    assert np.allclose(result.grid, gso.net.predict(design, model=net), atol=1e-9)
+    assert result.details["net"] == "CoarseNet"
+    assert result.seconds["total"] >= result.seconds["net"] > 0
+
+
+@needs_torch
+def test_the_net_alone_flattens(surfaces):
+    net = made("flatten", size=0.01)
+    result = hybrid.solve(surfaces[0], task="flatten", net=net, polish=False)
+    expected = gso.net.predict(surfaces[0], task="flatten", model=net)
+    apart = [np.linalg.norm(np.diff(f, axis=0), axis=-1) for f in (result.flat_grid, expected)]
+    assert np.allclose(*apart)
+
+
+@pytest.fixture
+def coarse_net(monkeypatch):
+    """Predictions like those of a fair net, and why there is none where that is asked."""
+
+    def predictions(designs, task, net):
+        if net == "none":
+            return [prediction.Prediction(refused="there is none")] * len(designs)
+        few = gso.DevelopableOptions(iterations=1)
+        results = [optimize(design, options=few) for design in designs]
+        return [prediction.Prediction(r.mesh.vertices, 0.01, "fair") for r in results]
+
+    monkeypatch.setattr(solving, "predictions", predictions)
+
+
+@pytest.mark.parametrize("most", [1, 4])
+@pytest.mark.parametrize("net", ["fair", "none"])
+def test_polish_is_bounded(surfaces, coarse_net, most, net):
+    result = hybrid.solve(surfaces[0], net=net, polish=most)
+    assert 1 <= result.iterations <= most
+    assert result.metrics["loss_gc"] < result.metrics["loss_gc_before"]
+    assert result.warm_start == ("net" if net == "fair" else "cold")
+
+
+def test_polish_goes_on_where_the_net_ended(surfaces, coarse_net):
+    alone = hybrid.solve(surfaces[0], polish=False)
+    some = hybrid.solve(surfaces[0], polish=3)
+    whole = hybrid.solve(surfaces[0])
+    assert energy(alone) > energy(some) > energy(whole)
+    assert energy(whole) < 1.1 * energy(optimize(surfaces[0]))
+    assert whole.iterations < optimize(surfaces[0]).iterations
+    assert (alone.seconds["net"], alone.iterations) == (0.01, 0)
+
+
+@needs_torch
+@pytest.mark.parametrize("task", ["denoise", "bend", "conformal"])
+def test_tasks_without_nets_are_solved(task):
+    constraints = [gso.Handle([0], [(-1.0, -1.0, 1.0)]), gso.Fixed([80])] if task == "bend" else []
+    cold = optimize(saddle(9), task=task, constraints=constraints)
+    result = hybrid.solve(saddle(9), task=task, constraints=constraints)
+    assert same(cold, result)
+    assert "no net makes a start" in result.notes[-1]
+
+
+@needs_torch
+def test_a_developable_design_stays_untouched():
+    result = hybrid.solve(cylinder(33), net=made(size=0.02))
+    assert result.status is gso.Status.ALREADY_GOOD
+    assert (result.grid == cylinder(33)).all()
+
+
+@needs_torch
+def test_constraints_hold(surfaces):
+    design = surfaces[0]
+    result = hybrid.solve(design, net=made(size=0.01), constraints=[gso.FixedBoundary()])
+    border = np.ones(design.shape[:2], bool)
+    border[1:-1, 1:-1] = False
+    assert np.allclose(result.grid[border], design[border], atol=1e-12)
+
+
+@needs_torch
+@pytest.mark.parametrize(
+    ("keywords", "error", "words"),
+    [
+        ({"polish": -1}, OptionError, "polish is -1"),
+        ({"polish": "yes"}, OptionError, "polish is 'yes'"),
+        ({"x0": 1}, OptionError, "gso.tno.optimize"),
+        ({"net": "nothing"}, WeightsError, "no net 'nothing'"),
+        ({"options": "best"}, OptionError, "no preset 'best'"),
+    ],
+)
+def test_wrong_arguments_are_named(keywords, error, words):
+    with pytest.raises(error, match=words):
+        hybrid.solve(saddle(9), **keywords)
+
+
+@needs_torch
+def test_a_net_of_another_task_is_refused():
+    with pytest.raises(OptionError, match="task 'flatten'"):
+        hybrid.solve(saddle(9), net=made("flatten"))
+
+
+# ---------------------------------------------------------------- without one
+
+
+def test_without_torch_it_is_the_optimiser(monkeypatch, surfaces):
+    monkeypatch.setattr(prediction, "find_spec", lambda name: None)
+    cold, result = optimize(surfaces[0]), hybrid.solve(surfaces[0])
+    assert same(cold, result)
+    assert "torch" in result.notes[-1]
+    assert result.warm_start == "cold"
+
+
+def test_without_weights_it_is_the_optimiser(monkeypatch, surfaces):
+    monkeypatch.setattr(prediction, "available", lambda task: [])
+    cold, result = optimize(surfaces[0]), hybrid.solve(surfaces[0])
+    assert same(cold, result)
+    assert "no net" in result.notes[-1]
+
+
+@needs_torch
+def test_a_small_grid_is_the_optimisers():
+    cold, result = optimize(saddle(5)), hybrid.solve(saddle(5), net=made(size=0.01))
+    assert same(cold, result)
+    assert "5 x 5" in result.notes[-1]
+
+
+@needs_torch
+def test_what_is_no_disk_is_the_optimisers():
+    grid = Mesh.from_grid(saddle(9))
+    other = grid.vertices + np.array([5.0, 0.0, 0.0])
+    both = Mesh(
+        np.concatenate([grid.vertices, other]), np.concatenate([grid.faces, grid.faces + 81])
+    )
+    cold, result = optimize(both), hybrid.solve(both, net=made(size=0.01))
+    assert same(cold, result)
+    assert "one piece" in result.notes[-1]
+
+
+# ---------------------------------------------------------------- any mesh
+
+
+def ragged(n=33, hole=0, seed=0):
+    """A triangulated patch with vertices in random order, and maybe a hole."""
+    grid = Mesh.from_grid(saddle(n))
+    centre = grid.vertices[grid.triangles].mean(axis=1)[:, :2]
+    faces = grid.triangles[np.abs(centre - 0.2).max(axis=1) > 0.05 * hole]
+    order = np.random.default_rng(seed).permutation(len(grid.vertices))
+    kept = np.isin(order, faces)
+    new = np.full(len(order), -1)
+    new[order[kept]] = np.arange(kept.sum())
+    return Mesh(grid.vertices[order[kept]], new[faces])
+
+
+@pytest.mark.parametrize(("hole", "most"), [(0, 2e-3), (3, 0.03)])
+def test_a_mesh_becomes_a_grid_and_comes_back(hole, most):
+    mesh = ragged(hole=hole)
+    patch = as_patch(mesh, 48)
+    away = np.linalg.norm(patch.at_vertices(patch.grid) - mesh.vertices, axis=1)
+    assert away.max() < most  # of 2; next to holes the map is not smooth
+    assert (
+        gso.metrics.point_to_surface(patch.grid.reshape(-1, 3), Mesh.from_grid(saddle(33))).max()
+        < 5e-3
+    )
+    # The same side is up.
+    u, v = np.gradient(patch.grid, axis=0), np.gradient(patch.grid, axis=1)
+    assert (np.cross(u, v)[..., 2] > 0).all()
+
+
+def test_a_round_mesh_becomes_a_grid():
+    r, a = np.meshgrid(np.linspace(0.1, 1, 12), 2 * np.pi * np.arange(40) / 40, indexing="ij")
+    x, y = r * np.cos(a), r * np.sin(a)
+    points = np.stack([x, y, 0.2 * x * y], axis=-1).reshape(-1, 3)
+    k = np.arange(40)
+    ring = np.stack([k, k + 40, (k + 1) % 40 + 40, (k + 1) % 40], axis=1)
+    mesh = Mesh(points, np.concatenate([ring + 40 * j for j in range(11)]))
+    patch = as_patch(mesh, 32)
+    away = np.linalg.norm(patch.at_vertices(patch.grid) - mesh.vertices, axis=1)
+    assert away.max() < 0.03
+
+
+def test_a_closed_mesh_is_no_patch():
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    with pytest.raises(MeshError, match="one piece"):
+        as_patch(Mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]), 16)
+
+
+@needs_torch
+@pytest.mark.parametrize("task", ["developable", "flatten"])
+def test_a_mesh_is_started_by_a_net(task):
+    mesh = ragged(hole=2)
+    alone = hybrid.solve(mesh, task=task, net=made(task), polish=False)
+    assert alone.warm_start == "net"
+    if task == "developable":
+        # A net that moves nothing.
+        assert np.allclose(alone.mesh.vertices, mesh.vertices, atol=1e-9)
+    else:
+        assert alone.metrics["flipped_cells"] == 0
+    cold, result = optimize(mesh, task=task), hybrid.solve(mesh, task=task, net=made(task))
+    assert energy(result) <= 1.2 * energy(cold)
+
+
+# ---------------------------------------------------------------- many
+
+
+@needs_torch
+@pytest.mark.parametrize("workers", [0, 2])
+def test_many(workers, surfaces):
+    designs = [surfaces[0], saddle(9), np.full((4, 4, 3), np.nan), surfaces[1]]
+    net = made(size=0.002)
+    items = {i.index: i for i in hybrid.solve_many(designs, net=net, polish=2, workers=workers)}
+    assert "not finite" in items[2].error
+    for k in (0, 1, 3):
+        alone = hybrid.solve(designs[k], net=net, polish=2)
+        assert np.allclose(items[k].result.mesh.vertices, alone.mesh.vertices, atol=1e-6)
+        assert items[k].result.warm_start == alone.warm_start
