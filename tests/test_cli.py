@@ -314,6 +314,50 @@ def test_many_files_to_another_format(run, small):
     assert sorted(os.listdir("out")) == ["other.svg", "small.svg"]
 
 
+@pytest.fixture
+def net(tmp_path):
+    """File of a net that moves nothing."""
+    pytest.importorskip("torch")
+    from gso.net import CoarseNet, save
+
+    path = tmp_path / "still.safetensors"
+    save(CoarseNet(widths=(8, 8, 8), depths=(1, 1, 1), passes=1), path)
+    return path
+
+
+def test_a_net_alone(run, small, net):
+    done = run("optimize", small, "-o", "out.npz", "--method", "net", "--net", net)
+    assert done.exit_code == 0
+    result = gso.Result.load("out.npz")
+    assert (result.warm_start, result.iterations) == ("net", 0)
+    assert np.allclose(result.mesh.vertices, gso.load(small).vertices)
+    assert f"net {net}" in done.stdout
+
+
+def test_a_net_starts_many_files(run, small, net):
+    gso.save(bump(12), "other.obj")
+    done = run(
+        "optimize", small, "other.obj", "-o", "out", "--method", "hybrid", "--net", net,
+        "--workers", 0, "--suffix", ".npz",
+    )  # fmt: skip
+    assert done.exit_code == 0
+    for name in ("small", "other"):
+        assert gso.Result.load(f"out/{name}.npz").details["net"] == str(net)
+
+
+def test_without_a_net_the_optimiser_says_so(run, small, monkeypatch):
+    monkeypatch.setattr("gso.hybrid.prediction.available", lambda task: [])
+    done = run("optimize", small, "-o", "out.obj", "--method", "hybrid")
+    assert done.exit_code == 0
+    assert "note: solved without a net: no net" in done.stdout
+
+
+def test_net_mistakes(run, small, never):
+    refused(run("optimize", small, "-o", "out.obj", "--net", "best"), "--net", "--method")
+    done = run("optimize", small, "-o", "out.obj", "--method", "net", "--net", "best")
+    refused(done, "no net 'best'")
+
+
 def test_one_file_into_a_folder(run, small):
     assert run("optimize", small, "-o", "out/", "--workers", 0).exit_code == 0
     assert os.listdir("out") == ["small.obj"]
