@@ -615,6 +615,19 @@ class TestCommands:
         assert "per second" in out
         assert self.run("info", tmp_path / "set").startswith(f"{tmp_path / 'set'}: 10 surfaces")
 
+    def test_a_set_without_labels(self, tmp_path):
+        place = tmp_path / "set"
+        words = ("build", "-o", place, "--n", 12, "--size", 16, "--no-extras", "--workers", 0)
+        self.run(*words, "--label", "none")
+        assert sorted(dataset.open(place)["train"].arrays) == ["features", "id", "surface"]
+        assert "0.1 to 0.2" in self.run("info", place)
+
+    def test_none_is_no_label_among_others(self, tmp_path):
+        words = ["build", "-o", str(tmp_path), "--label", "none", "--label", "strain"]
+        done = CliRunner().invoke(main, ["dataset", *words], prog_name="gso")
+        assert done.exit_code == 1
+        assert "--label none goes with no other" in done.stderr
+
     def test_info_shows_intervals_and_labels_beside_the_published_figures(self, tiny, tmp_path):
         pytest.importorskip("matplotlib")
         table, picture = tmp_path / "set.json", tmp_path / "set.png"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gso.status import DatasetError
+from gso.status import DatasetError, OptionError
 
 if TYPE_CHECKING:
     from gso.dataset import Dataset
@@ -35,8 +35,8 @@ def dataset() -> None:
     "--label",
     "labels",
     multiple=True,
-    type=click.Choice(["developable", "strain", "lengths"]),
-    help="Label to make; all when not given. May be repeated.",
+    type=click.Choice(["developable", "strain", "lengths", "none"]),
+    help="Label to make; all when not given. May be repeated. none: surfaces alone, in minutes.",
 )
 @click.option(
     "--extras/--no-extras",
@@ -72,9 +72,11 @@ def build(out: str, quiet: bool, **given: Any) -> None:
     from gso.cli import progress
     from gso.dataset.labels import LABELS
 
-    recipe = sets.Recipe(
-        given["n"], given["seed"], given["size"], given["labels"] or LABELS, given["extras"]
-    )
+    labels = given["labels"] or LABELS
+    if "none" in labels and len(labels) > 1:
+        raise OptionError("--label none goes with no other label")
+    labels = () if labels == ("none",) else labels
+    recipe = sets.Recipe(given["n"], given["seed"], given["size"], labels, given["extras"])
     start = time.perf_counter()
     with progress.counts() as bars:
         data = sets.build(
