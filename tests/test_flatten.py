@@ -367,14 +367,15 @@ def test_starts_are_valid_and_relaxing_lowers_their_strain():
 
 
 def test_tutte_image_always_exists():
-    from gso.flat_start.embed import _tutte
+    from gso.flat_start.embed import _circle, _tutte
 
     mesh = with_hole(disk_mesh(9))
     rng = np.random.default_rng(4)
     rough = mesh.replaced(mesh.vertices + 0.05 * rng.standard_normal(mesh.vertices.shape))
     outer = max(rough.boundary_loops, key=len)
-    image = _tutte(rough, outer)
-    assert metrics.corner_areas(image, rough.faces).min() > 0
+    circle = _circle(rough.vertices[outer])
+    for image in (_tutte(rough, outer, circle), flat_start.spanned(rough, outer, circle)):
+        assert metrics.corner_areas(image, rough.faces).min() > 0
 
 
 def test_a_cap_of_a_sphere_strains_as_little_as_it_must():
