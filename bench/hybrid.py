@@ -33,7 +33,6 @@ from tqdm import tqdm
 
 import gso
 from gso import hybrid
-from gso.hybrid.prediction import TASKS
 from gso.mesh import Mesh
 from gso.net.catalogue import DEFAULTS, available
 from gso.tno import Start, optimize
@@ -66,6 +65,11 @@ def timed(function: Callable[..., Any], *given: Any, **keywords: Any) -> tuple[A
     return value, 1e3 * (time.perf_counter() - start)
 
 
+def first(surfaces: Surfaces, count: int) -> list[np.ndarray]:
+    """The first surfaces of a split."""
+    return [surfaces[k] for k in range(min(count, len(surfaces)))]
+
+
 def energy(result: gso.Result) -> float:
     """What the solve minimised."""
     return sum(result.energy.values())
@@ -93,7 +97,7 @@ def ratios(found: dict[str, np.ndarray]) -> str:
 
 def speed(test: Surfaces, count: int) -> None:
     """Time and energy, cold and from the net's result."""
-    chosen = [test[k] for k in range(min(count, len(test)))]
+    chosen = first(test, count)
     print(
         f"\nSpeed: medians over {len(chosen)} surfaces, milliseconds; energies over the cold ones"
     )
@@ -113,7 +117,6 @@ def speed(test: Surfaces, count: int) -> None:
         )
     denoised = [timed(optimize, p, task="denoise")[1] for p in chosen]
     print(f"  denoise    cold {np.median(denoised):6.0f}, in closed form: no start can help")
-    assert "denoise" not in TASKS
 
 
 def guard(splits: dict[str, Surfaces], count: int | None) -> None:
@@ -127,16 +130,18 @@ def guard(splits: dict[str, Surfaces], count: int | None) -> None:
 
 def general(test: Surfaces, count: int) -> None:
     """The same on meshes that are no grids."""
-    meshes = [patch(test[k], HOLES[k % len(HOLES)], seed=k) for k in range(count)]
+    chosen = first(test, count)
+    meshes = [patch(p, HOLES[k % len(HOLES)], seed=k) for k, p in enumerate(chosen)]
     found = compared(watched(meshes, "general"), "developable", {})
-    print(f"\nGeneral meshes: {count}, triangulated in random order, half of them with a hole")
+    print(f"\nGeneral meshes: {len(meshes)}, triangulated in random order, half with a hole")
     print(f"  started {found['started'].mean():.0%}; energy {ratios(found)}")
 
 
 def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:
     """A grid as triangles in random order, with a hole in its middle."""
     whole = Mesh.from_grid(grid)
-    at = np.stack(np.meshgrid(*(np.linspace(-1, 1, n) for n in grid.shape[:2])), axis=-1)
+    sides = (np.linspace(-1, 1, n) for n in grid.shape[:2])
+    at = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
     middle = at.reshape(-1, 2)[whole.triangles].mean(axis=1)
     faces = whole.triangles[np.abs(middle).max(axis=1) >= hole]
     rng = np.random.default_rng(seed)
@@ -149,7 +154,7 @@ def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:
 def anytime(test: Surfaces, count: int, plot: str) -> None:
     """Energy over that of the cold solve, against time, for solves that are cut off."""
     curves: dict[str, list[tuple[float, float]]] = {"TNO": [], "hybrid": []}
-    chosen = [test[k] for k in range(count)]
+    chosen = first(test, count)
     final = [energy(timed(optimize, p)[0]) for p in watched(chosen, "anytime")]
     for most in watched(POINTS, "anytime"):
         for name, points in curves.items():
@@ -161,7 +166,7 @@ def anytime(test: Surfaces, count: int, plot: str) -> None:
                     result, spent = timed(hybrid.solve, p, polish=most or False)
                 rows.append((spent, energy(result) / last))
             points.append(tuple(np.median(rows, axis=0)))
-    print(f"\nAnytime: medians over {count} surfaces; energy over that of the whole cold solve")
+    print(f"\nAnytime: medians over {len(chosen)} surfaces; energy over that of the cold solve")
     for name, points in curves.items():
         print(f"  {name:7s}" + "  ".join(f"{e:.3g} in {t:.0f} ms" for t, e in points))
     print(f"  the net alone is the first point of the hybrid; see {plot}")

@@ -19,6 +19,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from report.peers_flatten import lscm
 from tno import progress, quality, reference, run, table, timed
 
 import gso
@@ -270,18 +271,6 @@ def conformal() -> dict[str, Any]:
         rows,
     )
     return out
-
-
-def lscm(mesh: Mesh) -> np.ndarray:
-    """Least-squares conformal map (Levy et al. 2002) of a triangulated mesh, (n, 2)."""
-    import igl
-
-    loop = mesh.boundary_loops[0]
-    p = mesh.vertices[loop]
-    far = int(np.linalg.norm(p - p[0], axis=1).argmax())
-    pins = np.array([[0.0, 0.0], [np.linalg.norm(p[far] - p[0]), 0.0]])
-    held = np.array([loop[0], loop[far]])
-    return igl.lscm(mesh.vertices.copy(), mesh.triangles.copy(), held, pins)[0]
 
 
 def _rated(mesh: Mesh, flat: np.ndarray) -> tuple[float, ...]:

@@ -27,25 +27,16 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 os.environ.setdefault("OMP_NUM_THREADS", "2")
 
 import numpy as np
+from report.published import NETS, TABLE_3
 from tqdm import tqdm
 
 from gso import dataset, net
 from gso.dataset.noise import LEVELS
-from gso.net import weights
+from gso.net import catalogue, weights
 from gso.net.config import from_dict
 from gso.net.curves import read
 from gso.net.validate import SCORE, figures
 
-#: Published figures (Wang et al. 2024, Tables 1 to 3), by net.
-PUBLISHED = {
-    "net-s": {"loss_gc": 0.0273, "K_A_r": 0.8776, "d_H": 0.608},
-    "net-c": {"loss_gc": 0.0417, "K_A_r": 0.8300, "d_H": 0.414},
-    "net-cf": {"loss_gc": 0.0291, "K_A_r": 0.8768, "d_H": 0.517},
-    "developable": {"loss_gc": 0.0291, "K_A_r": 0.8768, "d_H": 0.517},
-    "flatten": {"loss_iso_cell": 2.94e-4},
-    "flatten-w": {"loss_iso_cell": 2.46e-4},
-}
-THETA = dict(zip(LEVELS, (0.633, 1.502, 2.505, 3.544), strict=True))
 OTHERS = (
     "hard",
     "enneper",
@@ -69,7 +60,7 @@ def watched(items: Any, text: str) -> Any:
 def measured(task: str, model: Any, split: Any, count: int | None = None) -> dict[str, float]:
     """Mean figures of a net over a split."""
     if task == "denoise":
-        card = {} if model is None else weights.read_card(weights.chain(model, task)[-1])
+        card = {} if model is None else catalogue.read_card(catalogue.chain(model, task)[-1])
         low, high = card.get("config", {}).get("sigma", (0.0, 1.0))
         levels = [s for s in LEVELS if low <= s <= high]
         found = {}
@@ -125,23 +116,23 @@ def rows(arguments: argparse.Namespace) -> None:
     if not names:
         print("no net comes with the package yet; give --model RUN/model.safetensors")
     for name in names:
-        first = weights.CHAINS.get(name, (name,))[0]
-        task = weights.read_card(weights.located(first))["model"]["task"]
+        first = catalogue.CHAINS.get(name, (name,))[0]
+        task = catalogue.read_card(catalogue.located(first))["model"]["task"]
         found = measured(task, name, data["test"], arguments.n)
         found["ms"] = milliseconds(task, name, data["test"]["surface"][0])
-        published = PUBLISHED.get(name, {})
+        published = NETS.get(name, {})
         if task == "denoise":
-            published = {f"theta_{s:g}": v for s, v in THETA.items()}
+            published = {f"theta_{s:g}": row["theta"] for s, row in TABLE_3.items()}
         print(line(Path(name).stem, found, published), flush=True)
         if arguments.others and task != "denoise":
             for other in OTHERS:
                 if other in data:
                     print(line(f"  {other}", measured(task, name, data[other], arguments.n), {}))
         if arguments.cards:
-            path = weights.located(weights.CHAINS.get(name, (name,))[-1])
-            key = "test" if name not in weights.CHAINS else f"test of {name}"
+            path = catalogue.located(catalogue.CHAINS.get(name, (name,))[-1])
+            key = "test" if name not in catalogue.CHAINS else f"test of {name}"
             count = min(len(data["test"]), arguments.n or len(data["test"]))
-            card = weights.read_card(path) | {key: found | {"surfaces": count}}
+            card = catalogue.read_card(path) | {key: found | {"surfaces": count}}
             weights.write_card(path.with_suffix(".json"), card)
 
 
@@ -154,7 +145,7 @@ def curve(runs: list[Path], target: str) -> None:
 
     figure, axes = pyplot.subplots(figsize=(7, 4.5), constrained_layout=True)
     for run in runs:
-        card = weights.read_card(run / "model.safetensors")
+        card = catalogue.read_card(run / "model.safetensors")
         name = SCORE[card["model"]["task"]]
         seen = [(r["seconds"] / 3600, r[name]) for r in read(run) if name in r]
         axes.plot(*np.array(seen).reshape(-1, 2).T, marker=".", label=f"{card['name']}: {name}")

@@ -29,6 +29,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from report.peers_flatten import arap
 from tqdm import tqdm
 
 import gso
@@ -149,28 +150,6 @@ def flat_figures(surface: Any, flat: np.ndarray) -> tuple[float, ...]:
         metrics.edge_length_error(surface, flat),
         metrics.flipped_cells(flat, faces),
     )
-
-
-def arap(mesh: gso.Mesh, iterations: int = 100) -> np.ndarray:
-    """libigl's as-rigid-as-possible parameterisation from its harmonic map, (n, 2)."""
-    import igl
-
-    v, f = np.asarray(mesh.vertices), np.ascontiguousarray(mesh.triangles)
-    rim = mesh.boundary_loops[0]
-    start = igl.harmonic(v, f, rim, igl.map_vertices_to_circle(v, rim), 1)
-    # Scaled to the surface's area, or the local steps start far from it.
-    e, g = (v[f[:, k]] - v[f[:, 0]] for k in (1, 2))
-    a, b = (start[f[:, k]] - start[f[:, 0]] for k in (1, 2))
-    area = np.linalg.norm(np.cross(e, g), axis=1).sum()
-    start = start * np.sqrt(area / np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
-    solver = igl.ARAPData()
-    solver.max_iter = iterations
-    # One vertex is held, so that the pattern cannot drift.
-    held = np.array([len(v) // 2], np.int32)
-    start = np.ascontiguousarray(start)
-    igl.arap_precomputation(v, f, 2, held, solver)
-    flat = igl.arap_solve(np.ascontiguousarray(start[held]), solver, start)
-    return np.asarray(flat)[:, :2]
 
 
 def flatten() -> dict[str, Any]:

@@ -1,21 +1,28 @@
 """Write the tables of README.rst: ``python docs/tables.py`` from the repository's root.
 
-They are made from the docstrings and values in the code. Each stands between the comments
-``.. begin NAME`` and ``.. end NAME``; what is between them is replaced.
+They are made from the docstrings and values in the code, and from the figures that
+``python bench/run_all.py --store`` measured. Each stands between the comments ``.. begin NAME`` and
+``.. end NAME``; what is between them is replaced.
 """
 
 from __future__ import annotations
 
 import inspect
+import json
 import re
 import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
+from statistics import median
+from typing import Any
 
 from gso import Options, metrics, tasks
 
-README = Path(__file__).resolve().parents[1] / "README.rst"
+ROOT = Path(__file__).resolve().parents[1]
+README = ROOT / "README.rst"
+#: What was measured; without it there are no tables of it.
+RESULTS = ROOT / "bench" / "data" / "results.json"
 
 
 def tables() -> dict[str, str]:
@@ -28,6 +35,8 @@ def tables() -> dict[str, str]:
         for formulation, options in getattr(module, "OPTIONS", {}).items():
             if options is not module.Options:
                 found[f"options-{task}-{formulation}"] = option_table(options, shared=shared)
+    if RESULTS.exists():
+        found |= measured(json.loads(RESULTS.read_text(encoding="utf-8")))
     return found
 
 
@@ -57,6 +66,100 @@ def option_table(options: type[Options], shared: Mapping[str, object]) -> str:
     if presets:
         parts.append("\n".join(wrapped("Presets: " + "; ".join(presets) + ".")))
     return "\n\n".join(parts)
+
+
+def measured(results: dict[str, Any]) -> dict[str, str]:
+    """Tables of a run of ``bench/run_all.py``, and where it loses, as a list."""
+    sections = results["sections"]
+    found = {
+        f"measured-{name}": quality_table(section)
+        for name, section in sections.items()
+        if not name.startswith("denoise")
+    }
+    levels = {k: v for k, v in sections.items() if k.startswith("denoise")}
+    found["measured-denoise"] = denoise_table(levels)
+    found["measured-size"] = size_table(results["timing"])
+    found["measured-losses"] = "\n".join(
+        line
+        for loss in results["losses"]
+        if loss["lost"]
+        for line in wrapped(f"{loss['section']}, {loss['text']}", "- ", "  ")
+    )
+    about, surfaces = results["machine"], results["surfaces"]
+    found["measured-machine"] = "\n".join(
+        wrapped(
+            f"{surfaces['name']}; mean loss_gc {surfaces['loss_gc']:.3f}. {about['processor']}, "
+            f"Python {about['python']}, one thread. Printed by ``{results['command']}``."
+        )
+    )
+    return found
+
+
+def quality_table(section: dict[str, Any]) -> str:
+    """Quality and time of the methods of a section; those without figures are left out."""
+    head = ("Method", *section["headings"], "Time", "Surfaces")
+    rows = [
+        (
+            row_name(row),
+            *(number(row["figures"].get(column)) for column in section["columns"]),
+            duration(row["seconds"].get("median")),
+            f"{row['count']:,}" if row["count"] else "",
+        )
+        for row in section["rows"]
+        if not row["absent"]
+    ]
+    return list_table(head, rows, (24, *[10] * (len(head) - 1)))
+
+
+def denoise_table(levels: dict[str, dict[str, Any]]) -> str:
+    """Angle of the normals at every level of the noise, and the time at the first."""
+    angles: dict[str, list[str]] = {}
+    times: dict[str, tuple[str, str]] = {}
+    for section in levels.values():
+        for row in section["rows"]:
+            if not row["absent"]:
+                angles.setdefault(row_name(row), []).append(number(row["figures"]["theta"]))
+                count = f"{row['count']:,}" if row["count"] else ""
+                times.setdefault(row_name(row), (duration(row["seconds"].get("median")), count))
+    whole = {name: found for name, found in angles.items() if len(found) == len(levels)}
+    head = ("Method", *(f"σ {name.split('-')[1]}" for name in levels), "Time", "Surfaces")
+    rows = [(name, *found, *times[name]) for name, found in whole.items()]
+    return list_table(head, rows, (28, *[12] * (len(head) - 1)))
+
+
+def size_table(timing: list[dict[str, Any]]) -> str:
+    """Median time, iterations, memory, and the limit, by task, method and size."""
+    rows = [
+        (
+            f"{t['task']}, {t['method']}",
+            f"{t['size']} x {t['size']}",
+            duration(median(t["seconds"])),
+            str(t["iterations"] or ""),
+            f"{t['peak_mb']:.0f}",
+            duration(t["limit"]),
+        )
+        for t in timing
+        if not t["absent"]
+    ]
+    head = ("Solve", "Grid", "Time", "Iterations", "Peak MB", "Factorisations alone")
+    return list_table(head, rows, (28, 14, 14, 14, 14, 16))
+
+
+def row_name(row: dict[str, Any]) -> str:
+    """Name of a row; published ones say so."""
+    return f"*{row['name']}, published*" if row["source"] == "paper" else row["name"]
+
+
+def number(value: float | None) -> str:
+    """Return a number with three digits."""
+    return "" if value is None else f"{value:.3g}"
+
+
+def duration(seconds: float | None) -> str:
+    """A time in milliseconds or seconds."""
+    if seconds is None:
+        return ""
+    return f"{1e3 * seconds:.2g} ms" if seconds < 0.0995 else f"{seconds:.2g} s"
 
 
 def descriptions(options: type) -> dict[str, str]:

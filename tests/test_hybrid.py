@@ -13,8 +13,11 @@ from gso.hybrid import prediction, solving
 from gso.hybrid.patch import as_patch
 from gso.mesh import Mesh
 from gso.status import MeshError, OptionError, WeightsError
+from gso.tasks.joint import Options as JointOptions
 from gso.tno import Start, optimize
-from tests.conftest import cylinder, saddle, sphere_cap
+from gso.tno.run import Run
+from gso.topology import reverse
+from tests.conftest import cylinder, saddle, shuffled, sphere_cap
 
 try:
     import torch
@@ -67,6 +70,44 @@ def test_a_guarded_start_that_is_better_is_used(surfaces):
     assert energy(result) <= energy(good) * (1 + 1e-9)
 
 
+def test_a_search_is_the_same_once_its_start_is_dropped():
+    design = saddle(9)
+    start = Start(2.0 * design, source="guess", guarded=True)
+    for keywords in ({"target_curvature": 0.2}, {"max_deviation": 0.05}):
+        cold, result = optimize(design, **keywords), optimize(design, x0=start, **keywords)
+        assert same(cold, result)
+        assert (result.warm_start, result.iterations) == ("cold", cold.iterations)
+
+
+def test_a_search_may_begin_at_its_own_results(monkeypatch):
+    design = saddle(9)
+    judged = []
+    worse = Run._worse
+
+    def counted(plan):
+        judged.append(plan)
+        return worse(plan)
+
+    monkeypatch.setattr(Run, "_worse", staticmethod(counted))
+    near = Start(optimize(design).mesh, source="guess", guarded=True)
+    assert optimize(design, x0=near, target_curvature=0.2).warm_start == "guess"
+    assert len(judged) == 1
+
+
+def test_a_spline_is_compared_before_it_is_fitted(surfaces):
+    design = surfaces[0][::2, ::2]
+    options = JointOptions(variables="surface", controls=6, iterations=1)
+    good = Start(optimize(design).mesh, source="guess", guarded=True)
+    result = optimize(design, formulation="isometry", options=options, x0=good)
+    assert result.warm_start == "guess"
+
+
+@pytest.mark.parametrize("most", [-1, 1.5, True, "few"])
+def test_iterations_of_a_start_are_a_number(most):
+    with pytest.raises(OptionError, match="iterations is"):
+        Start(None, iterations=most)
+
+
 @pytest.mark.parametrize("most", [0, 1, 3])
 @pytest.mark.parametrize(
     "keywords",
@@ -92,6 +133,28 @@ def test_a_flat_start_that_turns_over_is_dropped():
     result = optimize(design, task="flatten", x0=Start(turned, guarded=True))
     assert same(cold, result)
     assert "turns" in result.notes[-1]
+
+
+@pytest.mark.parametrize(
+    "keywords",
+    [
+        {},
+        {"formulation": "isometry"},
+        {"task": "flatten"},
+        {"task": "flatten", "formulation": "lengths"},
+        {"task": "flatten", "formulation": "isometry"},
+        {"max_deviation": 0.1},
+        {"constraints": [gso.Handle([0, 16, 272], saddle(17).reshape(-1, 3)[[0, 16, 272]] * 1.1)]},
+    ],
+    ids=lambda k: "-".join(map(str, k.values()))[:20] or "curvature",
+)
+def test_a_good_start_stays_good(keywords):
+    design = saddle(17)
+    cold = optimize(design, **keywords)
+    points = cold.flat if keywords.get("task") == "flatten" else cold.mesh
+    result = optimize(design, x0=Start(points, source="guess", guarded=True), **keywords)
+    assert result.warm_start == "guess"
+    assert energy(result) <= 1.02 * energy(cold)
 
 
 # ---------------------------------------------------------------- with a net
@@ -150,12 +213,84 @@ def coarse_net(monkeypatch):
     monkeypatch.setattr(solving, "predictions", predictions)
 
 
-@pytest.mark.parametrize("most", [1, 4])
+def predicts(monkeypatch, points):
+    """Let every net make the same of every design."""
+    found = prediction.Prediction(points, 0.01, "odd")
+    monkeypatch.setattr(solving, "predictions", lambda designs, task, net: [found] * len(designs))
+
+
+@pytest.mark.parametrize("polish", [True, False])
+@pytest.mark.parametrize(
+    ("keywords", "points", "words"),
+    [
+        ({}, np.full((81, 3), np.nan), "not finite"),
+        ({}, np.ones((81, 3)), "no area"),
+        ({"formulation": "isometry"}, np.eye(3)[np.arange(81) // 27], "area"),
+        ({"task": "flatten"}, np.zeros((81, 2)), "turns 256 corner triangles over"),
+        ({"task": "flatten"}, saddle(9).reshape(-1, 3)[:, 1::-1], "turns 256 corner"),
+    ],
+    ids=["nan", "point", "points", "flat point", "mirrored"],
+)
+def test_nonsense_is_dropped_polished_or_not(monkeypatch, keywords, points, words, polish):
+    cold = optimize(saddle(9), **keywords)
+    predicts(monkeypatch, points)
+    result = hybrid.solve(saddle(9), polish=polish, **keywords)
+    assert same(cold, result)
+    assert (result.warm_start, result.seconds["net"]) == ("cold", 0.01)
+    assert "solved without a net" in result.notes[-1] and words in result.notes[-1]
+
+
+@pytest.mark.parametrize("polish", [True, False])
+@pytest.mark.parametrize("general", [False, True], ids=["grid", "mesh"])
+def test_flat_images_lie_where_the_optimiser_puts_them(monkeypatch, general, polish):
+    mesh = ragged(17) if general else shuffled(Mesh.from_grid(saddle(17)))
+    cold = optimize(mesh, task="flatten")
+    turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    predicts(monkeypatch, (cold.flat - cold.flat.mean(axis=0)) @ turn)
+    result = hybrid.solve(mesh, task="flatten", polish=polish)
+    assert result.warm_start == "net"
+    assert np.allclose(result.flat.min(axis=0), 0.0, atol=1e-12)
+    assert np.abs(result.flat - cold.flat).max() < 0.1  # of 2
+    assert (result.mesh.vertices[:, :2] == result.flat).all()
+
+
+def test_errors_of_the_design_are_its_own(coarse_net):
+    with pytest.raises(MeshError, match="no interior vertex"):
+        hybrid.solve(([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), net="none")
+
+
+@pytest.mark.parametrize("polish", [False, 0, 3])
+def test_a_target_needs_more_than_one_solve(coarse_net, polish):
+    with pytest.raises(OptionError, match="target_curvature takes many solves"):
+        hybrid.solve(saddle(9), polish=polish, target_curvature=0.1)
+
+
+def test_a_bound_holds_for_the_net_alone(surfaces, coarse_net):
+    result = hybrid.solve(surfaces[0], polish=False, max_deviation=0.01)
+    moved = np.linalg.norm(result.grid - surfaces[0], axis=-1)
+    assert (result.warm_start, result.iterations) == ("net", 0)
+    assert 0 < moved.max() <= 0.01
+
+
+def test_polish_as_numpy_has_it(coarse_net):
+    for given, plain in ((np.True_, True), (np.False_, False), (np.int64(2), 2)):
+        here, there = (hybrid.solve(saddle(13), polish=p) for p in (given, plain))
+        assert same(here, there)
+
+
+def test_constraints_may_be_an_iterator(surfaces, coarse_net):
+    plain, given = [gso.FixedBoundary()], iter([gso.FixedBoundary()])
+    results = [hybrid.solve(saddle(13), polish=1, constraints=c) for c in (plain, given)]
+    assert same(*results)
+
+
+@pytest.mark.parametrize("most", [0, 1, 4])
 @pytest.mark.parametrize("net", ["fair", "none"])
 def test_polish_is_bounded(surfaces, coarse_net, most, net):
     result = hybrid.solve(surfaces[0], net=net, polish=most)
-    assert 1 <= result.iterations <= most
-    assert result.metrics["loss_gc"] < result.metrics["loss_gc_before"]
+    assert min(most, 1) <= result.iterations <= most
+    if most or net == "fair":
+        assert result.metrics["loss_gc"] < result.metrics["loss_gc_before"]
     assert result.warm_start == ("net" if net == "fair" else "cold")
 
 
@@ -240,6 +375,15 @@ def test_a_small_grid_is_the_optimisers():
     cold, result = optimize(saddle(5)), hybrid.solve(saddle(5), net=made(size=0.01))
     assert same(cold, result)
     assert "5 x 5" in result.notes[-1]
+    assert result.seconds["net"] > 0
+
+
+@needs_torch
+def test_a_small_mesh_is_the_optimisers():
+    mesh = ragged(7)
+    cold, result = optimize(mesh), hybrid.solve(mesh, net=made(size=0.01))
+    assert same(cold, result)
+    assert "49 vertices" in result.notes[-1]
 
 
 @needs_torch
@@ -294,6 +438,62 @@ def test_a_round_mesh_becomes_a_grid():
     patch = as_patch(mesh, 32)
     away = np.linalg.norm(patch.at_vertices(patch.grid) - mesh.vertices, axis=1)
     assert away.max() < 0.03
+
+
+@pytest.mark.parametrize(("unit", "place"), [(1e-80, 0.0), (1e80, 0.0), (1.0, 1e6)])
+def test_a_patch_is_the_same_in_any_unit_and_place(unit, place):
+    mesh = ragged(17, hole=2)
+    here = as_patch(mesh, 24)
+    there = as_patch(mesh.replaced(unit * mesh.vertices + place), 24)
+    assert np.allclose(there.parameters, here.parameters, atol=1e-6)
+    assert np.allclose((there.grid - place) / unit, here.grid, atol=1e-6)
+
+
+def test_a_slit_is_bridged():
+    """Two triangles of a planar grid lose their common edge."""
+    grid = Mesh.from_grid(saddle(17, strength=0.0))
+    middle = 8 * 17 + 8
+    triangles = grid.triangles.copy()
+    right = (triangles == middle).any(axis=1)
+    right &= grid.vertices[triangles].mean(axis=1)[:, 0] > 0
+    triangles[right] = np.where(triangles[right] == middle, 17 * 17, triangles[right])
+    mesh = Mesh(np.concatenate([grid.vertices, grid.vertices[[middle]]]), triangles)
+    patch = as_patch(mesh, 24)
+    assert np.allclose(patch.at_vertices(patch.grid), mesh.vertices, atol=0.1)
+
+
+@needs_torch
+@pytest.mark.parametrize("task", ["developable", "flatten"])
+def test_vertices_of_no_face_count_in_nothing(task):
+    mesh = ragged(13)
+    more = Mesh(np.concatenate([[[9.0, 9, 9]], mesh.vertices]), mesh.faces + 1)
+    net = made(task, size=0.002)
+    plain, result = (hybrid.solve(m, task=task, net=net, polish=False) for m in (mesh, more))
+    assert result.warm_start == "net"
+    if task == "developable":
+        assert (result.mesh.vertices[0] == 9.0).all()
+    assert np.allclose(result.mesh.vertices[1:], plain.mesh.vertices)
+
+
+@needs_torch
+@pytest.mark.parametrize("turn", [shuffled, lambda m: Mesh(m.vertices, reverse(m.faces))])
+def test_a_grid_may_be_numbered_and_oriented_at_will(turn):
+    mesh = turn(Mesh.from_grid(saddle(12, 17)))
+    net = made(size=0.01)
+    result = hybrid.solve(mesh, net=net, polish=False)
+    assert result.warm_start == "net"
+    assert np.allclose(result.grid, gso.net.predict(mesh.grid, model=net), atol=1e-9)
+    image = hybrid.solve(mesh, task="flatten", net=made("flatten", size=0.002), polish=False)
+    assert (image.warm_start, image.metrics["flipped_cells"]) == ("net", 0)
+
+
+@needs_torch
+def test_a_welded_pole_is_a_mesh_like_others():
+    fan = saddle(12)
+    fan[0] = fan[0].mean(axis=0)
+    result = hybrid.solve(fan, net=made(), polish=False)
+    assert result.warm_start == "net"
+    assert np.allclose(result.mesh.vertices, Mesh.from_grid(fan).vertices, atol=1e-9)
 
 
 def test_a_closed_mesh_is_no_patch():

@@ -33,15 +33,18 @@ class Patch:
     ----------
     grid : ndarray, (size, size, 3)
         Samples of a bicubic spline through the mesh, in its unit and place.
+    vertices : ndarray of int, (n,)
+        Vertices of the mesh that belong to a face.
     parameters : ndarray, (n, 2)
-        Where the vertices are on it, in [0, 1]^2.
+        Where they are on the grid, in [0, 1]^2.
     """
 
     grid: Array
+    vertices: Ints
     parameters: Array
 
     def at_vertices(self, values: Array) -> Array:
-        """Values (size, size, d) on the grid, at the mesh's own vertices (n, d)."""
+        """Values (size, size, d) on the grid, at those vertices (n, d)."""
         from scipy.interpolate import RectBivariateSpline
 
         sides = (np.linspace(0.0, 1.0, n) for n in values.shape[:2])
@@ -80,18 +83,28 @@ def as_patch(mesh: Mesh, size: int) -> Patch:
     >>> bool(np.allclose(patch.at_vertices(patch.grid), mesh.vertices))
     True
     """
-    loops = mesh.boundary_loops
-    if not loops or mesh.euler_characteristic != 2 - len(loops) or len(flat_start.parts(mesh)) > 1:
+    loops, parts = mesh.boundary_loops, flat_start.parts(mesh)
+    if not loops or mesh.euler_characteristic != 2 - len(loops) or len(parts) > 1:
         raise MeshError("it is not one piece with a boundary and without handles")
-    used = mesh.used
-    loop, at, sides = _boundary(mesh)
-    image = flat_start.spanned(_filled(mesh, loop), loop, at)[: len(used)]
+    piece = _unit(mesh, parts[0])
+    loop, at, sides = _boundary(piece)
+    image = flat_start.spanned(_filled(piece, loop), loop, at)[: len(piece.vertices)]
     parameters = (image / sides).clip(0.0, 1.0)
-    fitted, grid = _spline(mesh.vertices[used], parameters[used], size)
-    far = float(np.linalg.norm(fitted - mesh.vertices[used], axis=1).max())
-    if not far <= _FAR * mesh.frame.scale:
+    fitted, grid = _spline(piece.vertices, parameters, size)
+    far = float(np.linalg.norm(fitted - piece.vertices, axis=1).max())
+    if not far <= _FAR:
         raise MeshError("it is no surface that a grid of few vertices follows")
-    return Patch(grid, parameters)
+    return Patch(mesh.frame.to_user(grid), parts[0], parameters)
+
+
+def _unit(mesh: Mesh, ids: Ints) -> Mesh:
+    """The mesh in its unit ball, with those of its vertices that belong to a face."""
+    points = mesh.frame.to_unit(mesh.vertices)
+    if len(ids) == len(points):
+        return mesh.replaced(points)
+    new = np.zeros(len(points), np.int64)
+    new[ids] = np.arange(len(ids))
+    return Mesh(points[ids], np.where(mesh.faces < 0, -1, new[mesh.faces]))
 
 
 def _filled(mesh: Mesh, outer: Ints) -> Mesh:
@@ -105,7 +118,13 @@ def _filled(mesh: Mesh, outer: Ints) -> Mesh:
         middle = len(mesh.vertices) + len(points) - 1
         points.append(mesh.vertices[loop].mean(axis=0, keepdims=True))
         triangles.append(np.stack([edge, np.roll(edge, -1), np.full(len(edge), middle)], axis=1))
-    return Mesh(np.concatenate(points), np.concatenate(triangles)) if len(points) > 1 else mesh
+    if len(points) == 1:
+        return mesh
+    try:
+        return Mesh(np.concatenate(points), np.concatenate(triangles))
+    except MeshError:
+        # A slit has no middle; maps go round it as it is.
+        return mesh
 
 
 def _boundary(mesh: Mesh) -> tuple[Ints, Array, Array]:

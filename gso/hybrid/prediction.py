@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gso.hybrid.patch import Patch, as_patch
 from gso.mesh import Mesh
 from gso.net.catalogue import DEFAULTS, available
-from gso.status import MeshError, OptionError, WeightsError
+from gso.status import MeshError
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 TASKS = ("developable", "flatten")
 #: Vertices along each side of the grid that a mesh is resampled to.
 _SIZE = 64
-#: Shortest side of a grid for which a net is asked.
+#: Shortest side of a grid for which a net is asked; other meshes have as many vertices.
 _SMALLEST = 8
 
 
@@ -35,7 +35,7 @@ class Prediction:
     points : ndarray or None
         Vertices (n, 3) or their flat image (n, 2), in the design's numbering, unit and place.
     seconds : float
-        What it took, of a batch each design's share.
+        What it took, points or none; of a batch each design's share.
     net : str
         Which net.
     refused : str
@@ -79,7 +79,7 @@ def predictions(designs: Sequence[Mesh], task: str, net: Any = None) -> list[Pre
             grid, patch = _seen(design)
             sizes.setdefault(grid.shape, []).append((k, grid, patch))
         except MeshError as error:
-            found[k] = Prediction(refused=str(error), net=name)
+            found[k] = Prediction(None, time.perf_counter() - clock, name, str(error))
         spent[k] = time.perf_counter() - clock
     for group in sizes.values():
         clock = time.perf_counter()
@@ -87,12 +87,10 @@ def predictions(designs: Sequence[Mesh], task: str, net: Any = None) -> list[Pre
         share = (time.perf_counter() - clock) / len(group)
         for (k, grid, patch), values in zip(group, moved, strict=True):
             clock = time.perf_counter()
-            if isinstance(values, str):
-                found[k] = Prediction(refused=values, net=name)
-                continue
-            points = _back(designs[k], grid, patch, values)
+            refused = values if isinstance(values, str) else ""
+            points = None if refused else _back(designs[k], grid, patch, values)
             seconds = spent[k] + share + time.perf_counter() - clock
-            found[k] = Prediction(points, seconds, name)
+            found[k] = Prediction(points, seconds, name, refused)
     return found
 
 
@@ -126,6 +124,9 @@ def _seen(design: Mesh) -> tuple[Array, Patch | None]:
             height, width = design.grid.shape[:2]
             raise MeshError(f"a grid {height} x {width} is solved faster than a net sees it")
         return design.grid, None
+    count = int(design.used.sum())
+    if count < _SMALLEST**2:
+        raise MeshError(f"a mesh of {count} vertices is solved faster than a net sees it")
     patch = as_patch(design, _SIZE)
     return patch.grid, patch
 
@@ -136,8 +137,6 @@ def _predicted(grids: Array, task: str, net: Any) -> Sequence[Any]:
 
     try:
         return list(predict(grids, task=task, model=net))
-    except (OptionError, WeightsError):
-        raise
     except MeshError as error:
         if len(grids) == 1:
             return [str(error)]
@@ -145,13 +144,13 @@ def _predicted(grids: Array, task: str, net: Any) -> Sequence[Any]:
 
 
 def _back(design: Mesh, grid: Array, patch: Patch | None, values: Array) -> Array:
-    """A net's result at the vertices of the design."""
-    if patch is not None and values.shape[-1] == 3:
-        return design.vertices + patch.at_vertices(values - grid)
-    if patch is not None:
-        return patch.at_vertices(values)
-    points = np.zeros((len(design.vertices), values.shape[-1]))
-    if values.shape[-1] == 3:
-        points = design.vertices.copy()
-    points[design.grid_index] = values
+    """A net's result at the vertices of the design; those of no face stay, or are at the origin."""
+    surface = values.shape[-1] == 3
+    points = design.vertices.copy() if surface else np.zeros((len(design.vertices), 2))
+    if patch is None:
+        points[design.grid_index] = values
+    elif surface:
+        points[patch.vertices] += patch.at_vertices(values - grid)
+    else:
+        points[patch.vertices] = patch.at_vertices(values)
     return points

@@ -11,14 +11,20 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gso import flat_start
+from gso.constraints import listed
 from gso.hybrid.prediction import Prediction, predictions
 from gso.mesh import Mesh
 from gso.result import Result
-from gso.status import GSOError, OptionError
+from gso.status import GSOError, MeshError, OptionError
 from gso.tno import Start, check, optimize
 from gso.tno.batch import Item
+from gso.tno.canonical import Canonical
 from gso.tno.pool import spread
+
+Array = NDArray[np.float64]
 
 #: Surfaces that go through a net together.
 _BATCH = 64
@@ -35,10 +41,10 @@ def solve(
     """Let a net make a start, and the optimiser finish it.
 
     The start is dropped, and the solve is that of :func:`gso.tno.optimize`, where there is
-    no net (none for the task, PyTorch is not installed), where the design is no grid and
-    cannot be resampled to one, and where the net's result turns cells over, is not finite,
-    or has more of the energy than the start without it. The result's `notes` then say so,
-    and its `warm_start` is "cold".
+    no net (none for the task, PyTorch is not installed), where the design is small, or is no
+    grid and cannot be resampled to one, and where the net's result turns cells of a flat
+    image over, is not finite, or has more of the energy than the start without it. The
+    result's `notes` then say so, and its `warm_start` is "cold".
 
     Parameters
     ----------
@@ -51,7 +57,9 @@ def solve(
         As `model` of :func:`gso.net.predict`; the task's default when not given.
     polish : bool or int
         True: solve from there. A number: at most so many iterations, also without a net.
-        False: the net's result as it is, measured.
+        False: the net's result as it is, whatever its energy, measured; hard constraints
+        and `max_deviation` are kept. With `target_curvature`, which takes many solves, only
+        True.
     **keywords
         Passed to :func:`gso.tno.optimize`: `formulation`, `options`, `constraints`,
         `max_deviation`, `target_curvature`, `callback`.
@@ -82,7 +90,7 @@ def solve(
     from gso.io import as_mesh
 
     clock = time.perf_counter()
-    _checked(task, polish, keywords)
+    polish = _checked(task, polish, keywords)
     design = as_mesh(mesh)
     (prediction,) = predictions([design], task, net)
     result = _finished(design, prediction, task, polish, keywords)
@@ -123,9 +131,7 @@ def solve_many(
     [0]
     """
     keywords.pop("callback", None)
-    if isinstance(keywords.get("constraints"), Iterator):
-        keywords["constraints"] = list(keywords["constraints"])
-    _checked(task, polish, keywords)
+    polish = _checked(task, polish, keywords)
     work = partial(_one, task, polish, keywords)
     with closing(spread(work, _started(meshes, task, net), workers=workers)) as results:
         for done in results:
@@ -134,11 +140,10 @@ def solve_many(
 
 @dataclass(frozen=True)
 class _Started:
-    """A design with its prediction, or why it is none."""
+    """A design, or why it is none, with its prediction."""
 
-    design: Mesh | None
+    design: Mesh | GSOError
     prediction: Prediction
-    error: GSOError | None = None
 
 
 def _started(meshes: Iterable[Any], task: str, net: Any) -> Iterator[_Started]:
@@ -146,13 +151,9 @@ def _started(meshes: Iterable[Any], task: str, net: Any) -> Iterator[_Started]:
     source = iter(meshes)
     while block := list(islice(source, _BATCH)):
         read = [_read(mesh) for mesh in block]
-        designs = [design for design in read if isinstance(design, Mesh)]
-        found = iter(predictions(designs, task, net))
+        found = iter(predictions([d for d in read if isinstance(d, Mesh)], task, net))
         for design in read:
-            if isinstance(design, Mesh):
-                yield _Started(design, next(found))
-            else:
-                yield _Started(None, Prediction(), design)
+            yield _Started(design, next(found) if isinstance(design, Mesh) else Prediction())
 
 
 def _read(mesh: Any) -> Mesh | GSOError:
@@ -165,20 +166,28 @@ def _read(mesh: Any) -> Mesh | GSOError:
 
 
 def _one(task: str, polish: bool | int, keywords: dict[str, Any], started: _Started) -> Result:
-    if started.error is not None or started.design is None:
-        raise started.error or OptionError("there is no design")
+    if isinstance(started.design, GSOError):
+        raise started.design
     result = _finished(started.design, started.prediction, task, polish, keywords)
     result.metrics  # noqa: B018 - computed here, where there is a processor for it
     return result
 
 
-def _checked(task: str, polish: Any, keywords: dict[str, Any]) -> None:
+def _checked(task: str, polish: Any, keywords: dict[str, Any]) -> bool | int:
+    """Check what needs no mesh; the polish as what it is, the constraints as a list."""
     if not isinstance(polish, bool | np.bool_ | int | np.integer) or polish < 0:
         raise OptionError(f"polish is {polish!r}; take True, False, or a number of iterations")
     if "x0" in keywords:
         raise OptionError("the net makes the start; for one of your own call gso.tno.optimize")
     names = ("formulation", "options", "max_deviation", "target_curvature")
     check(task, **{name: keywords[name] for name in names if name in keywords})
+    polish = bool(polish) if isinstance(polish, bool | np.bool_) else int(polish)
+    if polish is not True and keywords.get("target_curvature") is not None:
+        raise OptionError(
+            f"polish is {polish!r}, but target_curvature takes many solves; leave one of them out"
+        )
+    keywords["constraints"] = listed(keywords.get("constraints", ()))
+    return polish
 
 
 def _finished(
@@ -189,17 +198,57 @@ def _finished(
     keywords: dict[str, Any],
 ) -> Result:
     """Solve from a prediction, if there is a sound one."""
-    points, refused = prediction.points, prediction.refused
-    if points is not None and not np.isfinite(points).all():
-        points, refused = None, "its result is not finite"
-    most = None if polish is True or (points is None and not polish) else int(polish)
-    # A result that is not polished is what was asked for, whatever it is like.
-    start = Start(points, source="net", guarded=polish is not False, iterations=most)
-    result = optimize(design, task=task, x0=start, **keywords)
-    if points is None:
+    try:
+        refused = _unsound(design, prediction)
+        result = None if refused else _polished(design, prediction.points, task, polish, keywords)
+    except MeshError as error:
+        # A start may have no area. What is wrong with the design comes again.
+        refused, result = str(error), None
+    if result is None:
+        most = None if isinstance(polish, bool) else polish
+        result = optimize(design, task=task, x0=Start(None, iterations=most), **keywords)
         result.notes += (f"solved without a net: {refused}",)
     result.seconds["net"] = prediction.seconds
     result.seconds["total"] += prediction.seconds
     if prediction.net:
         result.details = {**result.details, "net": prediction.net}
     return result
+
+
+def _unsound(design: Mesh, prediction: Prediction) -> str:
+    """Why nothing can start from a prediction."""
+    points = prediction.points
+    if points is None:
+        return prediction.refused
+    if not np.isfinite(points).all():
+        return "its result is not finite"
+    turned = flat_start.flips(design, points) if points.shape[1] == 2 else 0
+    return f"its result turns {turned} corner triangles over" if turned else ""
+
+
+def _polished(
+    design: Mesh,
+    points: Array | None,
+    task: str,
+    polish: bool | int,
+    keywords: dict[str, Any],
+) -> Result:
+    """Solve from a net's result."""
+    # One that is not polished is what was asked for, whatever it is like.
+    start = Start(
+        points,
+        source="net",
+        guarded=polish is not False,
+        iterations=None if polish is True else int(polish),
+    )
+    result = optimize(design, task=task, x0=start, **keywords)
+    if task == "flatten" and result.warm_start == "net" and not keywords["constraints"]:
+        _place(result)
+    return result
+
+
+def _place(result: Result) -> None:
+    """Put a flat image, which is where the net's was, where the optimiser puts its own."""
+    frame, flat = Canonical(result.design), np.asarray(result.flat)
+    result.flat = frame.back("flat", flat_start.place(frame.mesh, flat[frame.order]))
+    result.mesh = result.mesh.replaced(np.pad(result.flat, ((0, 0), (0, 1))))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.status import Progress, Status
-from gso.tasks.base import Options, Plan, Request, Stage
+from gso.tasks.base import Options, Plan, Request, Stage, same
 from gso.tno.problem import Problem
 from gso.tno.solver import Callback, Solution, Timings, minimise
 from gso.tno.tighten import tighten
@@ -69,9 +69,12 @@ class Run:
     Attributes
     ----------
     guarded : bool
-        Starts that are worse than none are dropped; `refused` then says why.
+        The start of the first request is dropped, there and from then on, where it is worse
+        than none.
     budget : int or None
         Most iterations of all its solves together.
+    refused : str
+        Why that start was not used.
     """
 
     def __init__(
@@ -87,6 +90,8 @@ class Run:
         self.guarded = guarded
         self.budget = budget
         self.refused = ""
+        self._judged = False
+        self._dropped: Array | None = None
         self.history: list[Progress] = []
         self.timings = Timings()
         self.iterations = 0
@@ -121,13 +126,23 @@ class Run:
 
     def _plan(self, request: Request) -> Plan:
         """The task's plan, from the start that was given unless there is a better one."""
+        if request.start is not None and request.start is self._dropped:
+            request = replace(request, start=None)
         plan: Plan = self.module.plan(request)
-        if not self.guarded or request.start is None:
+        # Later on, searches bring starts of their own.
+        first, self._judged = not self._judged, True
+        if not first or request.start is None:
             return plan
-        refused = plan.refused or self._worse(plan)
-        if not refused:
+        self.refused = plan.refused
+        if self.guarded and not self.refused:
+            self.refused = self._worse(plan)
+            if not self.refused and request.max_deviation is not None:
+                # The same search solves without a bound, too.
+                free = self.module.plan(replace(request, max_deviation=None))
+                self.refused = self._worse(free)
+        if not (self.guarded and self.refused):
             return plan
-        self.refused = refused
+        self._dropped = request.start
         return self.module.plan(replace(request, start=None))
 
     @staticmethod
@@ -135,9 +150,13 @@ class Run:
         """Why to begin without the start: it has more of the energy."""
         if plan.unstarted is None or not plan.stages:
             return ""
-        problem = objective(plan.stages[-1])
+        # A spline is fitted to what the stage before its own ends with.
+        stages = plan.stages if plan.spline is None else plan.stages[:-1]
+        # What that costs is paid once, for the comparison and for the solve.
+        plan.start, stages[0].enter = stages[0].enter(plan.start), same
+        problem = objective(stages[-1])
         energies = []
-        for coordinates in (plan.entered(), plan.unstarted()):
+        for coordinates in (replace(plan, stages=stages).entered(), plan.unstarted()):
             problem.refresh(coordinates)
             energies.append(problem.energy(coordinates))
         warm, cold = energies

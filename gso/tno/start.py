@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from gso.status import OptionError
+
 
 @dataclass(frozen=True)
 class Start:
@@ -17,13 +21,38 @@ class Start:
     source : str
         Where it is from, for the result's `warm_start`.
     guarded : bool
-        It is dropped where its energy is above that of the start without it, where it turns
-        cells over, or where it is not finite; the result is then the same as without it.
+        "developable", "flatten": it is dropped where its energy is above that of the start
+        without it, or where it turns cells of a flat image over; the result is then the
+        same as without it.
     iterations : int, optional
         Most iterations, over all stages.
+
+    Raises
+    ------
+    OptionError
+        `iterations` is no number of iterations.
+
+    Examples
+    --------
+    >>> import gso
+    >>> u, v = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9), indexing="ij")
+    >>> saddle = np.stack([u, v, 0.3 * u * v], axis=-1)
+    >>> guess = Start(2 * saddle, source="guess", guarded=True, iterations=5)
+    >>> result = gso.tno.optimize(saddle, x0=guess)
+    >>> result.warm_start, result.iterations <= 5
+    ('cold', True)
     """
 
     points: Any
     source: str = "x0"
     guarded: bool = False
     iterations: int | None = None
+
+    def __post_init__(self) -> None:
+        most = self.iterations
+        if most is None:
+            return
+        if isinstance(most, bool) or not isinstance(most, int | np.integer) or most < 0:
+            raise OptionError(
+                f"iterations is {most!r}; take a whole number from 0 up, or None for no limit"
+            )

@@ -1,0 +1,79 @@
+"""Results that are drawn: some surfaces of different curvature, by several methods."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from gso.metrics import loss_gc
+from gso.status import ConvergenceWarning
+from gso.tno.linear import blas_threads
+from report.method import TASKS, Array, Method, level_name
+from report.methods import of
+from report.quality import levels
+from report.settings import Settings
+from report.store import Store
+from report.surfaces import Case, Surfaces
+
+#: Methods that are drawn, by task; those that cannot run are left out.
+DRAWN = {
+    "developable": ("TNO jiang2020", "TNO balanced", "Net-S", "Net-C", "Net-CF", "Net", "hybrid"),
+    "flatten": ("Init", "TNO lengths", "TNO strain", "Net", "Net-W", "Net strain", "libigl ARAP"),
+    "denoise": ("TNO", "Net sigma"),
+}
+#: Surfaces among which the examples are looked for.
+_AMONG = 64
+
+
+@dataclass
+class Example:
+    """A surface, what was given of it, and the results by method."""
+
+    case: Case
+    number: int
+    results: dict[str, Array] = field(default_factory=dict)
+
+
+def chosen(settings: Settings, surfaces: Surfaces) -> list[int]:
+    """Surfaces whose mean curvature is nearest to what is asked for."""
+    among = min(_AMONG, len(surfaces))
+    curved = np.array([loss_gc(surfaces[k], scale=1.0) for k in range(among)])
+    return [int(np.abs(curved - wanted).argmin()) for wanted in settings.examples]
+
+
+def solved(
+    settings: Settings, surfaces: Surfaces, kept: Store, tick: Callable[..., None]
+) -> dict[tuple[str, float], list[Example]]:
+    """Examples by task and level of the noise."""
+    found: dict[tuple[str, float], list[Example]] = {}
+    numbers = chosen(settings, surfaces)
+    with warnings.catch_warnings(), blas_threads(1):
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        for task in TASKS:
+            for sigma in levels(task):
+                # A row of the figure of denoising is a surface at every level.
+                some = numbers[:1] if task == "denoise" else numbers
+                found[task, sigma] = [_example(surfaces, k, task, sigma, kept) for k in some]
+            tick(task)
+    return found
+
+
+def _example(surfaces: Surfaces, k: int, task: str, sigma: float, kept: Store) -> Example:
+    example = Example(surfaces.case(k, sigma), k)
+    for name in DRAWN[task]:
+        method = of(task, name)
+        if method.absent(sigma):
+            continue
+        place = f"examples/{task}-{name}-{level_name(sigma)}".replace(" ", "-")
+        key = method.key(sigma) | {"surfaces": surfaces.key, "number": k}
+        arrays = kept.arrays(place, key, partial(_points, method, example.case))
+        example.results[name] = arrays["points"]
+    return example
+
+
+def _points(method: Method, case: Case) -> dict[str, Array]:
+    return {"points": method(case).points}

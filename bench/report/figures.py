@@ -1,0 +1,270 @@
+"""The figures: those of the paper, and time against size."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import geometry, metrics
+from gso.dataset.screen import CURVATURE
+from gso.mesh import Mesh
+from gso.plot.draw import GRAZING, Panel, draw
+from gso.plot.heat import Heat, Scale, curvatures, distance, strain
+from gso.plot.view import View
+from report.examples import Example
+from report.method import TASKS
+from report.methods import of
+from report.published import CHOSEN
+from report.quality import Records
+from report.surfaces import BENCH
+from report.timing import METHODS, PHASES, Timing, exponent
+
+Array = NDArray[np.float64]
+
+#: The runs of figure 5, and the command that makes them.
+GRID = BENCH / "data" / "architecture_grid.json"
+GRID_COMMAND = "python bench/net.py DIR --grid bench/data/architecture_grid.json"
+#: Methods of figure 6.
+CURVES = ("TNO jiang2020", "TNO balanced", "Net-S", "Net-C", "Net-CF", "Net", "hybrid")
+#: Percentile at which scales that several panels share end.
+_TOP = 99.0
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture and the text below it; without a picture, why there is none."""
+
+    number: str
+    caption: str
+    path: Path | None = None
+
+
+def intervals(records: Records, metric: str, name: str) -> list[dict[str, float]]:
+    """Means of a metric of a developable method over intervals of the input's curvature."""
+    good = [r["figures"] for r in records["developable", 0.0, name] if "error" not in r]
+    curved = np.array([f["loss_gc_before"] for f in good])
+    values = np.array([f[metric] for f in good])
+    place = np.clip(np.searchsorted(CURVATURE, curved) - 1, 0, len(CURVATURE) - 2)
+    return [
+        {"from": a, "to": b, "mean": float(values[place == k].mean()), "count": int(n)}
+        for k, (a, b) in enumerate(pairwise(CURVATURE))
+        if (n := (place == k).sum())
+    ]
+
+
+def figure_5(folder: Path) -> Figure:
+    """Loss against parameters of nets of several sizes, from the stored runs."""
+    text = "Figure 5: loss of nets supervised on the optimiser's results, against their size"
+    if not GRID.exists():
+        return Figure("5", f"{text}. Not run yet: {GRID_COMMAND}")
+    rows = json.loads(GRID.read_text())["rows"]
+    canvas, axes = _canvas(1)
+    for channels in sorted({r["channels"] for r in rows}):
+        some = sorted((r for r in rows if r["channels"] == channels), key=lambda r: r["blocks"])
+        millions = [r["parameters"] / 1e6 for r in some]
+        axes[0].plot(millions, [r["loss"] for r in some], "o-", label=f"{channels}X channels")
+        for r, m in zip(some, millions, strict=True):
+            axes[0].annotate(f"NB={r['blocks']}", (m, r["loss"]), fontsize=7)
+    axes[0].axvline(CHOSEN["parameters"] / 1e6, color="0.7", linewidth=0.8)
+    axes[0].set(xlabel="million parameters", ylabel="loss", xscale="log", yscale="log")
+    axes[0].legend(fontsize=8)
+    return _written(canvas, folder / "figure-5.png", "5", f"{text}; the line: the paper's choice")
+
+
+def figure_6(folder: Path, records: Records) -> Figure:
+    """Curvature removed and distance, against intervals of the input's curvature."""
+    canvas, axes = _canvas(2)
+    for name in (n for n in CURVES if not of("developable", n).absent()):
+        for ax, metric in zip(axes, ("K_A_r", "d_H"), strict=True):
+            found = intervals(records, metric, name)
+            middle = [(f["from"] + f["to"]) / 2 for f in found]
+            ax.plot(middle, [f["mean"] for f in found], "o-", markersize=3, label=name)
+    axes[0].set(xlabel="mean |K| of the input", ylabel="K_A-r, higher is better")
+    axes[1].set(xlabel="mean |K| of the input", ylabel="d_H %, lower is better")
+    axes[0].legend(fontsize=8)
+    text = "Figure 6: share of curvature removed, and distance, by the curvature of the input"
+    return _written(canvas, folder / "figure-6.png", "6", text)
+
+
+def figure_7(folder: Path, examples: Iterable[Example]) -> list[Figure]:
+    """Developable surfaces: curvature before and after, and distance."""
+    found = []
+    for k, example in enumerate(examples):
+        design = Mesh.from_grid(example.case.surface, weld=False)
+        meshes = [_mesh(design, points) for points in example.results.values()]
+        view = View.of(design)
+        panels = [Panel(view.project(m.vertices), m.faces) for m in (design, *meshes)]
+        size = metrics.unit(design)
+        for panel, heat, mesh in zip(
+            panels, curvatures([design, *meshes]), (design, *meshes), strict=True
+        ):
+            panel.heat, panel.title = heat, f"|K| {metrics.loss_gc(mesh, scale=size):.3f}"
+        for panel, name in zip(panels, ("input", *example.results), strict=True):
+            panel.title = f"{name}: {panel.title}"
+        caption = f"Figure 7: surface {example.number}, Gaussian curvature before and after"
+        found.append(_drawn(panels, folder / f"figure-7-{k}-curvature.png", "7", caption))
+        heats = _shared([distance(design, m) for m in meshes])
+        panels = [
+            Panel(view.project(m.vertices), m.faces, f"{name}: {heat.summary}", heat)
+            for name, m, heat in zip(example.results, meshes, heats, strict=True)
+        ]
+        caption = f"Figure 7: surface {example.number}, distance to the input"
+        found.append(_drawn(panels, folder / f"figure-7-{k}-distance.png", "7", caption))
+    return found
+
+
+def figure_8(folder: Path, examples: Iterable[Example]) -> list[Figure]:
+    """Flat images: the published defect and the strain of every cell."""
+    found = []
+    for k, example in enumerate(examples):
+        design = Mesh.from_grid(example.case.surface, weld=False)
+        flat = {name: p.reshape(-1, 2) for name, p in example.results.items()}
+        kinds: dict[str, Callable[[Array], Heat]] = {
+            "isometry": partial(_defect, design),
+            "strain": partial(strain, design),
+        }
+        for kind, heat_of in kinds.items():
+            heats = _shared([heat_of(image) for image in flat.values()])
+            panels = [
+                Panel(
+                    _laid(design, image),
+                    design.faces,
+                    f"{name}: {heat.summary}",
+                    heat,
+                    shaded=False,
+                )
+                for (name, image), heat in zip(flat.items(), heats, strict=True)
+            ]
+            caption = f"Figure 8: surface {example.number}, {kind} of the cells"
+            found.append(_drawn(panels, folder / f"figure-8-{k}-{kind}.png", "8", caption))
+    return found
+
+
+def figure_9(folder: Path, examples: dict[float, list[Example]]) -> list[Figure]:
+    """Denoised surfaces at every level: the angle of each cell's normal to the clean one's."""
+    found = []
+    for sigma, some in examples.items():
+        for example in some:
+            clean = Mesh.from_grid(example.case.surface, weld=False)
+            view = View.of(clean)
+            noisy = _mesh(clean, example.case.given)
+            panel = Panel(view.project(noisy.vertices), noisy.faces, f"sigma {sigma:.3f}")
+            panel.light = GRAZING
+            meshes = [_mesh(clean, points) for points in example.results.values()]
+            heats = _shared([_angles(clean, m) for m in meshes])
+            panels = [panel] + [
+                Panel(view.project(m.vertices), m.faces, f"{name}: {heat.summary}", heat)
+                for name, m, heat in zip(example.results, meshes, heats, strict=True)
+            ]
+            caption = f"Figure 9: surface {example.number} with noise {sigma:.3f}, and denoised"
+            path = folder / f"figure-9-{sigma:.3f}.png"
+            found.append(_drawn(panels, path, "9", caption))
+    return found
+
+
+def time_against_size(folder: Path, timings: Sequence[Timing]) -> Figure:
+    """Seconds against vertices by task, with exponents and the physical limit."""
+    canvas, axes = _canvas(len(TASKS))
+    for ax, task in zip(axes, TASKS, strict=True):
+        for name in METHODS:
+            some = [t for t in timings if (t.task, t.method) == (task, name) and t.seconds]
+            if not some:
+                continue
+            vertices = [t.size**2 for t in some]
+            power = exponent(some)
+            label = name if power is None else f"{name}, n^{power:.2f}"
+            (line,) = ax.plot(vertices, [t.median for t in some], "o-", markersize=3, label=label)
+            limits = [(n, t.limit) for n, t in zip(vertices, some, strict=True) if t.limit]
+            if limits:
+                ax.plot(*zip(*limits, strict=True), ":", color=line.get_color())
+        sizes = sorted({t.size for t in timings})
+        ax.set(xscale="log", yscale="log", xlabel="vertices", ylabel="seconds", title=task)
+        ax.set_xticks([n**2 for n in sizes], [f"{n}²" for n in sizes])
+        ax.minorticks_off()
+        ax.legend(fontsize=8)
+    text = "Time against size; dotted: one numeric factorisation per iteration, nothing else"
+    return _written(canvas, folder / "time.png", "Time", text)
+
+
+def shares(folder: Path, timings: Sequence[Timing]) -> Figure:
+    """Where the time goes, by size."""
+    some = [t for t in timings if t.shares and t.method != "Net"]
+    canvas, axes = _canvas(1, width=max(7.0, 0.45 * len(some)))
+    base = np.zeros(len(some))
+    for phase in PHASES:
+        part = np.array([100.0 * t.shares.get(phase, 0.0) for t in some])
+        if part.any():
+            axes[0].bar(range(len(some)), part, bottom=base, label=phase)
+        base += part
+    labels = [f"{t.task} {t.method} {t.size}" for t in some]
+    axes[0].set_xticks(range(len(some)), labels, rotation=90, fontsize=7)
+    axes[0].set(ylabel="% of the time")
+    axes[0].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return _written(canvas, folder / "shares.png", "Shares", "Where the time of a solve goes")
+
+
+def _mesh(design: Mesh, points: Array) -> Mesh:
+    return design.replaced(points.reshape(-1, 3))
+
+
+def _defect(design: Mesh, flat: Array) -> Heat:
+    values = metrics.isometry_defect(design, flat)
+    scale = Scale("loss_iso of the cell (size)", "PuRd", 0.0, float(values.max()))
+    return Heat(values, scale, f"mean {values.mean():.2g}")
+
+
+def _angles(clean: Mesh, mesh: Mesh) -> Heat:
+    """Angle of each cell's normal to the clean surface's, degrees."""
+    one, other = (metrics.components(metrics.face_normals(m)) for m in (clean, mesh))
+    values = np.degrees(np.asarray(geometry.angle(one, other)))
+    scale = Scale("angle of the normals (degrees)", "OrRd", 0.0, float(values.max()))
+    return Heat(values, scale, f"{metrics.normal_angle(clean, mesh):.3g} degrees")
+
+
+def _shared(heats: Sequence[Heat]) -> list[Heat]:
+    """Heats in one scale, that of a high percentile of all."""
+    every = np.concatenate([h.values[np.isfinite(h.values)] for h in heats])
+    high = max(float(np.percentile(every, _TOP)), 1e-9)
+    scale = replace(heats[0].scale, high=high, extend="max" if every.max() > high else "neither")
+    return [replace(heat, scale=scale) for heat in heats]
+
+
+def _laid(design: Mesh, flat: Array) -> Array:
+    """A flat image as a panel has it, its longer side across."""
+    points = (flat - flat.mean(axis=0)) / design.frame.scale
+    _, _, axes = np.linalg.svd(points, full_matrices=False)
+    # Turned, not mirrored.
+    axes[1] *= np.sign(np.linalg.det(axes))
+    return np.c_[points @ axes.T, np.zeros(len(points))]
+
+
+def _drawn(panels: list[Panel], path: Path, number: str, caption: str) -> Figure:
+    for panel in panels:
+        panel.title = panel.title.replace(": ", "\n", 1)
+    figure = draw(panels)
+    for ax in figure.axes:
+        ax.title.set_fontsize(8)
+    return _written(figure, path, number, caption)
+
+
+def _canvas(count: int, width: float = 0.0) -> tuple[Any, list[Any]]:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure as Canvas
+
+    canvas = Canvas(figsize=(width or 4.5 * count, 3.6), dpi=110, layout="constrained")
+    FigureCanvasAgg(canvas)
+    return canvas, list(np.atleast_1d(canvas.subplots(1, count)))
+
+
+def _written(canvas: Any, path: Path, number: str, caption: str) -> Figure:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    canvas.savefig(path, dpi=90)
+    return Figure(number, caption, path)

@@ -1,0 +1,194 @@
+"""Time, memory and shares of one method at one size: a script, in a process of its own.
+
+``python measure.py '{"task": "flatten", "method": "TNO", "size": 64, ...}'`` prints JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import sys
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+import gso
+from gso.dataset import bezier
+from gso.tno import codegen, linear, problem
+
+#: Noise of the denoising task.
+SIGMA = 0.005
+#: Side of the grid that everything is tried on before; kernels are made at first use.
+_WARM = 32
+#: Backends are tried whose own estimate is at most so many times the smallest.
+_HOPEFUL = 4.0
+
+
+class Clock:
+    """Time spent in functions, without that of timed functions that they call."""
+
+    def __init__(self) -> None:
+        self.spent: defaultdict[str, float] = defaultdict(float)
+        self._inner = [0.0]
+
+    def timed(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """The function, whose time counts under a name."""
+
+        def run(*arguments: Any, **keywords: Any) -> Any:
+            self._inner.append(0.0)
+            start = time.perf_counter()
+            try:
+                return function(*arguments, **keywords)
+            finally:
+                whole = time.perf_counter() - start
+                self.spent[name] += whole - self._inner.pop()
+                self._inner[-1] += whole
+
+        return run
+
+
+class Factored:
+    """A backend's solver that remembers the last matrix and counts."""
+
+    def __init__(self, pattern: linear.Pattern, solver: Any, clock: Clock):
+        self.pattern, self.name, self.count = pattern, solver.name, 0
+        self.values = np.empty(0)
+        self._factor = clock.timed("factor", solver.factor)
+        self.solve = clock.timed("solve", solver.solve)
+
+    def factor(self, values: np.ndarray) -> None:
+        """Factor a matrix."""
+        self.count += 1
+        self.values = values
+        self._factor(values)
+
+
+def case(task: str, size: int) -> np.ndarray:
+    """The surface that all sizes are samples of; with noise for denoising."""
+    points = bezier.generate(1, seed=77)[0].sample(size)
+    if task == "denoise":
+        points = points + SIGMA * np.random.default_rng(0).standard_normal(points.shape)
+    return points
+
+
+def solve(task: str, method: str, model: str, points: np.ndarray) -> Any:
+    """Let a method solve; what comes back has iterations unless it is a net's."""
+    if method == "Net":
+        return gso.net.predict(points, task=task, model=model)
+    if method == "hybrid":
+        from gso import hybrid
+
+        return hybrid.solve(points, task=task, net=model)
+    return gso.tno.optimize(points, task=task)
+
+
+def shares(run: Callable[[], Any]) -> dict[str, Any]:
+    """Where the time of a solve goes, and the time of its factorisations alone."""
+    clock, stages = Clock(), list[Factored]()
+
+    def chosen(pattern: linear.Pattern, name: str | None = None) -> Factored:
+        stages.append(Factored(pattern, analysed(pattern, name), clock))
+        return stages[-1]
+
+    analysed = clock.timed("setup", linear.choose)
+    places: list[tuple[Any, str, Callable[..., Any]]] = [
+        (linear, "choose", chosen),
+        (codegen.Kernel, "__call__", clock.timed("evaluation", codegen.Kernel.__call__)),
+        (problem.Problem, "energy", clock.timed("evaluation", problem.Problem.energy)),
+        (problem.Problem, "linearise", clock.timed("assembly", problem.Problem.linearise)),
+    ]
+    before = [(owner, name, getattr(owner, name)) for owner, name, _ in places]
+    try:
+        for owner, name, function in places:
+            setattr(owner, name, function)
+        start = time.perf_counter()
+        result = run()
+        total = time.perf_counter() - start
+    finally:
+        for owner, name, function in before:
+            setattr(owner, name, function)
+    spent = dict(clock.spent)
+    net = getattr(result, "seconds", {}).get("net")
+    if net is not None:
+        spent["net"] = net
+    spent["setup"] = total - sum(v for k, v in spent.items() if k != "setup")
+    return {"shares": {k: v / total for k, v in spent.items()}} | limit(result, stages)
+
+
+def limit(result: Any, stages: list[Factored]) -> dict[str, Any]:
+    """Seconds of one numeric factorisation per iteration, by the fastest backend."""
+    history = getattr(result, "history", [])
+    done = Counter(entry.stage for entry in history if entry.iteration > 0)
+    iterations = [done[stage] for stage in sorted({entry.stage for entry in history})]
+    if not stages or len(iterations) != len(stages):
+        return {"limit": None, "factorisations": sum(s.count for s in stages)}
+    seconds, backend = 0.0, ""
+    for count, stage in zip(iterations, stages):
+        if stage.count:
+            fastest, backend = _fastest(stage)
+            seconds += count * fastest
+    return {
+        "limit": seconds,
+        "factorisations": sum(stage.count for stage in stages),
+        "fastest": backend,
+    }
+
+
+def _fastest(stage: Factored) -> tuple[float, str]:
+    """Seconds of one factorisation of a stage's last matrix, and whose."""
+    usable = {k: m for k, m in linear.backends().items() if m.available()}
+    least = min(m.cost(stage.pattern) for m in usable.values())
+    found = []
+    for name, module in usable.items():
+        if module.cost(stage.pattern) > _HOPEFUL * least:
+            continue
+        solver = module.Solver(stage.pattern)
+        with linear.blas_threads(1):
+            solver.factor(stage.values)
+            spent: list[float] = []
+            while len(spent) < 5 and sum(spent) < 2.0:
+                start = time.perf_counter()
+                solver.factor(stage.values)
+                spent.append(time.perf_counter() - start)
+        found.append((float(np.median(spent)), name))
+    return min(found)
+
+
+def main(
+    task: str, method: str, model: str, size: int, repeats: int, budget: float
+) -> dict[str, Any]:
+    """Measure; after two solves, no further one is begun that the budget has no time for."""
+
+    def run() -> Any:
+        return solve(task, method, model, points)
+
+    points = case(task, min(size, _WARM))
+    run()
+    points = case(task, size)
+    seconds: list[float] = []
+    while len(seconds) < 2 or (len(seconds) < repeats and sum(seconds) + seconds[-1] < budget):
+        start = time.perf_counter()
+        result = run()
+        seconds.append(time.perf_counter() - start)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    found = {
+        "seconds": seconds,
+        "iterations": getattr(result, "iterations", 0),
+        "backend": getattr(result, "backend", ""),
+        # In kilobytes, but on macOS in bytes.
+        "peak_mb": peak / (1e6 if sys.platform == "darwin" else 1e3),
+    }
+    if method == "Net":
+        return found | {"shares": {"net": 1.0}, "limit": None, "factorisations": 0}
+    return found | shares(run)
+
+
+if __name__ == "__main__":
+    print(json.dumps(main(**json.loads(sys.argv[1]))))

@@ -1,0 +1,147 @@
+"""Other solvers on the package's objective, and MeshLab's filter, on the developable task.
+
+The objective is that of the preset ``balanced`` on the design's own grid, over offsets along
+the design's normals, from the design itself, without the coarser grids that ``balanced``
+begins with. The package's own iteration on that very problem is a row, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tno import last_problem
+
+import gso
+from gso.mesh import Mesh
+from gso.tno.canonical import Canonical
+from gso.tno.problem import Problem
+from gso.tno.solver import minimise
+from report import energy
+from report.method import Array, Method, Solved
+from report.surfaces import Case
+
+#: Relative fall of the objective at which each solver stops, and when it gives up.
+TOLERANCE, ITERATIONS = 1e-5, 50
+#: Names of the rows that compare the solvers.
+SAME_ENERGY = ("balanced, all of it", "Levenberg-Marquardt of gso", "least_squares", "IPOPT")
+
+
+def _whole(points: Array, problem: Problem, x: Array) -> tuple[Array, int, float]:
+    result = gso.tno.optimize(points)
+    return np.asarray(result.grid), result.iterations, sum(result.energy.values())
+
+
+def _own(points: Array, problem: Problem, x: Array) -> tuple[Array, int, float]:
+    found = minimise(
+        problem, x, iterations=ITERATIONS, tolerance=TOLERANCE, method="levenberg-marquardt"
+    )
+    return _placed(points, problem, found.x), found.iterations, found.energy
+
+
+def _least_squares(points: Array, problem: Problem, x: Array) -> tuple[Array, int, float]:
+    from scipy.optimize import least_squares
+
+    found = least_squares(
+        lambda at: energy.residuals(problem, at),
+        x,
+        lambda at: energy.jacobian(problem, at),
+        tr_solver="lsmr",
+        x_scale="jac",
+        ftol=TOLERANCE,
+        xtol=1e-12,
+        gtol=1e-12,
+        max_nfev=ITERATIONS,
+    )
+    return _placed(points, problem, found.x), int(found.nfev), problem.energy(found.x)
+
+
+def _ipopt(points: Array, problem: Problem, x: Array) -> tuple[Array, int, float]:
+    import casadi
+
+    ca: Any = casadi
+    unknowns, value = energy.expressions(problem)
+    slope = ca.jacobian(value, unknowns)
+    factor, none = ca.MX.sym("lam_f"), ca.MX.sym("none", 0)
+    matrix = ca.triu(factor * ca.mtimes(slope.T, slope))
+    hessian = ca.Function("hessian", [unknowns, none, factor, none], [matrix])
+    options = {
+        "hess_lag": hessian,
+        "print_time": False,
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "ipopt.max_iter": ITERATIONS,
+        "ipopt.acceptable_tol": 1e-5,
+        "ipopt.acceptable_obj_change_tol": TOLERANCE,
+    }
+    aim = {"x": unknowns, "f": 0.5 * ca.sumsqr(value)}
+    solver = ca.nlpsol("solver", "ipopt", aim, options)
+    at = np.asarray(solver(x0=x)["x"]).ravel()
+    return _placed(points, problem, at), solver.stats()["iter_count"], problem.energy(at)
+
+
+def _placed(points: Array, problem: Problem, x: Array) -> Array:
+    """Unknowns as a grid in the frame of the design."""
+    frame = Canonical(Mesh.from_grid(points, weld=False))
+    at = frame.back("surface", problem.variables.points(x).reshape(-1, 3))
+    return frame.frame.to_user(at).reshape(points.shape)
+
+
+def _same(
+    name: str, solve: Callable[[Array, Problem, Array], tuple[Array, int, float]], note: str
+) -> Method:
+    def run(case: Case) -> Solved:
+        problem, x = last_problem(case.given, "developable", "balanced")
+        points, iterations, left = solve(case.given, problem, x)
+        return Solved(points, iterations, {"objective_ratio": left / problem.energy(x)})
+
+    return Method(
+        name,
+        "developable",
+        run,
+        peer=name in SAME_ENERGY[2:],
+        pace="peer",
+        note=note,
+        files=(Path(__file__), Path(energy.__file__)),
+        solver=True,
+    )
+
+
+def _meshlab(case: Case, **parameters: float) -> Solved:
+    import pymeshlab
+
+    mesh = Mesh.from_grid(case.given, weld=False)
+    work = pymeshlab.MeshSet()
+    work.add_mesh(pymeshlab.Mesh(mesh.vertices, mesh.triangles.astype(np.int32)))
+    work.apply_filter(
+        "apply_coord_developability_of_mesh", edgeflips=False, edgecollapses=False, **parameters
+    )
+    return Solved(work.current_mesh().vertex_matrix().reshape(case.given.shape))
+
+
+METHODS = [
+    _same(SAME_ENERGY[0], _whole, "coarse grids first"),
+    _same(SAME_ENERGY[1], _own, "on the one grid, from the design"),
+    _same(SAME_ENERGY[2], _least_squares, "SciPy: trust region, LSMR, the same Jacobian"),
+    _same(
+        SAME_ENERGY[3],
+        _ipopt,
+        "CasADi's expressions of the same terms, Gauss-Newton matrix; time with building them",
+    ),
+    Method(
+        "MeshLab developability",
+        "developable",
+        _meshlab,
+        peer=True,
+        note="Stein et al. 2018, of hinges; tuned",
+        needs=("pymeshlab",),
+        candidates=tuple(
+            {"maxfunevals": count, "stepsize": step}
+            for count in (10, 50, 200)
+            for step in (1e-4, 1e-3, 1e-2)
+        ),
+        files=(Path(__file__),),
+    ),
+]

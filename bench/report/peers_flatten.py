@@ -1,0 +1,100 @@
+"""libigl's parameterisations on the inputs of the flatten task.
+
+None has parameters to tune but a number of iterations, which is one from which on more of
+them change nothing that the tables show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from gso.mesh import Mesh
+from report.method import Array, Method, Solved
+from report.surfaces import Case
+
+ARAP_ITERATIONS, SLIM_ITERATIONS = 100, 20
+
+
+def harmonic(mesh: Mesh) -> tuple[Array, np.ndarray, Array]:
+    """Vertices, triangles, and their harmonic map to a circle, scaled to the surface's area."""
+    import igl
+
+    v, f = np.asarray(mesh.vertices), np.ascontiguousarray(mesh.triangles)
+    rim = mesh.boundary_loops[0]
+    return v, f, scaled(v, f, igl.harmonic(v, f, rim, igl.map_vertices_to_circle(v, rim), 1))
+
+
+def scaled(vertices: Array, triangles: np.ndarray, flat: Array) -> Array:
+    """A flat image (n, 2) with the area of the surface."""
+    e, g = (vertices[triangles[:, k]] - vertices[triangles[:, 0]] for k in (1, 2))
+    a, b = (flat[triangles[:, k]] - flat[triangles[:, 0]] for k in (1, 2))
+    area = np.linalg.norm(np.cross(e, g), axis=1).sum()
+    return flat * np.sqrt(area / np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+
+
+def arap(mesh: Mesh, iterations: int = ARAP_ITERATIONS) -> Array:
+    """As-rigid-as-possible parameterisation (Liu et al. 2008) from a harmonic map, (n, 2)."""
+    import igl
+
+    v, f, start = harmonic(mesh)
+    solver = igl.ARAPData()
+    solver.max_iter = iterations
+    # One vertex is held, so that the pattern cannot drift.
+    held = np.array([len(v) // 2], np.int32)
+    start = np.ascontiguousarray(start)
+    igl.arap_precomputation(v, f, 2, held, solver)
+    flat = igl.arap_solve(np.ascontiguousarray(start[held]), solver, start)
+    return np.asarray(flat)[:, :2]
+
+
+def slim(mesh: Mesh, iterations: int = SLIM_ITERATIONS) -> Array:
+    """Scalable locally injective map of symmetric Dirichlet energy (Rabinovich et al. 2017)."""
+    import igl
+
+    v, f, start = harmonic(mesh)
+    energy = igl.MappingEnergyType.SYMMETRIC_DIRICHLET
+    nobody, nowhere = np.empty(0, np.int32), np.empty((0, 2), order="F")
+    data = igl.slim_precompute(
+        np.asfortranarray(v),
+        np.asfortranarray(f.astype(np.int32)),
+        np.asfortranarray(start),
+        energy,
+        nobody,
+        nowhere,
+        0.0,
+    )
+    return np.asarray(igl.slim_solve(data, iterations))[:, :2]
+
+
+def lscm(mesh: Mesh) -> Array:
+    """Least-squares conformal map (Levy et al. 2002), held at two vertices far apart, (n, 2)."""
+    import igl
+
+    loop = mesh.boundary_loops[0]
+    p = mesh.vertices[loop]
+    far = int(np.linalg.norm(p - p[0], axis=1).argmax())
+    pins = np.array([[0.0, 0.0], [np.linalg.norm(p[far] - p[0]), 0.0]])
+    held = np.array([loop[0], loop[far]])
+    return igl.lscm(mesh.vertices.copy(), mesh.triangles.copy(), held, pins)[0]
+
+
+def _lscm(mesh: Mesh) -> Array:
+    return scaled(np.asarray(mesh.vertices), np.asarray(mesh.triangles), lscm(mesh))
+
+
+def _peer(name: str, map_of: Callable[[Mesh], Array], note: str) -> Method:
+    def run(case: Case) -> Solved:
+        flat = map_of(Mesh.from_grid(case.given, weld=False))
+        return Solved(flat.reshape(*case.given.shape[:2], 2))
+
+    return Method(name, "flatten", run, peer=True, note=note, files=(Path(__file__),))
+
+
+METHODS = [
+    _peer("libigl LSCM", _lscm, "conformal, scaled to the surface's area"),
+    _peer("libigl ARAP", arap, f"{ARAP_ITERATIONS} iterations"),
+    _peer("libigl SLIM", slim, f"{SLIM_ITERATIONS} iterations"),
+]

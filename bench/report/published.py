@@ -1,0 +1,53 @@
+"""The published figures: Wang et al. 2024, Tables 1 to 3.
+
+Times of the nets were measured on an NVIDIA 3080; the processor of the optimiser's is not
+given, nor are fairness, strain and flipped cells.
+"""
+
+from __future__ import annotations
+
+from gso.dataset.noise import LEVELS
+from gso.dataset.summary import PUBLISHED, PUBLISHED_FLAT
+
+#: Mean loss_gc of the surfaces before.
+INPUT = PUBLISHED["loss_gc_before"]
+
+#: Developable surfaces.
+TABLE_1: dict[str, dict[str, float]] = {
+    "TNO": {**{k: PUBLISHED[k] for k in ("loss_gc", "K_A_r", "d_H")}, "seconds": 38.256},
+    "Net-S": {"loss_gc": 0.0273, "K_A_r": 0.8776, "d_H": 0.608, "seconds": 0.013},
+    "Net-C": {"loss_gc": 0.0417, "K_A_r": 0.8300, "d_H": 0.414, "seconds": 0.013},
+    "Net-CF": {"loss_gc": 0.0291, "K_A_r": 0.8768, "d_H": 0.517, "seconds": 0.026},
+}
+
+#: Flat images.
+TABLE_2: dict[str, dict[str, float]] = {
+    "Init": {"loss_iso_cell": 6.21e-3, "seconds": 0.002},
+    "TNO": {**PUBLISHED_FLAT, "seconds": 4.235},
+    "Net": {"loss_iso_cell": 2.94e-4, "seconds": 0.015},
+    "Net-W": {"loss_iso_cell": 2.46e-4, "seconds": 0.015},
+}
+
+#: Denoised surfaces by the standard deviation of the noise: angles in degrees, rate in percent.
+TABLE_3: dict[float, dict[str, float]] = {
+    level: {"theta_noisy": noisy, "theta": theta, "rate": rate}
+    for level, noisy, theta, rate in zip(
+        LEVELS,
+        (4.02, 21.36, 44.64, 61.59),
+        (0.633, 1.502, 2.505, 3.544),
+        (83.84, 92.85, 94.42, 94.30),
+        strict=True,
+    )
+}
+
+#: The row that each net of the package stands beside.
+NETS: dict[str, dict[str, float]] = {
+    "net-s": TABLE_1["Net-S"],
+    "net-c": TABLE_1["Net-C"],
+    "net-cf": TABLE_1["Net-CF"],
+    "developable": TABLE_1["Net-CF"],
+    "flatten": TABLE_2["Net"],
+    "flatten-w": TABLE_2["Net-W"],
+}
+#: Figure 5: parameters of the net that was taken, and what it is called there.
+CHOSEN = {"blocks": 4, "channels": 16, "parameters": 2.82e6}

@@ -1,0 +1,180 @@
+"""Quality and time of every method, surface by surface, in pieces that are kept."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import metrics, tasks
+from gso.dataset.noise import LEVELS
+from gso.mesh import Mesh
+from gso.status import ConvergenceWarning
+from gso.tno import pool
+from gso.tno.linear import blas_threads
+from report import store
+from report.method import TASKS, Method, level_name
+from report.methods import methods, of
+from report.settings import Settings
+from report.store import Store
+from report.surfaces import Case, Surfaces
+
+Array = NDArray[np.float64]
+#: What is known of a method on a surface: figures, seconds, iterations, or an error.
+Record = dict[str, Any]
+#: Records in the order of the surfaces, by task, level of the noise, and method.
+Records = dict[tuple[str, float, str], list[Record]]
+#: Told of a method's surfaces that are done.
+Tick = Callable[[str, int], None]
+
+#: Surfaces of a piece by the method's pace; those that are not timed.
+_BLOCKS, _UNTIMED = {"fast": 16, "slow": 4, "peer": 2}, 64
+
+
+@dataclass(frozen=True)
+class Block:
+    """Some surfaces for one method."""
+
+    task: str
+    name: str
+    sigma: float
+    surfaces: Surfaces
+    start: int
+    stop: int
+    timed: bool
+
+    @property
+    def method(self) -> Method:
+        """The method."""
+        return of(self.task, self.name)
+
+    @property
+    def place(self) -> str:
+        """Name of its piece."""
+        name = f"{self.name} {level_name(self.sigma)}".strip().replace(" ", "-").replace(",", "")
+        return f"quality/{self.task}/{name}/{self.start:04d}-{self.stop:04d}"
+
+    @property
+    def key(self) -> dict[str, Any]:
+        """What its records depend on."""
+        known = self.method.key(self.sigma) | {"surfaces": self.surfaces.key}
+        return known | {"processor": store.processor() if self.timed else ""}
+
+
+def levels(task: str) -> tuple[float, ...]:
+    """Levels of the noise of a task: one without noise, but for denoising."""
+    return LEVELS if task == "denoise" else (0.0,)
+
+
+def blocks(settings: Settings, surfaces: Surfaces) -> Iterator[Block]:
+    """Everything that is to be measured."""
+    for task in TASKS:
+        for sigma in levels(task):
+            for method in (m for m in methods().values() if m.task == task):
+                if method.absent(sigma):
+                    continue
+                count = min(settings.counts[method.pace], len(surfaces))
+                timed = min(settings.timed, count)
+                for start in range(0, timed, _BLOCKS[method.pace]):
+                    stop = min(start + _BLOCKS[method.pace], timed)
+                    yield Block(task, method.name, sigma, surfaces, start, stop, True)
+                for start in range(timed, count, _UNTIMED):
+                    stop = min(start + _UNTIMED, count)
+                    yield Block(task, method.name, sigma, surfaces, start, stop, False)
+
+
+def measured(settings: Settings, surfaces: Surfaces, kept: Store, tick: Tick) -> Records:
+    """Records of every method; what is there already is not made again.
+
+    What is timed runs first, in one process with nothing beside it; the rest over all
+    processes.
+    """
+    every = list(blocks(settings, surfaces))
+    found: dict[Block, list[Record]] = {}
+    for block in every:
+        there = kept.find(block.place, block.key)
+        if there is not None:
+            found[block] = there
+            tick(block.name, len(there))
+    for timed, workers in ((True, min(settings.workers, 1)), (False, settings.workers)):
+        missing = [b for b in every if b not in found and b.timed is timed]
+        with closing(pool.spread(measure, missing, workers=workers)) as results:
+            for done in results:
+                block = missing[done.index]
+                if done.error is None:
+                    kept.keep(block.place, block.key, done.value)
+                    found[block] = done.value
+                else:
+                    found[block] = [{"error": done.error}] * (block.stop - block.start)
+                tick(block.name, block.stop - block.start)
+    records: Records = {}
+    for block in every:
+        records.setdefault((block.task, block.sigma, block.name), []).extend(found[block])
+    return records
+
+
+_warm: set[tuple[str, str]] = set()
+
+
+def measure(block: Block) -> list[Record]:
+    """Records of the surfaces of a block."""
+    method = block.method
+    with warnings.catch_warnings(), blas_threads(1):
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        if block.timed and method.pace == "fast" and (block.task, block.name) not in _warm:
+            # What is made at first use only: kernels, plans, a net's weights.
+            _record(method, block.surfaces.case(block.start, block.sigma))
+            _warm.add((block.task, block.name))
+        found = [
+            _record(method, block.surfaces.case(k, block.sigma))
+            for k in range(block.start, block.stop)
+        ]
+    return found if block.timed else [record | {"seconds": None} for record in found]
+
+
+def _record(method: Method, case: Case) -> Record:
+    clock = time.perf_counter()
+    try:
+        solved = method(case)
+    except Exception as error:  # a peer may raise anything, and the others go on
+        return {"error": f"{type(error).__name__}: {error}"}
+    seconds = time.perf_counter() - clock
+    if not np.isfinite(solved.points).all():
+        return {"error": "the result is not finite"}
+    return {
+        "figures": figures(method.task, case, solved.points) | solved.more,
+        "seconds": seconds,
+        "iterations": solved.iterations,
+    }
+
+
+def figures(task: str, case: Case, result: Array) -> dict[str, float]:
+    """Metrics of a result: those of its task, as :data:`gso.metrics.INFO` names them.
+
+    "unflipped" is 1 where no cell is flipped; "rate" the percentage by which the angle of
+    the normals fell, from "theta_noisy"; "off" the root mean square distance of the vertices
+    from where they are without noise, percent of the diagonal.
+    """
+    mesh = Mesh.from_grid(case.surface, weld=False)
+    module = tasks.get(task)
+    if task == "flatten":
+        found = module.metrics(mesh, None, result.reshape(-1, 2), metrics.unit(mesh))
+        return found | {"unflipped": float(found["flipped_cells"] == 0)}
+    after = mesh.replaced(result.reshape(-1, 3))
+    found = module.metrics(mesh, after, None, metrics.unit(mesh))
+    if task == "developable":
+        return found
+    noisy = metrics.normal_angle(case.surface, case.given)
+    rate = 100.0 * (noisy - found["theta"]) / noisy
+    return {
+        "theta": found["theta"],
+        "theta_noisy": noisy,
+        "rate": rate,
+        "off": found["displacement_rms"],
+    }

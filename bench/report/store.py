@@ -1,0 +1,158 @@
+"""What has been measured already, in files: a run that was killed goes on where it was.
+
+A piece is a file whose name ends in a digest of what its content depends on. Whatever of
+that changes, the piece is not found and is made anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import platform
+from collections.abc import Callable, Iterable
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import gso
+from gso.io import replacing
+
+PACKAGE = Path(gso.__file__).parent
+#: Parts of the package that no figure of the optimiser depends on.
+_ASIDE = ("cli", "dataset", "hybrid", "io", "net", "plot", "rulings")
+#: Parts that the measures of a peer's result depend on.
+_MEASURES = ("geometry", "mesh.py", "metrics.py", "nearest.py", "tasks", "topology.py")
+
+
+class Store:
+    """Pieces in a folder.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> store = Store(tempfile.mkdtemp())
+    >>> store.value("figures/one", {"n": 3}, lambda: {"mean": 0.5})
+    {'mean': 0.5}
+    >>> store.find("figures/one", {"n": 3}), store.find("figures/one", {"n": 4})
+    ({'mean': 0.5}, None)
+    """
+
+    def __init__(self, folder: str | os.PathLike[str]):
+        self.folder = Path(folder)
+
+    def find(self, name: str, key: dict[str, Any]) -> Any:
+        """A piece that is there, or None."""
+        try:
+            return json.loads(self._path(name, key, ".json").read_bytes())["value"]
+        except (OSError, ValueError, KeyError):
+            return None
+
+    def keep(self, name: str, key: dict[str, Any], value: Any) -> None:
+        """Write a piece, whole or not at all."""
+        path = self._path(name, key, ".json")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as file:
+            file.write(json.dumps({"key": key, "value": value}).encode())
+
+    def value(self, name: str, key: dict[str, Any], make: Callable[[], Any]) -> Any:
+        """A piece, made if it is not there."""
+        found = self.find(name, key)
+        if found is None:
+            found = make()
+            self.keep(name, key, found)
+        return found
+
+    def arrays(
+        self, name: str, key: dict[str, Any], make: Callable[[], dict[str, np.ndarray]]
+    ) -> dict[str, np.ndarray]:
+        """Arrays, made if they are not there."""
+        path = self._path(name, key, ".npz")
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                return dict(data)
+        except (OSError, ValueError, EOFError):
+            found = make()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        memory = io.BytesIO()
+        np.savez(memory, **found)  # type: ignore[arg-type]
+        with replacing(path) as file:
+            file.write(memory.getvalue())
+        return found
+
+    def _path(self, name: str, key: dict[str, Any], suffix: str) -> Path:
+        return self.folder / f"{name}-{digest(key)}{suffix}"
+
+
+def digest(key: Any) -> str:
+    """Twelve signs for anything that JSON can say."""
+    text = json.dumps(key, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+@lru_cache(maxsize=1)
+def solver() -> str:
+    """Digest of the code that the optimiser's results and all measures depend on."""
+    aside = {PACKAGE / name for name in _ASIDE}
+    return _content(
+        path
+        for path in PACKAGE.rglob("*.py")
+        if path not in aside and not aside & set(path.parents)
+    )
+
+
+@lru_cache(maxsize=1)
+def measures() -> str:
+    """Digest of the code that all measures depend on."""
+    places = [PACKAGE / name for name in _MEASURES]
+    return _content(
+        path for place in places for path in ([place] if place.is_file() else place.glob("*.py"))
+    )
+
+
+@lru_cache(maxsize=1)
+def nets() -> str:
+    """Digest of the code that nets and warm starts depend on, beside the optimiser's."""
+    return _content(path for name in ("net", "hybrid") for path in (PACKAGE / name).glob("*.py"))
+
+
+@lru_cache(maxsize=32)
+def source(*paths: Path) -> str:
+    """Digest of some files."""
+    return _content(paths)
+
+
+def _content(paths: Iterable[Path]) -> str:
+    content = hashlib.sha256()
+    for path in sorted(paths):
+        content.update(path.read_bytes())
+    return content.hexdigest()[:12]
+
+
+def installed(names: Iterable[str]) -> dict[str, str]:
+    """Versions of packages; "" for one that is not installed."""
+    return {name: _version(name) for name in names}
+
+
+@lru_cache(maxsize=64)
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return ""
+
+
+@lru_cache(maxsize=1)
+def processor() -> str:
+    """Name of the processor, and how many cores there are."""
+    name = platform.processor() or platform.machine()
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    name = next((line.split(":")[1].strip() for line in lines if line[:10] == "model name"), name)
+    return f"{name}, {os.cpu_count()} cores"

@@ -1,0 +1,150 @@
+"""Surfaces to compare on, and where they come from.
+
+The test split of the published size follows from its seed, without its labels; it is
+screened once, in a minute or two, and kept in a folder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import dataset
+from gso.dataset import noise
+from gso.dataset.builder import tasks
+from gso.dataset.recipe import Recipe
+from gso.dataset.screen import select
+from gso.dataset.shard import surfaces as sampled
+from gso.io import replacing
+from gso.resample import resample
+from gso.status import DatasetError
+from gso.tno.linear import blas_threads
+from report.store import Store, digest
+
+Array = NDArray[np.float64]
+Tick = Callable[[int, int], None]
+
+BENCH = Path(__file__).resolve().parents[1]
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a method gets, and what its result is measured by.
+
+    Attributes
+    ----------
+    surface : ndarray, (H, W, 3)
+        The surface.
+    given : ndarray, (H, W, 3)
+        What the method sees of it: itself, or with noise.
+    sigma : float
+        Standard deviation of that noise.
+    """
+
+    surface: Array
+    given: Array
+    sigma: float = 0.0
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Grids of the unit ball with their noise, in two files.
+
+    Attributes
+    ----------
+    name : str
+        What they are, for people.
+    folder : Path
+        Where ``surface.npy`` (n, H, W, 3) and ``noise.npy`` lie.
+    """
+
+    name: str
+    folder: Path
+
+    @property
+    def key(self) -> str:
+        """Digest of what they are."""
+        return self.folder.name
+
+    def __len__(self) -> int:
+        return len(_mapped(self.folder / "surface.npy"))
+
+    def __getitem__(self, k: int) -> Array:
+        return np.array(_mapped(self.folder / "surface.npy")[k], float)
+
+    def case(self, k: int, sigma: float = 0.0) -> Case:
+        """Surface k, with noise if `sigma` is positive."""
+        surface = self[k]
+        if not sigma:
+            return Case(surface, surface)
+        unit = np.array(_mapped(self.folder / "noise.npy")[k], float)
+        return Case(surface, surface + sigma * unit, sigma)
+
+
+@lru_cache(maxsize=4)
+def _mapped(path: Path) -> np.ndarray:
+    return np.load(path, mmap_mode="r", allow_pickle=False)
+
+
+def written(folder: Path, name: str, points: Any, unit_noise: Any) -> Surfaces:
+    """Write grids (n, H, W, 3) and their noise."""
+    content = np.ascontiguousarray(points, np.float64)
+    home = folder / digest([name, content.shape, float(content.sum()), float(content.std())])
+    home.mkdir(parents=True, exist_ok=True)
+    for file, array in (("surface.npy", content), ("noise.npy", np.asarray(unit_noise))):
+        if not (home / file).exists():
+            with replacing(home / file) as stream:
+                np.save(stream, array.astype(np.float64 if file[0] == "s" else np.float32))
+    return Surfaces(name, home)
+
+
+def reference(folder: Path, count: int | None = None, size: int = 64) -> Surfaces:
+    """The 24 reference surfaces that are in the repository, or the first of them.
+
+    Other sizes than 64 are resampled.
+    """
+    with np.load(BENCH / "data" / "bench24.npz") as data:
+        points, unit = (data[k][:count].astype(float) for k in ("surfaces", "unit_noise"))
+    if size != points.shape[1]:
+        points = np.stack([resample(p, size, size) for p in points])
+        unit = unit[:, :size, :size]
+    return written(folder, "24 reference surfaces of another seed", points, unit)
+
+
+def screened(folder: Path, split: str, store: Store, tick: Tick | None = None) -> Surfaces:
+    """A split of the set of the published size and seed 0."""
+    recipe = Recipe()
+    key = {"recipe": recipe.as_dict() | {"options": None, "labels": None}, "split": split}
+
+    def draws() -> dict[str, np.ndarray]:
+        with blas_threads(1):
+            selection = select(recipe.n, recipe.splits["hard"], seed=recipe.seed, tick=tick)
+        every = list(tasks(recipe, selection, ()))
+        names = ("validation", "test")
+        return {s: np.concatenate([t.ids for t in every if t.split == s]) for s in names}
+
+    ids = store.arrays("surfaces/draws", key | {"split": None}, draws)[split].tolist()
+    name = f"{split} split of seed {recipe.seed}, {len(ids):,} surfaces"
+    home = folder / digest(key)
+    if (home / "surface.npy").exists() and (home / "noise.npy").exists():
+        return Surfaces(name, home)
+    home.mkdir(parents=True, exist_ok=True)
+    with replacing(home / "surface.npy") as stream:
+        np.save(stream, sampled(recipe, split, tuple(ids)))
+    with replacing(home / "noise.npy") as stream:
+        np.save(stream, noise.draw(recipe.seed, ids, recipe.size))
+    return Surfaces(name, home)
+
+
+def opened(folder: Path, path: Path) -> Surfaces:
+    """The test split of a set that is built."""
+    split = dataset.open(path)["test"]
+    if "noise" not in split.arrays:
+        raise DatasetError(f"{path}: its test split has no noise; give a set of gso dataset build")
+    return written(folder, f"test split of {path.name}", split["surface"][:], split["noise"][:])

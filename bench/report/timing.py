@@ -1,0 +1,137 @@
+"""Time against size: optimiser, net and hybrid, each in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from report import store
+from report.method import TASKS
+from report.methods import DEFAULT, of
+from report.settings import Settings
+from report.store import Store
+
+_SCRIPT = Path(__file__).with_name("measure.py")
+#: Seconds for the repeated solves of one size.
+_BUDGET = 30.0
+#: Smallest side that counts for the exponent: below, the time hardly depends on the size.
+_LEAST = 32
+#: Phases, in the order in which they are shown.
+PHASES = ("net", "setup", "evaluation", "assembly", "factor", "solve")
+#: Methods that are compared, by what they are called in each task.
+METHODS = ("TNO", "Net", "hybrid")
+
+
+@dataclass
+class Timing:
+    """A method at one size.
+
+    Attributes
+    ----------
+    task, method, size : str, str, int
+        What was solved.
+    seconds : list of float
+        Of every solve.
+    iterations, factorisations : int
+        Of one solve.
+    peak_mb : float
+        Largest memory of the process, Python and its packages included.
+    shares : dict of str to float
+        Shares of the time by :data:`PHASES`.
+    limit : float or None
+        Seconds of one numeric factorisation per iteration, by the fastest backend.
+    backend, fastest : str
+        Which was used in the last stage, and which is the fastest for it.
+    absent : str
+        Why there are no figures, or nothing.
+    """
+
+    task: str
+    method: str
+    size: int
+    seconds: list[float] = field(default_factory=list)
+    iterations: int = 0
+    factorisations: int = 0
+    peak_mb: float = 0.0
+    shares: dict[str, float] = field(default_factory=dict)
+    limit: float | None = None
+    backend: str = ""
+    fastest: str = ""
+    absent: str = ""
+
+    @property
+    def median(self) -> float:
+        """Median time."""
+        return float(np.median(self.seconds))
+
+
+def pieces(settings: Settings) -> list[tuple[str, str, int]]:
+    """Task, method and size of everything that is timed."""
+    return [(task, m, size) for task in TASKS for m in METHODS for size in settings.sizes]
+
+
+def timings(settings: Settings, kept: Store, tick: Callable[..., None]) -> list[Timing]:
+    """Measure what is not there yet."""
+    found = []
+    for task, name, size in pieces(settings):
+        method = of(task, _named(task, name))
+        timing = Timing(task, name, size, absent=method.absent())
+        if not timing.absent:
+            place = f"timing/{task}-{name}-{size}"
+            key = method.key(0.0) | {
+                "processor": store.processor(),
+                "repeats": settings.repeats,
+                "script": store.source(_SCRIPT),
+            }
+            known = kept.find(place, key)
+            if known is None:
+                known = _measured(task, name, method.net, size, settings.repeats)
+                if "absent" not in known:
+                    kept.keep(place, key, known)
+            timing = Timing(task, name, size, **known)
+        found.append(timing)
+        tick(f"{task} {name} {size}")
+    return found
+
+
+def _named(task: str, name: str) -> str:
+    """Name of a method in the tables of its task."""
+    names = {"TNO": DEFAULT[task], "Net": "Net strain" if task == "flatten" else "Net"}
+    return names.get(name, name)
+
+
+def _measured(task: str, method: str, model: str, size: int, repeats: int) -> dict[str, Any]:
+    asked = {"task": task, "method": method, "model": model, "size": size}
+    command = [sys.executable, str(_SCRIPT), json.dumps(asked | _limits(repeats))]
+    one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **one})
+    if done.returncode:
+        return {"absent": f"failed: {(done.stderr.strip().splitlines() or ['no message'])[-1]}"}
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def _limits(repeats: int) -> dict[str, float]:
+    return {"repeats": repeats, "budget": _BUDGET}
+
+
+def exponent(some: Iterable[Timing]) -> float | None:
+    """Power of the number of vertices that the time grows with, by least squares.
+
+    Examples
+    --------
+    >>> round(exponent([Timing("", "", n, [1e-6 * n**3]) for n in (32, 64, 128)]), 6)
+    1.5
+    """
+    known = [(t.size**2, t.median) for t in some if t.seconds and t.size >= _LEAST]
+    if len(known) < 2:
+        return None
+    vertices, seconds = np.log(np.array(known)).T
+    return float(np.polyfit(vertices, seconds, 1)[0])

@@ -1,0 +1,72 @@
+"""The peers' best parameters, on surfaces that nothing is reported of."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from gso import metrics
+from report import store
+from report.method import TUNED, Array, Method, level_name
+from report.methods import methods
+from report.quality import levels
+from report.store import Store
+from report.surfaces import Case, Surfaces
+
+#: What the parameters are chosen by; lower is better.
+_SCORE: dict[str, Callable[[Case, Array], float]] = {
+    "developable": lambda case, points: metrics.loss_gc(points),
+    "denoise": lambda case, points: metrics.normal_angle(case.surface, points),
+}
+#: Surfaces that they are chosen on.
+COUNT = 8
+
+
+def tuned(
+    surfaces: Surfaces, kept: Store, command: str, tick: Callable[..., None]
+) -> dict[str, Any]:
+    """Parameters by task, method and level of the noise, for ``tuned.json``."""
+    values: dict[str, Any] = {}
+    count = min(COUNT, len(surfaces))
+    for method in (m for m in methods().values() if m.candidates and not m.absent()):
+        for sigma in levels(method.task):
+            own = values.setdefault(method.task, {}).setdefault(method.name, {})
+            key = {
+                "candidates": method.candidates,
+                "packages": store.installed(method.needs),
+                "surfaces": [surfaces.key, count],
+                "files": store.source(*method.files),
+            }
+            place = f"tuning/{method.name}-{level_name(sigma)}".replace(" ", "-")
+            best = partial(_best, method, surfaces, count, sigma)
+            own[level_name(sigma)] = kept.value(place, key, best)
+            tick(f"{method.name} {level_name(sigma)}")
+    return {"command": command, "surfaces": f"first {count}, {surfaces.name}", "values": values}
+
+
+def write(found: dict[str, Any]) -> None:
+    """Replace the parameters that are in the repository."""
+    TUNED.write_text(json.dumps(found, indent=1) + "\n")
+
+
+def _best(method: Method, surfaces: Surfaces, count: int, sigma: float) -> dict[str, Any]:
+    cases = [surfaces.case(k, sigma) for k in range(count)]
+    scores = []
+    for parameters in method.candidates:
+        found = []
+        for case in cases:
+            with warnings.catch_warnings():
+                # SciPy's splines say where they could not smooth as much as they were asked to.
+                warnings.simplefilter("ignore")
+                points = method.run(case, **parameters).points
+            if not np.isfinite(points).all():
+                found = [np.inf]
+                break
+            found.append(_SCORE[method.task](case, points))
+        scores.append(np.mean(found))
+    return method.candidates[int(np.argmin(scores))]

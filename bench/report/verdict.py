@@ -1,0 +1,181 @@
+"""Where the package loses: computed from the rows, for every metric."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from report.quality import Record, Records
+from report.sections import HEADINGS, SECTIONS, Section, lower_is_better
+from report.timing import Timing
+
+#: What is compared beside the metrics of a table.
+TIME = "seconds"
+_GIVEN = ("theta_noisy",)
+#: Rows that are no results but what results begin with.
+_STARTS = ("Init",)
+
+
+@dataclass(frozen=True)
+class Winner:
+    """Who is better than the package's default at something.
+
+    Attributes
+    ----------
+    name : str
+        The peer, or the row of the paper.
+    theirs, ours, best : float
+        Its figure, that of the default, and that of the package's best method.
+    best_name : str
+        That method.
+    count : int
+        Surfaces that these are means over; 0 for the paper, whose surfaces are others.
+    but : str
+        What it is worse at: the figure that the task is about.
+    """
+
+    name: str
+    theirs: float
+    ours: float
+    best: float
+    best_name: str
+    count: int
+    but: str = ""
+
+    def __str__(self) -> str:
+        where = f"{self.count:,} surfaces" if self.count else "published"
+        but = f", but {self.but}" if self.but else ""
+        return f"{self.name} {self.theirs:.3g} (ours there {self.ours:.3g}, {where}{but})"
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What the package's default is beaten at.
+
+    Attributes
+    ----------
+    section, metric : str
+        At what.
+    default : str
+        The default's name.
+    winners : list of Winner
+        By whom, those that no method of the package is as good as first.
+    """
+
+    section: str
+    metric: str
+    default: str
+    winners: list[Winner]
+
+    @property
+    def lost(self) -> list[Winner]:
+        """Those that no method of the package is as good as."""
+        return [w for w in self.winners if _better(self.metric, w.theirs, w.best)]
+
+    def __str__(self) -> str:
+        name = HEADINGS.get(self.metric, "time in seconds")
+        parts = []
+        if self.lost:
+            parts.append("better than all of the package: " + "; ".join(map(str, self.lost)))
+        rest = [w for w in self.winners if w not in self.lost]
+        if rest:
+            best = f"{rest[0].best_name} has {rest[0].best:.3g}"
+            text = "; ".join(map(str, rest))
+            parts.append(f"better than {self.default}, but not than {best}: {text}")
+        return f"{name}, {'. '.join(parts)}"
+
+
+def losses(records: Records) -> list[Loss]:
+    """Everything that the default is beaten at, what is lost to all of the package first."""
+    found = [
+        Loss(section.name, metric, section.default, winners)
+        for section in SECTIONS
+        for metric in [m for m in section.columns if m not in _GIVEN] + [TIME]
+        if (winners := list(_winners(section, metric, records)))
+    ]
+    return sorted(found, key=lambda loss: not loss.lost)
+
+
+def _winners(section: Section, metric: str, records: Records) -> Iterator[Winner]:
+    own = {m.name: section.of(records, m) for m in section.methods if not m.peer}
+    default = own[section.default]
+    main = next(m for m in section.columns if m not in _GIVEN)
+    for name, figures in section.published.items():
+        if metric in figures and name not in _STARTS:
+            where = list(range(len(default)))
+            found = _against(section, metric, f"the paper's {name}", figures[metric], own, where)
+            yield from (replace(w, count=0) for w in found)
+    for method in section.methods:
+        given = section.of(records, method)
+        pairs = enumerate(zip(given, default, strict=False))
+        where = [k for k, (a, b) in pairs if "error" not in a and "error" not in b]
+        if not method.peer or not where:
+            continue
+        theirs = _mean(given, where, metric)
+        if theirs is None:
+            continue
+        central, ours = _mean(given, where, main), _mean(default, where, main)
+        worse = central is not None and ours is not None and _better(main, ours, central)
+        but = f"{HEADINGS[main]} {central:.3g} against {ours:.3g}" if worse else ""
+        for winner in _against(section, metric, method.name, theirs, own, where):
+            yield replace(winner, but=but)
+
+
+def _against(
+    section: Section,
+    metric: str,
+    name: str,
+    theirs: float,
+    own: dict[str, list[Record]],
+    where: list[int],
+) -> Iterator[Winner]:
+    """A winner, if it is one on some surfaces."""
+    ours = _mean(own[section.default], where, metric)
+    if ours is None or not _better(metric, theirs, ours):
+        return
+    means = {k: _mean(r, where, metric) for k, r in own.items() if k not in _STARTS}
+    known = {k: v for k, v in means.items() if v is not None}
+    sign = 1.0 if metric == TIME or lower_is_better(metric) else -1.0
+    best = min(known, key=lambda k: sign * known[k])
+    yield Winner(name, theirs, ours, known[best], best, len(where))
+
+
+def _better(metric: str, theirs: float, ours: float) -> bool:
+    lower = metric == TIME or lower_is_better(metric)
+    return theirs < ours if lower else theirs > ours
+
+
+def _mean(records: list[Record], where: list[int], metric: str) -> float | None:
+    """Mean over some surfaces, the median of times; None if one of them has no figure."""
+    if not records or (metric != TIME and max(where) >= len(records)):
+        return None
+    some = [records[k] for k in where if k < len(records) and "error" not in records[k]]
+    if metric == TIME:
+        spent = [r["seconds"] for r in some if r["seconds"] is not None]
+        return float(np.median(spent)) if spent else None
+    values = [r["figures"][metric] for r in some if metric in r["figures"]]
+    return float(np.mean(values)) if values and len(values) == len(some) else None
+
+
+def against_limit(timings: Sequence[Timing]) -> list[str]:
+    """How many times as long as its factorisations alone a solve takes."""
+    return [
+        f"{t.task} {t.method}, {t.size} x {t.size}: {t.median:.3g} s, "
+        f"{t.median / t.limit:.1f} times one numeric factorisation per iteration ({t.fastest})"
+        for t in timings
+        if t.seconds and t.limit
+    ]
+
+
+def unmeasured(records: Records) -> list[str]:
+    """Methods without figures, why, and in which sections."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for section in SECTIONS:
+        for method in section.methods:
+            errors = [r.get("error", "") for r in section.of(records, method)]
+            why = method.absent(section.sigma) or (errors[0] if errors and all(errors) else "")
+            if why:
+                found.setdefault((method.name, why), []).append(section.name)
+    return [f"{name}: {why} ({', '.join(where)})" for (name, why), where in found.items()]

@@ -1,0 +1,99 @@
+"""Everything at once: the paper's tables and figures, times, and peers, as one report.
+
+    python bench/run_all.py --quick      a few surfaces of the repository (five minutes)
+    python bench/run_all.py              the test split (an hour on two cores)
+    python bench/run_all.py --data DIR   the test split of a set that is there already
+    python bench/run_all.py --store      the same, and keeps its figures in bench/data
+    python bench/run_all.py --tune       chooses the peers' parameters anew
+
+Writes ``report.html``, ``report.md``, ``results.json`` and the figures. Killed, it goes on
+where it was; what depends on code, options or packages that changed is made anew. Peers need
+``pip install ".[bench]"``; those that are missing are named in the report.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+
+# Before NumPy: every process of the run has one thread.
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+os.environ["MKL_NUM_THREADS"] = "1"
+
+BENCH = Path(__file__).resolve().parent
+sys.path.insert(0, str(BENCH))
+
+from report import build, surfaces, tuning  # noqa: E402
+from report.methods import methods  # noqa: E402
+from report.quality import levels  # noqa: E402
+from report.settings import FULL, QUICK  # noqa: E402
+from report.store import Store  # noqa: E402
+
+
+def main() -> None:
+    """Run what the command line asks for."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="few surfaces, small grids")
+    parser.add_argument("--out", type=Path, default=BENCH / "out", help="default: bench/out")
+    parser.add_argument("--data", type=Path, metavar="DIR", help="set of gso dataset build")
+    parser.add_argument("--store", action="store_true", help="keep the figures in bench/data")
+    parser.add_argument("--tune", action="store_true", help="tune the peers, and end")
+    arguments = parser.parse_args()
+    command = " ".join(["python bench/run_all.py", *(f"--{k}" for k in _asked(arguments))])
+    if arguments.tune:
+        some = _screened(arguments.out, "validation")
+        total = sum(len(levels(m.task)) for m in methods().values() if m.candidates)
+        with build.bar(total, "tuning") as tick:
+            tuning.write(tuning.tuned(some, Store(arguments.out), command, tick))
+        return
+    settings = QUICK if arguments.quick else FULL
+    folder = arguments.out / "surfaces"
+    if arguments.data:
+        some = surfaces.opened(folder, arguments.data)
+    elif arguments.quick:
+        some = surfaces.reference(folder)
+    else:
+        some = _screened(arguments.out, "test")
+    out = arguments.out / settings.name
+    result = build.run(settings, some, out, command)
+    if arguments.store:
+        _store(settings.name, result)
+    print(out / "report.html")
+
+
+def _asked(arguments: argparse.Namespace) -> list[str]:
+    return [name for name in ("quick", "store", "tune", "data") if getattr(arguments, name)]
+
+
+def _screened(out: Path, split: str) -> surfaces.Surfaces:
+    with build.bar(100, "screening") as tick:
+        done = 0
+
+        def told(count: int, wanted: int) -> None:
+            nonlocal done
+            percent = 100 * count // wanted
+            if percent > done:
+                tick("surfaces drawn", percent - done)
+                done = percent
+
+        return surfaces.screened(out / "surfaces", split, Store(out), told)
+
+
+def _store(name: str, result: dict[str, object]) -> None:
+    """Keep what the README and the tests need."""
+    records = result.pop("records")
+    if name == QUICK.name:
+        kept = {key: result[key] for key in ("command", "machine", "surfaces")}
+        text = json.dumps({**kept, "records": records}, indent=1)
+        (BENCH / "data" / "quick.json").write_text(text + "\n")
+    else:
+        (BENCH / "data" / "results.json").write_text(json.dumps(result, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
