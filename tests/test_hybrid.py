@@ -157,6 +157,34 @@ def test_a_good_start_stays_good(keywords):
     assert energy(result) <= 1.02 * energy(cold)
 
 
+@pytest.mark.parametrize("task", ["flatten", "conformal"])
+@pytest.mark.parametrize("weight", [None, 10.0], ids=["hard", "soft"])
+def test_a_flat_start_is_moved_to_its_constraints(task, weight):
+    design = saddle(13)
+    free = optimize(design, task=task).flat
+    turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    ids = [0, 12, 156]
+    wanted = gso.Handle(ids, free[ids] @ turn + [30.0, -7.0], weight=weight)
+    cold = optimize(design, task=task, constraints=[wanted])
+    result = optimize(design, task=task, constraints=[wanted], x0=Start(free, guarded=True))
+    assert result.warm_start == "x0"
+    assert energy(result) <= 1.05 * energy(cold) + 1e-9
+    assert np.allclose(result.flat, cold.flat, atol=0.05)
+
+
+def test_a_start_that_is_not_used_did_not_start_anything():
+    design = sphere_cap(9)
+    turned = optimize(design, task="flatten").flat_grid[::-1]
+    result = optimize(design, task="flatten", x0=turned)
+    assert result.warm_start == "cold"
+    assert sum("x0" in note for note in result.notes) == 1
+
+
+def test_a_target_needs_more_than_one_solve_without_a_net():
+    with pytest.raises(OptionError, match="target_curvature takes many solves"):
+        optimize(saddle(9), x0=Start(None, iterations=3), target_curvature=0.1)
+
+
 # ---------------------------------------------------------------- with a net
 
 

@@ -99,7 +99,7 @@ def given(mesh: Mesh, start: Array | None) -> tuple[Array | None, str]:
     flat = np.ascontiguousarray(start[:, :2])
     turned = flips(mesh, flat)
     if turned:
-        return None, f"x0 turns {turned} corner triangles over and was not used"
+        return None, f"it turns {turned} corner triangles over"
     return flat, ""
 
 

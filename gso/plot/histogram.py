@@ -33,7 +33,7 @@ def plot_histograms(
     values : dict of dict of ndarray, (n,)
         Numbers by quantity and group; each group's shares sum to one.
     limits : dict of (float, float)
-        Range of each quantity; what lies beyond is in the last bar.
+        Range of each quantity; what lies beyond is in the last bar, which may be cut off.
     path : str or PathLike, optional
         A .png, .pdf or .svg file to write.
 
@@ -66,10 +66,15 @@ def plot_histograms(
         figure.subplots(1, len(values), squeeze=False)[0], values.items(), strict=True
     ):
         low, high = limits[name]
+        tallest = 0.0
         for label, numbers in groups.items():
             inside = np.clip(numbers, low, high)
             share = np.full(len(inside), 1.0 / max(len(inside), 1))
-            axes.hist(inside, _BARS, range=(low, high), weights=share, histtype="step", label=label)
+            bars, _, _ = axes.hist(
+                inside, _BARS, range=(low, high), weights=share, histtype="step", label=label
+            )
+            tallest = max(tallest, float(np.max(bars[:-1])))
+        axes.set_ylim(0.0, 1.1 * tallest or None)
         axes.set_xlabel(name)
         axes.set_yticks([])
         axes.spines[["top", "left", "right"]].set_visible(False)

@@ -102,14 +102,12 @@ def plan(request: Request) -> Plan:
     )
     stages = [stage]
     if not request.constraints.empty:
-        if given is None:
-            flat = flat_start.align(mesh, flat, request.constraints)
+        flat = flat_start.align(mesh, flat, request.constraints)
         stages = [*held.drawing(request, stage), held.keeping(request, stage)]
     return Plan(
         layout,
         layout.pack({"flat": flat, "scale": _area_ratios(mesh, flat)}),
         stages,
-        notes=[refused] if refused else [],
         finish=partial(_finish, request, layout, given),
         refused=refused,
     )

@@ -140,7 +140,6 @@ def plan(request: Request) -> Plan:
     start = flat_start.begin(levels[0], iterations=options.relax_iterations)
     notes = _remarks(mesh, start.level)
     given, refused = flat_start.given(mesh, request.start)
-    notes += [refused] if refused else []
     strained = given is not None and flat_start.strain(mesh, given) > _STRAINED * start.level
     below = levels
     if given is not None:
@@ -153,8 +152,7 @@ def plan(request: Request) -> Plan:
     first = start.flat if given is None else given
     finish = partial(_place, mesh, given)
     if not request.constraints.empty:
-        if given is None:
-            first = flat_start.align(mesh, first, request.constraints)
+        first = flat_start.align(mesh, first, request.constraints)
         stages = _bound(request, stages)
         finish = partial(_settle, request)
     return Plan(
@@ -165,7 +163,7 @@ def plan(request: Request) -> Plan:
         details={"strain_level": start.level},
         finish=finish,
         remark=partial(_remark, mesh) if request.formulation == "isometry" else None,
-        unstarted=None if given is None else partial(_finest, below, start.flat),
+        unstarted=None if given is None else partial(_unstarted, request, below, start.flat),
         refused=refused,
     )
 
@@ -288,10 +286,12 @@ def _unknowns(layout: Layout, coordinates: Array) -> Variables:
     return free(layout)
 
 
-def _finest(levels: list[Mesh], flat: Array) -> Array:
-    """An image of the first grid, interpolated to the last one."""
+def _unstarted(request: Request, levels: list[Mesh], flat: Array) -> Array:
+    """An image of the first grid on the last one, near its constraints."""
     for coarse, fine in pairwise(levels):
         flat = flat_start.refine(coarse, fine, flat)
+    if not request.constraints.empty:
+        flat = flat_start.align(levels[-1], flat, request.constraints)
     return flat.ravel()
 
 

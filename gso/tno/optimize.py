@@ -104,6 +104,11 @@ def optimize(
     )
     frame = Canonical(design)
     given = x0 if isinstance(x0, Start) else Start(x0)
+    if target_curvature is not None and given.iterations is not None:
+        raise OptionError(
+            "target_curvature takes many solves, which the iterations of a start would cut off; "
+            "leave one of them out"
+        )
     flat = getattr(module, "BLOCK", "surface") == "flat"
     request = Request(
         frame.mesh,

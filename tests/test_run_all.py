@@ -1,0 +1,356 @@
+"""The report of bench/run_all.py: complete, resumable, in one file, and the same as stored."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import json
+import math
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "bench"))
+
+pytest.importorskip("jinja2")
+pytest.importorskip("matplotlib")
+
+from report import build, energy, measure, quality, surfaces, timing, verdict  # noqa: E402
+from report.method import TASKS, Method, Solved, tuned  # noqa: E402
+from report.methods import methods, of  # noqa: E402
+from report.published import NETS, TABLE_1, TABLE_2, TABLE_3  # noqa: E402
+from report.sections import SECTIONS, Section, rows  # noqa: E402
+from report.settings import Settings  # noqa: E402
+from report.store import Store  # noqa: E402
+from tno import last_problem  # noqa: E402
+
+STORED = ROOT / "bench" / "data" / "quick.json"
+TINY = Settings(
+    "tiny",
+    {"fast": 2, "slow": 1, "peer": 1},
+    timed=1,
+    sizes=(16,),
+    repeats=2,
+    examples=(0.3,),
+    workers=0,
+)
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory):
+    """Folder and figures of a run on two coarse surfaces."""
+    out = tmp_path_factory.mktemp("report")
+    some = surfaces.reference(out / "surfaces", 2, 20)
+    return out, some, build.run(TINY, some, out, "test")
+
+
+# ---------------------------------------------------------------- the report
+
+
+def test_every_published_row_is_there(tiny):
+    sections = tiny[2]["sections"]
+    published = {name: {r["name"]: r for r in s["rows"]} for name, s in sections.items()}
+    found = {
+        name: {r["name"]: r["figures"] for r in section["rows"] if r["source"] == "paper"}
+        for name, section in sections.items()
+    }
+    wanted = {"developable": TABLE_1, "flatten": TABLE_2}
+    wanted |= {f"denoise-{level:.3f}": {"Net": row} for level, row in TABLE_3.items()}
+    for section, table in wanted.items():
+        assert set(found[section]) == set(table)
+        for name, figures in table.items():
+            own = {k: v for k, v in figures.items() if k != "seconds"}
+            assert found[section][name] == own
+            # The package's row beside it.
+            assert any(r["source"] == "package" for r in published[section].values())
+
+
+def test_every_row_has_figures_time_and_count_or_says_why_not(tiny):
+    for name, section in tiny[2]["sections"].items():
+        for row in section["rows"]:
+            if row["source"] == "paper" or row["absent"]:
+                continue
+            figures = [row["figures"][column] for column in section["columns"]]
+            assert np.isfinite(figures).all(), (name, row)
+            assert row["count"] > 0 and row["seconds"]["median"] > 0, (name, row)
+    assert {"fairness_ratio"} <= set(tiny[2]["sections"]["developable"]["columns"])
+    assert {"strain_mean", "flipped_cells"} <= set(tiny[2]["sections"]["flatten"]["columns"])
+
+
+def test_only_nets_and_peers_are_absent(tiny):
+    for section in SECTIONS:
+        for row in rows(section, {}):
+            own = next((m for m in section.methods if m.name == row.name), None)
+            if row.absent:
+                assert own is not None and (own.net or own.peer or own.refused)
+
+
+def test_the_page_needs_nothing_else(tiny):
+    out, _, result = tiny
+    page = (out / "report.html").read_text()
+    assert not re.search(r"(?:src|href)=[\"'](?!data:|#)", page)
+    assert not re.search(r"<(?:script|link|iframe)|url\(|@import", page)
+    drawn = sorted((out / "figures").glob("*.png"))
+    assert page.count("data:image/png;base64,") == len(drawn) > 8
+    for section in result["sections"].values():
+        assert section["title"] in page
+    for number in "56789":
+        assert f"Figure {number}" in page
+
+
+def test_markdown_has_the_same_pictures_and_tables(tiny):
+    out, _, result = tiny
+    text = (out / "report.md").read_text()
+    for path in re.findall(r"\]\((\S+)\)", text):
+        assert (out / path).exists()
+    for section in result["sections"].values():
+        for row in section["rows"]:
+            assert f"| {row['name']} |" in text
+
+
+def test_json_says_on_what_it_was_measured(tiny):
+    found = json.loads((tiny[0] / "results.json").read_text())
+    assert found["machine"]["processor"] and found["machine"]["packages"]["numpy"]
+    assert found["surfaces"]["count"] == 2
+    assert {t["task"] for t in found["timing"]} == set(TASKS)
+    for t in found["timing"]:
+        assert t["absent"] or (t["seconds"] and t["peak_mb"] > 0)
+        if t["limit"]:
+            assert t["limit"] < np.median(t["seconds"])
+            assert sum(t["shares"].values()) == pytest.approx(1.0)
+
+
+# ---------------------------------------------------------------- resuming
+
+
+def test_a_finished_run_measures_nothing_again(tiny, monkeypatch):
+    out, some, before = tiny
+
+    def never(*_: object) -> None:
+        raise AssertionError("measured again")
+
+    for module, name in ((quality, "measure"), (timing, "_measured"), (build.examples, "_points")):
+        monkeypatch.setattr(module, name, never)
+    again = build.run(TINY, some, out, "test")
+    assert again["sections"] == before["sections"] and again["timing"] == before["timing"]
+
+
+def test_a_killed_run_goes_on_where_it_was(tmp_path, monkeypatch):
+    some = surfaces.reference(tmp_path, 2, 12)
+    known = {k: m for k, m in methods().items() if m.name in ("Init", "TNO strain", "libigl LSCM")}
+    monkeypatch.setattr(quality, "methods", lambda: known)
+    settings = Settings("killed", {"fast": 2}, timed=1, workers=0)
+    kept, done = Store(tmp_path), []
+
+    def killed(name, count):
+        done.append(name)
+        if len(done) == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        quality.measured(settings, some, kept, killed)
+    seen, measure_one = [], quality.measure
+    monkeypatch.setattr(quality, "measure", lambda block: seen.append(block) or measure_one(block))
+    records = quality.measured(settings, some, kept, lambda *_: None)
+    assert len(seen) == 2
+    assert all(len(r) == 2 and "figures" in r[1] for r in records.values()) and len(records) == 3
+
+
+def test_pieces_follow_what_they_depend_on(tmp_path):
+    block = quality.Block(
+        "flatten", "TNO strain", 0.0, surfaces.reference(tmp_path, 1, 12), 0, 1, True
+    )
+    assert block.key == block.key
+    assert block.key["measures"] != of("flatten", "libigl ARAP").key(0.0)["measures"]
+    store = Store(tmp_path)
+    store.keep("a", {"version": 1}, [1.0])
+    assert store.find("a", {"version": 1}) == [1.0] and store.find("a", {"version": 2}) is None
+
+
+def test_a_method_that_fails_does_not_stop_the_others(tmp_path):
+    def broken(case):
+        raise ValueError("no")
+
+    case = surfaces.reference(tmp_path, 1, 12).case(0)
+    record = quality._record(Method("broken", "flatten", broken), case)
+    assert record == {"error": "ValueError: no"}
+    endless = Method("endless", "flatten", lambda c: Solved(np.full((12, 12, 2), np.nan)))
+    assert "not finite" in quality._record(endless, case)["error"]
+
+
+def test_surfaces_of_a_set_that_is_built(tmp_path):
+    from gso import dataset
+
+    pytest.importorskip("h5py")
+    recipe = dataset.Recipe(n=10, size=16, labels=("strain",), extras=False)
+    split = dataset.build(tmp_path / "set", recipe, workers=0)["test"]
+    some = surfaces.opened(tmp_path, tmp_path / "set")
+    assert len(some) == len(split)
+    np.testing.assert_array_equal(some[0], split["surface"][0])
+    np.testing.assert_allclose(some.case(0, 0.01).given, split["noisy_0.010"][0], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["store", "method", "timing", "pages"])
+def test_examples_in_the_docstrings(name):
+    module = importlib.import_module(f"report.{name}")
+    tried = doctest.testmod(module)
+    assert tried.attempted and not tried.failed
+
+
+# ---------------------------------------------------------------- figures
+
+
+def compared(task, sigma, name, some):
+    """Figures of the first surfaces, and the stored ones."""
+    stored = json.loads(STORED.read_text())["records"].get(f"{task}/{sigma:g}/{name}", [])
+    for k, figures in enumerate(stored):
+        found = quality._record(of(task, name), some.case(k, sigma))
+        yield found["figures"], figures
+
+
+def check_stored(paces, some, share):
+    """Every figure within a share of the stored one: other machines round otherwise."""
+    for (task, name), method in methods().items():
+        for sigma in quality.levels(task):
+            if method.pace not in paces or method.absent(sigma):
+                continue
+            for found, figures in compared(task, sigma, name, some):
+                for metric, value in figures.items():
+                    wrong = abs(found[metric] - value)
+                    assert wrong <= share * abs(value) + 1e-5, (task, sigma, name, metric)
+
+
+def test_quality_is_as_stored(tmp_path):
+    check_stored(("fast",), surfaces.reference(tmp_path), 0.03)
+
+
+@pytest.mark.slow
+def test_quality_of_slow_methods_is_as_stored(tmp_path):
+    check_stored(("slow", "peer"), surfaces.reference(tmp_path), 0.1)
+
+
+def test_published_figures_are_those_of_the_tables():
+    assert TABLE_1["TNO"] == {"loss_gc": 0.0283, "K_A_r": 0.8888, "d_H": 0.823, "seconds": 38.256}
+    assert TABLE_3[0.01] == {"theta_noisy": 44.64, "theta": 2.505, "rate": 94.42}
+    assert NETS["flatten-w"]["loss_iso_cell"] == 2.46e-4
+
+
+def test_peers_have_tuned_parameters_for_every_level():
+    found = tuned()
+    for method in methods().values():
+        if method.candidates:
+            own = found[method.task][method.name]
+            assert len(own) == len(quality.levels(method.task))
+            assert all(p in [dict(c) for c in method.candidates] for p in own.values())
+
+
+# ---------------------------------------------------------------- peers
+
+
+def test_other_solvers_get_the_same_objective(surfaces):
+    problem, x = last_problem(surfaces[0][::2, ::2], "developable", "balanced")
+    x = x + 1e-3 * np.random.default_rng(0).standard_normal(len(x))
+    value, slope = energy.residuals(problem, x), energy.jacobian(problem, x)
+    objective, gradient, _ = problem.linearise(x)
+    assert 0.5 * value @ value == pytest.approx(objective, rel=1e-12)
+    np.testing.assert_allclose(slope.T @ value, gradient, atol=1e-12 * np.abs(gradient).max())
+    import casadi
+
+    unknowns, expression = energy.expressions(problem)
+    at = np.asarray(casadi.Function("f", [unknowns], [expression])(x)).ravel()
+    assert at @ at == pytest.approx(value @ value, rel=1e-12)
+
+
+def test_parameterisations_are_those_of_the_surface(surfaces):
+    from gso.mesh import Mesh
+
+    for name in ("libigl LSCM", "libigl ARAP", "libigl SLIM"):
+        points = surfaces[0]
+        case = quality.Case(points, points)
+        flat = of("flatten", name)(case).points
+        assert flat.shape == (*points.shape[:2], 2)
+        figures = quality.figures("flatten", case, flat)
+        assert figures["strain_mean"] < 0.3 and figures["flipped_cells"] == 0
+        assert Mesh.from_grid(points).vertices.shape[0] == flat.shape[0] * flat.shape[1]
+
+
+# ---------------------------------------------------------------- losses and times
+
+
+def record(seconds=1.0, **figures):
+    return {"figures": figures, "seconds": seconds, "iterations": None}
+
+
+def made_up(monkeypatch, default, own, peer):
+    """Losses of a section with three methods."""
+    known = [
+        Method("default", "flatten", lambda c: None),
+        Method("own", "flatten", lambda c: None),
+        Method("peer", "flatten", lambda c: None, peer=True),
+    ]
+    paper = {"TNO": {"strain_mean": 0.5, "seconds": 0.5}}
+    section = Section("one", "One", "flatten", ("strain_mean",), paper, default="default")
+    monkeypatch.setattr(Section, "methods", property(lambda self: known))
+    monkeypatch.setattr(verdict, "SECTIONS", (section,))
+    given = {"default": default, "own": own, "peer": peer}
+    return verdict.losses({("flatten", 0.0, k): v for k, v in given.items()})
+
+
+def test_losses_are_found_on_the_same_surfaces(monkeypatch):
+    default = [record(strain_mean=0.2), record(strain_mean=9.0)]
+    peer = [record(0.1, strain_mean=0.1)]
+    found = made_up(monkeypatch, default, [record(strain_mean=0.05)], peer)
+    by = {(loss.metric, w.name): (w, w in loss.lost) for loss in found for w in loss.winners}
+    strain, lost = by["strain_mean", "peer"]
+    assert (strain.ours, strain.theirs, strain.count) == (0.2, 0.1, 1)
+    assert not lost and strain.best_name == "own"
+    assert by["seconds", "peer"][1]
+    paper, lost = by["strain_mean", "the paper's TNO"]
+    assert lost and paper.ours == pytest.approx(4.6) and paper.best_name == "default"
+    assert "better than all of the package: the paper's TNO 0.5" in str(found[0])
+
+
+def test_nothing_is_lost_to_what_is_worse_or_failed(monkeypatch):
+    fine = [record(0.01, strain_mean=0.1)]
+    assert not made_up(monkeypatch, fine, fine, [{"error": "no"}])
+    assert not made_up(monkeypatch, fine, fine, fine)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_shares_and_limit_of_a_solve(task):
+    found = measure.main(task, "TNO", "", 16, 2, 5.0)
+    assert len(found["seconds"]) == 2 and found["peak_mb"] > 10
+    assert sum(found["shares"].values()) == pytest.approx(1.0)
+    assert min(found["shares"].values()) >= 0
+    if task == "denoise":
+        assert found["limit"] is None
+    else:
+        assert 0 < found["limit"] < max(found["seconds"])
+        assert found["factorisations"] >= found["iterations"] > 0
+
+
+# ---------------------------------------------------------------- README
+
+
+def test_tables_of_the_readme_come_from_the_figures(tiny, monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    tables = importlib.import_module("tables")
+    result = {k: v for k, v in tiny[2].items() if k != "records"}
+    found = tables.measured(result)
+    names = {f"measured-{n}" for n in ("machine", "developable", "energy", "flatten", "denoise")}
+    assert names | {"measured-size", "measured-losses"} == set(found)
+    balanced = next(
+        r for r in result["sections"]["developable"]["rows"] if r["name"] == "TNO balanced"
+    )
+    assert tables.number(balanced["figures"]["loss_gc"]) in found["measured-developable"]
+    assert "*Net-CF, published*" in found["measured-developable"]
+    assert not math.isnan(float(tables.number(0.02)))
+    path = tmp_path / "results.json"
+    path.write_text(json.dumps(result))
+    monkeypatch.setattr(tables, "RESULTS", path)
+    with pytest.raises(SystemExit, match="measured-"):
+        tables.replaced((ROOT / "README.rst").read_text().replace(".. begin measured-", ".. "))
