@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 import time
 import warnings
 from collections.abc import Callable, Iterable
@@ -29,7 +28,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "2")
 import numpy as np
 from report.store import Store
 from report.surfaces import Surfaces, opened, screened
-from tqdm import tqdm
+from tno import progress as watched
 
 import gso
 from gso import hybrid
@@ -49,11 +48,6 @@ CASES = {
 POINTS = (0, 1, 2, 3, 4, 6, 8, 12, 18, 24)
 #: Holes of the general meshes, as shares of the side; every other one has none.
 HOLES = (0.0, 0.15)
-
-
-def watched(items: Iterable[Any], text: str) -> Any:
-    """A progress bar when a person is watching."""
-    return tqdm(items, desc=text, leave=False, disable=not sys.stderr.isatty())
 
 
 def timed(function: Callable[..., Any], *given: Any, **keywords: Any) -> tuple[Any, float]:
@@ -211,11 +205,11 @@ def main() -> None:
         parser.error(f"no section {', '.join(sorted(unknown))}; there are {', '.join(SECTIONS)}")
     if DEFAULTS["developable"] not in available("developable"):
         parser.error("no net comes with the package: gso train developable, then see docs/net.rst")
-    store, n = Store(arguments.out), arguments.n
+    store, n, folder = Store(arguments.out), arguments.n, arguments.out / "surfaces"
     if arguments.data is None:
-        splits = {s: screened(arguments.out, s, store) for s in ("test", "hard")}
+        splits = {s: screened(folder, s, store) for s in ("test", "hard")}
     else:
-        splits = {s: opened(arguments.out, arguments.data, s) for s in ("test", "hard")}
+        splits = {s: opened(folder, arguments.data, s) for s in ("test", "hard")}
     test = splits["test"]
     for section in arguments.sections:
         if section == "speed":

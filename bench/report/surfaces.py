@@ -30,6 +30,9 @@ from report.store import Store, digest
 Array = NDArray[np.float64]
 Tick = Callable[[int, int], None]
 
+#: Splits that are drawn again from the seed.
+_SCREENED = ("validation", "test", "hard")
+
 BENCH = Path(__file__).resolve().parents[1]
 
 
@@ -126,10 +129,9 @@ def screened(folder: Path, split: str, store: Store, tick: Tick | None = None) -
         with blas_threads(1):
             selection = select(recipe.n, recipe.splits["hard"], seed=recipe.seed, tick=tick)
         every = list(tasks(recipe, selection, ()))
-        names = ("validation", "test")
-        return {s: np.concatenate([t.ids for t in every if t.split == s]) for s in names}
+        return {s: np.concatenate([t.ids for t in every if t.split == s]) for s in _SCREENED}
 
-    ids = store.arrays("surfaces/draws", key | {"split": None}, draws)[split].tolist()
+    ids = store.arrays("surfaces/draws", key | {"split": _SCREENED}, draws)[split].tolist()
     name = f"{split} split of seed {recipe.seed}, {len(ids):,} surfaces"
     home = folder / digest(key)
     if (home / "surface.npy").exists() and (home / "noise.npy").exists():
@@ -142,9 +144,12 @@ def screened(folder: Path, split: str, store: Store, tick: Tick | None = None) -
     return Surfaces(name, home)
 
 
-def opened(folder: Path, path: Path) -> Surfaces:
-    """The test split of a set that is built."""
-    split = dataset.open(path)["test"]
+def opened(folder: Path, path: Path, name: str = "test") -> Surfaces:
+    """A split of a set that is built; the test split with its noise, others without any."""
+    split = dataset.open(path)[name]
+    points = split["surface"][:]
+    if name != "test":
+        return written(folder, f"{name} split of {path.name}", points, np.zeros_like(points))
     if "noise" not in split.arrays:
         raise DatasetError(f"{path}: its test split has no noise; give a set of gso dataset build")
-    return written(folder, f"test split of {path.name}", split["surface"][:], split["noise"][:])
+    return written(folder, f"test split of {path.name}", points, split["noise"][:])
