@@ -25,6 +25,7 @@ from gso.net.config import FOLDER, Config, Phase, from_dict, read  # noqa: E402
 from gso.net.curves import read as read_curves  # noqa: E402
 from gso.net.data import Source, fresh, noisy, open_source  # noqa: E402
 from gso.net.grids import normalise  # noqa: E402
+from gso.net.muon import optimisers  # noqa: E402
 from gso.net.objective import aligned  # noqa: E402
 from gso.net.schedule import place  # noqa: E402
 
@@ -72,6 +73,7 @@ def test_shipped_configurations(path):
     [
         ({"task": "bend"}, "task is 'bend'"),
         ({"colour": 3}, "unknown: colour"),
+        ({"optimiser": "sgd"}, "optimiser is 'sgd'"),
         ({"phase": []}, "phase"),
         ({"phase": 3}, "phase"),
         ({"phase": [{"loss": "l2"}]}, "loss is 'l2'"),
@@ -251,11 +253,38 @@ def test_what_a_folder_holds_is_respected(folder, tmp_path):
 
 def test_checkpoint_of_another_net(tmp_path):
     small, large = (GSONet(channels=c, blocks=1) for c in (4, 8))
-    checkpoint.save(
-        tmp_path / "c", small, copy.deepcopy(small), torch.optim.AdamW(small.parameters()), {}
-    )
+    mine, others = (optimisers(net, "muon", 0.0) for net in (small, large))
+    checkpoint.save(tmp_path / "c", small, copy.deepcopy(small), mine, {})
     with pytest.raises(WeightsError):
-        checkpoint.load(tmp_path / "c", large, large, torch.optim.AdamW(large.parameters()))
+        checkpoint.load(tmp_path / "c", large, large, others)
+
+
+def test_steps_of_muon_are_alike_in_all_directions():
+    weight = torch.nn.Parameter(torch.zeros(24, 5, 3, 3))
+    (muon,) = optimisers(torch.nn.ParameterList([weight]), "muon", 0.0)
+    generator = torch.Generator().manual_seed(0)
+    # A gradient that is ten thousand times larger along some directions than along others.
+    scale = torch.logspace(-4, 0, 24)[:, None, None, None]
+    weight.grad = scale * torch.randn(weight.shape, generator=generator)
+    muon.step()
+    sizes = torch.linalg.svdvals(weight.detach().flatten(1)) / muon.defaults["lr"]
+    rms = 0.2 * 45**0.5
+    assert sizes.median() / rms == pytest.approx(1.0, abs=0.3)
+    assert sizes.max() < 1.3 * rms
+    # Of AdamW's size: both kinds of weights go by one rate.
+    step = weight.detach().square().mean().sqrt() / muon.defaults["lr"]
+    assert 0.1 < step < 0.3
+
+
+def test_muon_takes_matrices_and_adamw_the_rest():
+    net = GSONet(channels=8, blocks=1)
+    muon, adamw = optimisers(net, "muon", 0.1)
+    both = [[p for group in o.param_groups for p in group["params"]] for o in (muon, adamw)]
+    assert all(p.ndim > 1 and min(p.shape[0], p[0].numel()) >= 8 for p in both[0])
+    assert {id(p) for p in both[0] + both[1]} == {id(p) for p in net.parameters()}
+    assert sum(p.numel() for p in both[0]) > 0.9 * sum(p.numel() for p in net.parameters())
+    (alone,) = optimisers(net, "adamw", 0.1)
+    assert isinstance(alone, torch.optim.AdamW) and isinstance(adamw, torch.optim.AdamW)
 
 
 def test_minutes_end_a_run(folder, tmp_path):

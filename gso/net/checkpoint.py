@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,25 +14,26 @@ from gso.io import replacing
 from gso.net.base import Net
 from gso.status import WeightsError
 
+Optimisers = Sequence[torch.optim.Optimizer]
 
-def save(
-    path: Path, net: Net, average: Net, optimiser: torch.optim.Optimizer, state: dict[str, Any]
-) -> None:
-    """Write nets, the optimiser's moments, and numbers."""
+
+def save(path: Path, net: Net, average: Net, optimisers: Optimisers, state: dict[str, Any]) -> None:
+    """Write nets, the optimisers' moments, and numbers."""
     from safetensors.torch import save as packed
 
     tensors: dict[str, Tensor] = {}
     for prefix, module in (("net", net), ("average", average)):
         tensors |= {f"{prefix}.{k}": v for k, v in module.state_dict().items()}
-    for k, moments in optimiser.state_dict()["state"].items():
-        tensors |= {f"optimiser.{k}.{name}": value for name, value in moments.items()}
+    for number, optimiser in enumerate(optimisers):
+        for k, moments in optimiser.state_dict()["state"].items():
+            tensors |= {f"optimiser.{number}.{k}.{name}": value for name, value in moments.items()}
     tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
     data = packed(tensors, metadata={"state": json.dumps(state)})
     with replacing(path) as file:
         file.write(data)
 
 
-def load(path: Path, net: Net, average: Net, optimiser: torch.optim.Optimizer) -> dict[str, Any]:
+def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> dict[str, Any]:
     """Take up what :func:`save` wrote; returns the numbers.
 
     Raises
@@ -47,11 +49,12 @@ def load(path: Path, net: Net, average: Net, optimiser: torch.optim.Optimizer) -
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         for prefix, module in (("net", net), ("average", average)):
             module.load_state_dict(_part(tensors, prefix))
-        moments: dict[int, dict[str, Tensor]] = {}
-        for key, value in _part(tensors, "optimiser").items():
-            number, name = key.split(".")
-            moments.setdefault(int(number), {})[name] = value
-        optimiser.load_state_dict({**optimiser.state_dict(), "state": moments})
+        for number, optimiser in enumerate(optimisers):
+            moments: dict[int, dict[str, Tensor]] = {}
+            for key, value in _part(tensors, f"optimiser.{number}").items():
+                k, name = key.split(".")
+                moments.setdefault(int(k), {})[name] = value
+            optimiser.load_state_dict({**optimiser.state_dict(), "state": moments})
     except (OSError, SafetensorError, KeyError, ValueError, RuntimeError) as error:
         raise WeightsError(
             f"{path} is no checkpoint of this run ({error}); remove it to begin anew"

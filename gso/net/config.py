@@ -16,6 +16,7 @@ from gso.status import OptionError
 FOLDER = Path(__file__).parent / "configs"
 
 LOSSES = ("published", "label", "energy", "clean")
+OPTIMISERS = ("muon", "adamw")
 AUGMENTATIONS = ("none", "symmetries", "shear")
 #: Terms of the published losses.
 TERMS = ("in", "fair", "gc", "iso", "iso_w")
@@ -119,8 +120,10 @@ class Config:
         Net whose results take the surfaces' place: Net-F learns from those of Net-C.
     ema : float
         Decay of the moving average of the weights, which is what is kept in the end.
+    optimiser : {"muon", "adamw"}
+        Muon for the weights that are matrices and AdamW for the rest, or AdamW for all.
     weight_decay : float
-        Of AdamW.
+        Share of the weights, over the rate, that each step takes away.
     bf16 : bool or None
         Convolutions in bfloat16; None where the processor has it.
     validate_every, checkpoint_every : float
@@ -143,6 +146,7 @@ class Config:
     init: str = ""
     through: str = ""
     ema: float = 0.999
+    optimiser: str = "muon"
     weight_decay: float = 1e-2
     bf16: bool | None = None
     validate_every: float = 300.0
@@ -152,6 +156,7 @@ class Config:
     def __post_init__(self) -> None:
         _choice("task", self.task, tuple(TASKS))
         _choice("augment", self.augment, AUGMENTATIONS)
+        _choice("optimiser", self.optimiser, OPTIMISERS)
         _number("steps", self.steps, 1, whole=True)
         _number("validate", self.validate, 1, whole=True)
         _number("limit", self.limit, 0, whole=True)

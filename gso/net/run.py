@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 
 from gso import dataset
-from gso.net import checkpoint, weights
+from gso.net import checkpoint, muon, weights
 from gso.net.base import Net
 from gso.net.config import Config
 from gso.net.curves import Curves
@@ -45,7 +45,7 @@ class Run:
     check: tuple[Tensor, Tensor, Tensor | None]
     net: Net
     average: Net
-    optimiser: torch.optim.Optimizer
+    optimisers: list[torch.optim.Optimizer]
     origin: dict[str, Any]
     step: int = 0
     spent: float = 0.0
@@ -78,7 +78,7 @@ class Run:
                 "config": _kept(self.config),
             }
             path = self.folder / CHECKPOINT
-            checkpoint.save(path, self.net, self.average, self.optimiser, state)
+            checkpoint.save(path, self.net, self.average, self.optimisers, state)
 
     def validate(self) -> None:
         """Measure the averaged net, and write it with its card."""
@@ -151,14 +151,14 @@ def begin(
         _validation(config, data),
         net,
         average,
-        torch.optim.AdamW(net.parameters(), weight_decay=config.weight_decay),
+        muon.optimisers(net, config.optimiser, config.weight_decay),
         _origin(data, here),
     )
     if config.through:
         _pass_through(run)
     path = folder / CHECKPOINT
     if path.exists():
-        state = checkpoint.load(path, net, average, run.optimiser)
+        state = checkpoint.load(path, net, average, run.optimisers)
         if state.get("config") != _kept(config):
             raise OptionError(
                 f"{folder} holds a run with another configuration; take another folder"

@@ -126,15 +126,17 @@ def _loop(run: Run, show: Callable[[Report], None] | None) -> None:
         batch = run.source.batch(
             config, at.phase, run.step, rank=here.rank, world=here.world, device=here.device
         )
-        for group in run.optimiser.param_groups:
-            group["lr"] = at.rate
-        run.optimiser.zero_grad(set_to_none=True)
+        for optimiser in run.optimisers:
+            for group in optimiser.param_groups:
+                group["lr"] = at.rate
+            optimiser.zero_grad(set_to_none=True)
         loss = objective(batch, at.phase, at.progress)
         loss.backward()
         norm = torch.nn.utils.clip_grad_norm_(run.net.parameters(), at.phase.clip)
         # A surface without a finite gradient costs one step, and not the run.
         if bool(norm.isfinite()):
-            run.optimiser.step()
+            for optimiser in run.optimisers:
+                optimiser.step()
         run.step += 1
         run.follow()
         losses.append(loss.detach())

@@ -1,0 +1,104 @@
+"""Muon: steps of the same size in every direction of a weight matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+#: The polynomial whose iterates take singular values close to one.
+_QUINTIC = (3.4445, -4.7750, 2.0315)
+_ITERATIONS = 5
+#: Root mean square of AdamW's steps, over its rate: with it both take the same rates.
+_RMS = 0.2
+#: Matrices with fewer rows or columns than that are left to AdamW.
+_LEAST = 8
+
+
+class Muon(torch.optim.Optimizer):
+    """Momentum whose steps are made orthogonal (Jordan et al. 2024, Liu et al. 2025).
+
+    The kernels of a convolution count as a matrix with one row per output. Unlike
+    ``torch.optim.Muon`` it takes them as they are, and computes in their own precision, which
+    processors without bfloat16 need.
+
+    Parameters
+    ----------
+    weights : iterable of Tensor
+        Weights of two or more dimensions.
+    lr : float
+        Rate, on the scale of AdamW's.
+    weight_decay, momentum : float
+        Share of the weights, over the rate, that each step takes away; share of the old steps
+        in each.
+
+    Examples
+    --------
+    >>> layer = nn.Conv2d(8, 16, 3)
+    >>> muon = Muon([layer.weight], lr=0.1)
+    >>> layer(torch.ones(1, 8, 3, 3)).sum().backward()
+    >>> muon.step()
+    """
+
+    def __init__(
+        self,
+        weights: Iterable[Tensor],
+        lr: float = 1e-3,
+        *,
+        weight_decay: float = 1e-2,
+        momentum: float = 0.95,
+    ):
+        super().__init__(weights, {"lr": lr, "weight_decay": weight_decay, "momentum": momentum})
+
+    @torch.no_grad()
+    def step(self, closure: Any = None) -> None:  # type: ignore[override]
+        """Take a step along the gradients that the weights hold."""
+        for group in self.param_groups:
+            rate, keep = group["lr"], group["momentum"]
+            for weight in group["params"]:
+                if weight.grad is None:
+                    continue
+                state = self.state[weight]
+                if not state:
+                    state["momentum"] = torch.zeros_like(weight)
+                mean = state["momentum"].lerp_(weight.grad, 1.0 - keep)
+                ahead = weight.grad.lerp(mean, keep).flatten(1)
+                along = orthogonal(ahead)
+                weight.mul_(1.0 - rate * group["weight_decay"])
+                size = _RMS * max(along.shape) ** 0.5
+                weight.add_(along.view_as(weight), alpha=-rate * size)
+
+
+def orthogonal(matrix: Tensor) -> Tensor:
+    """The nearest matrix whose rows (or columns, if fewer) are orthonormal, roughly.
+
+    >>> values = torch.linalg.svdvals(orthogonal(torch.randn(20, 50)))
+    >>> bool((values > 0.5).all() and (values < 1.5).all())
+    True
+    """
+    a, b, c = _QUINTIC
+    tall = matrix.shape[0] > matrix.shape[1]
+    x = matrix.T if tall else matrix
+    x = x / x.norm().clamp_min(1e-12)
+    for _ in range(_ITERATIONS):
+        square = x @ x.T
+        x = torch.addmm(x, torch.addmm(square, square, square, beta=b, alpha=c), x, beta=a)
+    return x.T if tall else x
+
+
+def optimisers(net: nn.Module, kind: str, weight_decay: float) -> list[torch.optim.Optimizer]:
+    """What trains a net: Muon its matrices and AdamW the rest, or AdamW everything."""
+    weights = list(net.parameters())
+    if kind == "adamw":
+        return [torch.optim.AdamW(weights, weight_decay=weight_decay)]
+    wide = [w.ndim > 1 and min(w.shape[0], w[0].numel()) >= _LEAST for w in weights]
+    made: list[torch.optim.Optimizer] = []
+    if any(wide):
+        rows = [w for w, is_wide in zip(weights, wide, strict=True) if is_wide]
+        made.append(Muon(rows, weight_decay=weight_decay))
+    rest = [w for w, is_wide in zip(weights, wide, strict=True) if not is_wide]
+    if rest:
+        made.append(torch.optim.AdamW(rest, weight_decay=weight_decay))
+    return made
