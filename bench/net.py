@@ -4,7 +4,7 @@
     python bench/net.py DIR --cards            the same, and writes it into the nets' cards
     python bench/net.py DIR --model RUN/model.safetensors    one net
     python bench/net.py DIR --others           the splits that are no Bezier surfaces, too
-    python bench/net.py --curve RUN...  --plot FILE          quality against training time
+    python bench/net.py --curve [NET...] --plot FILE         quality against training time
     python bench/net.py DIR --grid FILE        figure 5: loss against parameters (hours)
 
 Figures are means over the test split; times are medians for one surface, from array to
@@ -32,6 +32,7 @@ from tqdm import tqdm
 
 from gso import dataset, net
 from gso.dataset.noise import LEVELS
+from gso.io import replacing
 from gso.net import catalogue, weights
 from gso.net.config import from_dict
 from gso.net.curves import read
@@ -136,29 +137,36 @@ def rows(arguments: argparse.Namespace) -> None:
             weights.write_card(path.with_suffix(".json"), card)
 
 
-def curve(runs: list[Path], target: str) -> None:
-    """Plot what validation showed against the hours of training."""
+def curve(names: list[str], target: str) -> None:
+    """Plot what validation showed against the hours of training, as the cards have it."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(figsize=(7, 4.5), constrained_layout=True)
-    for run in runs:
-        card = catalogue.read_card(run / "model.safetensors")
-        name = SCORE[card["model"]["task"]]
-        seen = [(r["seconds"] / 3600, r[name]) for r in read(run) if name in r]
-        axes.plot(*np.array(seen).reshape(-1, 2).T, marker=".", label=f"{card['name']}: {name}")
+    for name in names:
+        card = catalogue.read_card(catalogue.located(name))
+        seen = np.array(card["curve"]).reshape(-1, 2)
+        label = f"{card['name']}: {SCORE[card['model']['task']]}"
+        axes.plot(*seen.T, marker=".", label=label)
     axes.set(xlabel="hours", ylabel="validation, lower is better", yscale="log")
     axes.legend()
     figure.savefig(target)
 
 
 def grid(arguments: argparse.Namespace) -> None:
-    """Figure 5: nets of several sizes, supervised on the optimiser's results."""
-    table = []
+    """Figure 5: nets of several sizes, supervised on the optimiser's results.
+
+    Nets that the file has already are not trained again.
+    """
+    path = Path(arguments.grid)
+    table = json.loads(path.read_text())["rows"] if path.exists() else []
+    done = {(row["blocks"], row["channels"]) for row in table}
     for blocks in BLOCKS:
         for channels in CHANNELS:
+            if (blocks, channels) in done:
+                continue
             config = from_dict(
                 {
                     "name": f"nb{blocks}-nc{channels}",
@@ -183,8 +191,9 @@ def grid(arguments: argparse.Namespace) -> None:
             }
             table.append(row)
             print(line(config.name, {k: v for k, v in row.items() if k[0] != "b"}, {}), flush=True)
-    record = {"command": f"python bench/net.py DIR --grid {arguments.grid}", "rows": table}
-    Path(arguments.grid).write_text(json.dumps(record, indent=1) + "\n")
+            record = {"command": "python bench/net.py DIR --grid FILE", "rows": table}
+            with replacing(path) as file:
+                file.write((json.dumps(record, indent=1) + "\n").encode())
 
 
 def main() -> None:
@@ -198,11 +207,12 @@ def main() -> None:
     parser.add_argument("--others", action="store_true", help="splits that are no Bezier surfaces")
     parser.add_argument("--cards", action="store_true", help="write the figures into the cards")
     parser.add_argument("--grid", metavar="FILE", help="figure 5, as JSON")
-    parser.add_argument("--curve", nargs="+", type=Path, metavar="RUN", help="plot runs")
+    parser.add_argument("--curve", nargs="*", metavar="NET", help="plot these, or all")
     parser.add_argument("--plot", default="curves.png", metavar="FILE", help="for --curve")
     arguments = parser.parse_args()
-    if arguments.curve:
-        curve(arguments.curve, arguments.plot)
+    if arguments.curve is not None:
+        every = [name for name in net.available() if name not in catalogue.CHAINS]
+        curve(arguments.curve or every, arguments.plot)
     elif arguments.data is None:
         parser.error("give a set of surfaces")
     elif arguments.grid:

@@ -302,6 +302,10 @@ def test_begin_with_a_net_and_learn_from_its_results(folder, tmp_path):
     train(made, folder, tmp_path / "run")
     first, last = tensors(net), tensors(tmp_path / "run" / "model.safetensors")
     assert all(torch.allclose(first[k], last[k], atol=1e-4) for k in first)
+    again = str(tmp_path / "run" / "model.safetensors")
+    card = train(replace(made, init=again, through=""), folder, tmp_path / "again")
+    assert card["begun_with"]["name"] == made.name and len(card["curve"]) == 2
+    assert card["curve"][1][0] >= card["curve"][0][0]
     with pytest.raises(OptionError, match="does not fit"):
         train(config(model={**PUBLISHED, "channels": 8}, init=net), folder, tmp_path / "other")
     with pytest.raises(OptionError, match="another kind"):

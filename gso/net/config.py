@@ -149,7 +149,7 @@ class Config:
     optimiser: str = "muon"
     weight_decay: float = 1e-2
     bf16: bool | None = None
-    validate_every: float = 300.0
+    validate_every: float = 600.0
     checkpoint_every: float = 180.0
     validate: int = 128
 

@@ -17,12 +17,13 @@ from torch import Tensor
 from gso import dataset
 from gso.net import checkpoint, muon, weights
 from gso.net.base import Net
+from gso.net.catalogue import located, read_card
 from gso.net.config import Config
-from gso.net.curves import Curves
+from gso.net.curves import Curves, read
 from gso.net.data import Source, noisy, open_source
 from gso.net.grids import normalise
 from gso.net.processes import Processes
-from gso.net.validate import applied, mean_figures
+from gso.net.validate import SCORE, applied, mean_figures
 from gso.status import OptionError
 
 #: Files of a run.
@@ -47,6 +48,7 @@ class Run:
     average: Net
     optimisers: list[torch.optim.Optimizer]
     origin: dict[str, Any]
+    begun_with: dict[str, Any]
     step: int = 0
     spent: float = 0.0
     figures: dict[str, float] = field(default_factory=dict)
@@ -92,7 +94,7 @@ class Run:
         self.here.wait()
 
     def _card(self) -> dict[str, Any]:
-        return {
+        card = {
             "name": self.config.name,
             "config": self.config.as_dict(),
             "steps": self.step,
@@ -100,6 +102,20 @@ class Run:
             "validation": self.figures,
             **self.origin,
         }
+        if self.begun_with:
+            card["begun_with"] = {k: self.begun_with.get(k) for k in ("name", "hours", "sha256")}
+        return card | {"curve": self._curve()}
+
+    def _curve(self) -> list[list[float]]:
+        """Hours and the figure that nets are judged by, of earlier runs of this net, too."""
+        name = SCORE[self.config.task]
+        same = self.begun_with.get("name") == self.config.name
+        curve = list(self.begun_with.get("curve", [])) if same else []
+        before = curve[-1][0] if curve else 0.0
+        for row in read(self.folder):
+            if name in row:
+                curve.append([round(before + row["seconds"] / 3600, 3), round(row[name], 5)])
+        return curve
 
     def close(self) -> None:
         """Finish the curves."""
@@ -153,6 +169,7 @@ def begin(
         average,
         muon.optimisers(net, config.optimiser, config.weight_decay),
         _origin(data, here),
+        read_card(located(config.init)) if config.init else {},
     )
     if config.through:
         _pass_through(run)
