@@ -16,7 +16,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -28,7 +27,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "2")
 
 import numpy as np
 from report.published import NETS, TABLE_3
-from tqdm import tqdm
+from tno import progress as watched
 
 from gso import dataset, net
 from gso.dataset.noise import LEVELS
@@ -51,11 +50,6 @@ OTHERS = (
 )
 #: Figure 5: blocks per level, channels, surfaces, epochs.
 BLOCKS, CHANNELS, SURFACES, EPOCHS = (2, 4, 6), (8, 16, 32), 2000, 10
-
-
-def watched(items: Any, text: str) -> Any:
-    """A progress bar when a person is watching."""
-    return tqdm(items, desc=text, leave=False, disable=not sys.stderr.isatty())
 
 
 def measured(task: str, model: Any, split: Any, count: int | None = None) -> dict[str, float]:

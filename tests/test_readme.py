@@ -84,7 +84,8 @@ def test_commands_run(workshop):
 
 
 def test_every_option_of_a_command_in_the_readme_exists():
-    named = set(re.findall(r"--[a-z][a-z-]+", "\n".join(commands(README))))
+    ours = [line for line in commands(README) if line.startswith("gso ")]
+    named = set(re.findall(r"--[a-z][a-z-]+", "\n".join(ours)))
     known = {name for c in main.commands.values() for p in c.params for name in p.opts}
     assert named <= known
 

@@ -25,10 +25,14 @@ class Net(nn.Module):
         What it was made for.
     settings : dict
         What it is made of again, with its class.
+    passes : int
+        How often it is applied.
     bf16 : bool
         Convolutions run in bfloat16; what goes in and comes out, curvature above all, is in single
         precision all the same.
     """
+
+    passes = 1
 
     def __init__(self, task: str, **settings: Any):
         super().__init__()
@@ -37,8 +41,12 @@ class Net(nn.Module):
         self.task, self.settings, self.bf16 = task, {"task": task, **settings}, False
 
     @abstractmethod
-    def displacements(self, surface: Tensor, sigma: Tensor | None = None) -> list[Tensor]:
-        """Displacements (B, H, W, d) from the start, one per pass, the last one the best.
+    def displacements(
+        self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
+    ) -> Tensor:
+        """Displacements (B, H, W, d) from the start.
+
+        Gradients are those of the last pass: what the passes before it made is given to it.
 
         Parameters
         ----------
@@ -46,6 +54,8 @@ class Net(nn.Module):
             Grids of the unit ball.
         sigma : Tensor, (B,), optional
             Standard deviation of the noise, for nets that are told.
+        passes : int, optional
+            How many passes; all of the net's when not given.
         """
 
     @abstractmethod
@@ -58,7 +68,7 @@ class Net(nn.Module):
 
     def forward(self, surface: Tensor, sigma: Tensor | None = None) -> Tensor:
         """Grids (B, H, W, 3), or flat images (B, H, W, 2), of grids (B, H, W, 3)."""
-        return self.start(surface) + self.displacements(surface, sigma)[-1]
+        return self.start(surface) + self.displacements(surface, sigma)
 
     def autocast(self, device: torch.device) -> torch.autocast:
         """Context for convolutions."""

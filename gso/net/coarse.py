@@ -36,7 +36,7 @@ class CoarseNet(Net):
     depths : sequence of 3 int
         Residual blocks there; at the first two on the way down and on the way up.
     passes : int
-        How often the net is applied, with the same weights.
+        How often the net is applied, with the same weights, each time to what it made last.
 
     Raises
     ------
@@ -58,7 +58,7 @@ class CoarseNet(Net):
         *,
         widths: tuple[int, int, int] = (32, 64, 128),
         depths: tuple[int, int, int] = (1, 1, 4),
-        passes: int = 2,
+        passes: int = 3,
     ):
         sound = len(widths) == len(depths) == 3 and all(4 <= w <= 512 for w in widths)
         if not sound or not all(0 <= d <= 32 for d in depths) or not 1 <= passes <= 8:
@@ -93,8 +93,16 @@ class CoarseNet(Net):
             nn.init.zeros_(head.weight)
             nn.init.zeros_(head.bias)  # type: ignore[arg-type]
 
-    def coefficients(self, surface: Tensor) -> list[tuple[Tensor, Tensor]]:
-        """Coefficients (B, d, n, m) of both fields after each pass."""
+    def coefficients(self, surface: Tensor, passes: int | None = None) -> tuple[Tensor, Tensor]:
+        """Coefficients (B, d, n, m) of both fields after some passes, all when not given."""
+        passes = self.passes if passes is None else passes
+        with torch.no_grad():
+            seen, coarse, fine = self._seen(surface, passes - 1)
+        more = self._fields(seen)
+        return coarse + more[0], fine + more[1]
+
+    def _seen(self, surface: Tensor, passes: int) -> tuple[Tensor, Tensor | float, Tensor | float]:
+        """What the net sees after some passes, and the sums of their coefficients."""
         p = planes(surface)
         frame = Frame.of(p)
         bent = inputs.bending(p, frame)
@@ -102,34 +110,28 @@ class CoarseNet(Net):
         start = self.start(surface)
         state = inputs.stretching(frame, planes(start)) if self.task == "flatten" else bent
         moved = known.new_zeros(len(known), TASKS[self.task], *known.shape[2:])
-        fields: list[tuple[Tensor, Tensor]] = []
-        for k in range(self.passes):
-            if k:
-                image = planes(start + self._vectors(moved, frame))
-                # What is differentiated is the result of each pass, not what the next one sees.
-                image = tuple(c.detach() for c in image)
-                if self.task == "flatten":
-                    state = inputs.stretching(frame, image)
-                else:
-                    state = inputs.bending(image, Frame.of(image))
-            seen = torch.cat([known, torch.stack(state, dim=1), moved.detach() / self.unit], dim=1)
-            coarse, fine = self._fields(seen)
-            if fields:
-                coarse, fine = coarse + fields[-1][0], fine + fields[-1][1]
-            fields.append((coarse, fine))
+        coarse: Tensor | float = 0.0
+        fine: Tensor | float = 0.0
+        for _ in range(passes):
+            more = self._fields(_joined(known, state, moved / self.unit))
+            coarse, fine = coarse + more[0], fine + more[1]
             moved = self._shares(coarse, fine, *known.shape[2:])
-        return fields
+            image = planes(start + self._vectors(moved, frame))
+            if self.task == "flatten":
+                state = inputs.stretching(frame, image)
+            else:
+                state = inputs.bending(image, Frame.of(image))
+        return _joined(known, state, moved / self.unit), coarse, fine
 
-    def displacements(self, surface: Tensor, sigma: Tensor | None = None) -> list[Tensor]:
-        frame = Frame.of(planes(surface))
-        shape = surface.shape[1:3]
-        return [
-            self._vectors(self._shares(*fields, *shape), frame)
-            for fields in self.coefficients(surface)
-        ]
+    def displacements(
+        self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
+    ) -> Tensor:
+        fields = self.coefficients(surface, passes)
+        shares = self._shares(*fields, *surface.shape[1:3])
+        return self._vectors(shares, Frame.of(planes(surface)))
 
     def carried(self, surface: Tensor, fine: Tensor, sigma: Tensor | None = None) -> Tensor:
-        first, second = (c.to(fine.dtype) for c in self.coefficients(surface)[-1])
+        first, second = (c.to(fine.dtype) for c in self.coefficients(surface))
         shares = self._shares(first, second, fine.shape[1], fine.shape[2])
         return self._vectors(shares, Frame.of(planes(fine)))
 
@@ -151,6 +153,10 @@ class CoarseNet(Net):
 
     def _vectors(self, shares: Tensor, frame: Frame) -> Tensor:
         return shares.movedim(1, -1) if self.task == "flatten" else frame.combine(shares)
+
+
+def _joined(known: Tensor, state: list[Tensor], moved: Tensor) -> Tensor:
+    return torch.cat([known, torch.stack(state, dim=1), moved], dim=1)
 
 
 def _enlarged(x: Tensor, target: Tensor) -> Tensor:

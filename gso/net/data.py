@@ -36,11 +36,14 @@ class Batch:
         What it is to make of it, where that is known.
     sigma : Tensor, (B,), or None
         Noise of the surfaces.
+    step : int
+        Step of the run.
     """
 
     surface: Tensor
     target: Tensor | None = None
     sigma: Tensor | None = None
+    step: int = 0
 
 
 @dataclass
@@ -89,11 +92,15 @@ class Source:
         if config.task == "denoise":
             surface, target, sigma = noisy(surface, config.sigma, generator)
         mine = slice(rank, None, world)
+
+        def placed(x: Tensor) -> Tensor:
+            return x[mine].to(device, torch.float32)
+
         return Batch(
-            *(
-                None if x is None else x[mine].to(device, torch.float32)
-                for x in (surface, target, sigma)
-            )  # type: ignore[arg-type]
+            placed(surface),
+            None if target is None else placed(target),
+            None if sigma is None else placed(sigma),
+            step,
         )
 
 

@@ -87,7 +87,9 @@ class GSONet(Net):
         # It begins with no change, where random displacements would crumple the surface.
         nn.init.zeros_(self.tail.weight)
 
-    def displacements(self, surface: Tensor, sigma: Tensor | None = None) -> list[Tensor]:
+    def displacements(
+        self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
+    ) -> Tensor:
         x = surface.movedim(-1, 1)
         if self.sigma:
             if sigma is None:
@@ -106,7 +108,7 @@ class GSONet(Net):
                 y = step(y + skip)
             y = self.tail(y + skips[0])
         y = y.to(surface.dtype)
-        return [(torch.tanh(y) if self.tanh else y).movedim(1, -1)]
+        return (torch.tanh(y) if self.tanh else y).movedim(1, -1)
 
     def carried(self, surface: Tensor, fine: Tensor, sigma: Tensor | None = None) -> Tensor:
-        return resampled(self.displacements(surface, sigma)[-1], fine.shape[1], fine.shape[2])
+        return resampled(self.displacements(surface, sigma), fine.shape[1], fine.shape[2])

@@ -17,8 +17,6 @@ from gso.net.data import Batch
 from gso.net.grids import planes
 from gso.tasks import developable, flatten
 
-#: Weight of what comes before the last pass of a net.
-_EARLIER = 0.3
 #: Least size of a label's displacement that its misfit is divided by.
 _LEAST = 3e-3
 #: Least energy of a design that results are compared with.
@@ -37,10 +35,11 @@ class Objective(nn.Module):
     def forward(self, batch: Batch, phase: Phase, progress: float) -> Tensor:
         """Mean loss of a batch; `progress` runs from 0 to 1 within the phase."""
         start = self.net.start(batch.surface)
-        steps = self.net.displacements(batch.surface, batch.sigma)
+        # Each step is for one of the passes; those before it only make what it begins with.
+        passes = 1 + batch.step % self.net.passes
+        moved = self.net.displacements(batch.surface, batch.sigma, passes=passes)
         cost = _COSTS[phase.loss](self.net.task, batch, start, phase, progress)
-        values = [cost(start + moved).mean() for moved in steps]
-        return values[-1] + _EARLIER * sum(values[:-1])
+        return cost(start + moved).mean()
 
 
 def _published(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:

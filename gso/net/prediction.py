@@ -106,7 +106,7 @@ def _predicted(batch: Array, nets: list[Net], sigma: float | None, device: str) 
         coarse = torch.as_tensor(_resampled(unit), dtype=torch.float32, device=device)
         with torch.inference_mode():
             if unit.shape[1:3] == (SIZE, SIZE):
-                moved = net.displacements(coarse, noise)[-1]
+                moved = net.displacements(coarse, noise)
             else:
                 fine = torch.as_tensor(unit, dtype=torch.float32, device=device)
                 moved = net.carried(coarse, fine, noise)
