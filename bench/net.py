@@ -5,6 +5,7 @@
     python bench/net.py DIR --model RUN/model.safetensors    one net
     python bench/net.py DIR --others           the splits that are no Bezier surfaces, too
     python bench/net.py --curve [NET...] --plot FILE         quality against training time
+    python bench/net.py DIR --rounding RUN     what half precision changes in a run's net
     python bench/net.py DIR --grid FILE        figure 5: loss against parameters (hours)
 
 Figures are means over the test split; times are medians for one surface, from array to
@@ -32,9 +33,10 @@ from tno import progress as watched
 from gso import dataset, net
 from gso.dataset.noise import LEVELS
 from gso.io import replacing
-from gso.net import catalogue, weights
+from gso.net import catalogue, checkpoint, weights
 from gso.net.config import from_dict
 from gso.net.curves import read
+from gso.net.run import CHECKPOINT
 from gso.net.validate import SCORE, figures
 
 OTHERS = (
@@ -131,6 +133,21 @@ def rows(arguments: argparse.Namespace) -> None:
             weights.write_card(path.with_suffix(".json"), card)
 
 
+def rounding(arguments: argparse.Namespace) -> None:
+    """Print the change of every figure by writing a net in half precision."""
+    data = dataset.open(arguments.data)
+    with tempfile.TemporaryDirectory() as folder:
+        exact = weights.load(arguments.rounding / "model.safetensors")
+        checkpoint.load(arguments.rounding / CHECKPOINT, exact, exact, [])
+        task = exact.task
+        halved = Path(folder) / "half.safetensors"
+        weights.save(exact, halved)
+        one, other = (measured(task, m, data["test"], arguments.n) for m in (exact, halved))
+    for name, value in one.items():
+        change = abs(other[name] - value) / max(abs(value), 1e-12)
+        print(f"{name:18s} {value:.6g}  in half precision {other[name]:.6g}  {change:.2%}")
+
+
 def curve(names: list[str], target: str) -> None:
     """Plot what validation showed against the hours of training, as the cards have it."""
     import matplotlib
@@ -200,6 +217,7 @@ def main() -> None:
     parser.add_argument("-n", type=int, metavar="N", help="only so many surfaces of each split")
     parser.add_argument("--others", action="store_true", help="splits that are no Bezier surfaces")
     parser.add_argument("--cards", action="store_true", help="write the figures into the cards")
+    parser.add_argument("--rounding", type=Path, metavar="RUN", help="half precision, measured")
     parser.add_argument("--grid", metavar="FILE", help="figure 5, as JSON")
     parser.add_argument("--curve", nargs="*", metavar="NET", help="plot these, or all")
     parser.add_argument("--plot", default="curves.png", metavar="FILE", help="for --curve")
@@ -209,6 +227,8 @@ def main() -> None:
         curve(arguments.curve or every, arguments.plot)
     elif arguments.data is None:
         parser.error("give a set of surfaces")
+    elif arguments.rounding:
+        rounding(arguments)
     elif arguments.grid:
         grid(arguments)
     else:
