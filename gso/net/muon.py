@@ -90,15 +90,10 @@ def orthogonal(matrix: Tensor) -> Tensor:
 
 def optimisers(net: nn.Module, kind: str, weight_decay: float) -> list[torch.optim.Optimizer]:
     """What trains a net: Muon its matrices and AdamW the rest, or AdamW everything."""
-    weights = list(net.parameters())
-    if kind == "adamw":
-        return [torch.optim.AdamW(weights, weight_decay=weight_decay)]
-    wide = [w.ndim > 1 and min(w.shape[0], w[0].numel()) >= _LEAST for w in weights]
-    made: list[torch.optim.Optimizer] = []
-    if any(wide):
-        rows = [w for w, is_wide in zip(weights, wide, strict=True) if is_wide]
-        made.append(Muon(rows, weight_decay=weight_decay))
-    rest = [w for w, is_wide in zip(weights, wide, strict=True) if not is_wide]
-    if rest:
-        made.append(torch.optim.AdamW(rest, weight_decay=weight_decay))
-    return made
+    matrices: list[Tensor] = []
+    rest: list[Tensor] = []
+    for weight in net.parameters():
+        wide = weight.ndim > 1 and min(weight.shape[0], weight[0].numel()) >= _LEAST
+        (matrices if wide and kind == "muon" else rest).append(weight)
+    kinds = ((Muon, matrices), (torch.optim.AdamW, rest))
+    return [make(some, weight_decay=weight_decay) for make, some in kinds if some]
