@@ -163,6 +163,23 @@ def test_a_warm_start_from_the_result_stays_at_least_as_good(surfaces):
     assert sum(warm.energy.values()) <= sum(cold.energy.values()) * (1 + 1e-9)
 
 
+def test_a_start_that_is_wrong_at_large_costs_no_quality(surfaces):
+    for points in surfaces:
+        cold = gso.tno.optimize(points)
+        u = np.linspace(0.0, np.pi, len(points))
+        lift = 0.02 * np.sin(u)[:, None] * np.sin(u)
+        warm = gso.tno.optimize(points, x0=cold.grid + lift[..., None] * [0.0, 0.0, 1.0])
+        assert warm.warm_start == "x0" and warm.history[0].name == "20x20"
+        assert sum(warm.energy.values()) <= 1.05 * sum(cold.energy.values())
+
+
+def test_free_vertices_come_after_offsets(surfaces):
+    stages = list(
+        dict.fromkeys(p.name for p in gso.tno.optimize(surfaces[0], options="accurate").history)
+    )
+    assert stages == ["20x20", "normal", "free"]
+
+
 def test_irregular_and_triangle_meshes():
     grid = Mesh.from_grid(sphere_cap(21, radius=1.0))
     triangles = Mesh(grid.vertices, grid.triangles)

@@ -83,6 +83,8 @@ def test_shipped_configurations(path):
         ({"phase": [{"loss": "label"}], "augment": "shear"}, "do not follow"),
         ({"phase": [{"loss": "energy", "rate": 0}]}, "positive"),
         ({"phase": [{"loss": "energy", "batch": 1.5}]}, "batch is 1.5"),
+        ({"phase": [{"loss": "energy", "stride": 0}]}, "stride is 0"),
+        ({"phase": [{"loss": "energy", "stride": 5}]}, "stride is 5"),
         ({"model": {"kind": "mlp"}}, "no kind 'mlp'"),
         ({"model": {"kind": "coarse", "depth": 3}}, "settings of the net"),
         ({"model": 3}, "needs task"),
@@ -131,6 +133,15 @@ def test_batches_are_functions_of_the_step():
         for r in range(2)
     ]
     assert sorted(chain.from_iterable(halves)) == sorted(rows[3])
+
+
+def test_strides_leave_out_vertices_of_surfaces_and_labels():
+    made = config(augment="none", phase=[{"loss": "label", "batch": 2, "stride": 2}])
+    surfaces = torch.rand(2, 6, 8, 3)
+    batch = Source(surfaces, 2 * surfaces).batch(made, made.phases[0], 0)
+    assert batch.surface.shape == (2, 3, 4, 3)
+    assert torch.equal(batch.target, 2 * batch.surface)
+    assert {float(x) for x in batch.surface[:, 1, 1, 0]} == {float(x) for x in surfaces[:, 2, 2, 0]}
 
 
 def test_augmentation_keeps_what_it_should():

@@ -18,6 +18,8 @@ FOLDER = Path(__file__).parent / "configs"
 LOSSES = ("published", "label", "energy", "clean")
 OPTIMISERS = ("muon", "adamw")
 AUGMENTATIONS = ("none", "symmetries", "shear")
+#: Steps of a phase through the vertices that leave a grid worth training on.
+LARGEST_STRIDE = 4
 #: Terms of the published losses.
 TERMS = ("in", "fair", "gc", "iso", "iso_w")
 
@@ -52,6 +54,8 @@ class Phase:
         "published": the weight of "in" falls as exp(-decay t), with t from 0 to 1.
     eps : tuple of 2 float
         "energy" (developable): smoothing of \|K\| at the start and from the middle on.
+    stride : int
+        The nets see every so-many-th vertex along both sides: with 2 a step costs a quarter.
     """
 
     loss: str = "published"
@@ -63,10 +67,14 @@ class Phase:
     weights: Mapping[str, float] = field(default_factory=dict)
     decay: float = 0.0
     eps: tuple[float, float] = (0.1, 0.01)
+    stride: int = 1
 
     def __post_init__(self) -> None:
         _choice("loss", self.loss, LOSSES)
         _number("batch", self.batch, 1, whole=True)
+        _number("stride", self.stride, 1, whole=True)
+        if self.stride > LARGEST_STRIDE:
+            raise OptionError(f"stride is {self.stride}; take at most {LARGEST_STRIDE}")
         for name in ("share", "rate", "final_rate", "clip", "decay"):
             _number(name, getattr(self, name), 0.0)
         for value in (self.share, self.rate, self.clip, *self.eps):

@@ -87,6 +87,7 @@ class Source:
             chosen = augment.symmetries(chosen, generator)
         elif config.augment == "shear":
             chosen = [augment.shear(chosen[0], generator)]
+        chosen = [x[:, :: phase.stride, :: phase.stride] for x in chosen]
         surface, target = chosen[0], chosen[1] if len(chosen) > 1 else None
         sigma = None
         if config.task == "denoise":

@@ -23,7 +23,7 @@ from gso import metrics as measure
 from gso.constraints import Pins
 from gso.mesh import Mesh
 from gso.resample import carry, coarser, resample
-from gso.smoothing import smooth_grid
+from gso.smoothing import most_noise, smooth_grid
 from gso.status import MeshError, OptionError, Status
 from gso.tasks import held, joint, splined
 from gso.tasks.base import Plan, Request, Stage
@@ -70,12 +70,12 @@ class Options(BaseOptions):
     controls : int
         "spline", "surface": control points along each side; fewer on small grids.
     coarse_iterations : int
-        Iterations on the coarsest grid.
+        Iterations on the coarsest grid; half as many where `x0` is given.
     coarse_size : int
         Largest side of the coarsest grid; a grid that small is halved once.
     between_iterations : int
         Iterations on each grid between the coarsest and the design's own, in normal
-        offsets; free vertices take `iterations`, halved from grid to grid.
+        offsets; without `x0`, free vertices take `iterations`, halved from grid to grid.
     developable_below : float
         A design whose mean |K| is below this is developable already and comes back
         untouched.
@@ -125,6 +125,12 @@ FLAT_CURVATURE = 0.02
 #: much of its curvature; it then moves by at most so many standard deviations.
 NOISE_ONLY = 0.1
 NOISE_REACH = 2.8
+#: Noise, relative to the grid's second differences, that changes nothing.
+_NO_NOISE = 1e-3
+
+#: Most iterations of offsets along normals before those of free vertices, and their tolerance.
+_OFFSETS_FIRST = 12
+_LOOSE = 1e-3
 
 
 #: Settings by formulation.
@@ -167,15 +173,15 @@ def _plan(request: Request) -> Plan:
         if spline is None:
             notes.append("the design is developable but for noise: it moves no further than that")
     make = partial(_objective, request, curved, _bending(mesh), smooth)
-    climb = request.start is None and request.constraints.empty and mesh.grid_index is not None
-    levels = coarser(mesh, options.coarse_size) if climb else []
+    levels = _levels(request)
+    starts = _starts(request, levels)
     stages = [_coarse_stage(request, level, make, k) for k, level in enumerate(levels)]
     stages += _stages(request, mesh, make, len(levels))
-    for below, above, stage in zip(levels, [*levels[1:], mesh], stages[1:], strict=False):
-        stage.enter = partial(_carry, below, above, _reach(request))
+    for k, stage in enumerate(stages[1 : len(levels) + 1]):
+        stage.enter = partial(_carry, starts[k], starts[k + 1], _reach(request))
     if spline is not None:
         stages.append(splined.stage(stages[-1], mesh, spline))
-    begin = levels[0].vertices if levels else _inside(start, mesh, _reach(request))
+    begin = starts[0].vertices if levels else _inside(start, mesh, _reach(request))
     free_to_return = request.constraints.empty
     free_to_return &= request.start is None or request.max_deviation is None
     fallback = start.ravel()
@@ -190,6 +196,29 @@ def _plan(request: Request) -> Plan:
         spline=spline,
         unstarted=None if request.start is None else mesh.vertices.ravel,
     )
+
+
+def _levels(request: Request) -> list[Mesh]:
+    """Coarser copies of the design to begin with, coarsest first."""
+    mesh = request.mesh
+    if mesh.grid_index is None or not request.constraints.empty:
+        return []
+    if request.start is not None and request.max_deviation is not None:
+        return []
+    return coarser(mesh, request.options.coarse_size)
+
+
+def _starts(request: Request, levels: list[Mesh]) -> list[Mesh]:
+    """Where the solve starts, on each of the coarser grids and on the design's own.
+
+    A start that was given is not carried up: what the solves of the coarser grids change in
+    it there is added to it. Its fine detail stays, and what is wrong with it at large, which
+    takes many iterations on the fine grid, is put right at a fraction of the cost.
+    """
+    if request.start is None:
+        return [*levels, request.mesh]
+    begun = request.mesh.replaced(request.start)
+    return [level.replaced(_resampled(begun, level)) for level in levels] + [begun]
 
 
 def _check_handles(request: Request) -> None:
@@ -217,6 +246,9 @@ def _check_handles(request: Request) -> None:
 def _smoothed(mesh: Mesh) -> tuple[Mesh, float]:
     """The design without noise, and the noise's standard deviation; grids only."""
     if mesh.grid is None:
+        return mesh, 0.0
+    second = [np.square(np.diff(mesh.grid, 2, axis=k)).sum(axis=-1).mean() for k in (0, 1)]
+    if most_noise(mesh.grid) <= _NO_NOISE * np.mean(second) ** 0.5:
         return mesh, 0.0
     smoothed = smooth_grid(mesh.grid, order=4)
     return mesh.replaced(smoothed.points.reshape(-1, 3)), smoothed.sigma
@@ -351,7 +383,13 @@ def _stages(request: Request, mesh: Mesh, make: Any, coarser_grids: int) -> list
             return [first, last]
         start = mesh.vertices if request.start is None else request.start
         return [held.approach(request, start), first, last]
-    return [stage(o.variables, _iterations(o, coarser_grids), falling)]
+    last = stage(o.variables, _iterations(o, coarser_grids), falling)
+    if o.variables == "free" and coarser_grids <= 1:
+        # Offsets get nearly there, at a third of the cost. After free vertices on a grid
+        # that is half as fine they would gain little.
+        first = stage("normal", _OFFSETS_FIRST, falling)
+        return [replace(first, tolerance=_LOOSE), replace(last, eps=(o.eps,))]
+    return [last]
 
 
 def _iterations(options: Options, coarser_grids: int) -> int:
@@ -369,12 +407,14 @@ def _iterations(options: Options, coarser_grids: int) -> int:
 def _coarse_stage(request: Request, level: Mesh, make: Any, number: int) -> Stage:
     """A coarse grid: free vertices on the first; the last stage's unknowns on the others."""
     o = request.options
-    first = number == 0
-    if o.variables != "free":
-        between = o.between_iterations
+    first, begun = number == 0, request.start is not None
+    if first:
+        iterations = o.coarse_iterations // 2 if begun else o.coarse_iterations
+    elif o.variables != "free" or begun:
+        iterations = o.between_iterations
     else:
-        between = _iterations(o, number)
-    kind = "free" if first or o.variables == "free" else "normal"
+        iterations = _iterations(o, number)
+    kind = "free" if first or (o.variables == "free" and not begun) else "normal"
     if request.max_deviation is not None:
         kind = "normal"
     return Stage(
@@ -382,9 +422,9 @@ def _coarse_stage(request: Request, level: Mesh, make: Any, number: int) -> Stag
         _layout(level),
         make(level),
         partial(_unknowns, kind, level, request),
-        iterations=o.coarse_iterations if first else between,
-        tolerance=1e-3,
-        eps=(10.0 * o.eps, 3.0 * o.eps, o.eps) if first else (o.eps,),
+        iterations=iterations,
+        tolerance=_LOOSE,
+        eps=(10.0 * o.eps, 3.0 * o.eps, o.eps) if first and not begun else (o.eps,),
         robust="curvature",
         bounds=_bounds(level, _reach(request)),
     )

@@ -65,7 +65,8 @@ def optimize(
         smallest displacement that does.
     x0 : Mesh, array or Start, optional
         Where to start: vertices (n, 3) or a grid; (n, 2) or (H, W, 2) for a flat image.
-        Proximity and lengths stay those of `mesh`. A :class:`gso.tno.Start` says more
+        Proximity and lengths stay those of `mesh`. On grids what is wrong with a surface
+        at large is put right on a coarser grid first. A :class:`gso.tno.Start` says more
         about it.
     callback : callable, optional
         Called with a :class:`gso.Progress` after each iteration; returning False stops

@@ -19,17 +19,16 @@ from gso.terms.base import Limit, Weighted
 from gso.terms.losses import Loss
 from gso.tno.codegen import kernel, turning
 from gso.tno.linear.base import Pattern
-from gso.variables import Variables
+from gso.variables import Layout, Variables
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class _Elements:
-    """One weighted term on given unknowns: gathers, kernels, pulled-back Jacobian."""
+class _Values:
+    """One weighted term on given coordinates: gathers, residuals, energy."""
 
-    def __init__(self, item: Weighted, variables: Variables):
-        layout = variables.layout
+    def __init__(self, item: Weighted, layout: Layout):
         term = item.term
         columns, shape = [], []
         for block, index in term.stencil:
@@ -41,7 +40,6 @@ class _Elements:
         self.constants = term.constants if term.constants.size else np.empty((0, term.count))
         self.shape = tuple(shape)
         self.weights = term.weights
-        self._pull, self.columns = _pull_back(self.gather, variables)
 
     def refresh(self, coordinates: Array) -> None:
         """Renew the constants of a term that asks for it."""
@@ -52,6 +50,20 @@ class _Elements:
         """Residuals (r, e)."""
         run = kernel(self.item.term.residual, self.shape, len(self.constants), False)
         return run(coordinates[self.gather], self.constants)[0]
+
+    def energy(self, residual: Array) -> float:
+        """Weighted cost."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            total = self.item.weight * float((self.item.loss.value(residual) @ self.weights).sum())
+        return total if np.isfinite(total) else np.inf
+
+
+class _Elements(_Values):
+    """One weighted term on given unknowns: with the Jacobian, pulled back to them."""
+
+    def __init__(self, item: Weighted, variables: Variables):
+        super().__init__(item, variables.layout)
+        self._pull, self.columns = _pull_back(self.gather, variables)
 
     def linearise(self, coordinates: Array) -> tuple[Array, Array]:
         """Residuals (r, e) and Jacobian by the element's unknowns (r, q, e)."""
@@ -72,12 +84,6 @@ class _Elements:
             return slope
         q = len(self.columns)
         return np.stack([(self._pull @ s.ravel()).reshape(q, -1) for s in slope])
-
-    def energy(self, residual: Array) -> float:
-        """Weighted cost."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            total = self.item.weight * float((self.item.loss.value(residual) @ self.weights).sum())
-        return total if np.isfinite(total) else np.inf
 
 
 def _pull_back(gather: Ints, variables: Variables):
@@ -174,7 +180,7 @@ class Problem:
     ):
         self.variables = variables
         self.limits = tuple(limits)
-        used = [i for i in items if i.weight > 0 and i.term.count]
+        used = _counted(items)
         self._elements = [_Elements(i, variables) for i in used if not i.quadratic]
         self._quadratic = _Quadratic(
             [_Elements(i, variables) for i in used if i.quadratic], variables
@@ -332,6 +338,22 @@ class _Quadratic:
         for name, part in self.slices:
             out[name] = out.get(name, 0.0) + 0.5 * float(r[part] @ r[part])
         return out
+
+
+def energies(items: Sequence[Weighted], layout: Layout, coordinates: Array) -> dict[str, float]:
+    """Energy by term name at coordinates, constants renewed, without unknowns to solve for."""
+    out: dict[str, float] = {}
+    for item in _counted(items):
+        values = _Values(item, layout)
+        values.refresh(coordinates)
+        name = item.term.name
+        out[name] = out.get(name, 0.0) + values.energy(values.residual(coordinates))
+    return out
+
+
+def _counted(items: Sequence[Weighted]) -> list[Weighted]:
+    """Those that have a say."""
+    return [i for i in items if i.weight > 0 and i.term.count]
 
 
 def _products(slope: Array, weight: Array) -> Array:

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from gso.status import Progress, Status
 from gso.tasks.base import Options, Plan, Request, Stage, same
-from gso.tno.problem import Problem
+from gso.tno.problem import Problem, energies
 from gso.tno.solver import Callback, Solution, Timings, minimise
 from gso.tno.tighten import tighten
-from gso.variables import free
 
 Array = NDArray[np.float64]
 
@@ -57,10 +56,10 @@ class End(NamedTuple):
     solution: Solution
 
 
-def objective(stage: Stage) -> Problem:
-    """What a stage minimises over its coordinates; what must hold is no part of it."""
+def objective(stage: Stage, coordinates: Array) -> dict[str, float]:
+    """What a stage minimises, by term, at coordinates; what must hold is no part of it."""
     items = [item for item in stage.items if item.term.multipliers is None]
-    return Problem(items, free(stage.layout))
+    return energies(items, stage.layout, coordinates)
 
 
 class Run:
@@ -154,12 +153,10 @@ class Run:
         stages = plan.stages if plan.spline is None else plan.stages[:-1]
         # What that costs is paid once, for the comparison and for the solve.
         plan.start, stages[0].enter = stages[0].enter(plan.start), same
-        problem = objective(stages[-1])
-        energies = []
-        for coordinates in (replace(plan, stages=stages).entered(), plan.unstarted()):
-            problem.refresh(coordinates)
-            energies.append(problem.energy(coordinates))
-        warm, cold = energies
+        warm, cold = (
+            sum(objective(stages[-1], coordinates).values())
+            for coordinates in (replace(plan, stages=stages).entered(), plan.unstarted())
+        )
         if warm <= cold:
             return ""
         return f"its energy, {warm:.3g}, is above that of the start without it, {cold:.3g}"
@@ -171,7 +168,10 @@ class Run:
             clock = time.perf_counter()
             given, coordinates = coordinates, stage.enter(coordinates)
             self.timings.setup += time.perf_counter() - clock
-            solve = partial(self.solve, options, (number, len(plan.stages)))
+            last = stage is plan.stages[-1]
+            # A start is near the end already: there is where few iterations do most.
+            kept = 0 if last or plan.unstarted is None else plan.stages[-1].iterations
+            solve = partial(self.solve, options, (number, len(plan.stages)), kept=kept)
             coordinates, solution = solve(stage, coordinates)
             if solution.status is Status.CANCELLED:
                 break
@@ -187,9 +187,15 @@ class Run:
         return End(coordinates, None if after else given, stage, solution)
 
     def solve(
-        self, options: Options, place: tuple[int, int], stage: Stage, coordinates: Array
+        self,
+        options: Options,
+        place: tuple[int, int],
+        stage: Stage,
+        coordinates: Array,
+        *,
+        kept: int = 0,
     ) -> tuple[Array, Solution]:
-        """Solve one stage from coordinates."""
+        """Solve one stage from coordinates, and leave so many iterations of the budget."""
         clock = time.perf_counter()
         variables = stage.variables(coordinates)
         problem = Problem(stage.items, variables, stage.limits)
@@ -198,7 +204,7 @@ class Run:
         self.timings.setup += time.perf_counter() - clock
         most = stage.iterations
         if self.budget is not None:
-            most = min(most, max(self.budget - self.iterations, 0))
+            most = min(most, max(self.budget - self.iterations - kept, 0))
         solution = minimise(
             problem,
             x,
@@ -222,8 +228,9 @@ class Run:
     @staticmethod
     def guard(plan: Plan, stage: Stage, coordinates: Array) -> tuple[Array, dict[str, float]]:
         """The result, unless what it must not be worse than has less of the objective."""
-        problem = objective(stage)
-        energy = problem.by_term(coordinates)
-        if plan.fallback is not None and not sum(energy.values()) <= problem.energy(plan.fallback):
-            return plan.fallback, problem.by_term(plan.fallback)
+        energy = objective(stage, coordinates)
+        if plan.fallback is not None:
+            other = objective(stage, plan.fallback)
+            if not sum(energy.values()) <= sum(other.values()):
+                return plan.fallback, other
         return coordinates, energy

@@ -212,7 +212,7 @@ class Session:
         outcome.details, outcome.spline = dict(plan.details), plan.spline
         if stage is not None and self._problem is not None:
             aimed = replace(stage, items=self._aimed(stage))
-            outcome.energy = objective(aimed).by_term(self._coordinates)
+            outcome.energy = objective(aimed, self._coordinates)
             outcome.backend = self._solver.name
         judge(self._request, self._frame, outcome)
         result = packed(
