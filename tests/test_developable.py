@@ -173,11 +173,13 @@ def test_a_start_that_is_wrong_at_large_costs_no_quality(surfaces):
         assert sum(warm.energy.values()) <= 1.05 * sum(cold.energy.values())
 
 
-def test_free_vertices_come_after_offsets(surfaces):
-    stages = list(
-        dict.fromkeys(p.name for p in gso.tno.optimize(surfaces[0], options="accurate").history)
-    )
-    assert stages == ["20x20", "normal", "free"]
+def test_free_vertices_come_after_offsets_where_a_start_is_given(surfaces):
+    def stages(**keywords):
+        result = gso.tno.optimize(surfaces[0], options="accurate", **keywords)
+        return list(dict.fromkeys(p.name for p in result.history))
+
+    assert stages() == ["20x20", "free"]
+    assert stages(x0=surfaces[0]) == ["20x20", "normal", "free"]
 
 
 def test_irregular_and_triangle_meshes():

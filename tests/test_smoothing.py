@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from gso.smoothing import Smoothed, most_noise, smooth_grid, smooth_mesh
+from gso.smoothing import Smoothed, smooth_grid, smooth_mesh
 from gso.smoothing.grid import modes
 from gso.smoothing.patches import boundary_edges, neighbours, residuals, rings, umbrella
 from gso.smoothing.select import best_weight, factor, gcv
@@ -198,16 +198,6 @@ def test_noise_is_measured_and_removed_blind(shape, sigma):
     # About as good as the best weight that one could pick knowing the truth.
     plain = [smooth_grid(dirty, order=4, weight=w).points for w in 10.0 ** np.arange(-14, 0)]
     assert theta(clean, result.points) < 1.3 * min(theta(clean, q) for q in plain)
-
-
-@pytest.mark.parametrize("shape", [(32, 32), (16, 90)])
-def test_most_noise_is_no_less_than_the_noise(shape):
-    clean = wavy(*shape)
-    noise = np.random.default_rng(3).standard_normal(clean.shape)
-    bounds = [most_noise(clean + sigma * noise) for sigma in (0.0, 1e-6, 1e-3)]
-    assert bounds[0] < 1e-7
-    assert 0.9e-6 < bounds[1] < 1.2e-6 and 0.9e-3 < bounds[2] < 1.2e-3
-    assert most_noise(clean[:15]) == np.inf
 
 
 def test_random_polynomials_are_denoised_to_a_fraction_of_a_degree():

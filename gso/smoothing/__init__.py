@@ -5,7 +5,7 @@
 """
 
 from gso.smoothing.base import Smoothed
-from gso.smoothing.grid import most_noise, smooth_grid
+from gso.smoothing.grid import smooth_grid
 from gso.smoothing.mesh import smooth_mesh
 
-__all__ = ["Smoothed", "most_noise", "smooth_grid", "smooth_mesh"]
+__all__ = ["Smoothed", "smooth_grid", "smooth_mesh"]

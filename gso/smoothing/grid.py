@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,8 +18,6 @@ TRIED = (8, 4, 2)
 DEFAULT_ORDER = 4
 # Coefficients of x, y and z share parameters, so the likelihood overstates its evidence.
 TEMPERATURE = 4.0
-# Order of differences that leave next to nothing of a smooth surface.
-_HIGH = 8
 
 
 def smooth_grid(
@@ -97,43 +94,6 @@ def smooth_grid(
     if weight is not None:
         return _whittaker(array, order or DEFAULT_ORDER, weight)
     return _blind(array, TRIED if order is None else (order,))
-
-
-def most_noise(points: ArrayLike) -> float:
-    """Upper estimate of the noise of a grid, at a fraction of what :func:`smooth_grid` costs.
-
-    Parameters
-    ----------
-    points : array_like, (H, W, 3)
-        Surface in any unit of length.
-
-    Returns
-    -------
-    float
-        Standard deviation per coordinate, in that unit, of noise whose differences of order 8
-        would be as large as those of the grid, in the direction where they are smaller;
-        infinite for grids with fewer than 16 rows or columns.
-
-    Raises
-    ------
-    MeshError
-        Not an (H, W, 3) array of finite numbers.
-
-    Examples
-    --------
-    >>> u, v = np.meshgrid(np.linspace(0, 1, 40), np.linspace(0, 1, 30), indexing="ij")
-    >>> clean = np.stack([u, v, u * u - v * u], axis=-1)
-    >>> most_noise(clean) < 1e-15
-    True
-    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(clean.shape)
-    >>> bool(abs(most_noise(clean + noise) - 0.01) < 0.001)
-    True
-    """
-    array = checked_points(points, 3)
-    if min(array.shape[:2]) < 2 * _HIGH:
-        return float("inf")
-    squares = [float((np.diff(array, _HIGH, axis=axis) ** 2).mean()) for axis in (0, 1)]
-    return (min(squares) / comb(2 * _HIGH, _HIGH)) ** 0.5
 
 
 @lru_cache(maxsize=32)

@@ -23,7 +23,7 @@ from gso import metrics as measure
 from gso.constraints import Pins
 from gso.mesh import Mesh
 from gso.resample import carry, coarser, resample
-from gso.smoothing import most_noise, smooth_grid
+from gso.smoothing import smooth_grid
 from gso.status import MeshError, OptionError, Status
 from gso.tasks import held, joint, splined
 from gso.tasks.base import Plan, Request, Stage
@@ -125,10 +125,8 @@ FLAT_CURVATURE = 0.02
 #: much of its curvature; it then moves by at most so many standard deviations.
 NOISE_ONLY = 0.1
 NOISE_REACH = 2.8
-#: Noise, relative to the grid's second differences, that changes nothing.
-_NO_NOISE = 1e-3
 
-#: Most iterations of offsets along normals before those of free vertices, and their tolerance.
+#: Most iterations of offsets between a given start and free vertices, and their tolerance.
 _OFFSETS_FIRST = 12
 _LOOSE = 1e-3
 
@@ -246,9 +244,6 @@ def _check_handles(request: Request) -> None:
 def _smoothed(mesh: Mesh) -> tuple[Mesh, float]:
     """The design without noise, and the noise's standard deviation; grids only."""
     if mesh.grid is None:
-        return mesh, 0.0
-    second = [np.square(np.diff(mesh.grid, 2, axis=k)).sum(axis=-1).mean() for k in (0, 1)]
-    if most_noise(mesh.grid) <= _NO_NOISE * np.mean(second) ** 0.5:
         return mesh, 0.0
     smoothed = smooth_grid(mesh.grid, order=4)
     return mesh.replaced(smoothed.points.reshape(-1, 3)), smoothed.sigma
@@ -384,11 +379,10 @@ def _stages(request: Request, mesh: Mesh, make: Any, coarser_grids: int) -> list
         start = mesh.vertices if request.start is None else request.start
         return [held.approach(request, start), first, last]
     last = stage(o.variables, _iterations(o, coarser_grids), falling)
-    if o.variables == "free" and coarser_grids <= 1:
-        # Offsets get nearly there, at a third of the cost. After free vertices on a grid
-        # that is half as fine they would gain little.
+    if o.variables == "free" and request.start is not None:
+        # Offsets do most of what is left, at a third of the cost.
         first = stage("normal", _OFFSETS_FIRST, falling)
-        return [replace(first, tolerance=_LOOSE), replace(last, eps=(o.eps,))]
+        return [replace(first, tolerance=_LOOSE), last]
     return [last]
 
 
