@@ -126,10 +126,10 @@ FLAT_CURVATURE = 0.02
 NOISE_ONLY = 0.1
 NOISE_REACH = 2.8
 
-#: Most iterations of offsets between a given start and free vertices, and their tolerance.
+#: Most iterations of offsets between a given start and free vertices.
 _OFFSETS_FIRST = 12
+#: Tolerance of stages that only prepare another one.
 _LOOSE = 1e-3
-
 
 #: Settings by formulation.
 OPTIONS = {"curvature": Options, "isometry": joint.Options}
@@ -399,16 +399,18 @@ def _iterations(options: Options, coarser_grids: int) -> int:
 
 
 def _coarse_stage(request: Request, level: Mesh, make: Any, number: int) -> Stage:
-    """A coarse grid: free vertices on the first; the last stage's unknowns on the others."""
+    """A coarse grid: free vertices on the first; the last stage's unknowns on the others.
+
+    Where a start was given those are offsets, which are cheaper.
+    """
     o = request.options
     first, begun = number == 0, request.start is not None
+    free_between = o.variables == "free" and not begun
     if first:
         iterations = o.coarse_iterations // 2 if begun else o.coarse_iterations
-    elif o.variables != "free" or begun:
-        iterations = o.between_iterations
     else:
-        iterations = _iterations(o, number)
-    kind = "free" if first or (o.variables == "free" and not begun) else "normal"
+        iterations = _iterations(o, number) if free_between else o.between_iterations
+    kind = "free" if first or free_between else "normal"
     if request.max_deviation is not None:
         kind = "normal"
     return Stage(

@@ -233,12 +233,7 @@ class Problem:
 
     def by_term(self, x: Array) -> dict[str, float]:
         """Energy by term name, constants renewed; the values sum to :meth:`energy`."""
-        self.refresh(x)
-        coordinates = self.variables.points(x)
-        out: dict[str, float] = {}
-        for element in self._elements:
-            value = element.energy(element.residual(coordinates))
-            out[element.item.term.name] = out.get(element.item.term.name, 0.0) + value
+        out = _by_term(self._elements, self.variables.points(x))
         for name, value in self._quadratic.by_term(x).items():
             out[name] = out.get(name, 0.0) + value
         return out
@@ -342,12 +337,15 @@ class _Quadratic:
 
 def energies(items: Sequence[Weighted], layout: Layout, coordinates: Array) -> dict[str, float]:
     """Energy by term name at coordinates, constants renewed, without unknowns to solve for."""
+    return _by_term([_Values(item, layout) for item in _counted(items)], coordinates)
+
+
+def _by_term(terms: Sequence[_Values], coordinates: Array) -> dict[str, float]:
     out: dict[str, float] = {}
-    for item in _counted(items):
-        values = _Values(item, layout)
-        values.refresh(coordinates)
-        name = item.term.name
-        out[name] = out.get(name, 0.0) + values.energy(values.residual(coordinates))
+    for term in terms:
+        term.refresh(coordinates)
+        name = term.item.term.name
+        out[name] = out.get(name, 0.0) + term.energy(term.residual(coordinates))
     return out
 
 

@@ -25,7 +25,7 @@ class Start:
         without it, or where it turns cells of a flat image over; the result is then the
         same as without it.
     iterations : int, optional
-        Most iterations, over all stages.
+        Most iterations, over all stages; those of `points` go to the last stage first.
 
     Raises
     ------
