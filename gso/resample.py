@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,3 +61,18 @@ def coarser(mesh: Mesh, largest: int) -> list[Mesh]:
             # A pattern finer than the coarse grid can leave it without area.
             break
     return levels[::-1]
+
+
+def alike(levels: list[Mesh], mesh: Mesh) -> list[Mesh]:
+    """Another surface on the vertices of a grid, at the resolution of coarser copies of it.
+
+    >>> fine = Mesh.from_grid(np.dstack([*np.mgrid[:39.0, :39.0], np.zeros((39, 39))]))
+    >>> [m.grid_shape for m in alike(coarser(fine, 32), fine)]
+    [(20, 20)]
+    """
+    grid: Any = mesh.grid
+    shapes: list[Any] = [level.grid_shape for level in levels]
+    return [
+        level.replaced(resample(grid, *shape).reshape(-1, 3))
+        for level, shape in zip(levels, shapes, strict=True)
+    ]

@@ -108,6 +108,32 @@ def test_iterations_of_a_start_are_a_number(most):
         Start(None, iterations=most)
 
 
+@pytest.mark.parametrize("tolerance", [-1.0, "loose", None])
+def test_the_tolerance_of_a_start_is_a_number(tolerance):
+    with pytest.raises(OptionError, match="tolerance is"):
+        Start(None, tolerance=tolerance)
+
+
+def test_a_tolerance_ends_solves_from_a_start_only(surfaces):
+    design = surfaces[1]
+    cold = optimize(design)
+    assert same(cold, optimize(design, x0=Start(None, tolerance=0.5)))
+    near = optimize(design, options="fast").mesh
+    closely, loosely = (optimize(design, x0=Start(near, tolerance=t)) for t in (0.0, 0.5))
+    assert loosely.iterations < closely.iterations
+    assert energy(closely) < energy(loosely)
+
+
+def test_a_joint_solve_that_is_done_does_not_begin_again_on_a_coarser_grid(surfaces):
+    design = surfaces[0]
+    cold = optimize(design, options="jiang2020")
+    again = optimize(design, options="jiang2020", x0=cold.mesh)
+    assert {p.name for p in again.history} == {cold.history[-1].name}
+    assert energy(again) <= 1.001 * energy(cold)
+    afar = optimize(design, options="jiang2020", x0=design)
+    assert afar.history[0].name != afar.history[-1].name
+
+
 @pytest.mark.parametrize("most", [0, 1, 3])
 @pytest.mark.parametrize(
     "keywords",

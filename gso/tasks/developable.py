@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from gso import metrics as measure
 from gso.constraints import Pins
 from gso.mesh import Mesh
-from gso.resample import carry, coarser, resample
+from gso.resample import alike, carry, coarser, resample
 from gso.smoothing import smooth_grid
 from gso.status import MeshError, OptionError, Status
 from gso.tasks import held, joint, splined
@@ -216,7 +216,7 @@ def _starts(request: Request, levels: list[Mesh]) -> list[Mesh]:
     if request.start is None:
         return [*levels, request.mesh]
     begun = request.mesh.replaced(request.start)
-    return [level.replaced(_resampled(begun, level)) for level in levels] + [begun]
+    return [*alike(levels, begun), begun]
 
 
 def _check_handles(request: Request) -> None:

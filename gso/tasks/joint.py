@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,7 +26,7 @@ from numpy.typing import NDArray
 from gso import flat_start, limits
 from gso import metrics as measure
 from gso.mesh import Mesh
-from gso.resample import carry, coarser
+from gso.resample import alike, carry, coarser
 from gso.status import OptionError, Status
 from gso.tasks import held, splined
 from gso.tasks.base import Plan, Request, Stage
@@ -41,6 +42,8 @@ _FALL = 10.0
 _NEARLY = 1e-3
 #: Error of lengths up to which a flat image counts as isometric.
 _KEPT = 2e-3
+#: Multiple of `enough` below which a start is solved on the design's own grid only.
+_ISOMETRIC = 100.0
 #: Iterations of the flat image alone, where the design needs no change.
 _UNROLL = 100
 
@@ -78,9 +81,9 @@ class Options(BaseOptions):
     controls : int
         "surface": control points along each side; fewer on small grids.
     coarse_size : int
-        "design": largest side of the coarsest grid; 0 for the design's own alone.
+        "design", `x0`: largest side of the coarsest grid; 0 for the design's own alone.
     coarse_iterations : int
-        "design": iterations of each stage on coarser grids.
+        "design", `x0`: iterations of each stage on coarser grids.
     developable_below : float
         A design whose mean |K| is below this is developable already: it comes back
         untouched, with its flat image.
@@ -146,18 +149,15 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
     own = spline is None and request.start is None and request.constraints.empty
     if own and measure.loss_gc(mesh, scale=1.0) <= options.developable_below:
         return _unrolling(request)
-    climb = own and options.begin == "design" and mesh.grid_index is not None
-    levels = coarser(mesh, options.coarse_size) if climb and options.coarse_size else []
-    before: list[Stage] = []
-    start = mesh.vertices if request.start is None else request.start
+    begun = mesh if request.start is None else mesh.replaced(request.start)
+    levels = _levels(request, begun)
+    stages = _chain(request, [*levels, mesh])
+    before, start = [], [*alike(levels, begun), begun][0].vertices
     if not request.constraints.empty:
         before = [held.approach(request, start)]
     elif request.start is None and options.begin == "curvature":
         first = curvature(request)
         before, start = first.stages, first.start.reshape(-1, 3)
-    stages = _chain(request, [*levels, mesh])
-    if levels:
-        start = levels[0].vertices
     stages[0].enter = partial(_with_flat, levels[0] if levels else mesh)
     if spline is not None:
         # The spline comes after all of them.
@@ -171,9 +171,7 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
         finish=partial(_place, mesh),
         remark=partial(_remark, mesh),
         spline=spline,
-        unstarted=None
-        if request.start is None
-        else partial(_with_flat, mesh, mesh.vertices.ravel()),
+        unstarted=None if request.start is None else partial(_unstarted, [*levels, mesh]),
     )
 
 
@@ -209,16 +207,33 @@ def _flat_only(layout: Layout, coordinates: Array) -> Variables:
     return Variables(layout, basis, offset)
 
 
+def _levels(request: Request, begun: Mesh) -> list[Mesh]:
+    """Coarser copies of the design to begin with, coarsest first.
+
+    What comes of the formulation "curvature" needs none, nor does a start that has an isometric
+    image already.
+    """
+    o = request.options
+    grid = request.mesh.grid_index is not None and request.constraints.empty
+    if not (grid and o.coarse_size):
+        return []
+    if request.start is None:
+        climb = o.begin == "design" and o.variables == "free"
+        return coarser(request.mesh, o.coarse_size) if climb else []
+    blocks = _layout(begun).split(_with_flat(begun, begun.vertices.ravel()))
+    done = measure.isometry_energy(begun, blocks["flat"]) <= _ISOMETRIC * o.enough
+    return [] if done else coarser(request.mesh, o.coarse_size)
+
+
 def _chain(request: Request, levels: list[Mesh]) -> list[Stage]:
-    """Coarse to fine, on each grid with less and less fairness."""
+    """Coarse to fine, on each grid with less and less fairness; with the least from a start."""
     options = request.options
     weights = [options.w_fairness]
-    if request.start is None:
-        while weights[-1] < 0.999 * options.stiff:
-            weights.append(_FALL * weights[-1])
+    while request.start is None and weights[0] < 0.999 * options.stiff:
+        weights.insert(0, _FALL * weights[0])
     stages = []
     for below, mesh in zip([None, *levels], levels, strict=False):
-        for k, weight in enumerate(weights[::-1]):
+        for k, weight in enumerate(weights):
             stage = _stage(request, mesh, weight)
             if k == 0 and below is not None:
                 stage.enter = partial(_refine, below, mesh)
@@ -268,6 +283,14 @@ def _with_flat(mesh: Mesh, coordinates: Array) -> Array:
     points = coordinates[: 3 * len(mesh.vertices)].reshape(-1, 3)
     flat = flat_start.begin(mesh.replaced(points)).flat
     return _layout(mesh).pack({"surface": points, "flat": flat})
+
+
+def _unstarted(levels: list[Mesh]) -> Array:
+    """The design (the last of the levels) and a flat image of it, which a coarse one gives."""
+    coordinates = _with_flat(levels[0], levels[0].vertices.ravel())
+    for coarse, fine in pairwise(levels):
+        coordinates = _refine(coarse, fine, coordinates)
+    return coordinates
 
 
 def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:

@@ -118,7 +118,13 @@ def optimize(
         frame.constraints(constraints, flat=flat),
         start=frame.start(given.points, flat=flat),
     )
-    run = Run(module, callback, guarded=given.guarded, budget=given.iterations)
+    run = Run(
+        module,
+        callback,
+        guarded=given.guarded,
+        budget=given.iterations,
+        tolerance=given.tolerance,
+    )
     if max_deviation is not None:
         outcome = stay_within(run, request, max_deviation / frame.frame.scale)
     elif target_curvature is not None:

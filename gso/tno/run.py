@@ -72,6 +72,8 @@ class Run:
         than none.
     budget : int or None
         Most iterations of all its solves together.
+    tolerance : float
+        Least tolerance of stages that begin from a start that was given.
     refused : str
         Why that start was not used.
     """
@@ -83,11 +85,13 @@ class Run:
         *,
         guarded: bool = False,
         budget: int | None = None,
+        tolerance: float = 0.0,
     ):
         self.module = module
         self.callback = callback
         self.guarded = guarded
         self.budget = budget
+        self.tolerance = tolerance
         self.refused = ""
         self._judged = False
         self._dropped: Array | None = None
@@ -164,7 +168,9 @@ class Run:
     def through(self, plan: Plan, options: Options) -> End:
         """Solve the stages of a plan that has some, the last one until its constraints hold."""
         coordinates, given = plan.start, None
+        least = 0.0 if plan.unstarted is None else self.tolerance
         for number, stage in enumerate(plan.stages):
+            stage.tolerance = max(stage.tolerance, least)
             clock = time.perf_counter()
             given, coordinates = coordinates, stage.enter(coordinates)
             self.timings.setup += time.perf_counter() - clock

@@ -26,11 +26,14 @@ class Start:
         same as without it.
     iterations : int, optional
         Most iterations, over all stages; those of `points` go to the last stage first.
+    tolerance : float
+        Stop the stages that begin from `points` when an iteration lowers the energy by less
+        than this share of it, where the options' own is smaller.
 
     Raises
     ------
     OptionError
-        `iterations` is no number of iterations.
+        `iterations` is no number of iterations, or `tolerance` is negative or no number.
 
     Examples
     --------
@@ -47,8 +50,11 @@ class Start:
     source: str = "x0"
     guarded: bool = False
     iterations: int | None = None
+    tolerance: float = 0.0
 
     def __post_init__(self) -> None:
+        if not (isinstance(self.tolerance, int | float | np.number) and self.tolerance >= 0):
+            raise OptionError(f"tolerance is {self.tolerance!r}; take a number, 0 or more")
         most = self.iterations
         if most is None:
             return
