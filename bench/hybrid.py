@@ -4,7 +4,8 @@
     python bench/hybrid.py speed -n 16        one section, on fewer surfaces
     python bench/hybrid.py --plot FILE        the curve of the section "anytime"
 
-Sections: "speed", cold and hybrid on the same surfaces, one after the other; "guard", the
+Sections: "speed", cold and hybrid on the same surfaces, one after the other; "sizes", the
+same on finer and coarser grids, by which the command line chooses; "guard", the
 energy against the cold solve's on the whole test split and the hard one; "general", the
 same on triangulated patches in random order, some with a hole; "anytime", quality against
 time. Surfaces are those of the test split, which no net has seen: they follow from the
@@ -34,6 +35,7 @@ import gso
 from gso import hybrid
 from gso.mesh import Mesh
 from gso.net.catalogue import DEFAULTS, available
+from gso.resample import resample
 from gso.tno import Start, optimize
 
 #: What is compared: task and keywords.
@@ -46,6 +48,8 @@ CASES = {
 }
 #: Iterations at which the curve has points.
 POINTS = (0, 1, 2, 3, 4, 6, 8, 12, 18, 24)
+#: Vertices along the sides of the section "sizes", and the presets compared there.
+SIZES, PRESETS = (32, 64, 128, 256), ("balanced", "accurate")
 #: Holes of the general meshes, as shares of the side; every other one has none.
 HOLES = (0.0, 0.15)
 
@@ -111,6 +115,25 @@ def speed(test: Surfaces, count: int) -> None:
         )
     denoised = [timed(optimize, p, task="denoise")[1] for p in chosen]
     print(f"  denoise    cold {np.median(denoised):6.0f}, in closed form: no start can help")
+
+
+def sizes(test: Surfaces, count: int) -> None:
+    """The same on other grids."""
+    chosen = first(test, count)
+    print(f"\nSizes: medians over {len(chosen)} surfaces, milliseconds, PyTorch loaded before")
+    for side in SIZES:
+        grids = [resample(np.asarray(p, float), side, side) for p in chosen]
+        for preset in PRESETS:
+            keywords = {"options": preset}
+            timed(hybrid.solve, grids[0], **keywords)
+            found = compared(watched(grids, f"{side} {preset}"), "developable", keywords)
+            cold, share = np.median(found["cold"]), np.median(found["hybrid"] / found["cold"])
+            print(
+                f"  {side:4d} x {side:<4d} {preset:9s} cold {cold:6.0f}  hybrid "
+                f"{np.median(found['hybrid']):6.0f}  {share:.2f} of the time; energy "
+                f"{ratios(found)}",
+                flush=True,
+            )
 
 
 def guard(splits: dict[str, Surfaces], count: int | None) -> None:
@@ -186,7 +209,7 @@ def _draw(curves: dict[str, list[tuple[float, float]]], plot: str) -> None:
     figure.savefig(plot)
 
 
-SECTIONS = ("speed", "guard", "general", "anytime")
+SECTIONS = ("speed", "sizes", "guard", "general", "anytime")
 
 
 def main() -> None:
@@ -214,6 +237,8 @@ def main() -> None:
     for section in arguments.sections:
         if section == "speed":
             speed(test, n or 64)
+        elif section == "sizes":
+            sizes(test, n or 4)
         elif section == "guard":
             guard(splits, n)
         elif section == "general":

@@ -64,8 +64,8 @@ def never(monkeypatch):
     def begin(*args, **keywords):
         raise AssertionError("the solve began")
 
-    monkeypatch.setattr("gso.tno.optimize", begin)
-    monkeypatch.setattr("gso.tno.optimize_many", begin)
+    monkeypatch.setattr("gso.hybrid.solve", begin)
+    monkeypatch.setattr("gso.hybrid.solve_many", begin)
 
 
 def test_optimises_one_file(run):
@@ -113,7 +113,7 @@ def test_options_reach_the_solver(run, small, monkeypatch):
         seen.update(keywords)
         raise gso.GSOError("enough")
 
-    monkeypatch.setattr("gso.tno.optimize", solve)
+    monkeypatch.setattr("gso.hybrid.solve", solve)
     done = run(
         *("optimize", small, "-o", "out.obj", "--options", "accurate", "--backend", "superlu"),
         *("--max-deviation", 0.1, "--fix-boundary"),
@@ -164,14 +164,14 @@ def test_flattens_to_a_drawing(run, small):
 
 
 def test_turned_cells_are_no_success(run, small, monkeypatch):
-    from gso.tno import optimize as solve
+    from gso.hybrid import solve
 
     def fold(mesh, **keywords):
         result = solve(mesh, **keywords)
         result.__dict__["metrics"] = {**result.metrics, "flipped_cells": 3}
         return result
 
-    monkeypatch.setattr("gso.tno.optimize", fold)
+    monkeypatch.setattr("gso.hybrid.solve", fold)
     assert run("optimize", small, "-o", "out.obj", "--task", "flatten").exit_code == 1
 
 
@@ -245,7 +245,7 @@ def test_interrupted_run_leaves_nothing(run, small, monkeypatch):
     def stop(*args, **keywords):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gso.tno.optimize", stop)
+    monkeypatch.setattr("gso.hybrid.solve", stop)
     done = run("optimize", small, "-o", "out.obj", "--metrics", "out.json")
     assert done.exit_code == 130
     assert os.listdir() == ["small.obj"]
@@ -345,6 +345,12 @@ def test_a_net_starts_many_files(run, small, net):
         assert gso.Result.load(f"out/{name}.npz").details["net"] == str(net)
 
 
+def test_the_optimiser_alone(run, small, never):
+    for out in ("out.obj", "out/"):
+        done = run("optimize", small, "-o", out, "--method", "tno", "--workers", 0)
+        assert done.exit_code == 0
+
+
 def test_without_a_net_the_optimiser_says_so(run, small, monkeypatch):
     monkeypatch.setattr("gso.hybrid.prediction.available", lambda task: [])
     done = run("optimize", small, "-o", "out.obj", "--method", "hybrid")
@@ -352,8 +358,11 @@ def test_without_a_net_the_optimiser_says_so(run, small, monkeypatch):
     assert "note: solved without a net: no net" in done.stdout
 
 
-def test_net_mistakes(run, small, never):
+def test_a_net_that_nobody_asks(run, small, never):
     refused(run("optimize", small, "-o", "out.obj", "--net", "best"), "--net", "--method")
+
+
+def test_a_net_that_does_not_exist(run, small):
     done = run("optimize", small, "-o", "out.obj", "--method", "net", "--net", "best")
     refused(done, "no net 'best'")
 

@@ -11,6 +11,7 @@ import gso
 from gso import hybrid
 from gso.hybrid import prediction, solving
 from gso.hybrid.patch import as_patch
+from gso.hybrid.worth import pays
 from gso.mesh import Mesh
 from gso.status import MeshError, OptionError, WeightsError
 from gso.tasks.joint import Options as JointOptions
@@ -585,3 +586,34 @@ def test_many(workers, surfaces):
         alone = hybrid.solve(designs[k], net=net, polish=2)
         assert np.allclose(items[k].result.mesh.vertices, alone.mesh.vertices, atol=1e-6)
         assert items[k].result.warm_start == alone.warm_start
+
+
+# ---------------------------------------------------------------- where a net pays
+
+
+@pytest.mark.parametrize(
+    ("size", "keywords", "many", "expected"),
+    [
+        (64, {}, False, False),
+        (64, {"options": "accurate"}, False, False),
+        (64, {"options": "accurate"}, True, True),
+        (128, {"options": "accurate"}, False, True),
+        (128, {}, True, True),
+        (256, {}, False, True),
+        (256, {"options": "jiang2020"}, False, False),
+        (256, {"max_deviation": 1.0}, False, False),
+        (256, {"constraints": [gso.FixedBoundary()]}, False, False),
+    ],
+)
+def test_where_a_net_pays(size, keywords, many, expected):
+    assert pays(Mesh.from_grid(saddle(size)), "developable", keywords, many=many) is expected
+    assert not pays(Mesh.from_grid(saddle(size)), "flatten", {})
+
+
+def test_no_net_is_asked_where_it_does_not_pay(surfaces, monkeypatch):
+    monkeypatch.setattr(solving, "predictions", lambda designs, *_: [1 / 0 for _ in designs])
+    cold, result = optimize(surfaces[0]), hybrid.solve(surfaces[0], sparing=True)
+    (item,) = hybrid.solve_many([surfaces[0]], sparing=True, workers=0)
+    for found in (result, item.result):
+        assert same(cold, found)
+        assert (found.warm_start, found.notes, found.seconds["net"]) == ("cold", (), 0.0)

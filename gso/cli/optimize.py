@@ -30,8 +30,9 @@ class Job:
     ----------
     keywords : dict
         For :func:`gso.tno.optimize`.
-    method : {"tno", "net", "hybrid"}
-        Who solves: the optimiser, a net alone, or the optimiser from a net's result.
+    method : {"auto", "tno", "net", "hybrid"}
+        Who solves: the optimiser, a net alone, the optimiser from a net's result, or that
+        where it saves time.
     net : str, optional
         Name or file of the net.
     unit : str
@@ -41,7 +42,7 @@ class Job:
     """
 
     keywords: dict[str, Any] = field(default_factory=dict)
-    method: str = "tno"
+    method: str = "auto"
     net: str | None = None
     unit: str = "mm"
     quiet: bool = False
@@ -67,7 +68,8 @@ class Job:
         return solve_many(meshes, workers=workers, **self._with_net())
 
     def _with_net(self) -> dict[str, Any]:
-        return {**self.keywords, "net": self.net, "polish": self.method == "hybrid"}
+        more = {"net": self.net, "polish": self.method != "net", "sparing": self.method == "auto"}
+        return {**self.keywords, **more}
 
     def check(self, out: str, plot: str | None = None) -> None:
         """Refuse outputs that cannot be written, before anything is computed."""
@@ -162,10 +164,11 @@ class Job:
 )
 @click.option(
     "--method",
-    type=click.Choice(["tno", "net", "hybrid"]),
-    default="tno",
+    type=click.Choice(["auto", "tno", "net", "hybrid"]),
+    default="auto",
     show_default=True,
-    help="Who solves: the optimiser, a net alone, or the optimiser from a net's result.",
+    help="Who solves: the optimiser, a net alone, the optimiser from a net's result, or that "
+    "where it saves time, which is on large grids.",
 )
 @click.option(
     "--net", metavar="NET", help="Name or .safetensors file; the task's own net by default."
@@ -199,7 +202,7 @@ def optimize(files: tuple[str, ...], out: str, **given: Any) -> None:
     when every result is usable: it was computed, reached its target if it had one, and has
     no cell turned over.
     """
-    if given["net"] is not None and given["method"] == "tno":
+    if given["net"] is not None and given["method"] in ("auto", "tno"):
         raise OptionError("--net goes with --method net or hybrid")
     job = Job(
         _keywords(given, given["suffix"] or out),

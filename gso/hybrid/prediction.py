@@ -39,7 +39,7 @@ class Prediction:
     net : str
         Which net.
     refused : str
-        Why there are no points.
+        Why there are no points; empty, too, where no net was asked.
     """
 
     points: Array | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gso import flat_start
 from gso.constraints import listed
 from gso.hybrid.prediction import Prediction, predictions
+from gso.hybrid.worth import pays
 from gso.mesh import Mesh
 from gso.result import Result
 from gso.status import GSOError, MeshError, OptionError
@@ -39,6 +40,7 @@ def solve(
     task: str = "developable",
     net: Any = None,
     polish: bool | int = True,
+    sparing: bool = False,
     **keywords: Any,
 ) -> Result:
     """Let a net make a start, and the optimiser finish it.
@@ -65,6 +67,9 @@ def solve(
         False: the net's result as it is, whatever its energy, measured; hard constraints
         and `max_deviation` are kept. With `target_curvature`, which takes many solves, only
         True.
+    sparing : bool
+        Ask the net only where that has been found to save time: on large grids, and by
+        curvature. Elsewhere the result is that of :func:`gso.tno.optimize`.
     **keywords
         Passed to :func:`gso.tno.optimize`: `formulation`, `options`, `constraints`,
         `max_deviation`, `target_curvature`, `callback`.
@@ -97,7 +102,8 @@ def solve(
     clock = time.perf_counter()
     polish = _checked(task, polish, keywords)
     design = as_mesh(mesh)
-    (prediction,) = predictions([design], task, net)
+    worth = not sparing or pays(design, task, keywords)
+    (prediction,) = predictions([design], task, net) if worth else [Prediction()]
     result = _finished(design, prediction, task, polish, keywords)
     result.seconds["total"] = time.perf_counter() - clock
     return result
@@ -109,6 +115,7 @@ def solve_many(
     task: str = "developable",
     net: Any = None,
     polish: bool | int = True,
+    sparing: bool = False,
     workers: int | None = None,
     **keywords: Any,
 ) -> Iterator[Item]:
@@ -118,7 +125,7 @@ def solve_many(
     ----------
     meshes : iterable
         Anything :func:`solve` takes; read in blocks, so that a generator of any length fits.
-    task, net, polish, **keywords
+    task, net, polish, sparing, **keywords
         As for :func:`solve`; a `callback` is left out.
     workers : int, optional
         Processes; the number of cores when not given, 0 for none (in this process).
@@ -138,7 +145,8 @@ def solve_many(
     keywords.pop("callback", None)
     polish = _checked(task, polish, keywords)
     work = partial(_one, task, polish, keywords)
-    with closing(spread(work, _started(meshes, task, net), workers=workers)) as results:
+    worth = partial(pays, task=task, keywords=keywords, many=True) if sparing else None
+    with closing(spread(work, _started(meshes, worth, task, net), workers=workers)) as results:
         for done in results:
             yield Item(done.index, done.value, done.error)
 
@@ -151,14 +159,18 @@ class _Started:
     prediction: Prediction
 
 
-def _started(meshes: Iterable[Any], task: str, net: Any) -> Iterator[_Started]:
-    """Designs with their predictions, a block at a time."""
+def _started(
+    meshes: Iterable[Any], worth: Callable[[Mesh], bool] | None, task: str, net: Any
+) -> Iterator[_Started]:
+    """Designs with their predictions where they are worth it, a block at a time."""
     source = iter(meshes)
     while block := list(islice(source, _BATCH)):
         read = [_read(mesh) for mesh in block]
-        found = iter(predictions([d for d in read if isinstance(d, Mesh)], task, net))
-        for design in read:
-            yield _Started(design, next(found) if isinstance(design, Mesh) else Prediction())
+        seen = [isinstance(d, Mesh) and (worth is None or worth(d)) for d in read]
+        chosen = [d for d, s in zip(read, seen, strict=True) if s and isinstance(d, Mesh)]
+        found = iter(predictions(chosen, task, net))
+        for design, asked in zip(read, seen, strict=True):
+            yield _Started(design, next(found) if asked else Prediction())
 
 
 def _read(mesh: Any) -> Mesh | GSOError:
@@ -203,16 +215,20 @@ def _finished(
     keywords: dict[str, Any],
 ) -> Result:
     """Solve from a prediction, if there is a sound one."""
-    try:
-        refused = _unsound(design, prediction)
-        result = None if refused else _polished(design, prediction.points, task, polish, keywords)
-    except MeshError as error:
-        # A start may have no area. What is wrong with the design comes again.
-        refused, result = str(error), None
+    refused, result = prediction.refused, None
+    if prediction.points is not None:
+        try:
+            refused = _unsound(design, prediction.points)
+            if not refused:
+                result = _polished(design, prediction.points, task, polish, keywords)
+        except MeshError as error:
+            # A start may have no area. What is wrong with the design comes again.
+            refused = str(error)
     if result is None:
         most = None if isinstance(polish, bool) else polish
         result = optimize(design, task=task, x0=Start(None, iterations=most), **keywords)
-        result.notes += (f"solved without a net: {refused}",)
+        if refused:
+            result.notes += (f"solved without a net: {refused}",)
     result.seconds["net"] = prediction.seconds
     result.seconds["total"] += prediction.seconds
     if prediction.net:
@@ -220,11 +236,8 @@ def _finished(
     return result
 
 
-def _unsound(design: Mesh, prediction: Prediction) -> str:
-    """Why nothing can start from a prediction."""
-    points = prediction.points
-    if points is None:
-        return prediction.refused
+def _unsound(design: Mesh, points: Array) -> str:
+    """Why nothing can start from a net's result."""
     if not np.isfinite(points).all():
         return "its result is not finite"
     turned = flat_start.flips(design, points) if points.shape[1] == 2 else 0
@@ -233,7 +246,7 @@ def _unsound(design: Mesh, prediction: Prediction) -> str:
 
 def _polished(
     design: Mesh,
-    points: Array | None,
+    points: Array,
     task: str,
     polish: bool | int,
     keywords: dict[str, Any],

@@ -1,0 +1,39 @@
+"""Where a net's start saves more time than it costs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gso.mesh import Mesh
+from gso.tno import check
+
+#: Vertices from which on a net pays, by the unknowns of the last stage: for one design, where
+#: loading PyTorch counts, and for many. ``python bench/hybrid.py sizes`` prints the times.
+_FREE = (10_000, 3_000)
+_OFFSETS = (40_000, 10_000)
+
+
+def pays(design: Mesh, task: str, keywords: dict[str, Any], *, many: bool = False) -> bool:
+    """Whether a solve with the task's own net is expected to end sooner, as good as without.
+
+    Only developable solves of grids by curvature have been found to; what bounds or
+    constraints make of it was not measured.
+
+    Parameters
+    ----------
+    design : Mesh
+    task, keywords
+        As for :func:`gso.hybrid.solve`.
+    many : bool
+        Whether it is one of many designs.
+    """
+    asked = {name: keywords.get(name) for name in ("formulation", "options")}
+    _, formulation, options = check(task, **asked)
+    if (task, formulation) != ("developable", "curvature") or design.grid_index is None:
+        return False
+    if any(keywords.get(name) is not None for name in ("max_deviation", "target_curvature")):
+        return False
+    if keywords.get("constraints"):
+        return False
+    least = _FREE if getattr(options, "variables", None) == "free" else _OFFSETS
+    return len(design.vertices) >= least[many]
