@@ -9,7 +9,7 @@ from gso.tno import check
 
 #: Vertices from which on a net pays, by the unknowns of the last stage: for one design, where
 #: loading PyTorch counts, and for many. ``python bench/hybrid.py sizes`` prints the times.
-_FREE = (10_000, 3_000)
+_FREE = (10_000, 2_500)
 _OFFSETS = (40_000, 10_000)
 
 
