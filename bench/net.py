@@ -6,7 +6,8 @@
     python bench/net.py DIR --others           the splits that are no Bezier surfaces, too
     python bench/net.py --curve [NET...] --plot FILE         quality against training time
     python bench/net.py DIR --rounding RUN     what half precision changes in a run's net
-    python bench/net.py DIR --grid FILE        figure 5: loss against parameters (hours)
+    python bench/net.py DIR --grid FILE        figure 5: loss against parameters (hours;
+                                               with --stride 2 a quarter of them)
 
 Figures are means over the test split; times are medians for one surface, from array to
 array, on the CPU, with the threads that OMP_NUM_THREADS allows.
@@ -17,8 +18,10 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +34,7 @@ from report.published import NETS, TABLE_3
 from tno import progress as watched
 
 from gso import dataset, net
+from gso.cli.progress import share
 from gso.dataset.noise import LEVELS
 from gso.io import replacing
 from gso.net import catalogue, checkpoint, weights
@@ -166,13 +170,22 @@ def curve(names: list[str], target: str) -> None:
     figure.savefig(target)
 
 
+def _told(show: Any, name: str, report: Any) -> None:
+    """How the training of one of the nets is going."""
+    show(report.progress, f"{name}: {report.left / 60:.0f} min left, loss {report.loss:.4g}")
+
+
 def grid(arguments: argparse.Namespace) -> None:
     """Figure 5: nets of several sizes, supervised on the optimiser's results.
 
-    Nets that the file has already are not trained again.
+    Nets that the file has already are not trained again; one that was cut off goes on from
+    its run, in a folder beside the file.
     """
-    path = Path(arguments.grid)
-    table = json.loads(path.read_text())["rows"] if path.exists() else []
+    path, stride = Path(arguments.grid), arguments.stride
+    record = json.loads(path.read_text()) if path.exists() else {"stride": stride, "rows": []}
+    if record["stride"] != stride:
+        raise SystemExit(f"{path} was begun with --stride {record['stride']}")
+    table = record["rows"]
     done = {(row["blocks"], row["channels"]) for row in table}
     for blocks in BLOCKS:
         for channels in CHANNELS:
@@ -186,25 +199,30 @@ def grid(arguments: argparse.Namespace) -> None:
                     "steps": EPOCHS * SURFACES // 20,
                     "limit": SURFACES,
                     "model": {"kind": "gsonet", "channels": channels, "blocks": blocks},
-                    "phase": [{"loss": "label", "batch": 20, "rate": 1e-3}],
+                    "phase": [{"loss": "label", "batch": 20, "rate": 1e-3, "stride": stride}],
                     "validate_every": 1e9,
                 }
             )
-            with tempfile.TemporaryDirectory() as run:
-                card = net.train(config, arguments.data, run)
-                losses = [r["loss"] for r in read(Path(run)) if "loss" in r]
+            run = path.with_suffix("") / config.name
+            with share() as show:
+                shown = partial(_told, show, config.name)
+                card = net.train(config, arguments.data, run, show=shown)
+            losses = [r["loss"] for r in read(run) if "loss" in r]
             row = {
                 "blocks": blocks,
                 "channels": channels,
                 "parameters": card["parameters"],
                 "loss": float(np.mean(losses[-5:])),
-                **card["validation"],
+                "hours": card["hours"],
             }
+            if stride == 1:
+                row |= card["validation"]
             table.append(row)
             print(line(config.name, {k: v for k, v in row.items() if k[0] != "b"}, {}), flush=True)
-            record = {"command": "python bench/net.py DIR --grid FILE", "rows": table}
+            record["command"] = f"python bench/net.py DIR --grid FILE --stride {stride}"
             with replacing(path) as file:
                 file.write((json.dumps(record, indent=1) + "\n").encode())
+            shutil.rmtree(run)
 
 
 def main() -> None:
@@ -219,6 +237,9 @@ def main() -> None:
     parser.add_argument("--cards", action="store_true", help="write the figures into the cards")
     parser.add_argument("--rounding", type=Path, metavar="RUN", help="half precision, measured")
     parser.add_argument("--grid", metavar="FILE", help="figure 5, as JSON")
+    parser.add_argument(
+        "--stride", type=int, default=1, metavar="N", help="of --grid: every N-th vertex"
+    )
     parser.add_argument("--curve", nargs="*", metavar="NET", help="plot these, or all")
     parser.add_argument("--plot", default="curves.png", metavar="FILE", help="for --curve")
     arguments = parser.parse_args()

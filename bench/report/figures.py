@@ -65,7 +65,8 @@ def figure_5(folder: Path) -> Figure:
     text = "Figure 5: loss of nets supervised on the optimiser's results, against their size"
     if not GRID.exists():
         return Figure("5", f"{text}. Not run yet: {GRID_COMMAND}")
-    rows = json.loads(GRID.read_text())["rows"]
+    stored = json.loads(GRID.read_text())
+    rows, command = stored["rows"], stored["command"]
     canvas, axes = _canvas(1)
     for channels in sorted({r["channels"] for r in rows}):
         some = sorted((r for r in rows if r["channels"] == channels), key=lambda r: r["blocks"])
@@ -76,7 +77,8 @@ def figure_5(folder: Path) -> Figure:
     axes[0].axvline(CHOSEN["parameters"] / 1e6, color="0.7", linewidth=0.8)
     axes[0].set(xlabel="million parameters", ylabel="loss", xscale="log", yscale="log")
     axes[0].legend(fontsize=8)
-    return _written(canvas, folder / "figure-5.png", "5", f"{text}; the line: the paper's choice")
+    text += f"; the line: the paper's choice. Made by {command}"
+    return _written(canvas, folder / "figure-5.png", "5", text)
 
 
 def figure_6(folder: Path, records: Records) -> Figure:
