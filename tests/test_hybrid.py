@@ -258,7 +258,7 @@ def test_the_net_alone_flattens(surfaces):
 def coarse_net(monkeypatch):
     """Predictions like those of a fair net, and why there is none where that is asked."""
 
-    def predictions(designs, task, net):
+    def predictions(designs, task, net, passes):
         if net == "none":
             return [prediction.Prediction(refused="there is none")] * len(designs)
         few = gso.DevelopableOptions(iterations=1)
@@ -271,7 +271,7 @@ def coarse_net(monkeypatch):
 def predicts(monkeypatch, points):
     """Let every net make the same of every design."""
     found = prediction.Prediction(points, 0.01, "odd")
-    monkeypatch.setattr(solving, "predictions", lambda designs, task, net: [found] * len(designs))
+    monkeypatch.setattr(solving, "predictions", lambda designs, **_: [found] * len(designs))
 
 
 @pytest.mark.parametrize("polish", [True, False])
@@ -588,6 +588,20 @@ def test_many(workers, surfaces):
         assert items[k].result.warm_start == alone.warm_start
 
 
+@pytest.mark.parametrize(("polish", "passes"), [(True, 2), (3, None), (False, None)])
+def test_passes_are_left_out_where_a_whole_solve_follows(surfaces, monkeypatch, polish, passes):
+    seen = []
+
+    def asked(designs, task, net, passes):
+        seen.append(passes)
+        return [prediction.Prediction(refused="enough")] * len(designs)
+
+    monkeypatch.setattr(solving, "predictions", asked)
+    hybrid.solve(surfaces[0], polish=polish)
+    list(hybrid.solve_many([surfaces[0]], polish=polish, workers=0))
+    assert seen == [passes, passes]
+
+
 # ---------------------------------------------------------------- where a net pays
 
 
@@ -611,7 +625,7 @@ def test_where_a_net_pays(size, keywords, many, expected):
 
 
 def test_no_net_is_asked_where_it_does_not_pay(surfaces, monkeypatch):
-    monkeypatch.setattr(solving, "predictions", lambda designs, *_: [1 / 0 for _ in designs])
+    monkeypatch.setattr(solving, "predictions", lambda designs, **_: [1 / 0 for _ in designs])
     cold, result = optimize(surfaces[0]), hybrid.solve(surfaces[0], sparing=True)
     (item,) = hybrid.solve_many([surfaces[0]], sparing=True, workers=0)
     for found in (result, item.result):

@@ -125,6 +125,15 @@ def test_repeat_is_the_same_net_again(coarse):
     np.testing.assert_allclose(predict(points, model=coarse, repeat=2), twice, atol=1e-6)
 
 
+@pytest.mark.parametrize("size", [64, 40])
+def test_fewer_passes_of_a_net(coarse, size):
+    points = saddle(size)
+    results = [predict(points, model=coarse, passes=p) for p in (1, coarse.passes)]
+    assert np.abs(results[0] - results[1]).max() > 1e-4
+    for most in (None, coarse.passes + 1):
+        np.testing.assert_array_equal(predict(points, model=coarse, passes=most), results[1])
+
+
 def test_noise_is_told_in_the_unit_of_the_input():
     net = shaken(GSONet("denoise", channels=8, blocks=1, sigma=True), size=0.02)
     points = saddle(64)
@@ -158,6 +167,8 @@ def test_bad_options(coarse):
         ({"task": "bend"}, "no task"),
         ({"task": "flatten", "model": coarse}, "is for task"),
         ({"model": coarse, "repeat": 0}, "repeat"),
+        ({"model": coarse, "passes": 0}, "passes"),
+        ({"model": coarse, "passes": 1.5}, "passes"),
         ({"model": coarse, "device": "abacus"}, "no device"),
     ]:
         with pytest.raises(OptionError, match=says):

@@ -48,7 +48,9 @@ class Prediction:
     refused: str = ""
 
 
-def predictions(designs: Sequence[Mesh], task: str, net: Any = None) -> list[Prediction]:
+def predictions(
+    designs: Sequence[Mesh], task: str, net: Any = None, passes: int | None = None
+) -> list[Prediction]:
     """Apply a net to designs, those of one size together.
 
     Parameters
@@ -57,7 +59,9 @@ def predictions(designs: Sequence[Mesh], task: str, net: Any = None) -> list[Pre
     task : str
         A task of :func:`gso.tno.optimize`.
     net : str, path or Net, optional
-        As in :func:`gso.net.predict`.
+        As `model` in :func:`gso.net.predict`.
+    passes : int, optional
+        As there.
 
     Raises
     ------
@@ -83,7 +87,7 @@ def predictions(designs: Sequence[Mesh], task: str, net: Any = None) -> list[Pre
         spent[k] = time.perf_counter() - clock
     for group in sizes.values():
         clock = time.perf_counter()
-        moved = _predicted(np.stack([grid for _, grid, _ in group]), task, net)
+        moved = _predicted(np.stack([grid for _, grid, _ in group]), task, net, passes)
         share = (time.perf_counter() - clock) / len(group)
         for (k, grid, patch), values in zip(group, moved, strict=True):
             clock = time.perf_counter()
@@ -131,16 +135,16 @@ def _seen(design: Mesh) -> tuple[Array, Patch | None]:
     return patch.grid, patch
 
 
-def _predicted(grids: Array, task: str, net: Any) -> Sequence[Any]:
+def _predicted(grids: Array, task: str, net: Any, passes: int | None) -> Sequence[Any]:
     """Results (H, W, d) for grids, or what is wrong with each of them."""
     from gso.net import predict
 
     try:
-        return list(predict(grids, task=task, model=net))
+        return list(predict(grids, task=task, model=net, passes=passes))
     except MeshError as error:
         if len(grids) == 1:
             return [str(error)]
-        return [_predicted(grid[None], task, net)[0] for grid in grids]
+        return [_predicted(grid[None], task, net, passes)[0] for grid in grids]
 
 
 def _back(design: Mesh, grid: Array, patch: Patch | None, values: Array) -> Array:

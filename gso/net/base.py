@@ -59,7 +59,14 @@ class Net(nn.Module):
         """
 
     @abstractmethod
-    def carried(self, surface: Tensor, fine: Tensor, sigma: Tensor | None = None) -> Tensor:
+    def carried(
+        self,
+        surface: Tensor,
+        fine: Tensor,
+        sigma: Tensor | None = None,
+        *,
+        passes: int | None = None,
+    ) -> Tensor:
         """Displacements (B, h, w, d) of the grids `fine`, which are `surface` resampled."""
 
     def start(self, surface: Tensor) -> Tensor:

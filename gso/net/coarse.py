@@ -130,8 +130,15 @@ class CoarseNet(Net):
         shares = self._shares(*fields, *surface.shape[1:3])
         return self._vectors(shares, Frame.of(planes(surface)))
 
-    def carried(self, surface: Tensor, fine: Tensor, sigma: Tensor | None = None) -> Tensor:
-        first, second = (c.to(fine.dtype) for c in self.coefficients(surface))
+    def carried(
+        self,
+        surface: Tensor,
+        fine: Tensor,
+        sigma: Tensor | None = None,
+        *,
+        passes: int | None = None,
+    ) -> Tensor:
+        first, second = (c.to(fine.dtype) for c in self.coefficients(surface, passes))
         shares = self._shares(first, second, fine.shape[1], fine.shape[2])
         return self._vectors(shares, Frame.of(planes(fine)))
 

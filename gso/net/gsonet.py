@@ -110,5 +110,12 @@ class GSONet(Net):
         y = y.to(surface.dtype)
         return (torch.tanh(y) if self.tanh else y).movedim(1, -1)
 
-    def carried(self, surface: Tensor, fine: Tensor, sigma: Tensor | None = None) -> Tensor:
+    def carried(
+        self,
+        surface: Tensor,
+        fine: Tensor,
+        sigma: Tensor | None = None,
+        *,
+        passes: int | None = None,
+    ) -> Tensor:
         return resampled(self.displacements(surface, sigma), fine.shape[1], fine.shape[2])

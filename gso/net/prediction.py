@@ -29,6 +29,7 @@ def predict(
     task: str = "developable",
     model: str | PathLike[str] | Net | None = None,
     repeat: int = 1,
+    passes: int | None = None,
     sigma: float | None = None,
     device: str | None = None,
 ) -> Array:
@@ -51,6 +52,9 @@ def predict(
     repeat : int
         How often the last net is applied, each time to what it made before; surfaces are
         normalised anew. Only where surfaces come out.
+    passes : int, optional
+        At most so many passes: the default nets correct their own results a few times, and
+        take time in proportion. All of a net's when not given.
     sigma : float, optional
         "denoise": standard deviation of the noise, in the unit of the input; estimated for
         each surface when not given. Nets that are not told ignore it.
@@ -88,9 +92,13 @@ def predict(
         raise OptionError(f"repeat is {repeat!r}; take a whole number from 1 to 100")
     if repeat > 1 and task == "flatten":
         raise OptionError("a flat image cannot be flattened again; leave repeat out")
+    whole = isinstance(passes, int | np.integer) and not isinstance(passes, bool)
+    if passes is not None and not (whole and passes >= 1):
+        raise OptionError(f"passes is {passes!r}; take a whole number from 1 up, or None for all")
     nets += [nets[-1]] * (repeat - 1)
     blocks = [
-        _predicted(batch[k : k + _BATCH], nets, sigma, where) for k in range(0, len(batch), _BATCH)
+        _predicted(batch[k : k + _BATCH], nets, passes, sigma, where)
+        for k in range(0, len(batch), _BATCH)
     ]
     out = (
         np.concatenate(blocks) if blocks else np.empty((*batch.shape[:3], 2 + (task != "flatten")))
@@ -98,18 +106,21 @@ def predict(
     return out[0] if points.ndim == 3 else out
 
 
-def _predicted(batch: Array, nets: list[Net], sigma: float | None, device: str) -> Array:
+def _predicted(
+    batch: Array, nets: list[Net], passes: int | None, sigma: float | None, device: str
+) -> Array:
     out = batch
     for net in nets:
         unit, centre, scale = _normalised(out)
+        most = net.passes if passes is None else min(int(passes), net.passes)
         noise = _sigma(net, unit, scale, sigma, device)
         coarse = torch.as_tensor(_resampled(unit), dtype=torch.float32, device=device)
         with torch.inference_mode():
             if unit.shape[1:3] == (SIZE, SIZE):
-                moved = net.displacements(coarse, noise)
+                moved = net.displacements(coarse, noise, passes=most)
             else:
                 fine = torch.as_tensor(unit, dtype=torch.float32, device=device)
-                moved = net.carried(coarse, fine, noise)
+                moved = net.carried(coarse, fine, noise, passes=most)
             start = net.start(torch.as_tensor(unit))
         out = scale * (start.numpy() + moved.double().cpu().numpy())
         if net.task == "flatten":
