@@ -93,6 +93,16 @@ def ratios(found: dict[str, np.ndarray]) -> str:
     return f"median {np.median(energies):.4f}, {shares}, worst {energies.max():.4f}"
 
 
+def costs(found: dict[str, np.ndarray]) -> str:
+    """Times and energies, cold and hybrid, in words."""
+    share = np.median(found["hybrid"] / found["cold"])
+    return (
+        f"cold {np.median(found['cold']):6.0f}  hybrid {np.median(found['hybrid']):6.0f} "
+        f"(net {np.median(found['net']):.0f})  {share:.2f} of the time; "
+        f"started {found['started'].mean():.0%}; energy {ratios(found)}"
+    )
+
+
 def speed(test: Surfaces, count: int) -> None:
     """Time and energy, cold and from the net's result."""
     chosen = first(test, count)
@@ -105,14 +115,7 @@ def speed(test: Surfaces, count: int) -> None:
             continue
         compared(chosen[:2], task, keywords)  # what is made at first use only
         found = compared(watched(chosen, name), task, keywords)
-        share = np.median(found["hybrid"] / found["cold"])
-        print(
-            f"  {name:10s} cold {np.median(found['cold']):6.0f}  hybrid "
-            f"{np.median(found['hybrid']):6.0f} (net {np.median(found['net']):.0f})  "
-            f"{share:.2f} of the time; started {found['started'].mean():.0%}; energy "
-            f"{ratios(found)}",
-            flush=True,
-        )
+        print(f"  {name:10s} {costs(found)}", flush=True)
     denoised = [timed(optimize, p, task="denoise")[1] for p in chosen]
     print(f"  denoise    cold {np.median(denoised):6.0f}, in closed form: no start can help")
 
@@ -127,13 +130,7 @@ def sizes(test: Surfaces, count: int) -> None:
             keywords = {"options": preset}
             timed(hybrid.solve, grids[0], **keywords)
             found = compared(watched(grids, f"{side} {preset}"), "developable", keywords)
-            cold, share = np.median(found["cold"]), np.median(found["hybrid"] / found["cold"])
-            print(
-                f"  {side:4d} x {side:<4d} {preset:9s} cold {cold:6.0f}  hybrid "
-                f"{np.median(found['hybrid']):6.0f}  {share:.2f} of the time; energy "
-                f"{ratios(found)}",
-                flush=True,
-            )
+            print(f"  {side:4d} x {side:<4d} {preset:9s} {costs(found)}", flush=True)
 
 
 def guard(splits: dict[str, Surfaces], count: int | None) -> None:

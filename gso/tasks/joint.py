@@ -220,8 +220,8 @@ def _levels(request: Request, begun: Mesh) -> list[Mesh]:
     if request.start is None:
         climb = o.begin == "design" and o.variables == "free"
         return coarser(request.mesh, o.coarse_size) if climb else []
-    blocks = _layout(begun).split(_with_flat(begun, begun.vertices.ravel()))
-    done = measure.isometry_energy(begun, blocks["flat"]) <= _ISOMETRIC * o.enough
+    flat = flat_start.begin(begun).flat
+    done = measure.isometry_energy(begun, flat) <= _ISOMETRIC * o.enough
     return [] if done else coarser(request.mesh, o.coarse_size)
 
 
