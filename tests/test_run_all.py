@@ -216,7 +216,7 @@ def check_stored(paces, some, share):
     """Every figure within a share of the stored one: other machines round otherwise."""
     for (task, name), method in methods().items():
         for sigma in quality.levels(task):
-            if method.pace not in paces or method.absent(sigma):
+            if method.pace not in paces or method.absent():
                 continue
             for found, figures in compared(task, sigma, name, some):
                 for metric, value in figures.items():

@@ -23,7 +23,7 @@ from report.surfaces import Case, Surfaces
 DRAWN = {
     "developable": ("TNO jiang2020", "TNO balanced", "Net-S", "Net-C", "Net-CF", "Net", "hybrid"),
     "flatten": ("Init", "TNO lengths", "TNO strain", "Net", "Net-W", "Net strain", "libigl ARAP"),
-    "denoise": ("TNO", "Net sigma"),
+    "denoise": ("TNO", "Net"),
 }
 #: Surfaces among which the examples are looked for.
 _AMONG = 64
@@ -66,7 +66,7 @@ def _example(surfaces: Surfaces, k: int, task: str, sigma: float, kept: Store) -
     example = Example(surfaces.case(k, sigma), k)
     for name in DRAWN[task]:
         method = of(task, name)
-        if method.absent(sigma):
+        if method.absent():
             continue
         place = f"examples/{task}-{name}-{level_name(sigma)}".replace(" ", "-")
         key = method.key(sigma) | {"surfaces": surfaces.key, "number": k}

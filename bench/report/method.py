@@ -57,7 +57,7 @@ class Method:
     needs : tuple of str
         Packages that must be installed, beside the package's own.
     net : str
-        Net that it uses; "{:.3f}" in it stands for the level of the noise.
+        Net that it uses.
     candidates : tuple of dict
         Parameters of which the best are taken, for each level of the noise, on surfaces that
         nothing is reported of.
@@ -88,19 +88,19 @@ class Method:
 
     def parameters(self, sigma: float) -> dict[str, Any]:
         """The parameters that were found best, and the net."""
-        found = {"model": self.net.format(sigma)} if self.net else {}
+        found = {"model": self.net} if self.net else {}
         if self.candidates:
             found |= tuned()[self.task][self.name][level_name(sigma)]
         return found
 
-    def absent(self, sigma: float = 0.0) -> str:
+    def absent(self) -> str:
         """Why it cannot run, or nothing."""
         if self.refused:
             return self.refused
         missing = [name for name, found in store.installed(self.needs).items() if not found]
         if missing:
             return f"not installed: pip install {' '.join(missing)}"
-        if self.net and self.net.format(sigma) not in shipped():
+        if self.net and self.net not in shipped():
             return "no weights shipped"
         return ""
 
@@ -115,7 +115,7 @@ class Method:
             "files": store.source(*self.files),
         }
         if self.net:
-            key |= {"net": _weights(self.net.format(sigma)), "code": store.nets()}
+            key |= {"net": _weights(self.net), "code": store.nets()}
         return key
 
 

@@ -68,7 +68,6 @@ def _own() -> list[Method]:
         net("Net-W", "flatten", "flatten-w"),
         net("Net strain", "flatten", "flatten-strain", "the default net"),
         tno("TNO", "denoise", note="is told nothing of the noise"),
-        net("Net sigma", "denoise", "denoise-{:.3f}", "one net per level"),
         net("Net", "denoise", "denoise", "the default net; estimates the noise"),
     ]
     for task in TASKS:

@@ -77,7 +77,7 @@ def blocks(settings: Settings, surfaces: Surfaces) -> Iterator[Block]:
     for task in TASKS:
         for sigma in levels(task):
             for method in (m for m in methods().values() if m.task == task):
-                if method.absent(sigma):
+                if method.absent():
                     continue
                 count = min(settings.counts[method.pace], len(surfaces))
                 timed = min(settings.timed, count)

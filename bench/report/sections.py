@@ -196,7 +196,7 @@ def rows(section: Section, records: Records) -> list[Row]:
 
 def _row(section: Section, method: Method, given: list[Record]) -> Row:
     row = Row(method.name, "peer" if method.peer else "package", note=method.note)
-    row.absent = method.absent(section.sigma)
+    row.absent = method.absent()
     good = [record for record in given if "error" not in record]
     if given and not good:
         row.absent = f"failed: {given[0]['error']}"

@@ -175,7 +175,7 @@ def unmeasured(records: Records) -> list[str]:
     for section in SECTIONS:
         for method in section.methods:
             errors = [r.get("error", "") for r in section.of(records, method)]
-            why = method.absent(section.sigma) or (errors[0] if errors and all(errors) else "")
+            why = method.absent() or (errors[0] if errors and all(errors) else "")
             if why:
                 found.setdefault((method.name, why), []).append(section.name)
     return [f"{name}: {why} ({', '.join(where)})" for (name, why), where in found.items()]
