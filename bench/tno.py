@@ -196,7 +196,7 @@ def denoise() -> dict[str, Any]:
             noisy = points + sigma * unit
             result, spent = timed(lambda q=noisy: gso.tno.optimize(q, task="denoise"))
             angles.append(metrics.normal_angle(points, result.grid))
-            estimates.append(result.details["sigma"] * metrics.unit(noisy))
+            estimates.append(result.details["sigma"])
             seconds.append(spent)
         rows.append(
             [f"{sigma:.3f}", np.mean(angles), floor, np.mean(estimates), 1e3 * np.median(seconds)]

@@ -42,7 +42,7 @@ def tables() -> dict[str, str]:
 
 def metric_table() -> str:
     """Metrics, their units, which way is better, and what they mean."""
-    better = {True: "lower", False: "higher"}
+    better = {True: "lower", False: "higher", None: ""}
     rows = [
         (f"``{name}``", info.unit or "1", better[info.lower_is_better], prose(info.text))
         for name, info in metrics.INFO.items()

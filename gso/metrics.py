@@ -27,10 +27,10 @@ Array = NDArray[np.float64]
 
 
 class Info(NamedTuple):
-    """What a metric means: its unit, whether lower is better, one line of text."""
+    """What a metric means: its unit, whether lower is better (None: neither is), a line of text."""
 
     unit: str
-    lower_is_better: bool
+    lower_is_better: bool | None
     text: str
 
 
@@ -54,12 +54,13 @@ INFO: dict[str, Info] = {
     "strain_p99": Info("", True, "99th percentile of the larger principal strain"),
     "strain_max": Info("", True, "largest principal strain"),
     "area_error": Info("", True, "mean |A'/A - 1| over corner triangles"),
-    "flipped_cells": Info("", True, "cells with a corner turned over"),
+    "flipped_cells": Info("", True, "cells turned over (of grids: with a corner turned over)"),
     "angle_distortion_mean": Info("", True, "mean over faces of s1/s2 - 1, principal stretches"),
     "angle_distortion_p99": Info("", True, "99th percentile of s1/s2 - 1"),
     "scale_min": Info("", False, "smallest ratio of lengths, flat over surface"),
     "scale_max": Info("", True, "largest ratio of lengths, flat over surface"),
-    "theta": Info("deg", True, "mean angle between cell normals (published)"),
+    "theta": Info("deg", True, "mean angle of the cell normals to the clean surface's (published)"),
+    "normal_change": Info("deg", None, "mean angle of the cell normals to the input's; no error"),
     "roughness_ratio": Info("", True, "sum of squared second differences, out / in"),
 }
 

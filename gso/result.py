@@ -54,11 +54,14 @@ class Result:
     backend, device : str
         Linear solver of the last stage, and where it ran.
     warm_start : str
-        What started the solve: "cold", "x0", or "net" (:func:`gso.hybrid.solve`).
+        What started the solve: "cold", "x0", "session", "net" (:func:`gso.hybrid.solve`), or
+        the source that a :class:`gso.tno.Start` names.
     notes : tuple of str
         What was repaired in the input or restricted in the run.
     details : dict
-        Numbers of the task: weights chosen, noise estimate ... With constraints,
+        Numbers of the task: weights chosen ... Of `denoise`: "sigma", the standard deviation
+        that the noise is estimated to have, in the input's unit; "dof", degrees of freedom
+        that the smoothing leaves to each coordinate; "order" and "weight". With constraints,
         "constraints": the largest length by which each is missed, in the input's unit. With
         a spline, "spline": its curvature and distances, see :func:`gso.fit.describe_spline`.
     spline : BSplineSurface or None

@@ -35,7 +35,7 @@ class DatasetError(GSOError, ValueError):
 
 
 class ConvergenceWarning(UserWarning):
-    """A result was returned, but the solver stopped for another reason than convergence."""
+    """A result was returned, but neither did the solver converge nor make all its iterations."""
 
 
 class Status(enum.Enum):

@@ -317,6 +317,7 @@ def test_begin_with_a_net_and_learn_from_its_results(folder, tmp_path):
     card = train(replace(made, init=again, through=""), folder, tmp_path / "again")
     assert card["begun_with"]["name"] == made.name and len(card["curve"]) == 2
     assert card["curve"][1][0] >= card["curve"][0][0]
+    assert card["hours"] == pytest.approx(card["curve"][1][0], abs=0.002)
     with pytest.raises(OptionError, match="does not fit"):
         train(config(model={**PUBLISHED, "channels": 8}, init=net), folder, tmp_path / "other")
     with pytest.raises(OptionError, match="another kind"):

@@ -170,11 +170,10 @@ def figures(task: str, case: Case, result: Array) -> dict[str, float]:
     found = module.metrics(mesh, after, None, metrics.unit(mesh))
     if task == "developable":
         return found
-    noisy = metrics.normal_angle(case.surface, case.given)
-    rate = 100.0 * (noisy - found["theta"]) / noisy
+    noisy, theta = (metrics.normal_angle(case.surface, x) for x in (case.given, result))
     return {
-        "theta": found["theta"],
+        "theta": theta,
         "theta_noisy": noisy,
-        "rate": rate,
+        "rate": 100.0 * (noisy - theta) / noisy,
         "off": found["displacement_rms"],
     }

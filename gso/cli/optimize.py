@@ -125,7 +125,8 @@ class Job:
     type=click.Path(),
     help="File to write; a folder when there are several inputs. The suffix says the format: "
     ".npz is the full result, .svg the flat pattern at 1:1; .step, .iges and .3dm are the "
-    "surface as a B-spline, which is then what is optimised.",
+    "surface as a B-spline, which is then what is optimised (fitted to the result where something "
+    "bounds or constrains it).",
 )
 @click.option(
     "--task",
@@ -153,9 +154,12 @@ class Job:
     "--target-curvature",
     metavar="K",
     type=float,
-    help="developable: mean |K| (loss_gc) to reach with the smallest displacement.",
+    help="developable: mean |K| to reach with the smallest displacement: the loss_gc that gso info "
+    "prints, in 1/size^2.",
 )
-@click.option("--fix-boundary", is_flag=True, help="Keep the boundary where it is.")
+@click.option(
+    "--fix-boundary", is_flag=True, help="Keep the boundary where it is; not for flat images."
+)
 @click.option(
     "--constraints",
     metavar="JSON",
@@ -168,13 +172,19 @@ class Job:
     default="auto",
     show_default=True,
     help="Who solves: the optimiser, a net alone, the optimiser from a net's result, or that "
-    "where it saves time, which is on large grids.",
+    "where it saves time, which is on large grids. Where there is no net, or its result is of no "
+    "use, the optimiser does, and a note says so.",
 )
 @click.option(
     "--net", metavar="NET", help="Name or .safetensors file; the task's own net by default."
 )
 @click.option("--backend", metavar="NAME", help="Linear solver; the fastest installed by default.")
-@click.option("--workers", metavar="N", type=click.IntRange(0), help="Processes for many inputs.")
+@click.option(
+    "--workers",
+    metavar="N",
+    type=click.IntRange(0),
+    help="Processes for many inputs; all cores by default, 0 for none beside this one.",
+)
 @click.option(
     "--suffix", metavar=".EXT", help="Format of many outputs; that of each input by default."
 )

@@ -25,7 +25,7 @@ _SHOWN = ("loss_gc", "K_A_r", "d_H", "strain_mean", "loss_iso_cell", "theta")
 @click.option("--seed", metavar="N", type=int, help="Seed of all random numbers.")
 @click.option("--fresh", metavar="N", type=int, help="Surfaces to draw beside those of the set.")
 @click.option("--init", metavar="NET", help="Net to begin with.")
-@click.option("--through", metavar="NET", help="Net whose results are learnt from.")
+@click.option("--through", metavar="NET", help="Net whose results take the surfaces' place.")
 @click.option("--device", metavar="NAME", help="cpu, cuda ...; the GPU when there is one.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 def train(

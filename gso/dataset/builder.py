@@ -90,7 +90,9 @@ def build(
     recipe = Recipe() if recipe is None else recipe
     wanted = _references(recipe, reference, reference_splits)
     if find_spec("h5py") is None or find_spec("filelock") is None:
-        raise DatasetError('datasets need h5py and filelock: pip install "gso[dataset]"')
+        raise DatasetError(
+            'datasets need h5py and filelock: pip install ".[dataset]" in the folder of gso'
+        )
     place = Path(folder)
     with claimed(place):
         with _kept():

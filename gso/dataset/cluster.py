@@ -41,7 +41,7 @@ def spread(
         Dask is not installed, or the scheduler does not answer.
     """
     if find_spec("distributed") is None:
-        raise DatasetError('a scheduler needs Dask: pip install "gso[cluster]"')
+        raise DatasetError('a scheduler needs Dask: pip install ".[cluster]" in the folder of gso')
     from distributed import Client, as_completed
 
     try:

@@ -99,7 +99,7 @@ class Split:
         from importlib.util import find_spec
 
         if find_spec("torch") is None:
-            raise DatasetError('this needs torch: pip install "gso[net]"')
+            raise DatasetError('this needs torch: pip install ".[net]" in the folder of gso')
         from gso.dataset.torch_data import TorchData
 
         return TorchData([self[name] for name in names or ("surface",)], **keywords)

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from gso.hybrid.patch import Patch, as_patch
 from gso.mesh import Mesh
-from gso.net.catalogue import DEFAULTS, available
+from gso.net.catalogue import DEFAULTS, available, chain
+from gso.net.catalogue import TASKS as NETS
 from gso.status import MeshError
 
 Array = NDArray[np.float64]
 
 #: Tasks whose solver starts anywhere; what nets are for besides has a closed form.
-TASKS = ("developable", "flatten")
+STARTED = ("developable", "flatten")
 #: Vertices along each side of the grid that a mesh is resampled to.
 _SIZE = 64
 #: Shortest side of a grid for which a net is asked; other meshes have as many vertices.
@@ -49,7 +50,12 @@ class Prediction:
 
 
 def predictions(
-    designs: Sequence[Mesh], task: str, net: Any = None, passes: int | None = None
+    designs: Sequence[Mesh],
+    task: str,
+    net: Any = None,
+    passes: int | None = None,
+    *,
+    alone: bool = False,
 ) -> list[Prediction]:
     """Apply a net to designs, those of one size together.
 
@@ -62,6 +68,8 @@ def predictions(
         As `model` in :func:`gso.net.predict`.
     passes : int, optional
         As there.
+    alone : bool
+        Whether the results are wanted for themselves, and not to start from.
 
     Raises
     ------
@@ -70,7 +78,9 @@ def predictions(
     WeightsError
         The net that is named does not exist, or its file is damaged.
     """
-    why = _missing(task, net)
+    if net is not None and not hasattr(net, "task") and task in NETS:
+        chain(net, task)
+    why = _missing(task, net, alone)
     if why:
         return [Prediction(refused=why)] * len(designs)
     name = _name(task, net)
@@ -80,7 +90,7 @@ def predictions(
     for k, design in enumerate(designs):
         clock = time.perf_counter()
         try:
-            grid, patch = _seen(design)
+            grid, patch = _seen(design, task)
             sizes.setdefault(grid.shape, []).append((k, grid, patch))
         except MeshError as error:
             found[k] = Prediction(None, time.perf_counter() - clock, name, str(error))
@@ -98,12 +108,12 @@ def predictions(
     return found
 
 
-def _missing(task: str, net: Any) -> str:
+def _missing(task: str, net: Any, alone: bool) -> str:
     """Why no net can be asked, whatever the design."""
-    if task not in TASKS:
+    if task not in (NETS if alone else STARTED):
         return f"no net makes a start for task {task!r}"
     if find_spec("torch") is None or find_spec("safetensors") is None:
-        return 'nets need torch and safetensors: pip install "gso[net]"'
+        return 'nets need torch and safetensors: pip install ".[net]" in the folder of gso'
     if net is None and DEFAULTS[task] not in available(task):
         return f"no net for task {task!r} comes with this version"
     return ""
@@ -115,7 +125,7 @@ def _name(task: str, net: Any) -> str:
     return type(net).__name__ if hasattr(net, "task") else str(net)
 
 
-def _seen(design: Mesh) -> tuple[Array, Patch | None]:
+def _seen(design: Mesh, task: str) -> tuple[Array, Patch | None]:
     """The grid that a net sees of a design.
 
     Raises
@@ -128,6 +138,8 @@ def _seen(design: Mesh) -> tuple[Array, Patch | None]:
             height, width = design.grid.shape[:2]
             raise MeshError(f"a grid {height} x {width} is solved faster than a net sees it")
         return design.grid, None
+    if task == "denoise":
+        raise MeshError("denoising nets take grids, and this mesh is none")
     count = int(design.used.sum())
     if count < _SMALLEST**2:
         raise MeshError(f"a mesh of {count} vertices is solved faster than a net sees it")

@@ -60,8 +60,9 @@ def solve(
         The design. Grids of any size, and meshes of one piece with a boundary and without
         handles: those are resampled to a grid, and the displacement is carried back.
     task : str
-        As for :func:`gso.tno.optimize`; nets make starts for "developable" and "flatten".
-    net : str, path or gso.net.Net, optional
+        As for :func:`gso.tno.optimize`; nets make starts for "developable" and "flatten". There
+        is nothing to start for "denoise", whose net is asked with ``polish=False`` only.
+    net : str, path or net, optional
         As `model` of :func:`gso.net.predict`; the task's default when not given.
     polish : bool or int
         True: solve from there, until an iteration gains less than 0.2 % of the energy (or the
@@ -107,7 +108,8 @@ def solve(
     design = as_mesh(mesh)
     prediction = Prediction()
     if not sparing or pays(design, task, keywords):
-        (prediction,) = predictions([design], task=task, net=net, passes=_passes(polish))
+        alone, passes = polish is False, _passes(polish)
+        (prediction,) = predictions([design], task, net, passes, alone=alone)
     result = _finished(design, prediction, task, polish, keywords)
     result.seconds["total"] = time.perf_counter() - clock
     return result
@@ -150,7 +152,8 @@ def solve_many(
     polish = _checked(task, polish, keywords)
     work = partial(_one, task, polish, keywords)
     worth = partial(pays, task=task, keywords=keywords, many=True) if sparing else None
-    ask = partial(predictions, task=task, net=net, passes=_passes(polish))
+    passes = _passes(polish)
+    ask = partial(predictions, task=task, net=net, passes=passes, alone=polish is False)
     with closing(spread(work, _started(meshes, worth, ask), workers=workers)) as results:
         for done in results:
             yield Item(done.index, done.value, done.error)

@@ -52,7 +52,11 @@ def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
         importlib.import_module(form.package)
     except ImportError as error:
         missing = isinstance(error, ModuleNotFoundError)
-        what = 'pip install "gso[cad]"' if missing else f"it is there but cannot be loaded: {error}"
+        what = (
+            'pip install ".[cad]" in the folder of gso'
+            if missing
+            else f"it is there but cannot be loaded: {error}"
+        )
         raise GSOError(
             f"{os.fsdecode(path)}: {_suffix(path)} files need {form.name}: {what}"
         ) from None
@@ -81,7 +85,8 @@ def save_spline(spline: BSplineSurface, path: str | PathLike[str], *, unit: str 
     OptionError
         Unknown unit, or `spline` is none.
     GSOError
-        The package that writes the format is not installed: ``pip install "gso[cad]"``.
+        The package that writes the format is not installed: ``pip install ".[cad]"`` in the
+        folder of gso.
 
     Examples
     --------

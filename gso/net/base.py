@@ -27,12 +27,15 @@ class Net(nn.Module):
         What it is made of again, with its class.
     passes : int
         How often it is applied.
+    multiple : int
+        What the sides of the grids are multiples of.
     bf16 : bool
         Convolutions run in bfloat16; what goes in and comes out, curvature above all, is in single
         precision all the same.
     """
 
     passes = 1
+    multiple = 1
 
     def __init__(self, task: str, **settings: Any):
         super().__init__()

@@ -24,20 +24,19 @@ class IMDB(nn.Module):
     def __init__(self, channels: int):
         super().__init__()
         kept, rest = channels // 4, channels - channels // 4
-        self.kept = kept
+        self.sizes = (kept, rest)
         self.steps = nn.ModuleList(
             nn.Conv2d(n, channels, 3, padding=1, bias=False) for n in (channels, rest, rest)
         )
         self.last = nn.Conv2d(rest, kept, 3, padding=1, bias=False)
         self.mix = nn.Conv2d(channels, channels, 1, bias=False)
-        self.active = nn.LeakyReLU(0.05)
+        self.active = nn.LeakyReLU(0.05, inplace=True)
 
     def forward(self, x: Tensor) -> Tensor:
         rest, parts = x, []
         for step in self.steps:
-            y = self.active(step(rest))
-            parts.append(y[:, : self.kept])
-            rest = y[:, self.kept :]
+            part, rest = self.active(step(rest)).split(self.sizes, dim=1)
+            parts.append(part)
         parts.append(self.last(rest))
         return x + self.mix(torch.cat(parts, dim=1))
 

@@ -14,6 +14,7 @@ from gso.io import replacing
 from gso.net.base import Net
 from gso.status import WeightsError
 
+_DAMAGED = "{} is no checkpoint of this run ({}); remove it to begin anew"
 Optimisers = Sequence[torch.optim.Optimizer]
 
 
@@ -43,9 +44,9 @@ def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> dict[str
     """
     from safetensors import SafetensorError, safe_open
 
+    state = numbers(path)
     try:
         with safe_open(path, framework="pt") as file:
-            state = json.loads((file.metadata() or {})["state"])
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         for prefix, module in (("net", net), ("average", average)):
             module.load_state_dict(_part(tensors, prefix))
@@ -56,10 +57,25 @@ def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> dict[str
                 moments.setdefault(int(k), {})[name] = value
             optimiser.load_state_dict({**optimiser.state_dict(), "state": moments})
     except (OSError, SafetensorError, KeyError, ValueError, RuntimeError) as error:
-        raise WeightsError(
-            f"{path} is no checkpoint of this run ({error}); remove it to begin anew"
-        ) from None
+        raise WeightsError(_DAMAGED.format(path, error)) from None
     return state
+
+
+def numbers(path: Path) -> dict[str, Any]:
+    """What else than tensors :func:`save` wrote.
+
+    Raises
+    ------
+    WeightsError
+        The file is damaged.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(path, framework="pt") as file:
+            return dict(json.loads((file.metadata() or {})["state"]))
+    except (OSError, SafetensorError, KeyError, TypeError, ValueError) as error:
+        raise WeightsError(_DAMAGED.format(path, error)) from None
 
 
 def _part(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from os import PathLike
@@ -77,9 +78,12 @@ class Phase:
             raise OptionError(f"stride is {self.stride}; take at most {LARGEST_STRIDE}")
         for name in ("share", "rate", "final_rate", "clip", "decay"):
             _number(name, getattr(self, name), 0.0)
-        for value in (self.share, self.rate, self.clip, *self.eps):
-            if not value > 0:
-                raise OptionError("share, rate, clip and eps of a phase must be positive")
+        _pair("eps", self.eps)
+        for name in ("share", "rate", "clip"):
+            if not getattr(self, name) > 0:
+                raise OptionError(f"{name} of a phase must be positive")
+        if not isinstance(self.weights, Mapping):
+            raise OptionError(f"weights is {self.weights!r}; it must be a table")
         known: tuple[str, ...] = {
             "published": TERMS,
             "energy": ("w_curvature", "w_fairness", "w_proximity", "balance"),
@@ -172,7 +176,8 @@ class Config:
         _number("seed", self.seed, 0, whole=True)
         for name in ("ema", "weight_decay", "validate_every", "checkpoint_every"):
             _number(name, getattr(self, name), 0.0)
-        if not self.ema < 1 or not 0 < self.sigma[0] <= self.sigma[1]:
+        _pair("sigma", self.sigma)
+        if not self.ema < 1 or not self.sigma[0] <= self.sigma[1]:
             raise OptionError("ema must be below 1, and sigma two positive numbers that rise")
         if not self.phases:
             raise OptionError("a configuration needs [[phase]] tables")
@@ -192,6 +197,8 @@ def _fits(config: Config, phase: Phase) -> None:
     """Refuse losses that a task has not."""
     if (phase.loss == "clean") != (config.task == "denoise" and phase.loss != "published"):
         raise OptionError(f"loss {phase.loss!r} does not go with task {config.task!r}")
+    if config.through and (phase.loss == "label" or config.task == "denoise"):
+        raise OptionError("through: there are no labels, nor clean surfaces, of a net's results")
     if phase.loss == "label" and config.augment == "shear":
         raise OptionError("labels do not follow a shear; take augment = 'symmetries'")
     wrong = {"iso", "iso_w"} if config.task != "flatten" else {"in", "gc"}
@@ -220,7 +227,7 @@ def read(path: str | PathLike[str], **changes: Any) -> Config:
     3
     """
     place = Path(path)
-    if not place.suffix and not place.exists():
+    if not place.suffix and not place.is_file():
         place = FOLDER / f"{place.name}.toml"
     try:
         data = place.read_bytes()
@@ -256,7 +263,7 @@ def _made(cls: Any, given: Mapping[str, Any]) -> Any:
         raise OptionError(
             f"unknown: {', '.join(sorted(unknown))}; there are {', '.join(sorted(names))}"
         )
-    values = {k: tuple(v) if k in ("eps", "sigma") else v for k, v in given.items()}
+    values = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
     try:
         return cls(**values)
     except TypeError as error:
@@ -280,5 +287,15 @@ def _choice(what: str, value: Any, known: tuple[str, ...]) -> None:
 
 def _number(what: str, value: Any, least: float, *, whole: bool = False) -> None:
     kind = int if whole else (int, float)
-    if isinstance(value, bool) or not isinstance(value, kind) or not value >= least:
+    sound = isinstance(value, kind) and not isinstance(value, bool) and math.isfinite(value)
+    if not sound or not value >= least:
         raise OptionError(f"{what} is {value!r}; it must be a number, {least} or more")
+
+
+def _pair(what: str, value: Any) -> None:
+    if not isinstance(value, tuple) or len(value) != 2:
+        raise OptionError(f"{what} is {value!r}; it must be two numbers")
+    for one in value:
+        _number(what, one, 0.0)
+        if not one > 0:
+            raise OptionError(f"{what} is {value!r}; it must be positive")

@@ -21,23 +21,26 @@ class Curves:
         Gets ``curves.jsonl``, and event files for TensorBoard where ``tensorboard`` is
         installed.
     step : int
-        Step at which the run is taken up: what was written from there on is dropped.
+        Step after which the run is taken up: what was written later is dropped.
     """
 
     def __init__(self, folder: Path, step: int = 0):
         self.path = folder / NAME
-        kept = [row for row in read(folder) if row["step"] < step]
+        kept = [row for row in read(folder) if row["step"] <= step]
+        self._known = {_what(row) for row in kept if row["step"] == step}
         with replacing(self.path) as file:
             file.write("".join(json.dumps(row) + "\n" for row in kept).encode())
         self._writer: Any = None
         if find_spec("tensorboard") is not None:
             from torch.utils.tensorboard import SummaryWriter
 
-            self._writer = SummaryWriter(str(folder), purge_step=step)
+            self._writer = SummaryWriter(str(folder), purge_step=step + 1)
 
     def add(self, step: int, seconds: float, **values: float) -> None:
-        """Write numbers of a step, so many seconds into the run."""
+        """Write numbers of a step, so many seconds into the run, if they are not there."""
         row = {"step": step, "seconds": round(seconds, 3), **values}
+        if _what(row) in self._known:
+            return
         with self.path.open("a") as file:
             file.write(json.dumps(row) + "\n")
         if self._writer is not None:
@@ -48,6 +51,10 @@ class Curves:
         """Finish the event files."""
         if self._writer is not None:
             self._writer.close()
+
+
+def _what(row: dict[str, float]) -> tuple[float, frozenset[str]]:
+    return row["step"], frozenset(row)
 
 
 def read(folder: Path) -> list[dict[str, float]]:

@@ -16,6 +16,7 @@ from gso.dataset import bezier
 from gso.io import replacing
 from gso.net import augment
 from gso.net.config import Config, Phase
+from gso.net.grids import ball, normalise
 from gso.status import DatasetError
 
 #: Seeds of the run's streams of random numbers.
@@ -112,18 +113,9 @@ def noisy(
     low, high = np.log(levels[0]), np.log(levels[1])
     sigma = torch.exp(low + (high - low) * torch.rand(len(clean), generator=generator)).to(clean)
     noise = torch.randn(clean.shape, generator=generator).to(clean)
-    return normalised_together(clean + sigma[:, None, None, None] * noise, clean, sigma)
-
-
-def normalised_together(
-    surface: Tensor, target: Tensor, sigma: Tensor
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Surfaces in the unit ball, and what belongs to them in the same frame."""
-    centre = surface.mean(dim=(1, 2), keepdim=True)
-    moved = surface - centre
-    scale = moved.square().sum(dim=-1).amax(dim=(1, 2)).sqrt()
-    wide = scale[:, None, None, None]
-    return moved / wide, (target - centre) / wide, sigma / scale
+    seen = clean + sigma[:, None, None, None] * noise
+    centre, radius = ball(seen)
+    return (seen - centre) / radius, (clean - centre) / radius, sigma / radius.ravel()
 
 
 def _seed(seed: int, *key: int) -> int:
@@ -160,10 +152,16 @@ def open_source(config: Config, folder: str | Path, cache: Path, tick: Any = Non
     """
     split = dataset.open(folder)["train"]
     rows = slice(config.limit or None)
-    surfaces = torch.from_numpy(split["surface"][rows]).float()
-    labels = None
+    given = torch.from_numpy(split["surface"][rows])
+    if given.shape[1] != given.shape[2]:
+        height, width = given.shape[1:3]
+        raise DatasetError(f"{folder} has grids {height} x {width}; nets learn from square ones")
+    surfaces, labels = normalise(given).float(), None
     if any(phase.loss == "label" for phase in config.phases):
-        labels = torch.from_numpy(split[config.label][rows]).float()
+        centre, radius = ball(given)
+        labels = torch.from_numpy(split[config.label][rows])
+        # A flat image has a place of its own.
+        labels = ((labels - centre if labels.shape[-1] == 3 else labels) / radius).float()
         # Surfaces that the solver refused have no label.
         sound = labels.isfinite().all(dim=(1, 2, 3))
         surfaces = torch.cat([surfaces[sound], surfaces[~sound]])
@@ -175,7 +173,8 @@ def open_source(config: Config, folder: str | Path, cache: Path, tick: Any = Non
 def fresh(count: int, seed: int, size: int, cache: Path, tick: Any = None) -> Tensor:
     """Surfaces (count, size, size, 3) by the recipe, other ones than any set has.
 
-    They are kept in a file, which is made anew when it holds anything else.
+    They are kept in a file, which is made anew when it has not so many of that size; the seed
+    is for its name to tell.
     """
     shape = (count, size, size, 3)
     if not count:

@@ -29,11 +29,17 @@ def points(components: Planes) -> Tensor:
     return torch.stack(components, dim=-1)
 
 
+def ball(grids: Tensor) -> tuple[Tensor, Tensor]:
+    """Centroids (B, 1, 1, 3) of grids (B, H, W, 3), and radii (B, 1, 1, 1) about them."""
+    centre = grids.mean(dim=(1, 2), keepdim=True)
+    far = (grids - centre).square().sum(dim=-1).amax(dim=(1, 2)).sqrt()
+    return centre, far.clamp_min(_SHORTEST)[:, None, None, None]
+
+
 def normalise(grids: Tensor) -> Tensor:
     """Grids (B, H, W, 3) moved and scaled to the unit ball, each by itself."""
-    centred = grids - grids.mean(dim=(1, 2), keepdim=True)
-    far = centred.square().sum(dim=-1).amax(dim=(1, 2)).sqrt()
-    return centred / far.clamp_min(_SHORTEST)[:, None, None, None]
+    centre, radius = ball(grids)
+    return (grids - centre) / radius
 
 
 def curvature(p: Planes) -> Tensor:

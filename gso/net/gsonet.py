@@ -50,6 +50,8 @@ class GSONet(Net):
     torch.Size([1, 16, 16, 2])
     """
 
+    multiple = 2**_LEVELS
+
     def __init__(
         self,
         task: str = "developable",

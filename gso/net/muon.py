@@ -82,9 +82,14 @@ def orthogonal(matrix: Tensor) -> Tensor:
     tall = matrix.shape[0] > matrix.shape[1]
     x = matrix.T if tall else matrix
     x = x / x.norm().clamp_min(1e-12)
+    # Of the iterates p(x x') x only the small factors before x are computed.
+    square, before = x @ x.T, torch.eye(len(x), dtype=x.dtype, device=x.device)
+    one = a * before
     for _ in range(_ITERATIONS):
-        square = x @ x.T
-        x = torch.addmm(x, torch.addmm(square, square, square, beta=b, alpha=c), x, beta=a)
+        step = torch.addmm(torch.add(one, square, alpha=b), square, square, alpha=c)
+        before = step @ before
+        square = step @ square @ step
+    x = before @ x
     return x.T if tall else x
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from numbers import Real
 from os import PathLike
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from gso.net import denoising
 from gso.net.base import SIZE, Net
 from gso.net.catalogue import chain
 from gso.net.weights import cached
@@ -38,12 +40,15 @@ def predict(
     Surfaces are moved and scaled to the unit ball and back. The nets are trained on 64 x 64
     vertices; other grids are resampled to that by cubic splines, and the displacements are
     carried back to the grid's own vertices: by evaluating their spline there (the default
-    nets), or by cubic interpolation.
+    nets), or by cubic interpolation. For "denoise" grids with more vertices are averaged to that
+    number, and what becomes of it interpolated, without details between its vertices; ones with
+    fewer are continued beyond their border.
 
     Parameters
     ----------
     surface : array_like, (H, W, 3) or (B, H, W, 3)
-        A grid or a batch of grids of one size, from 4 x 4 up, in any unit of length.
+        A grid or a batch of grids of one size, from 4 x 4 up (16 x 16 for "denoise"), in any
+        unit of length.
     task : {"developable", "flatten", "denoise"}
         What to do.
     model : str, path or Net, optional
@@ -96,14 +101,37 @@ def predict(
     if passes is not None and not (whole and passes >= 1):
         raise OptionError(f"passes is {passes!r}; take a whole number from 1 up, or None for all")
     nets += [nets[-1]] * (repeat - 1)
+    if sigma is not None and not (isinstance(sigma, Real) and np.isfinite(sigma) and sigma >= 0):
+        raise OptionError(f"sigma is {sigma!r}; it must be a number, zero or more")
+    work = _denoised if task == "denoise" else _predicted
     blocks = [
-        _predicted(batch[k : k + _BATCH], nets, passes, sigma, where)
+        work(batch[k : k + _BATCH], nets, passes, sigma, where)
         for k in range(0, len(batch), _BATCH)
     ]
     out = (
         np.concatenate(blocks) if blocks else np.empty((*batch.shape[:3], 2 + (task != "flatten")))
     )
     return out[0] if points.ndim == 3 else out
+
+
+def _denoised(
+    batch: Array, nets: list[Net], passes: int | None, sigma: float | None, device: str
+) -> Array:
+    """As :func:`_predicted`, of grids of any size as :mod:`gso.net.denoising` has them."""
+    height, width = batch.shape[1:3]
+    if (height, width) == (SIZE, SIZE):
+        return _predicted(batch, nets, passes, sigma, device)
+    if min(height, width) < denoising.SMALLEST:
+        least = denoising.SMALLEST
+        raise MeshError(
+            f"a grid {height} x {width} is too small for a denoising net, which needs {least} "
+            "vertices along each side; use gso.tno.optimize"
+        )
+    grids = np.stack([denoising.seen(grid) for grid in batch])
+    if sigma is not None:
+        sigma = sigma * denoising.share(height, width)
+    done = _predicted(grids, nets, passes, sigma, device)
+    return np.stack([denoising.back(grid, height, width) for grid in done])
 
 
 def _predicted(
@@ -195,8 +223,6 @@ def _sigma(
     """Noise of each surface in the unit ball, (B,)."""
     if not getattr(net, "sigma", False):
         return None
-    if sigma is not None and not (np.isfinite(sigma) and sigma >= 0):
-        raise OptionError(f"sigma is {sigma!r}; it must be zero or more")
     if sigma is not None:
         noise = sigma / scale.ravel()
     else:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import signal
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -42,10 +44,38 @@ class Processes:
         distributed.broadcast(shared, 0)
         return float(shared)
 
+    def summed(self, value: torch.Tensor) -> torch.Tensor:
+        """The sum of what all processes have, in all of them."""
+        if self.world == 1:
+            return value
+        shared = value.to(self.device)
+        distributed.all_reduce(shared)
+        return shared.to(value.device)
+
     def wait(self) -> None:
         """Until all are here."""
         if self.world > 1:
             distributed.barrier()
+
+
+@contextmanager
+def interruption() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C was pressed since; a second one interrupts at once."""
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False
+        return
+    asked = False
+
+    def ask(number: int, frame: object) -> None:
+        nonlocal asked
+        asked = True
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, ask)
+    try:
+        yield lambda: asked
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

@@ -30,6 +30,8 @@ from gso.status import OptionError
 CHECKPOINT, MODEL = "checkpoint.safetensors", "model.safetensors"
 #: Seed of the noise that validation adds.
 _NOISE = 7
+#: Surfaces that a process passes through another net before the next one's turn.
+_BLOCK = 64
 #: Told what is counted, how many there are, and how many there will be.
 Tick = Callable[[str, int, int], None]
 
@@ -77,10 +79,14 @@ class Run:
                 "step": self.step,
                 "spent": self.spent,
                 "figures": self.figures,
-                "config": _kept(self.config),
+                **self.same(),
             }
             path = self.folder / CHECKPOINT
             checkpoint.save(path, self.net, self.average, self.optimisers, state)
+
+    def same(self) -> dict[str, Any]:
+        """What must be the same when the run is taken up."""
+        return {"config": _kept(self.config), "data": self.origin["data"], "limit": self.limit}
 
     def validate(self) -> None:
         """Measure the averaged net, and write it with its card."""
@@ -98,7 +104,7 @@ class Run:
             "name": self.config.name,
             "config": self.config.as_dict(),
             "steps": self.step,
-            "hours": round(self.spent / 3600, 3),
+            "hours": round(self._hours_before + self.spent / 3600, 3),
             "validation": self.figures,
             **self.origin,
         }
@@ -106,15 +112,23 @@ class Run:
             card["begun_with"] = {k: self.begun_with.get(k) for k in ("name", "hours", "sha256")}
         return card | {"curve": self._curve()}
 
+    @property
+    def _goes_on(self) -> bool:
+        """Whether it begins with the weights of an earlier run of the same net."""
+        return self.begun_with.get("name") == self.config.name
+
+    @property
+    def _hours_before(self) -> float:
+        return float(self.begun_with.get("hours", 0.0)) if self._goes_on else 0.0
+
     def _curve(self) -> list[list[float]]:
         """Hours and the figure that nets are judged by, of earlier runs of this net, too."""
         name = SCORE[self.config.task]
-        same = self.begun_with.get("name") == self.config.name
-        curve = list(self.begun_with.get("curve", [])) if same else []
-        before = curve[-1][0] if curve else 0.0
+        curve = list(self.begun_with.get("curve", [])) if self._goes_on else []
         for row in read(self.folder):
             if name in row:
-                curve.append([round(before + row["seconds"] / 3600, 3), round(row[name], 5)])
+                hours = self._hours_before + row["seconds"] / 3600
+                curve.append([round(hours, 3), round(row[name], 5)])
         return curve
 
     def close(self) -> None:
@@ -152,12 +166,14 @@ def begin(
     net.bf16 = _fast(here.device) if config.bf16 is None else config.bf16
     average = copy.deepcopy(net).requires_grad_(False)
     average.bf16 = False
+    cache = folder / f"fresh-{config.seed}.npy"
     if here.first:
         # The other processes read what the first one draws.
-        source = open_source(config, data, folder / "fresh.npy", tick)
+        source = open_source(config, data, cache, tick)
     here.wait()
     if not here.first:
-        source = open_source(config, data, folder / "fresh.npy")
+        source = open_source(config, data, cache)
+    _sizes_fit(config, net, source)
     run = Run(
         config,
         folder,
@@ -172,14 +188,15 @@ def begin(
         read_card(located(config.init)) if config.init else {},
     )
     if config.through:
-        _pass_through(run)
+        _pass_through(run, tick if here.first else None)
     path = folder / CHECKPOINT
     if path.exists():
+        there, words = checkpoint.numbers(path), {"config": "configuration", "data": "set"}
+        for key, value in run.same().items():
+            if there.get(key) != value:
+                other = words.get(key, "number of minutes")
+                raise OptionError(f"{folder} holds a run with another {other}; take another folder")
         state = checkpoint.load(path, net, average, run.optimisers)
-        if state.get("config") != _kept(config):
-            raise OptionError(
-                f"{folder} holds a run with another configuration; take another folder"
-            )
         run.step, run.spent, run.figures = state["step"], state["spent"], state["figures"]
     if here.first:
         run.curves = Curves(folder, run.step)
@@ -196,12 +213,32 @@ def _take(net: Net, other: Net, name: str) -> None:
         raise OptionError(f"init: {name} does not fit: {error}") from None
 
 
-def _pass_through(run: Run) -> None:
+def _sizes_fit(config: Config, net: Net, source: Source) -> None:
+    """Refuse strides that leave grids which the net cannot take."""
+    size = source.surfaces.shape[1]
+    for phase in config.phases:
+        left = -(-size // phase.stride)
+        if left % net.multiple:
+            raise OptionError(
+                f"stride {phase.stride} leaves {left} of {size} vertices along a side, and this "
+                f"net needs a multiple of {net.multiple}"
+            )
+
+
+def _pass_through(run: Run, tick: Tick | None) -> None:
     """What another net makes of the surfaces takes their place, normalised anew."""
-    net = weights.load(run.config.through, device=run.here.device)
+    net, here = weights.load(run.config.through, device=run.here.device), run.here
 
     def done(surfaces: Tensor) -> Tensor:
-        return normalise(torch.from_numpy(applied(net, surfaces))).float()
+        out = torch.zeros_like(surfaces)
+        mine = range(here.rank * _BLOCK, len(surfaces), here.world * _BLOCK)
+        for start in mine:
+            block = slice(start, start + _BLOCK)
+            out[block] = normalise(torch.from_numpy(applied(net, surfaces[block]))).float()
+            if tick is not None:
+                count = min(start + here.world * _BLOCK, len(surfaces))
+                tick(f"surfaces through {run.config.through}", count, len(surfaces))
+        return here.summed(out)
 
     run.source = Source(done(run.source.surfaces))
     surfaces = done(run.check[0])
@@ -211,7 +248,7 @@ def _pass_through(run: Run) -> None:
 def _validation(config: Config, data: Path) -> tuple[Tensor, Tensor, Tensor | None]:
     """Surfaces that a net sees, what they are compared with, and their noise."""
     split = dataset.open(data)["validation"]
-    clean = torch.from_numpy(split["surface"][: config.validate]).float()
+    clean = normalise(torch.from_numpy(split["surface"][: config.validate])).float()
     if config.task != "denoise":
         return clean, clean, None
     return noisy(clean, config.sigma, torch.Generator().manual_seed(_NOISE))

@@ -14,7 +14,7 @@ from torch.nn.parallel import DistributedDataParallel
 
 from gso.net.config import Config
 from gso.net.objective import Objective
-from gso.net.processes import processes
+from gso.net.processes import interruption, processes
 from gso.net.run import MODEL, Run, Tick, begin
 from gso.net.schedule import place
 from gso.status import OptionError
@@ -104,16 +104,14 @@ def train(
                 raise OptionError(f"batch {phase.batch} is no multiple of {here.world} processes")
         run = begin(config, Path(data), Path(out), minutes, here, tick)
         try:
-            _loop(run, show)
-        except KeyboardInterrupt:
-            run.keep()
-            raise
+            with interruption() as asked:
+                _loop(run, show, asked)
         finally:
             run.close()
     return run.card
 
 
-def _loop(run: Run, show: Callable[[Report], None] | None) -> None:
+def _loop(run: Run, show: Callable[[Report], None] | None, interrupted: Callable[[], bool]) -> None:
     config, here = run.config, run.here
     objective: Any = Objective(run.net)
     if here.world > 1:
@@ -155,5 +153,8 @@ def _loop(run: Run, show: Callable[[Report], None] | None) -> None:
         if run.spent - kept > config.checkpoint_every:
             run.keep()
             kept = run.spent
+        if here.agreed(interrupted()):
+            run.keep()
+            raise KeyboardInterrupt
     run.validate()
     run.keep()

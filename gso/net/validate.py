@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -47,15 +46,9 @@ def figures(task: str, before: Array, result: Array) -> dict[str, float]:
     return found | {"score": left / 0.1232 + found["d_H"] / 0.517 + found["loss_gc"] / 0.0291}
 
 
-def mean_figures(
-    task: str, befores: Array, results: Array, tick: Callable[[int], Any] | None = None
-) -> dict[str, float]:
+def mean_figures(task: str, befores: Array, results: Array) -> dict[str, float]:
     """Means of :func:`figures` over surfaces; for "flatten" also the share without flips."""
-    rows = []
-    for k, (before, result) in enumerate(zip(befores, results, strict=True)):
-        rows.append(figures(task, before, result))
-        if tick is not None:
-            tick(k)
+    rows = [figures(task, a, b) for a, b in zip(befores, results, strict=True)]
     out = {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
     if task == "flatten":
         out["unflipped"] = float(np.mean([row["flipped_cells"] == 0 for row in rows]))

@@ -43,7 +43,7 @@ def make(settings: dict[str, Any]) -> Net:
         raise OptionError(f"no kind {kind!r} of net; there are {', '.join(KINDS)}")
     try:
         return KINDS[kind](**rest)
-    except (TypeError, AttributeError) as error:
+    except (TypeError, ValueError, AttributeError) as error:
         raise OptionError(f"settings of the net: {error}") from None
 
 

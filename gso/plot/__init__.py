@@ -45,7 +45,7 @@ def require() -> None:
         Saying how to install it.
     """
     if find_spec("matplotlib") is None:
-        raise GSOError('plots need Matplotlib: pip install "gso[plot]"')
+        raise GSOError('plots need Matplotlib: pip install ".[plot]" in the folder of gso')
 
 
 def plot_surface(

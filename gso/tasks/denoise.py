@@ -11,17 +11,22 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.smoothing import smooth_grid, smooth_mesh
-from gso.status import OptionError, Status
+from gso.status import Status
 from gso.tasks import held
 from gso.tasks.base import Plan, Request
 from gso.tasks.options import Options as BaseOptions
 from gso.variables import Layout
 
 FORMULATIONS = ("smooth", "crease")
+#: Details that are lengths.
+LENGTHS = ("sigma",)
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -33,8 +38,9 @@ class Options(BaseOptions):
     order : int or None
         Order of the differences that are penalised; chosen from the data when None.
     weight : float or None
-        Amount of smoothing, dimensionless; chosen from the data when None. The value
-        used stands in the result's `details` and can be given back, or a multiple of it.
+        Amount of smoothing, dimensionless; chosen from the data when None. The value in the
+        result's `details` can be given back, or a multiple of it; on grids, where none was
+        given, it is that of the plain smoother of that order which smooths as much.
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {"fast": {}, "balanced": {}, "accurate": {}}
@@ -44,10 +50,27 @@ class Options(BaseOptions):
 
 
 def plan(request: Request) -> Plan:
-    """The smoothed surface; what is left to solve is its constraints."""
+    """The smoothed surface, or the start that takes its place; what is left are constraints."""
     mesh, options = request.mesh, request.options
-    if request.start is not None:
-        raise OptionError("task 'denoise' has no start to choose; leave x0 out")
+    if request.start is None:
+        points, details = _smoothed(request)
+    else:
+        points, details = request.start, {}
+    points = np.where(mesh.used[:, None], points, mesh.vertices)
+    bound = not request.constraints.empty
+    stages = [held.approach(request, points, iterations=options.iterations)] if bound else []
+    return Plan(
+        Layout.of(len(points), "surface"),
+        points.ravel(),
+        stages,
+        status=None if bound else Status.CONVERGED,
+        details=details,
+    )
+
+
+def _smoothed(request: Request) -> tuple[Array, dict[str, Any]]:
+    """Smoothed vertices (n, 3), and what was chosen and found."""
+    mesh, options = request.mesh, request.options
     settings = {
         "order": options.order,
         "weight": options.weight,
@@ -57,22 +80,8 @@ def plan(request: Request) -> Plan:
         smoothed = smooth_grid(mesh.grid, **settings)
     else:
         smoothed = smooth_mesh(mesh.vertices, mesh.faces, **settings)
-    points = smoothed.points.reshape(-1, 3)
-    points = np.where(mesh.used[:, None], points, mesh.vertices)
-    bound = not request.constraints.empty
-    stages = [held.approach(request, points, iterations=options.iterations)] if bound else []
-    return Plan(
-        Layout.of(len(points), "surface"),
-        points.ravel(),
-        stages,
-        status=None if bound else Status.CONVERGED,
-        details={
-            "order": smoothed.order,
-            "weight": smoothed.weight,
-            "sigma": smoothed.sigma,
-            "dof": smoothed.dof,
-        },
-    )
+    names = ("order", "weight", "sigma", "dof")
+    return smoothed.points.reshape(-1, 3), {name: getattr(smoothed, name) for name in names}
 
 
 def metrics(before: Mesh, after: Mesh, flat: None, scale: float) -> dict[str, float]:
@@ -80,10 +89,10 @@ def metrics(before: Mesh, after: Mesh, flat: None, scale: float) -> dict[str, fl
     rough = measure.fairness(before, scale=scale)
     moved = np.linalg.norm((after.vertices - before.vertices)[before.used], axis=1)
     return {
-        "theta": measure.normal_angle(before, after),
+        "roughness_ratio": measure.fairness(after, scale=scale) / rough if rough > 0 else 1.0,
+        "normal_change": measure.normal_angle(before, after),
         "displacement_rms": 100.0 * float(np.sqrt((moved**2).mean())) / before.diagonal,
         "displacement_max": 100.0 * float(moved.max()) / before.diagonal,
-        "roughness_ratio": measure.fairness(after, scale=scale) / rough if rough > 0 else 1.0,
         "loss_gc_before": measure.loss_gc(before, scale=scale),
         "loss_gc": measure.loss_gc(after, scale=scale),
     }

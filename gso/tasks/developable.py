@@ -65,7 +65,8 @@ class Options(BaseOptions):
     variables : {"normal", "free", "spline", "surface"}
         Unknowns of the last stage: offsets along normals, free vertices, or (on grids) a
         coarse bicubic field of offsets, which cannot crumple. With `max_deviation` they
-        are offsets along normals. With "surface" (on grids) they are the control points of
+        are offsets along normals, with constraints free vertices without coarser grids
+        (but for "surface"). With "surface" (on grids) they are the control points of
         a bicubic B-spline surface, which the result then is: its `spline`.
     controls : int
         "spline", "surface": control points along each side; fewer on small grids.

@@ -58,16 +58,17 @@ def optimize(
         `SlidingBoundary`, `Glue`, `SymmetryPlane`, `PlanarFaces`, `FixedLengths`. For
         `flatten` and `conformal` they are about the flat image.
     max_deviation : float, optional
-        `developable` only: no vertex of the result is farther than this from the design,
-        in the mesh's unit; as developable as that allows.
+        `developable` by "curvature" only: no vertex of the result is farther than this from
+        the design, in the mesh's unit; as developable as that allows.
     target_curvature : float, optional
-        `developable` only: the mean absolute curvature ``loss_gc`` to reach, with the
-        smallest displacement that does.
+        `developable` by "curvature" only: the mean absolute curvature ``loss_gc`` to reach, in
+        1/size^2 as the metrics have it (size: the largest distance from the centroid), with
+        the smallest displacement that does.
     x0 : Mesh, array or Start, optional
         Where to start: vertices (n, 3) or a grid; (n, 2) or (H, W, 2) for a flat image.
         Proximity and lengths stay those of `mesh`. On grids what is wrong with a surface
-        at large is put right on a coarser grid first. A :class:`gso.tno.Start` says more
-        about it.
+        at large is put right on a coarser grid first. For `denoise` it takes the place of the
+        smoothed surface. A :class:`gso.tno.Start` says more about it.
     callback : callable, optional
         Called with a :class:`gso.Progress` after each iteration; returning False stops
         the solve, and the best iterate so far is returned.
@@ -218,7 +219,9 @@ def packed(
     else:
         mesh = design.replaced(np.c_[flat, np.zeros(len(design.vertices))])
     seconds = run.timings.as_dict()
-    spline, details = None, outcome.details
+    spline, details = None, dict(outcome.details)
+    lengths = getattr(tasks.get(task), "LENGTHS", ())
+    details |= {name: details[name] * frame.frame.scale for name in lengths if name in details}
     if outcome.spline is not None:
         before = outcome.fitted.get("surface")
         fitted = None if before is None else frame.frame.to_user(frame.back("surface", before))
