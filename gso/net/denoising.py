@@ -1,0 +1,64 @@
+"""Noisy grids of any size at the size of the nets, and back.
+
+Noise has no spline between its samples: a grid with many vertices is averaged, and one with few is
+continued beyond its border, so that what a net sees is noise from vertex to vertex again.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_lsq_spline
+
+from gso.net.base import SIZE
+from gso.resample import resample
+
+Array = NDArray[np.float64]
+
+#: Smallest side that is worth continuing so far.
+SMALLEST = 16
+#: Vertices along a side from which on it is averaged; with fewer to each coefficient the
+#: least-squares spline would follow the noise.
+_MANY = 2 * SIZE
+_DEGREE = 3
+
+
+def seen(grid: Array) -> Array:
+    """A grid (H, W, 3) as (SIZE, SIZE, 3).
+
+    Sides are first continued to SIZE or twice as many vertices, by reflection at the vertices of
+    the border; longer ones than SIZE become their least-squares cubic spline with SIZE
+    coefficients.
+    """
+    pads = [_margins(n) for n in grid.shape[:2]]
+    grid = np.pad(grid, [*pads, (0, 0)], mode="reflect", reflect_type="odd")
+    for axis in (0, 1):
+        if grid.shape[axis] > SIZE:
+            grid = np.moveaxis(_averaged(np.moveaxis(grid, axis, 0)), 0, axis)
+    return grid
+
+
+def back(done: Array, height: int, width: int) -> Array:
+    """What became of :func:`seen`, on the grid's own (height, width, 3) vertices."""
+    (top, below), (left, right) = _margins(height), _margins(width)
+    whole = resample(done, top + height + below, left + width + right)
+    return whole[top : top + height, left : left + width]
+
+
+def share(height: int, width: int) -> float:
+    """Share of the noise's standard deviation that :func:`seen` leaves."""
+    return float(np.sqrt(np.prod([SIZE / (n + sum(_margins(n))) for n in (height, width)])))
+
+
+def _margins(count: int) -> tuple[int, int]:
+    """Vertices that are added before and behind a side."""
+    more = max((SIZE if count <= SIZE else _MANY) - count, 0)
+    return more // 2, more - more // 2
+
+
+def _averaged(values: Array) -> Array:
+    """Values (n, ...) at SIZE places along the first axis."""
+    inner = np.linspace(0.0, 1.0, SIZE - _DEGREE + 1)[1:-1]
+    knots = np.concatenate([np.zeros(_DEGREE + 1), inner, np.ones(_DEGREE + 1)])
+    spline = make_lsq_spline(np.linspace(0.0, 1.0, len(values)), values, knots, k=_DEGREE)
+    return np.asarray(spline(np.linspace(0.0, 1.0, SIZE)))
