@@ -22,6 +22,8 @@ from pathlib import Path
 # Before NumPy: every process of the run has one thread.
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 os.environ["MKL_NUM_THREADS"] = "1"
+# And nets run where the optimiser does.
+os.environ["CUDA_VISIBLE_DEVICES"] = ""
 
 BENCH = Path(__file__).resolve().parent
 sys.path.insert(0, str(BENCH))

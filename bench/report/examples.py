@@ -71,9 +71,14 @@ def _example(surfaces: Surfaces, k: int, task: str, sigma: float, kept: Store) -
         place = f"examples/{task}-{name}-{level_name(sigma)}".replace(" ", "-")
         key = method.key(sigma) | {"surfaces": surfaces.key, "number": k}
         arrays = kept.arrays(place, key, partial(_points, method, example.case))
-        example.results[name] = arrays["points"]
+        if arrays["points"].size:
+            example.results[name] = arrays["points"]
     return example
 
 
 def _points(method: Method, case: Case) -> dict[str, Array]:
-    return {"points": method(case).points}
+    """What is drawn; nothing of a method that fails, which its row in the tables says."""
+    try:
+        return {"points": method(case).points}
+    except Exception:  # a peer may raise anything, and the others are drawn
+        return {"points": np.empty(0)}

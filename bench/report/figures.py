@@ -87,8 +87,9 @@ def figure_6(folder: Path, records: Records) -> Figure:
     for name in (n for n in CURVES if not of("developable", n).absent()):
         for ax, metric in zip(axes, ("K_A_r", "d_H"), strict=True):
             found = intervals(records, metric, name)
+            label = f"{name}, {sum(f['count'] for f in found):,} surfaces"
             middle = [(f["from"] + f["to"]) / 2 for f in found]
-            ax.plot(middle, [f["mean"] for f in found], "o-", markersize=3, label=name)
+            ax.plot(middle, [f["mean"] for f in found], "o-", markersize=3, label=label)
     axes[0].set(xlabel="mean |K| of the input", ylabel="K_A-r, higher is better")
     axes[1].set(xlabel="mean |K| of the input", ylabel="d_H %, lower is better")
     axes[0].legend(fontsize=8)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ TASKS = ("developable", "flatten", "denoise")
 #: Parameters of the peers by task, method and level of noise; made by ``--tune``.
 TUNED = Path(__file__).with_name("tuned.json")
 
+#: What makes the inputs and measures the results.
+_MEASURED = tuple(Path(__file__).with_name(name) for name in ("quality.py", "surfaces.py"))
 _CORE = ("numpy", "scipy", "casadi", "libigl", "cvxopt", "pypardiso")
 
 
@@ -28,12 +31,13 @@ _CORE = ("numpy", "scipy", "casadi", "libigl", "cvxopt", "pypardiso")
 class Solved:
     """A result: a surface (H, W, 3) or a flat image (H, W, 2).
 
-    `more` are figures that the method itself knows: what is left of an objective.
+    `more` gives figures that the method itself knows, such as what is left of an objective; it is
+    called when the clock has stopped.
     """
 
     points: Array
     iterations: int | None = None
-    more: dict[str, float] = field(default_factory=dict)
+    more: Callable[[], dict[str, float]] = dict
 
 
 @dataclass(frozen=True)
@@ -90,19 +94,27 @@ class Method:
         """The parameters that were found best, and the net."""
         found = {"model": self.net} if self.net else {}
         if self.candidates:
-            found |= tuned()[self.task][self.name][level_name(sigma)]
+            found |= self._tuned()[level_name(sigma)] or {}
         return found
+
+    def _tuned(self) -> dict[str, Any]:
+        return tuned().get(self.task, {}).get(self.name, {})
 
     def absent(self) -> str:
         """Why it cannot run, or nothing."""
-        if self.refused:
-            return self.refused
-        missing = [name for name, found in store.installed(self.needs).items() if not found]
-        if missing:
-            return f"not installed: pip install {' '.join(missing)}"
+        if self.refused or self.missing():
+            return self.refused or f"not installed: pip install {' '.join(self.missing())}"
         if self.net and self.net not in shipped():
             return "no weights shipped"
+        if self.candidates and not self._tuned():
+            return "not tuned: python bench/run_all.py --tune"
+        if self.candidates and not all(self._tuned().values()):
+            return f"with none of {len(self.candidates)} settings better than its input"
         return ""
+
+    def missing(self) -> list[str]:
+        """Packages that it needs and that are not installed."""
+        return [name for name, found in store.installed(self.needs).items() if not found]
 
     def key(self, sigma: float) -> dict[str, Any]:
         """What its results depend on."""
@@ -112,10 +124,11 @@ class Method:
             "parameters": self.parameters(sigma),
             "packages": store.installed((*_CORE, *self.needs)),
             "measures": store.measures() if self.peer and not self.solver else store.solver(),
-            "files": store.source(*self.files),
+            "files": store.source(*self.files, *_MEASURED),
         }
         if self.net:
-            key |= {"net": _weights(self.net), "code": store.nets()}
+            needs = store.installed(("torch", "safetensors"))
+            key |= {"net": _weights(self.net), "code": store.nets(), "needs": needs}
         return key
 
 
@@ -128,8 +141,9 @@ def level_name(sigma: float) -> str:
     return f"{sigma:.3f}" if sigma else ""
 
 
+@lru_cache(maxsize=1)
 def tuned() -> dict[str, Any]:
-    """The parameters that were found best."""
+    """The parameters that were found best; none where the input was better."""
     return json.loads(TUNED.read_text())["values"] if TUNED.exists() else {}
 
 

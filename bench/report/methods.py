@@ -5,19 +5,21 @@ from __future__ import annotations
 import importlib
 from dataclasses import replace
 from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 import gso
 from gso import hybrid
 from gso.flat_start import rectangle
+from gso.hybrid.prediction import STARTED
+from gso.net.catalogue import DEFAULTS
 from report.method import TASKS, Method, Solved
 from report.surfaces import Case
 
+_HERE = (Path(__file__),)
 _PEERS = ("peers_flatten", "peers_developable", "peers_denoise")
 #: The method of each task that the others are compared with.
 DEFAULT = {"developable": "TNO balanced", "flatten": "TNO strain", "denoise": "TNO"}
-#: The net that a hybrid solve starts from, by task.
-_STARTS = {"developable": "developable", "flatten": "flatten-strain"}
 
 
 def _solved(result: gso.Result) -> Solved:
@@ -32,12 +34,12 @@ def _tno(task: str, case: Case, **options: Any) -> Solved:
 
 
 def _net(task: str, case: Case, model: str) -> Solved:
-    return Solved(gso.net.predict(case.given, task=task, model=model))
+    return Solved(gso.net.predict(case.given, task=task, model=model, device="cpu"))
 
 
 def _hybrid(task: str, case: Case, model: str) -> Solved:
     result = hybrid.solve(case.given, task=task, net=model)
-    return replace(_solved(result), more={"warm": float(result.warm_start == "net")})
+    return replace(_solved(result), more=lambda: {"warm": float(result.warm_start == "net")})
 
 
 def _init(case: Case) -> Solved:
@@ -46,10 +48,11 @@ def _init(case: Case) -> Solved:
 
 def _own() -> list[Method]:
     def tno(name: str, task: str, pace: str = "fast", note: str = "", **options: Any) -> Method:
-        return Method(name, task, partial(_tno, task, **options), pace=pace, note=note)
+        run = partial(_tno, task, **options)
+        return Method(name, task, run, pace=pace, note=note, files=_HERE)
 
     def net(name: str, task: str, model: str, note: str = "") -> Method:
-        return Method(name, task, partial(_net, task), net=model, note=note)
+        return Method(name, task, partial(_net, task), net=model, note=note, files=_HERE)
 
     found = [
         tno("TNO jiang2020", "developable", "slow", "joint isometry", options="jiang2020"),
@@ -60,7 +63,7 @@ def _own() -> list[Method]:
         net("Net-C", "developable", "net-c"),
         net("Net-CF", "developable", "net-cf"),
         net("Net", "developable", "developable", "the default net"),
-        Method("Init", "flatten", _init, note="the rectangle that nets start from"),
+        Method("Init", "flatten", _init, note="the rectangle nets start from", files=_HERE),
         tno("TNO jiang2020", "flatten", note="isometry of the faces", options="jiang2020"),
         tno("TNO lengths", "flatten", note="the published figure", formulation="lengths"),
         tno("TNO strain", "flatten", note="the default"),
@@ -71,10 +74,17 @@ def _own() -> list[Method]:
         net("Net", "denoise", "denoise", "the default net; estimates the noise"),
     ]
     for task in TASKS:
-        run, model = partial(_hybrid, task), _STARTS.get(task, "")
-        refused = "" if model else "the optimiser has a closed form, and no start to improve"
-        note = "the default net, then the optimiser"
-        found.append(Method("hybrid", task, run, net=model, note=note, refused=refused))
+        found.append(
+            Method(
+                "hybrid",
+                task,
+                partial(_hybrid, task),
+                net=DEFAULTS[task],
+                note="the default net, then the optimiser",
+                refused="" if task in STARTED else "a closed form has no start to improve",
+                files=_HERE,
+            )
+        )
     return found
 
 

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from gso.mesh import Mesh
 from report.method import Array, Method, Solved
 from report.surfaces import Case
 
@@ -42,8 +41,7 @@ def _savgol(case: Case, window: int, order: int) -> Solved:
 
 
 def _triangles(case: Case) -> tuple[Array, np.ndarray]:
-    mesh = Mesh.from_grid(case.given, weld=False)
-    return np.array(mesh.vertices), np.array(mesh.triangles)
+    return np.array(case.mesh.vertices), np.array(case.mesh.triangles)
 
 
 def _trimesh(case: Case, filter: str, **parameters: float) -> Solved:

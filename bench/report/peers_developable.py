@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tno
 from tno import last_problem
 
 import gso
@@ -29,9 +30,14 @@ TOLERANCE, ITERATIONS = 1e-5, 50
 SAME_ENERGY = ("balanced, all of it", "Levenberg-Marquardt of gso", "least_squares", "IPOPT")
 
 
-def _whole(points: Array, problem: Problem, x: Array) -> tuple[Array, int, float]:
-    result = gso.tno.optimize(points)
-    return np.asarray(result.grid), result.iterations, sum(result.energy.values())
+def _whole(case: Case) -> Solved:
+    result = gso.tno.optimize(case.given)
+
+    def left() -> dict[str, float]:
+        problem, x = last_problem(case.given, "developable", "balanced")
+        return {"objective_ratio": sum(result.energy.values()) / problem.energy(x)}
+
+    return Solved(np.asarray(result.grid), result.iterations, left)
 
 
 def _own(points: Array, problem: Problem, x: Array) -> tuple[Array, int, float]:
@@ -89,14 +95,18 @@ def _placed(points: Array, problem: Problem, x: Array) -> Array:
     return frame.frame.to_user(at).reshape(points.shape)
 
 
-def _same(
-    name: str, solve: Callable[[Array, Problem, Array], tuple[Array, int, float]], note: str
-) -> Method:
+def _from_the_design(
+    solve: Callable[[Array, Problem, Array], tuple[Array, int, float]],
+) -> Callable[[Case], Solved]:
     def run(case: Case) -> Solved:
         problem, x = last_problem(case.given, "developable", "balanced")
         points, iterations, left = solve(case.given, problem, x)
-        return Solved(points, iterations, {"objective_ratio": left / problem.energy(x)})
+        return Solved(points, iterations, lambda: {"objective_ratio": left / problem.energy(x)})
 
+    return run
+
+
+def _same(name: str, run: Callable[[Case], Solved], note: str) -> Method:
     return Method(
         name,
         "developable",
@@ -104,7 +114,7 @@ def _same(
         peer=name in SAME_ENERGY[2:],
         pace="peer",
         note=note,
-        files=(Path(__file__), Path(energy.__file__)),
+        files=(Path(__file__), Path(energy.__file__), Path(tno.__file__)),
         solver=True,
     )
 
@@ -112,9 +122,8 @@ def _same(
 def _meshlab(case: Case, **parameters: float) -> Solved:
     import pymeshlab
 
-    mesh = Mesh.from_grid(case.given, weld=False)
     work = pymeshlab.MeshSet()
-    work.add_mesh(pymeshlab.Mesh(mesh.vertices, mesh.triangles.astype(np.int32)))
+    work.add_mesh(pymeshlab.Mesh(case.mesh.vertices, case.mesh.triangles.astype(np.int32)))
     work.apply_filter(
         "apply_coord_developability_of_mesh", edgeflips=False, edgecollapses=False, **parameters
     )
@@ -123,11 +132,15 @@ def _meshlab(case: Case, **parameters: float) -> Solved:
 
 METHODS = [
     _same(SAME_ENERGY[0], _whole, "coarse grids first"),
-    _same(SAME_ENERGY[1], _own, "on the one grid, from the design"),
-    _same(SAME_ENERGY[2], _least_squares, "SciPy: trust region, LSMR, the same Jacobian"),
+    _same(SAME_ENERGY[1], _from_the_design(_own), "on the one grid, from the design"),
+    _same(
+        SAME_ENERGY[2],
+        _from_the_design(_least_squares),
+        "SciPy: trust region, LSMR, the same Jacobian",
+    ),
     _same(
         SAME_ENERGY[3],
-        _ipopt,
+        _from_the_design(_ipopt),
         "CasADi's expressions of the same terms, Gauss-Newton matrix; time with building them",
     ),
     Method(

@@ -182,9 +182,9 @@ def rows(section: Section, records: Records) -> list[Row]:
         found.append(Row(name, "paper", figures=own, seconds=seconds))
     counts = []
     for method in section.methods:
-        row = _row(section, method, section.of(records, method))
-        found.append(row)
-        counts.append(row.count)
+        given = section.of(records, method)
+        found.append(_row(section, method, given))
+        counts.append(len(given))
     default = next(m for m in section.methods if m.name == section.default)
     whole = section.of(records, default)
     for count in sorted({n for n in counts if 0 < n < len(whole)}, reverse=True):
@@ -202,7 +202,7 @@ def _row(section: Section, method: Method, given: list[Record]) -> Row:
         row.absent = f"failed: {given[0]['error']}"
     if not good:
         return row
-    row.count = len(given)
+    row.count = len(good)
     names = good[0]["figures"]
     row.figures = {k: float(np.mean([r["figures"][k] for r in good])) for k in names}
     row.seconds = spread([r["seconds"] for r in good if r["seconds"] is not None])

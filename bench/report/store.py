@@ -11,6 +11,7 @@ import io
 import json
 import os
 import platform
+import zipfile
 from collections.abc import Callable, Iterable
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
@@ -75,7 +76,7 @@ class Store:
         try:
             with np.load(path, allow_pickle=False) as data:
                 return dict(data)
-        except (OSError, ValueError, EOFError):
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile):
             found = make()
         path.parent.mkdir(parents=True, exist_ok=True)
         memory = io.BytesIO()

@@ -6,9 +6,10 @@ screened once, in a minute or two, and kept in a folder.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import dataset
-from gso.dataset import noise
+from gso.dataset import noise as noises
 from gso.dataset.builder import tasks
 from gso.dataset.recipe import Recipe
 from gso.dataset.screen import select
 from gso.dataset.shard import surfaces as sampled
 from gso.io import replacing
+from gso.mesh import Mesh
 from gso.resample import resample
 from gso.status import DatasetError
 from gso.tno.linear import blas_threads
@@ -53,6 +55,19 @@ class Case:
     surface: Array
     given: Array
     sigma: float = 0.0
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """What the method sees of it, with its triangles: peers need them, and are not the
+        ones to make them."""
+        mesh = Mesh.from_grid(self.given, weld=False)
+        mesh.triangles  # noqa: B018 - kept by the mesh
+        return mesh
+
+    @property
+    def small(self) -> Case:
+        """Every fourth vertex of it."""
+        return Case(self.surface[::4, ::4], self.given[::4, ::4], self.sigma)
 
 
 @dataclass(frozen=True)
@@ -98,12 +113,14 @@ def _mapped(path: Path) -> np.ndarray:
 def written(folder: Path, name: str, points: Any, unit_noise: Any) -> Surfaces:
     """Write grids (n, H, W, 3) and their noise."""
     content = np.ascontiguousarray(points, np.float64)
-    home = folder / digest([name, content.shape, float(content.sum()), float(content.std())])
+    noise = np.ascontiguousarray(unit_noise, np.float32)
+    sums = [hashlib.sha256(array.tobytes()).hexdigest() for array in (content, noise)]
+    home = folder / digest([name, content.shape, *sums])
     home.mkdir(parents=True, exist_ok=True)
-    for file, array in (("surface.npy", content), ("noise.npy", np.asarray(unit_noise))):
+    for file, array in (("surface.npy", content), ("noise.npy", noise)):
         if not (home / file).exists():
             with replacing(home / file) as stream:
-                np.save(stream, array.astype(np.float64 if file[0] == "s" else np.float32))
+                np.save(stream, array)
     return Surfaces(name, home)
 
 
@@ -140,7 +157,7 @@ def screened(folder: Path, split: str, store: Store, tick: Tick | None = None) -
     with replacing(home / "surface.npy") as stream:
         np.save(stream, sampled(recipe, split, tuple(ids)))
     with replacing(home / "noise.npy") as stream:
-        np.save(stream, noise.draw(recipe.seed, ids, recipe.size))
+        np.save(stream, noises.draw(recipe.seed, ids, recipe.size))
     return Surfaces(name, home)
 
 

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from gso.net.catalogue import DEFAULTS
 from report import store
 from report.method import TASKS
-from report.methods import DEFAULT, of
+from report.methods import DEFAULT, methods, of
 from report.settings import Settings
 from report.store import Store
 
@@ -104,8 +105,10 @@ def timings(settings: Settings, kept: Store, tick: Callable[..., None]) -> list[
 
 def _named(task: str, name: str) -> str:
     """Name of a method in the tables of its task."""
-    names = {"TNO": DEFAULT[task], "Net": "Net strain" if task == "flatten" else "Net"}
-    return names.get(name, name)
+    if name == "Net":
+        nets = [m.name for m in methods().values() if (m.task, m.net) == (task, DEFAULTS[task])]
+        return next(n for n in nets if n != "hybrid")
+    return DEFAULT[task] if name == "TNO" else name
 
 
 def _measured(task: str, method: str, model: str, size: int, repeats: int) -> dict[str, Any]:

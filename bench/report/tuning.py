@@ -13,6 +13,7 @@ import numpy as np
 from gso import metrics
 from report import store
 from report.method import TUNED, Array, Method, level_name
+from report.method import tuned as before
 from report.methods import methods
 from report.quality import levels
 from report.store import Store
@@ -23,6 +24,8 @@ _SCORE: dict[str, Callable[[Case, Array], float]] = {
     "developable": lambda case, points: metrics.loss_gc(points),
     "denoise": lambda case, points: metrics.normal_angle(case.surface, points),
 }
+#: Share of the input's score that a result must be below, not to count as nothing done.
+_LESS = 0.999
 #: Surfaces that they are chosen on.
 COUNT = 8
 
@@ -31,9 +34,9 @@ def tuned(
     surfaces: Surfaces, kept: Store, command: str, tick: Callable[..., None]
 ) -> dict[str, Any]:
     """Parameters by task, method and level of the noise, for ``tuned.json``."""
-    values: dict[str, Any] = {}
+    values: dict[str, Any] = json.loads(json.dumps(before()))
     count = min(COUNT, len(surfaces))
-    for method in (m for m in methods().values() if m.candidates and not m.absent()):
+    for method in (m for m in methods().values() if m.candidates and not m.missing()):
         for sigma in levels(method.task):
             own = values.setdefault(method.task, {}).setdefault(method.name, {})
             key = {
@@ -54,8 +57,10 @@ def write(found: dict[str, Any]) -> None:
     TUNED.write_text(json.dumps(found, indent=1) + "\n")
 
 
-def _best(method: Method, surfaces: Surfaces, count: int, sigma: float) -> dict[str, Any]:
+def _best(method: Method, surfaces: Surfaces, count: int, sigma: float) -> dict[str, Any] | None:
+    """The best parameters; None if with none of them the results are better than the input."""
     cases = [surfaces.case(k, sigma) for k in range(count)]
+    untouched = np.mean([_SCORE[method.task](case, case.given) for case in cases])
     scores = []
     for parameters in method.candidates:
         found = []
@@ -69,4 +74,5 @@ def _best(method: Method, surfaces: Surfaces, count: int, sigma: float) -> dict[
                 break
             found.append(_SCORE[method.task](case, points))
         scores.append(np.mean(found))
-    return method.candidates[int(np.argmin(scores))]
+    worth = min(scores) < _LESS * untouched
+    return method.candidates[int(np.argmin(scores))] if worth else None

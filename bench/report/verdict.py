@@ -81,9 +81,8 @@ class Loss:
             parts.append("better than all of the package: " + "; ".join(map(str, self.lost)))
         rest = [w for w in self.winners if w not in self.lost]
         if rest:
-            best = f"{rest[0].best_name} has {rest[0].best:.3g}"
-            text = "; ".join(map(str, rest))
-            parts.append(f"better than {self.default}, but not than {best}: {text}")
+            text = "; ".join(f"{w}, {w.best_name} {w.best:.3g}" for w in rest)
+            parts.append(f"better than {self.default}, but not than another of ours: {text}")
         return f"{name}, {'. '.join(parts)}"
 
 
@@ -104,9 +103,8 @@ def _winners(section: Section, metric: str, records: Records) -> Iterator[Winner
     main = next(m for m in section.columns if m not in _GIVEN)
     for name, figures in section.published.items():
         if metric in figures and name not in _STARTS:
-            where = list(range(len(default)))
-            found = _against(section, metric, f"the paper's {name}", figures[metric], own, where)
-            yield from (replace(w, count=0) for w in found)
+            found = _against(section, metric, f"the paper's {name}", figures[metric], own, None)
+            yield from found
     for method in section.methods:
         given = section.of(records, method)
         pairs = enumerate(zip(given, default, strict=False))
@@ -129,17 +127,21 @@ def _against(
     name: str,
     theirs: float,
     own: dict[str, list[Record]],
-    where: list[int],
+    where: list[int] | None,
 ) -> Iterator[Winner]:
-    """A winner, if it is one on some surfaces."""
-    ours = _mean(own[section.default], where, metric)
+    """A winner, if it is one: on some surfaces, or without any, each on all that it has."""
+
+    def mean(given: list[Record]) -> float | None:
+        return _mean(given, list(range(len(given))) if where is None else where, metric)
+
+    ours = mean(own[section.default])
     if ours is None or not _better(metric, theirs, ours):
         return
-    means = {k: _mean(r, where, metric) for k, r in own.items() if k not in _STARTS}
+    means = {k: mean(r) for k, r in own.items() if k not in _STARTS}
     known = {k: v for k, v in means.items() if v is not None}
     sign = 1.0 if metric == TIME or lower_is_better(metric) else -1.0
     best = min(known, key=lambda k: sign * known[k])
-    yield Winner(name, theirs, ours, known[best], best, len(where))
+    yield Winner(name, theirs, ours, known[best], best, len(where or ()))
 
 
 def _better(metric: str, theirs: float, ours: float) -> bool:
