@@ -61,7 +61,8 @@ BLOCKS, CHANNELS, SURFACES, EPOCHS = (2, 4, 6), (8, 16, 32), 2000, 10
 def measured(task: str, model: Any, split: Any, count: int | None = None) -> dict[str, float]:
     """Mean figures of a net over a split."""
     if task == "denoise":
-        card = {} if model is None else catalogue.read_card(catalogue.chain(model, task)[-1])
+        named = isinstance(model, str | Path)
+        card = catalogue.read_card(catalogue.chain(model, task)[-1]) if named else {}
         low, high = card.get("config", {}).get("sigma", (0.0, 1.0))
         levels = [s for s in LEVELS if low <= s <= high]
         found = {}

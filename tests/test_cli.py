@@ -380,6 +380,9 @@ def test_outputs_that_clash_are_refused(run, small, never, tmp_path):
     gso.save(bump(), "other.obj")
     done = run("optimize", "small.obj", "other.obj", "-o", ".")
     assert refused(done, "would replace an input")
+    gso.save(bump(11), "small.ply")
+    done = run("optimize", small, "small.ply", "-o", "out", "--plot", "pictures")
+    assert refused(done, "would both be written to", "small.png")
     Path("file").write_text("")
     assert refused(run("optimize", "small.obj", "other.obj", "-o", "file"), "folder")
 

@@ -370,6 +370,25 @@ def test_tasks_without_nets_are_solved(task):
 
 
 @needs_torch
+def test_a_denoising_net_alone_is_asked():
+    clean = saddle(64)
+    noisy = clean + 0.005 * np.random.default_rng(0).standard_normal(clean.shape)
+    result = hybrid.solve(noisy, task="denoise", polish=False)
+    assert (result.warm_start, result.details["net"]) == ("net", "denoise")
+    np.testing.assert_allclose(result.grid, gso.net.predict(noisy, task="denoise"), atol=1e-6)
+    assert "no net makes a start" in hybrid.solve(noisy, task="denoise").notes[-1]
+    triangles = Mesh(noisy.reshape(-1, 3), Mesh.from_grid(noisy).triangles)
+    assert "take grids" in hybrid.solve(triangles, task="denoise", polish=False).notes[-1]
+
+
+@needs_torch
+@pytest.mark.parametrize("task", ["developable", "flatten", "denoise"])
+def test_a_net_that_is_named_must_be_there(task):
+    with pytest.raises(WeightsError, match="no net 'nonsense'"):
+        hybrid.solve(saddle(13), task=task, net="nonsense")
+
+
+@needs_torch
 def test_a_developable_design_stays_untouched():
     result = hybrid.solve(cylinder(33), net=made(size=0.02))
     assert result.status is gso.Status.ALREADY_GOOD

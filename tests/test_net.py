@@ -145,6 +145,34 @@ def test_noise_is_told_in_the_unit_of_the_input():
     assert np.abs(estimated - told).max() < 0.1 * np.abs(told - noisy).max()
 
 
+@pytest.mark.parametrize("shape", [(16, 16), (63, 64), (70, 65), (40, 100), (130, 130)])
+def test_noise_goes_from_grids_of_any_size(shape):
+    u, v = np.meshgrid(*(np.linspace(-1, 1, n) for n in shape), indexing="ij")
+    clean = np.stack([u, v, 0.4 * u * v], axis=-1)
+    noisy = clean + 0.005 * np.random.default_rng(0).standard_normal(clean.shape)
+    before = gso.metrics.normal_angle(clean, noisy)
+    for sigma in (None, 0.005):
+        result = predict(noisy, task="denoise", sigma=sigma)
+        assert result.shape == clean.shape
+        share = 0.4 if min(shape) < 20 else 0.1
+        assert gso.metrics.normal_angle(clean, result) < share * before
+    with pytest.raises(MeshError, match="16 vertices"):
+        predict(noisy[:15], task="denoise")
+
+
+@pytest.mark.parametrize("sigma", ["a", -1.0, np.nan, [0.1]])
+def test_sigma_is_a_number(sigma, coarse):
+    with pytest.raises(OptionError, match="sigma is"):
+        predict(saddle(16), model=coarse, sigma=sigma)
+
+
+def test_a_bad_surface_of_many_is_named(coarse):
+    many = np.stack([saddle(4)] * 70)
+    many[66] = 1.0
+    with pytest.raises(MeshError, match="surface 66"):
+        predict(many, model=coarse)
+
+
 @pytest.mark.parametrize(
     ("points", "says"),
     [

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 import os
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -16,12 +18,14 @@ from click.testing import CliRunner
 
 from gso.cli import main
 from gso.status import DatasetError, OptionError, WeightsError
+from tests.conftest import saddle, sphere_cap
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("safetensors")
 
 from gso.net import GSONet, augment, checkpoint, load, losses, save, train  # noqa: E402
 from gso.net.config import FOLDER, Config, Phase, from_dict, read  # noqa: E402
+from gso.net.curves import Curves  # noqa: E402
 from gso.net.curves import read as read_curves  # noqa: E402
 from gso.net.data import Source, fresh, noisy, open_source  # noqa: E402
 from gso.net.grids import normalise  # noqa: E402
@@ -91,6 +95,15 @@ def test_shipped_configurations(path):
         ({"name": "a/b"}, "no file name"),
         ({"steps": 0}, "steps is 0"),
         ({"sigma": [1, 0]}, "sigma"),
+        ({"sigma": [0.01]}, "sigma is"),
+        ({"sigma": 0.01}, "sigma is"),
+        ({"phase": [{"loss": "energy", "eps": [0.1]}]}, "eps is"),
+        ({"phase": [{"loss": "energy", "eps": ["a", 1]}]}, "eps is"),
+        ({"phase": [{"loss": "energy", "weights": 3}]}, "weights is 3"),
+        ({"phase": [{"loss": "energy", "share": math.inf}]}, "share is inf"),
+        ({"phase": [{"loss": "label"}], "through": "net-c"}, "through"),
+        ({"model": {"kind": "coarse", "widths": [50, 50, 50]}}, "settings of the net"),
+        ({"model": PUBLISHED, "phase": [{"loss": "energy", "stride": 3}]}, "multiple of 8"),
     ],
 )
 def test_bad_configurations(change, says, folder, tmp_path):
@@ -251,8 +264,66 @@ def test_a_killed_run_ends_with_the_same_weights(folder, tmp_path):
     assert train(made, folder, tmp_path / "killed")["sha256"] == card["sha256"]
 
 
+def test_ctrl_c_ends_a_run_between_steps(folder, tmp_path):
+    made = config(steps=50, augment="symmetries")
+    train(made, folder, tmp_path / "whole")
+
+    def interrupt(report):
+        if report.step == 20:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        train(made, folder, tmp_path / "interrupted", show=interrupt)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    kept = checkpoint.numbers(tmp_path / "interrupted" / "checkpoint.safetensors")
+    assert kept["step"] in (20, 21)
+    train(made, folder, tmp_path / "interrupted")
+    whole, again = (tensors(tmp_path / n / "model.safetensors") for n in ("whole", "interrupted"))
+    assert all(torch.equal(whole[k], again[k]) for k in whole)
+
+
+def test_rows_of_the_last_checkpoint_stay(tmp_path):
+    curves = Curves(tmp_path)
+    curves.add(20, 1.0, loss=1.0)
+    curves.add(20, 1.0, theta=2.0)
+    curves.add(21, 1.5, loss=0.9)
+    curves.close()
+    again = Curves(tmp_path, 20)
+    again.add(20, 1.0, theta=3.0)
+    again.add(21, 1.5, loss=0.8)
+    again.close()
+    assert [(r["step"], len(r), r.get("loss")) for r in read_curves(tmp_path)] == [
+        (20, 3, 1.0),
+        (20, 3, None),
+        (21, 3, 0.8),
+    ]
+
+
+def test_sets_in_another_unit_train_the_same_net(tmp_path):
+    surfaces = np.stack([saddle(16), 0.5 * sphere_cap(16)] * 4)
+    for name, unit in (("one", 1.0), ("thousand", 1000.0)):
+        for split in ("train", "validation"):
+            place = tmp_path / name / split
+            place.mkdir(parents=True)
+            for k, points in enumerate(surfaces):
+                np.save(place / f"{k}.npy", unit * points)
+        train(config(augment="symmetries"), tmp_path / name, tmp_path / f"run {name}")
+    one, other = (tensors(tmp_path / f"run {n}" / "model.safetensors") for n in ("one", "thousand"))
+    assert all(torch.allclose(one[k].float(), other[k].float(), atol=1e-2) for k in one)
+
+
+def test_a_folder_of_the_nets_name_is_no_configuration(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "net-c").mkdir()
+    assert read("net-c").name == "net-c"
+
+
 def test_what_a_folder_holds_is_respected(folder, tmp_path):
     train(config(), folder, tmp_path)
+    with pytest.raises(OptionError, match="number of minutes"):
+        train(config(), folder, tmp_path, minutes=1.0)
+    with pytest.raises(OptionError, match="another configuration"):
+        train(config(model={"kind": "coarse", "widths": [16, 16, 32]}), folder, tmp_path)
     with pytest.raises(OptionError, match="another configuration"):
         train(config(seed=5), folder, tmp_path)
     train(config(validate_every=1.0), folder, tmp_path)

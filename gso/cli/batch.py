@@ -29,6 +29,7 @@ def many(
     """Optimise files into a folder; whether all results are usable."""
     outs = _outputs(files, folder, suffix)
     pictures = [None if plots is None else str(Path(plots, f"{Path(o).stem}.png")) for o in outs]
+    _each_its_own(files, [p for p in pictures if p is not None])
     for path in filter(None, (folder, plots)):
         _make_folder(path)
     for out, picture in zip(outs, pictures, strict=True):
@@ -74,16 +75,22 @@ def _outputs(files: tuple[str, ...], folder: str, suffix: str | None) -> list[st
         str(Path(folder, Path(f).name if suffix is None else f"{Path(f).stem}{suffix}"))
         for f in files
     ]
+    _each_its_own(files, outs)
+    inputs = set(map(os.path.realpath, files))
+    for out in outs:
+        if os.path.realpath(out) in inputs:
+            raise OptionError(f"{out} would replace an input; give another folder for -o")
+    return outs
+
+
+def _each_its_own(files: tuple[str, ...], outs: list[str]) -> None:
+    """Refuse to write two things to one file."""
     owner: dict[str, str] = {}
-    inputs = {os.path.realpath(f): f for f in files}
-    for file, out in zip(files, outs, strict=True):
+    for file, out in zip(files, outs, strict=False):
         place = os.path.realpath(out)
         if place in owner:
             raise OptionError(f"{owner[place]} and {file} would both be written to {out}")
-        if place in inputs:
-            raise OptionError(f"{out} would replace an input; give another folder for -o")
         owner[place] = file
-    return outs
 
 
 def _make_folder(path: str) -> None:

@@ -216,7 +216,8 @@ def _checked(task: str, polish: Any, keywords: dict[str, Any]) -> bool | int:
     polish = bool(polish) if isinstance(polish, bool | np.bool_) else int(polish)
     if polish is not True and keywords.get("target_curvature") is not None:
         raise OptionError(
-            f"polish is {polish!r}, but target_curvature takes many solves; leave one of them out"
+            "target_curvature takes many solves: it needs the optimiser, without a limit of "
+            f"iterations; leave it out, or polish={polish!r} (a net alone)"
         )
     keywords["constraints"] = listed(keywords.get("constraints", ()))
     return polish

@@ -192,6 +192,12 @@ def _checked(surface: Any) -> Array:
         *which, i, j, _ = np.argwhere(~np.isfinite(points))[0]
         of = f" of surface {which[0]}" if which else ""
         raise MeshError(f"grid vertex ({i}, {j}){of} is not finite")
+    with np.errstate(over="ignore"):
+        reach = np.abs(points - points[..., :1, :1, :]).max(axis=(-3, -2, -1))
+    bad = ~(np.isfinite(reach) & (reach > 0))
+    if bad.any():
+        of = f"surface {int(bad.argmax())}: " if points.ndim == 4 else ""
+        raise MeshError(f"{of}all vertices are at one point, or too far apart for numbers")
     return points
 
 
@@ -203,9 +209,6 @@ def _normalised(batch: Array) -> tuple[Array, Array, Array]:
     middle = local.mean(axis=(1, 2), keepdims=True)
     local = local - middle
     size = np.abs(local).max(axis=(1, 2, 3), keepdims=True)
-    if not np.isfinite(size).all() or not (size > 0).all():
-        k = int(np.argmin(np.isfinite(size) & (size > 0)))
-        raise MeshError(f"surface {k}: all vertices are at one point, or too far apart for numbers")
     scale = size * np.sqrt(((local / size) ** 2).sum(axis=-1).max(axis=(1, 2)))[:, None, None, None]
     return local / scale, origin + middle, scale
 
