@@ -87,14 +87,14 @@ def _screened(out: Path, split: str) -> surfaces.Surfaces:
 
 
 def _store(name: str, result: dict[str, object]) -> None:
-    """Keep what the README and the tests need."""
-    records = result.pop("records")
+    """Keep what the README and the tests need; a quick run does not replace a whole one."""
+    records, whole = result.pop("records"), BENCH / "data" / "results.json"
     if name == QUICK.name:
         kept = {key: result[key] for key in ("command", "machine", "surfaces")}
         text = json.dumps({**kept, "records": records}, indent=1)
         (BENCH / "data" / "quick.json").write_text(text + "\n")
-    else:
-        (BENCH / "data" / "results.json").write_text(json.dumps(result, indent=1) + "\n")
+    if name == FULL.name or not whole.exists() or json.loads(whole.read_text())["run"] == name:
+        whole.write_text(json.dumps(result, indent=1) + "\n")
 
 
 if __name__ == "__main__":

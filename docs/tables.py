@@ -1,13 +1,15 @@
-"""Write the tables of README.rst: ``python docs/tables.py`` from the repository's root.
+"""Write the tables of README.rst and docs: ``python docs/tables.py`` from the repository's root.
 
 They are made from the docstrings and values in the code, and from the figures that
-``python bench/run_all.py --store`` measured. Each stands between the comments ``.. begin NAME`` and
-``.. end NAME``; what is between them is replaced.
+``python bench/run_all.py --store`` measured. Each stands in one place, between the comments
+``.. begin NAME`` and ``.. end NAME``; what is between them is replaced.
 """
 
 from __future__ import annotations
 
+import csv
 import inspect
+import io
 import json
 import re
 import textwrap
@@ -20,7 +22,8 @@ from typing import Any
 from gso import Options, metrics, tasks
 
 ROOT = Path(__file__).resolve().parents[1]
-README = ROOT / "README.rst"
+#: Files with tables.
+PAGES = (ROOT / "README.rst", ROOT / "docs" / "benchmarks.rst")
 #: What was measured; without it there are no tables of it.
 RESULTS = ROOT / "bench" / "data" / "results.json"
 
@@ -108,7 +111,7 @@ def quality_table(section: dict[str, Any]) -> str:
         for row in section["rows"]
         if not row["absent"]
     ]
-    return list_table(head, rows, (24, *[10] * (len(head) - 1)))
+    return csv_table(head, rows, (24, *[10] * (len(head) - 1)))
 
 
 def denoise_table(levels: dict[str, dict[str, Any]]) -> str:
@@ -124,7 +127,7 @@ def denoise_table(levels: dict[str, dict[str, Any]]) -> str:
     whole = {name: found for name, found in angles.items() if len(found) == len(levels)}
     head = ("Method", *(f"σ {name.split('-')[1]}" for name in levels), "Time", "Surfaces")
     rows = [(name, *found, *times[name]) for name, found in whole.items()]
-    return list_table(head, rows, (28, *[12] * (len(head) - 1)))
+    return csv_table(head, rows, (28, *[12] * (len(head) - 1)))
 
 
 def size_table(timing: list[dict[str, Any]]) -> str:
@@ -142,7 +145,7 @@ def size_table(timing: list[dict[str, Any]]) -> str:
         if not t["absent"]
     ]
     head = ("Solve", "Grid", "Time", "Iterations", "Peak MB", "Factorisations alone")
-    return list_table(head, rows, (28, 14, 14, 14, 14, 16))
+    return csv_table(head, rows, (28, 14, 14, 14, 14, 16))
 
 
 def row_name(row: dict[str, Any]) -> str:
@@ -207,17 +210,29 @@ def list_table(head: Iterable[str], rows: Iterable[Iterable[str]], widths: Itera
     return "\n".join(lines)
 
 
-def replaced(text: str) -> str:
-    """The README's text with the tables as they should be."""
+def csv_table(head: Iterable[str], rows: Iterable[Iterable[str]], widths: Iterable[int]) -> str:
+    """Return a table of figures in reStructuredText, a line for each row."""
+    lines = io.StringIO()
+    csv.writer(lines, lineterminator="\n").writerows([tuple(head), *map(tuple, rows)])
+    width = " ".join(map(str, widths))
+    text = textwrap.indent(lines.getvalue().rstrip(), "   ")
+    return f".. csv-table::\n   :header-rows: 1\n   :widths: {width}\n\n{text}"
+
+
+def replaced(pages: Mapping[Path, str]) -> dict[Path, str]:
+    """The texts of the pages with the tables as they should be."""
+    texts = dict(pages)
     for name, table in tables().items():
-        pattern = rf"(\.\. begin {name}\n).*?(\.\. end {name}\n)"
-        text, count = re.subn(
-            pattern, lambda m, t=table: f"{m[1]}\n{t}\n\n{m[2]}", text, flags=re.S
+        pattern = re.compile(rf"(\.\. begin {name}\n).*?(\.\. end {name}\n)", re.S)
+        places = [page for page, text in texts.items() for _ in pattern.finditer(text)]
+        if len(places) != 1:
+            raise SystemExit(f"{len(places)} places for the table {name!r}, expected one")
+        texts[places[0]] = pattern.sub(
+            lambda m, t=table: f"{m[1]}\n{t}\n\n{m[2]}", texts[places[0]]
         )
-        if count != 1:
-            raise SystemExit(f"README.rst: {count} places for the table {name!r}, expected one")
-    return text
+    return texts
 
 
 if __name__ == "__main__":
-    README.write_text(replaced(README.read_text(encoding="utf-8")), encoding="utf-8")
+    for page, text in replaced({p: p.read_text(encoding="utf-8") for p in PAGES}).items():
+        page.write_text(text, encoding="utf-8")

@@ -39,7 +39,7 @@ class Settings:
 FULL = Settings("full", {"fast": 1_000_000, "slow": 64, "peer": 16})
 QUICK = Settings(
     "quick",
-    {"fast": 24, "slow": 2, "peer": 1},
+    {"fast": 24, "slow": 3, "peer": 1},
     timed=8,
     sizes=(32, 64),
     repeats=3,
