@@ -258,7 +258,7 @@ def test_the_net_alone_flattens(surfaces):
 def coarse_net(monkeypatch):
     """Predictions like those of a fair net, and why there is none where that is asked."""
 
-    def predictions(designs, task, net, passes):
+    def predictions(designs, task, net, passes, alone):
         if net == "none":
             return [prediction.Prediction(refused="there is none")] * len(designs)
         few = gso.DevelopableOptions(iterations=1)
@@ -611,7 +611,8 @@ def test_many(workers, surfaces):
 def test_passes_are_left_out_where_a_whole_solve_follows(surfaces, monkeypatch, polish, passes):
     seen = []
 
-    def asked(designs, task, net, passes):
+    def asked(designs, task, net, passes, alone):
+        assert alone is (polish is False)
         seen.append(passes)
         return [prediction.Prediction(refused="enough")] * len(designs)
 

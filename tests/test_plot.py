@@ -151,11 +151,11 @@ def test_mistakes():
 
 def test_without_matplotlib(monkeypatch):
     monkeypatch.setattr("gso.plot.find_spec", lambda name: None)
-    with pytest.raises(gso.GSOError, match=r'pip install "gso\[plot\]"'):
+    with pytest.raises(gso.GSOError, match=r'pip install "\.\[plot\]"'):
         plot_surface(bump())
-    with pytest.raises(gso.GSOError, match=r'pip install "gso\[plot\]"'):
+    with pytest.raises(gso.GSOError, match=r'pip install "\.\[plot\]"'):
         plot_result(None)
-    with pytest.raises(gso.GSOError, match=r'pip install "gso\[plot\]"'):
+    with pytest.raises(gso.GSOError, match=r'pip install "\.\[plot\]"'):
         plot_rulings(bump())
 
 

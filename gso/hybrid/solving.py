@@ -108,8 +108,8 @@ def solve(
     design = as_mesh(mesh)
     prediction = Prediction()
     if not sparing or pays(design, task, keywords):
-        alone, passes = polish is False, _passes(polish)
-        (prediction,) = predictions([design], task, net, passes, alone=alone)
+        asked = {"task": task, "net": net, "passes": _passes(polish), "alone": polish is False}
+        (prediction,) = predictions([design], **asked)
     result = _finished(design, prediction, task, polish, keywords)
     result.seconds["total"] = time.perf_counter() - clock
     return result
@@ -152,8 +152,8 @@ def solve_many(
     polish = _checked(task, polish, keywords)
     work = partial(_one, task, polish, keywords)
     worth = partial(pays, task=task, keywords=keywords, many=True) if sparing else None
-    passes = _passes(polish)
-    ask = partial(predictions, task=task, net=net, passes=passes, alone=polish is False)
+    passes, alone = _passes(polish), polish is False
+    ask = partial(predictions, task=task, net=net, passes=passes, alone=alone)
     with closing(spread(work, _started(meshes, worth, ask), workers=workers)) as results:
         for done in results:
             yield Item(done.index, done.value, done.error)
