@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import warnings
 from collections.abc import Callable
@@ -34,7 +35,7 @@ def tuned(
     surfaces: Surfaces, kept: Store, command: str, tick: Callable[..., None]
 ) -> dict[str, Any]:
     """Parameters by task, method and level of the noise, for ``tuned.json``."""
-    values: dict[str, Any] = json.loads(json.dumps(before()))
+    values: dict[str, Any] = copy.deepcopy(before())
     count = min(COUNT, len(surfaces))
     for method in (m for m in methods().values() if m.candidates and not m.missing()):
         for sigma in levels(method.task):

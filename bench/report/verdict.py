@@ -103,8 +103,7 @@ def _winners(section: Section, metric: str, records: Records) -> Iterator[Winner
     main = next(m for m in section.columns if m not in _GIVEN)
     for name, figures in section.published.items():
         if metric in figures and name not in _STARTS:
-            found = _against(section, metric, f"the paper's {name}", figures[metric], own, None)
-            yield from found
+            yield from _against(section, metric, f"the paper's {name}", figures[metric], own)
     for method in section.methods:
         given = section.of(records, method)
         pairs = enumerate(zip(given, default, strict=False))
@@ -127,7 +126,7 @@ def _against(
     name: str,
     theirs: float,
     own: dict[str, list[Record]],
-    where: list[int] | None,
+    where: list[int] | None = None,
 ) -> Iterator[Winner]:
     """A winner, if it is one: on some surfaces, or without any, each on all that it has."""
 

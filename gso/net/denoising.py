@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import make_lsq_spline
 
+from gso.fit import interpolated
 from gso.net.base import SIZE
 from gso.resample import resample
 
@@ -20,22 +20,19 @@ SMALLEST = 16
 #: Vertices along a side from which on it is averaged; with fewer to each coefficient the
 #: least-squares spline would follow the noise.
 _MANY = 2 * SIZE
-_DEGREE = 3
 
 
 def seen(grid: Array) -> Array:
     """A grid (H, W, 3) as (SIZE, SIZE, 3).
 
     Sides are first continued to SIZE or twice as many vertices, by reflection at the vertices of
-    the border; longer ones than SIZE become their least-squares cubic spline with SIZE
-    coefficients.
+    the border; what has more becomes its least-squares spline with SIZE x SIZE coefficients.
     """
     pads = [_margins(n) for n in grid.shape[:2]]
     grid = np.pad(grid, [*pads, (0, 0)], mode="reflect", reflect_type="odd")
-    for axis in (0, 1):
-        if grid.shape[axis] > SIZE:
-            grid = np.moveaxis(_averaged(np.moveaxis(grid, axis, 0)), 0, axis)
-    return grid
+    if grid.shape[:2] == (SIZE, SIZE):
+        return grid
+    return interpolated(grid, (SIZE, SIZE)).sample(SIZE, SIZE)
 
 
 def back(done: Array, height: int, width: int) -> Array:
@@ -54,11 +51,3 @@ def _margins(count: int) -> tuple[int, int]:
     """Vertices that are added before and behind a side."""
     more = max((SIZE if count <= SIZE else _MANY) - count, 0)
     return more // 2, more - more // 2
-
-
-def _averaged(values: Array) -> Array:
-    """Values (n, ...) at SIZE places along the first axis."""
-    inner = np.linspace(0.0, 1.0, SIZE - _DEGREE + 1)[1:-1]
-    knots = np.concatenate([np.zeros(_DEGREE + 1), inner, np.ones(_DEGREE + 1)])
-    spline = make_lsq_spline(np.linspace(0.0, 1.0, len(values)), values, knots, k=_DEGREE)
-    return np.asarray(spline(np.linspace(0.0, 1.0, SIZE)))
