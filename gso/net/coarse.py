@@ -150,8 +150,8 @@ class CoarseNet(Net):
             body = self.body(self.to_body(middle))
             middle = self.middle_out(middle + _enlarged(self.from_body(body), middle))
             fine = self.fine_out(fine + _enlarged(self.from_middle(middle), fine))
-            fields = self.coarse_head(middle), self.fine_head(fine)
-        return fields[0].to(seen.dtype), fields[1].to(seen.dtype)
+        # Curvature shows what is rounded here.
+        return self.coarse_head(middle.to(seen.dtype)), self.fine_head(fine.to(seen.dtype))
 
     def _shares(self, coarse: Tensor, fine: Tensor, height: int, width: int) -> Tensor:
         """Displacement (B, d, height, width) along the axes of the frames."""

@@ -100,15 +100,18 @@ class GSONet(Net):
             level = (100.0 * sigma)[:, None, None, None].expand(-1, 1, *x.shape[2:])
             x = torch.cat([x, level.to(x.dtype)], dim=1)
         x = x.contiguous(memory_format=torch.channels_last)
+        y = self.head(x)
+        skips = [y]
         with self.autocast(x.device):
-            y = self.head(x)
-            skips = [y]
             for step in self.down:
                 skips.append(step(skips[-1]))
             y = self.body(skips[-1])
-            for step, skip in zip(self.up, reversed(skips[1:]), strict=True):
+            *coarser, (finest, last) = zip(self.up, reversed(skips[1:]), strict=True)
+            for step, skip in coarser:
                 y = step(y + skip)
-            y = self.tail(y + skips[0])
+        # Curvature multiplies what is rounded by the square of the samples' number: the layers
+        # that take positions and make displacements compute in single precision.
+        y = self.tail(finest((y + last).to(x.dtype)) + skips[0])
         y = y.to(surface.dtype)
         return (torch.tanh(y) if self.tanh else y).movedim(1, -1)
 
