@@ -19,6 +19,8 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterable
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +39,7 @@ from gso.mesh import Mesh
 from gso.net.catalogue import DEFAULTS, available
 from gso.resample import resample
 from gso.tno import Start, optimize
+from gso.tno.pool import spread
 
 #: What is compared: task and keywords.
 CASES = {
@@ -73,17 +76,28 @@ def energy(result: gso.Result) -> float:
     return sum(result.energy.values())
 
 
-def compared(designs: Iterable[Any], task: str, keywords: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Cold and hybrid on every design: milliseconds, energies, and which were started by a net."""
+def compared(
+    designs: Iterable[Any], task: str, keywords: dict[str, Any], workers: int = 0
+) -> dict[str, np.ndarray]:
+    """Cold and hybrid on every design: milliseconds, energies, and which were started by a net.
+
+    Times mean something without workers only.
+    """
     rows = []
-    for design in designs:
-        cold, slow = timed(optimize, design, task=task, **keywords)
-        warm, quick = timed(hybrid.solve, design, task=task, **keywords)
-        net = 1e3 * warm.seconds["net"]
-        ratio = energy(warm) / max(energy(cold), 1e-300)
-        rows.append((slow, quick, net, ratio, warm.warm_start == "net"))
+    with closing(spread(partial(_both, task, keywords), designs, workers=workers)) as results:
+        for done in results:
+            if done.error is not None:
+                raise SystemExit(f"design {done.index}: {done.error}")
+            rows.append(done.value)
     names = ("cold", "hybrid", "net", "energy", "started")
     return dict(zip(names, np.array(rows, float).T, strict=True))
+
+
+def _both(task: str, keywords: dict[str, Any], design: Any) -> tuple[float, ...]:
+    cold, slow = timed(optimize, design, task=task, **keywords)
+    warm, quick = timed(hybrid.solve, design, task=task, **keywords)
+    ratio = energy(warm) / max(energy(cold), 1e-300)
+    return slow, quick, 1e3 * warm.seconds["net"], ratio, warm.warm_start == "net"
 
 
 def ratios(found: dict[str, np.ndarray]) -> str:
@@ -138,7 +152,8 @@ def guard(splits: dict[str, Surfaces], count: int | None) -> None:
     print("\nGuard: energy of the hybrid solve over that of the cold one, balanced")
     for name, split in splits.items():
         total = min(count or len(split), len(split))
-        found = compared((split[k] for k in watched(range(total), name)), "developable", {})
+        designs = (split[k] for k in watched(range(total), name))
+        found = compared(designs, "developable", {}, workers=os.cpu_count() or 1)
         print(f"  {name:6s} {total:5d} surfaces: {ratios(found)}", flush=True)
 
 
