@@ -119,7 +119,8 @@ def shares(run: Callable[[], Any]) -> dict[str, Any]:
     if net is not None:
         spent["net"] = net
     spent["setup"] = total - sum(v for k, v in spent.items() if k != "setup")
-    return {"shares": {k: v / total for k, v in spent.items()}} | limit(result, stages)
+    found = {"shares": {k: v / total for k, v in spent.items()}, "seconds": total}
+    return found | limit(result, stages)
 
 
 def limit(result: Any, stages: list[Factored]) -> dict[str, Any]:
@@ -164,7 +165,10 @@ def _fastest(stage: Factored) -> tuple[float, str]:
 def main(
     task: str, method: str, model: str, size: int, repeats: int, budget: float
 ) -> dict[str, Any]:
-    """Measure; after two solves, no further one is begun that the budget has no time for."""
+    """Measure; after two solves, no further one is begun that the budget has no time for.
+
+    The last is the one whose shares are told.
+    """
 
     def run() -> Any:
         return solve(task, method, model, points)
@@ -173,7 +177,9 @@ def main(
     run()
     points = case(task, size)
     seconds: list[float] = []
-    while len(seconds) < 2 or (len(seconds) < repeats and sum(seconds) + seconds[-1] < budget):
+    divisible = method != "Net"
+    least, most = (1, repeats - 1) if divisible else (2, repeats)
+    while len(seconds) < least or (len(seconds) < most and sum(seconds) + seconds[-1] < budget):
         start = time.perf_counter()
         result = run()
         seconds.append(time.perf_counter() - start)
@@ -185,9 +191,10 @@ def main(
         # In kilobytes, but on macOS in bytes.
         "peak_mb": peak / (1e6 if sys.platform == "darwin" else 1e3),
     }
-    if method == "Net":
+    if not divisible:
         return found | {"shares": {"net": 1.0}, "limit": None, "factorisations": 0}
-    return found | shares(run)
+    last = shares(run)
+    return found | last | {"seconds": [*seconds, last["seconds"]]}
 
 
 if __name__ == "__main__":

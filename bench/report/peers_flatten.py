@@ -85,16 +85,16 @@ def _lscm(mesh: Mesh) -> Array:
     return scaled(np.asarray(mesh.vertices), np.asarray(mesh.triangles), lscm(mesh))
 
 
-def _peer(name: str, map_of: Callable[[Mesh], Array], note: str) -> Method:
+def _peer(name: str, map_of: Callable[[Mesh], Array], note: str, pace: str = "fast") -> Method:
     def run(case: Case) -> Solved:
         flat = map_of(case.mesh)
         return Solved(flat.reshape(*case.given.shape[:2], 2))
 
-    return Method(name, "flatten", run, peer=True, note=note, files=(Path(__file__),))
+    return Method(name, "flatten", run, peer=True, pace=pace, note=note, files=(Path(__file__),))
 
 
 METHODS = [
     _peer("libigl LSCM", _lscm, "conformal, scaled to the surface's area"),
     _peer("libigl ARAP", arap, f"{ARAP_ITERATIONS} iterations"),
-    _peer("libigl SLIM", slim, f"{SLIM_ITERATIONS} iterations"),
+    _peer("libigl SLIM", slim, f"{SLIM_ITERATIONS} iterations", "slow"),
 ]

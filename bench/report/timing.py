@@ -22,7 +22,7 @@ from report.store import Store
 
 _SCRIPT = Path(__file__).with_name("measure.py")
 #: Seconds for the repeated solves of one size.
-_BUDGET = 30.0
+_BUDGET = 20.0
 #: Smallest side that counts for the exponent: below, the time hardly depends on the size.
 _LEAST = 32
 #: Phases, in the order in which they are shown.
