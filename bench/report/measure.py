@@ -115,7 +115,8 @@ def shares(run: Callable[[], Any]) -> dict[str, Any]:
         for owner, name, function in before:
             setattr(owner, name, function)
     spent = dict(clock.spent)
-    net = getattr(result, "seconds", {}).get("net")
+    # A net alone makes an array, and nothing else is done.
+    net = total if isinstance(result, np.ndarray) else result.seconds.get("net")
     if net is not None:
         spent["net"] = net
     spent["setup"] = total - sum(v for k, v in spent.items() if k != "setup")
@@ -177,9 +178,7 @@ def main(
     run()
     points = case(task, size)
     seconds: list[float] = []
-    divisible = method != "Net"
-    least, most = (1, repeats - 1) if divisible else (2, repeats)
-    while len(seconds) < least or (len(seconds) < most and sum(seconds) + seconds[-1] < budget):
+    while not seconds or (len(seconds) < repeats - 1 and sum(seconds) + seconds[-1] < budget):
         start = time.perf_counter()
         result = run()
         seconds.append(time.perf_counter() - start)
@@ -191,8 +190,6 @@ def main(
         # In kilobytes, but on macOS in bytes.
         "peak_mb": peak / (1e6 if sys.platform == "darwin" else 1e3),
     }
-    if not divisible:
-        return found | {"shares": {"net": 1.0}, "limit": None, "factorisations": 0}
     last = shares(run)
     return found | last | {"seconds": [*seconds, last["seconds"]]}
 

@@ -112,7 +112,6 @@ class GSONet(Net):
         # Curvature multiplies what is rounded by the square of the samples' number: the layers
         # that take positions and make displacements compute in single precision.
         y = self.tail(finest((y + last).to(x.dtype)) + skips[0])
-        y = y.to(surface.dtype)
         return (torch.tanh(y) if self.tanh else y).movedim(1, -1)
 
     def carried(
