@@ -472,6 +472,17 @@ def test_what_is_no_disk_is_the_optimisers():
     assert "one piece" in result.notes[-1]
 
 
+@needs_torch
+def test_a_surface_unlike_all_that_nets_are_taught_is_the_optimisers():
+    rough = saddle(17)
+    rough[..., 2] += np.random.default_rng(3).normal(0.0, 0.1, rough.shape[:2])
+    cold, result = optimize(rough), hybrid.solve(rough, net=made(size=0.01))
+    assert same(cold, result)
+    assert "too far from what nets are taught" in result.notes[-1]
+    # The net alone is what was asked for.
+    assert hybrid.solve(rough, net=made(size=0.01), polish=False).warm_start == "net"
+
+
 # ---------------------------------------------------------------- any mesh
 
 

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso import metrics
+from gso.dataset.screen import CURVED
 from gso.hybrid.patch import Patch, as_patch
 from gso.mesh import Mesh
 from gso.net.catalogue import DEFAULTS, available, chain
@@ -91,6 +93,8 @@ def predictions(
         clock = time.perf_counter()
         try:
             grid, patch = _seen(design, task)
+            if not alone:
+                _check_curvature(grid)
             sizes.setdefault(grid.shape, []).append((k, grid, patch))
         except MeshError as error:
             found[k] = Prediction(None, time.perf_counter() - clock, name, str(error))
@@ -145,6 +149,16 @@ def _seen(design: Mesh, task: str) -> tuple[Array, Patch | None]:
         raise MeshError(f"a mesh of {count} vertices is solved faster than a net sees it")
     patch = as_patch(design, _SIZE)
     return patch.grid, patch
+
+
+def _check_curvature(grid: Array) -> None:
+    """Refuse surfaces far from all that nets are taught: what they make of those is a lottery."""
+    curved = metrics.loss_gc(grid)
+    if curved > CURVED:
+        raise MeshError(
+            f"mean |K| in the unit ball is {curved:.3g}, and above {CURVED:.2g} is too far from "
+            "what nets are taught"
+        )
 
 
 def _predicted(grids: Array, task: str, net: Any, passes: int | None) -> Sequence[Any]:

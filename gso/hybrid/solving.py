@@ -49,10 +49,11 @@ def solve(
     """Let a net make a start, and the optimiser finish it.
 
     The start is dropped, and the solve is that of :func:`gso.tno.optimize`, where there is
-    no net (none for the task, PyTorch is not installed), where the design is small, or is no
-    grid and cannot be resampled to one, and where the net's result turns cells of a flat
-    image over, is not finite, or has more of the energy than the start without it. The
-    result's `notes` then say so, and its `warm_start` is "cold".
+    no net (none for the task, PyTorch is not installed), where the design is small, is no
+    grid and cannot be resampled to one, or has far more curvature than what nets are taught,
+    and where the net's result turns cells of a flat image over, is not finite, or has more of
+    the energy than the start without it. The result's `notes` then say so, and its
+    `warm_start` is "cold".
 
     Parameters
     ----------
