@@ -202,6 +202,19 @@ def surface_distance(before: Any, after: Any) -> Distances:
     return Distances(float(there.mean()), float(there.max()), float(back.mean()), float(back.max()))
 
 
+def displacement(before: Any, after: Any) -> tuple[float, float]:
+    """Root mean square and largest displacement of the vertices, percent of the diagonal.
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> displacement(grid, grid + [0.0, 0.0, 0.1 * np.sqrt(0.08)])
+    (1.0, 1.0)
+    """
+    source = _used_points(before)
+    moved = np.linalg.norm(_used_points(after) - source, axis=1)
+    percent = 100.0 / np.linalg.norm(np.ptp(source, axis=0))
+    return float(percent * np.sqrt((moved**2).mean())), float(percent * moved.max())
+
+
 def fairness(surface: Any, *, scale: float | None = None) -> float:
     """Sum of squared second differences along the polylines (Jiang et al. 2020).
 

@@ -164,19 +164,22 @@ def figures(task: str, case: Case, result: Array) -> dict[str, float]:
     the normals fell, from "theta_noisy"; "off" the root mean square distance of the vertices
     from where they are without noise, percent of the diagonal.
     """
+    if task == "denoise":
+        return _denoised(case, result)
     mesh = Mesh.from_grid(case.surface, weld=False)
-    module = tasks.get(task)
+    module, scale = tasks.get(task), metrics.unit(mesh)
     if task == "flatten":
-        found = module.metrics(mesh, None, result.reshape(-1, 2), metrics.unit(mesh))
+        found = module.metrics(mesh, None, result.reshape(-1, 2), scale)
         return found | {"unflipped": float(found["flipped_cells"] == 0)}
-    after = mesh.replaced(result.reshape(-1, 3))
-    found = module.metrics(mesh, after, None, metrics.unit(mesh))
-    if task == "developable":
-        return found
+    return module.metrics(mesh, mesh.replaced(result.reshape(-1, 3)), None, scale)
+
+
+def _denoised(case: Case, result: Array) -> dict[str, float]:
+    """Against the surface without noise, which the task's own metrics do not know."""
     noisy, theta = (metrics.normal_angle(case.surface, x) for x in (case.given, result))
     return {
         "theta": theta,
         "theta_noisy": noisy,
         "rate": 100.0 * (noisy - theta) / noisy,
-        "off": found["displacement_rms"],
+        "off": metrics.displacement(case.surface, result)[0],
     }

@@ -87,12 +87,12 @@ def _smoothed(request: Request) -> tuple[Array, dict[str, Any]]:
 def metrics(before: Mesh, after: Mesh, flat: None, scale: float) -> dict[str, float]:
     """How much the surface changed, and how much rougher the input was."""
     rough = measure.fairness(before, scale=scale)
-    moved = np.linalg.norm((after.vertices - before.vertices)[before.used], axis=1)
+    rms, largest = measure.displacement(before, after)
     return {
         "roughness_ratio": measure.fairness(after, scale=scale) / rough if rough > 0 else 1.0,
         "normal_change": measure.normal_angle(before, after),
-        "displacement_rms": 100.0 * float(np.sqrt((moved**2).mean())) / before.diagonal,
-        "displacement_max": 100.0 * float(moved.max()) / before.diagonal,
+        "displacement_rms": rms,
+        "displacement_max": largest,
         "loss_gc_before": measure.loss_gc(before, scale=scale),
         "loss_gc": measure.loss_gc(after, scale=scale),
     }
