@@ -35,7 +35,9 @@ def many(
     for out, picture in zip(outs, pictures, strict=True):
         job.check(out, picture)
     if workers is None:
-        workers = min(os.cpu_count() or 1, len(files))
+        from gso.tno.pool import processors
+
+        workers = min(processors(), len(files))
         workers = workers if workers > 1 else 0  # a single process is this one
     records: dict[int, dict[str, Any]] = {}
     with progress.files(len(files)) as bar, report.status_only():

@@ -33,7 +33,7 @@ def spread(
     pieces : iterable
         Read as workers become free, so a generator of any length fits in memory.
     workers : int, optional
-        Processes; the number of cores when not given, 0 for none (in this process).
+        Processes; :func:`processors` when not given, 0 for none (in this process).
 
     Yields
     ------
@@ -46,7 +46,7 @@ def spread(
     >>> [done.value for done in spread(abs, [-1, 2], workers=0)]
     [1, 2]
     """
-    workers = (os.cpu_count() or 1) if workers is None else workers
+    workers = processors() if workers is None else workers
     numbered = enumerate(pieces)
     if workers <= 0:
         for index, piece in numbered:
@@ -65,6 +65,12 @@ def spread(
             yield from pool.finished()
     finally:
         pool.close()
+
+
+def processors() -> int:
+    """Number of processors that this process may use: batch systems and taskset give it some."""
+    allowed = getattr(os, "sched_getaffinity", None)
+    return len(allowed(0)) if allowed else os.cpu_count() or 1
 
 
 def _attempt(function: Callable[[Any], Any], index: int, piece: Any) -> Done:
