@@ -126,16 +126,23 @@ def rows(arguments: argparse.Namespace) -> None:
         if task == "denoise":
             published = {f"theta_{s:g}": row["theta"] for s, row in TABLE_3.items()}
         print(line(Path(name).stem, found, published), flush=True)
+        splits = {"test": counted(found, data["test"], arguments.n)}
         if arguments.others and task != "denoise":
-            for other in OTHERS:
-                if other in data:
-                    print(line(f"  {other}", measured(task, name, data[other], arguments.n), {}))
+            for other in (o for o in OTHERS if o in data):
+                found = measured(task, name, data[other], arguments.n)
+                splits[other] = counted(found, data[other], arguments.n)
+                print(line(f"  {other}", found, {}), flush=True)
         if arguments.cards:
             path = catalogue.located(catalogue.CHAINS.get(name, (name,))[-1])
-            key = "test" if name not in catalogue.CHAINS else f"test of {name}"
-            count = min(len(data["test"]), arguments.n or len(data["test"]))
-            card = catalogue.read_card(path) | {key: found | {"surfaces": count}}
+            of = f" of {name}" if name in catalogue.CHAINS else ""
+            card = catalogue.read_card(path) | {f"test{of}": splits.pop("test")}
+            card |= {f"other splits{of}": splits} if splits else {}
             weights.write_card(path.with_suffix(".json"), card)
+
+
+def counted(found: dict[str, float], split: Any, most: int | None) -> dict[str, float]:
+    """Figures with the number of surfaces that they are means of."""
+    return found | {"surfaces": min(len(split), most or len(split))}
 
 
 def rounding(arguments: argparse.Namespace) -> None:
@@ -220,7 +227,7 @@ def grid(arguments: argparse.Namespace) -> None:
                 row |= card["validation"]
             table.append(row)
             print(line(config.name, {k: v for k, v in row.items() if k[0] != "b"}, {}), flush=True)
-            record["command"] = f"python bench/net.py DIR --grid FILE --stride {stride}"
+            record["command"] = f"python bench/net.py DIR --grid {path} --stride {stride}"
             with replacing(path) as file:
                 file.write((json.dumps(record, indent=1) + "\n").encode())
             shutil.rmtree(run)
