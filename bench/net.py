@@ -44,7 +44,6 @@ from gso.net.run import CHECKPOINT
 from gso.net.validate import SCORE, figures
 
 OTHERS = (
-    "hard",
     "enneper",
     "monkey_saddle",
     "catenoid",

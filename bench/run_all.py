@@ -1,7 +1,7 @@
 """Everything at once: the paper's tables and figures, times, and peers, as one report.
 
     python bench/run_all.py --quick      a few surfaces of the repository (five minutes)
-    python bench/run_all.py              the test split (over an hour on two cores)
+    python bench/run_all.py              the test split (an hour on two cores)
     python bench/run_all.py --data DIR   the test split of a set that is there already
     python bench/run_all.py --store      the same, and keeps its figures in bench/data
     python bench/run_all.py --tune       chooses the peers' parameters anew

@@ -20,10 +20,11 @@ from statistics import median
 from typing import Any
 
 from gso import Options, metrics, tasks
+from gso.net import catalogue
 
 ROOT = Path(__file__).resolve().parents[1]
 #: Files with tables.
-PAGES = (ROOT / "README.rst", ROOT / "docs" / "benchmarks.rst")
+PAGES = (ROOT / "README.rst", ROOT / "docs" / "benchmarks.rst", ROOT / "docs" / "net.rst")
 #: What was measured; without it there are no tables of it.
 RESULTS = ROOT / "bench" / "data" / "results.json"
 
@@ -38,6 +39,8 @@ def tables() -> dict[str, str]:
         for formulation, options in getattr(module, "OPTIONS", {}).items():
             if options is not module.Options:
                 found[f"options-{task}-{formulation}"] = option_table(options, shared=shared)
+    for task, metric in (("developable", "K_A_r"), ("flatten", "strain_mean")):
+        found[f"splits-{task}"] = split_table(task, metric)
     if RESULTS.exists():
         found |= measured(json.loads(RESULTS.read_text(encoding="utf-8")))
     return found
@@ -69,6 +72,28 @@ def option_table(options: type[Options], shared: Mapping[str, object]) -> str:
     if presets:
         parts.append("\n".join(wrapped("Presets: " + "; ".join(presets) + ".")))
     return "\n\n".join(parts)
+
+
+def split_table(task: str, metric: str) -> str:
+    """Mean of a metric over every split of surfaces, for the nets whose cards have it."""
+    columns = {}
+    for name in catalogue.available(task):
+        card = catalogue.read_card(catalogue.located(catalogue.CHAINS.get(name, (name,))[-1]))
+        of = f" of {name}" if name in catalogue.CHAINS else ""
+        others = card.get(f"other splits{of}")
+        if others:
+            columns[name] = {"test": card[f"test{of}"], **others}
+    whole = next(iter(columns.values()), {})
+    head = ("Surfaces", "Count", *(f"``{name}``" for name in columns))
+    rows = [
+        (
+            split.replace("_", " "),
+            f"{found['surfaces']:,}",
+            *(number(column[split][metric]) for column in columns.values()),
+        )
+        for split, found in whole.items()
+    ]
+    return csv_table(head, rows, (20, 10, *[14] * len(columns)))
 
 
 def measured(results: dict[str, Any]) -> dict[str, str]:
