@@ -125,17 +125,19 @@ def rows(arguments: argparse.Namespace) -> None:
         if task == "denoise":
             published = {f"theta_{s:g}": row["theta"] for s, row in TABLE_3.items()}
         print(line(Path(name).stem, found, published), flush=True)
-        splits = {"test": counted(found, data["test"], arguments.n)}
+        others = {}
         if arguments.others and task != "denoise":
             for other in (o for o in OTHERS if o in data):
-                found = measured(task, name, data[other], arguments.n)
-                splits[other] = counted(found, data[other], arguments.n)
-                print(line(f"  {other}", found, {}), flush=True)
+                figures_there = measured(task, name, data[other], arguments.n)
+                others[other] = counted(figures_there, data[other], arguments.n)
+                print(line(f"  {other}", figures_there, {}), flush=True)
         if arguments.cards:
-            path = catalogue.located(catalogue.CHAINS.get(name, (name,))[-1])
+            path = catalogue.chain(name, task)[-1]
             of = f" of {name}" if name in catalogue.CHAINS else ""
-            card = catalogue.read_card(path) | {f"test{of}": splits.pop("test")}
-            card |= {f"other splits{of}": splits} if splits else {}
+            card = catalogue.read_card(path)
+            card[f"test{of}"] = counted(found, data["test"], arguments.n)
+            if others:
+                card[f"other splits{of}"] = others
             weights.write_card(path.with_suffix(".json"), card)
 
 

@@ -78,7 +78,7 @@ def split_table(task: str, metric: str) -> str:
     """Mean of a metric over every split of surfaces, for the nets whose cards have it."""
     columns = {}
     for name in catalogue.available(task):
-        card = catalogue.read_card(catalogue.located(catalogue.CHAINS.get(name, (name,))[-1]))
+        card = catalogue.read_card(catalogue.chain(name, task)[-1])
         of = f" of {name}" if name in catalogue.CHAINS else ""
         others = card.get(f"other splits{of}")
         if others:
