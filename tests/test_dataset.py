@@ -23,7 +23,7 @@ from click.testing import CliRunner
 import gso
 from gso import dataset, metrics
 from gso.cli import main
-from gso.dataset import bezier, hdf, labels, lazy, noise, screen, shapes, summary
+from gso.dataset import bezier, drawing, hdf, labels, lazy, noise, screen, shapes, summary
 from gso.dataset.recipe import PUBLISHED, Recipe
 from gso.status import DatasetError, OptionError
 from gso.variables.spline import tensor_matrix
@@ -94,6 +94,15 @@ class TestScreen:
             assert part.mean() == pytest.approx(0.307, abs=0.02)
             counts = np.histogram(part, screen.CURVATURE)[0] / len(part)
             np.testing.assert_allclose(counts, screen.CURVATURE_SHARES, atol=1.5 / len(part))
+
+    def test_processes_draw_what_one_does(self, monkeypatch):
+        pieces, told = [(3, 1), (2, 2), (1, 3)], []
+        alone = drawing.draw_many(pieces, 16, told.append)
+        assert told == [3, 5, 6]
+        monkeypatch.setattr(drawing, "_MANY", 1)
+        np.testing.assert_array_equal(drawing.draw_many(pieces, 16), alone)
+        expected = bezier.sample_many(bezier.generate(2, seed=2), 16)
+        np.testing.assert_allclose(alone[3:5], expected, atol=1e-6)
 
     def test_hard_draws_lie_beyond_the_intervals(self):
         found = self.features(5, screen.select(10, 12, seed=5).hard)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import json
 import math
@@ -28,10 +29,10 @@ from gso.net import GSONet, augment, checkpoint, load, losses, save, train  # no
 from gso.net.config import FOLDER, Config, Phase, from_dict, read  # noqa: E402
 from gso.net.curves import Curves  # noqa: E402
 from gso.net.curves import read as read_curves  # noqa: E402
-from gso.net.data import Source, fresh, noisy, open_source  # noqa: E402
+from gso.net.data import Batch, Source, fresh, noisy, open_source  # noqa: E402
 from gso.net.grids import normalise  # noqa: E402
-from gso.net.muon import optimisers  # noqa: E402
-from gso.net.objective import aligned  # noqa: E402
+from gso.net.muon import optimisers, orthogonal  # noqa: E402
+from gso.net.objective import Objective, aligned  # noqa: E402
 from gso.net.schedule import place  # noqa: E402
 from gso.net.validate import SCORE, applied, mean_figures  # noqa: E402
 
@@ -370,6 +371,32 @@ def test_steps_of_muon_are_alike_in_all_directions():
     # Of AdamW's size: both kinds of weights go by one rate.
     step = weight.detach().square().mean().sqrt() / muon.defaults["lr"]
     assert 0.1 < step < 0.3
+
+
+def test_matrices_are_made_orthogonal_together_as_alone():
+    many = torch.randn(3, 12, 30, generator=torch.Generator().manual_seed(0))
+    for some in (many, many.mT):
+        alone = torch.cat([orthogonal(one[None]) for one in some])
+        torch.testing.assert_close(orthogonal(some), alone, atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("name", ["developable", "net-c", "flatten-strain", "flatten", "denoise"])
+def test_a_step_stays_on_the_device_of_its_batch(name, monkeypatch):
+    from gso.net.base import Net
+    from gso.net.weights import make
+
+    # The device without storage refuses tensors of others, as a GPU does.
+    meta = torch.device("meta")
+    monkeypatch.setattr(Net, "autocast", lambda *_: contextlib.nullcontext())
+    made = read(name)
+    objective = Objective(make({**made.model, "task": made.task}).to(meta))
+    for phase in made.phases:
+        surface = torch.empty(2, 64, 64, 3, device=meta)
+        target = torch.empty(2, 64, 64, 2 if made.task == "flatten" else 3, device=meta)
+        sigma = torch.empty(2, device=meta) if made.task == "denoise" else None
+        loss = objective(Batch(surface, target, sigma, step=3), phase, 0.5)
+        loss.backward()
+        assert loss.device == meta
 
 
 def test_muon_takes_matrices_and_adamw_the_rest():

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 _BATCH = 64
 #: Passes of a net whose result is solved from: what more of them change at large, a solve on a
 #: coarser grid does as well in less time.
-_PASSES = 2
+_PASSES = 1
 #: Relative fall of the energy at which a solve from a net's result stops: most of the time
 #: that is left after it gains some per mille.
 _NEARLY = 2e-3

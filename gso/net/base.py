@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from contextlib import AbstractContextManager
 from typing import Any
 
 import torch
@@ -83,3 +84,17 @@ class Net(nn.Module):
     def autocast(self, device: torch.device) -> torch.autocast:
         """Context for convolutions."""
         return torch.autocast(device.type, torch.bfloat16, enabled=self.bf16)
+
+
+def exact(*, tuned: bool = False) -> AbstractContextManager[None]:
+    """Context in which GPUs compute convolutions in all of single precision.
+
+    Their default keeps ten bits of it where a net computes in single precision; curvature
+    would show that.
+
+    Parameters
+    ----------
+    tuned : bool
+        Whether algorithms are tried out first: worth it for many batches of one size.
+    """
+    return torch.backends.cudnn.flags(enabled=True, benchmark=tuned, allow_tf32=False)

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from gso import dataset
-from gso.dataset import bezier
+from gso.dataset.drawing import draw_many
 from gso.io import replacing
 from gso.net import augment
 from gso.net.config import Config, Phase
@@ -23,6 +23,8 @@ from gso.status import DatasetError
 _ORDER, _CHANGES, _FRESH = 0, 1, 2
 #: Surfaces that are drawn with one seed.
 _DRAWN = 256
+#: Share of a GPU's free memory that a run's surfaces may take.
+_ROOM = 0.5
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,14 @@ class Source:
     surfaces: Tensor
     labels: Tensor | None = None
 
+    def placed(self, device: torch.device) -> Source:
+        """The same on a GPU, if there is room: to gather batches elsewhere takes longer."""
+        arrays = [self.surfaces, self.labels]
+        size = sum(x.numel() * x.element_size() for x in arrays if x is not None)
+        if device.type != "cuda" or size > _ROOM * torch.cuda.mem_get_info(device)[0]:
+            return self
+        return Source(*(None if x is None else x.to(device) for x in arrays))  # type: ignore[arg-type]
+
     def batch(
         self,
         config: Config,
@@ -79,7 +89,7 @@ class Source:
         if use_labels and self.labels is None:
             raise DatasetError(f"there are no labels {config.label!r} to learn")
         count = len(self.labels) if use_labels and self.labels is not None else len(self.surfaces)
-        rows = _rows(count, phase.batch, step, config.seed)
+        rows = _rows(count, phase.batch, step, config.seed).to(self.surfaces.device)
         generator = torch.Generator().manual_seed(_seed(config.seed, _CHANGES, step))
         chosen = [self.surfaces[rows]]
         if use_labels and self.labels is not None:
@@ -185,13 +195,8 @@ def fresh(count: int, seed: int, size: int, cache: Path, tick: Any = None) -> Te
             return torch.from_numpy(kept)
     except (OSError, ValueError, EOFError):
         pass
-    drawn = np.empty(shape, np.float32)
-    for start in range(0, count, _DRAWN):
-        some = min(_DRAWN, count - start)
-        surfaces = bezier.generate(some, seed=_seed(seed, _FRESH, start))
-        drawn[start : start + some] = bezier.sample_many(surfaces, size)
-        if tick is not None:
-            tick("surfaces drawn", start + some, count)
+    pieces = [(min(_DRAWN, count - k), _seed(seed, _FRESH, k)) for k in range(0, count, _DRAWN)]
+    drawn = draw_many(pieces, size, tick and (lambda made: tick("surfaces drawn", made, count)))
     with replacing(cache) as file:
         np.save(file, drawn, allow_pickle=False)
     return torch.from_numpy(drawn)

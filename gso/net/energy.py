@@ -107,8 +107,8 @@ def _second(x: Planes, axis: int, spacing: Tensor) -> Planes:
     n = x[0].shape[axis] - 2
     triple = [tuple(c.narrow(axis, k, n) for c in x) for k in range(3)]
     scale = (spacing**-2)[:, None, None].expand_as(triple[0][0])
-    zeros = [torch.zeros(())] * len(x)
-    return fairness.residual(triple, [scale, -2.0 * scale, scale, *(z.to(scale) for z in zeros)])
+    zeros = [scale.new_zeros(())] * len(x)
+    return fairness.residual(triple, [scale, -2.0 * scale, scale, *zeros])
 
 
 def _mean_of_three(x: Tensor, axis: int) -> Tensor:

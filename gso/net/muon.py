@@ -57,40 +57,49 @@ class Muon(torch.optim.Optimizer):
         """Take a step along the gradients that the weights hold."""
         for group in self.param_groups:
             rate, keep = group["lr"], group["momentum"]
-            for weight in group["params"]:
-                if weight.grad is None:
-                    continue
-                state = self.state[weight]
-                if not state:
-                    state["momentum"] = torch.zeros_like(weight)
-                mean = state["momentum"].lerp_(weight.grad, 1.0 - keep)
-                ahead = weight.grad.lerp(mean, keep).flatten(1)
-                along = orthogonal(ahead)
-                weight.mul_(1.0 - rate * group["weight_decay"])
-                size = _RMS * max(along.shape) ** 0.5
-                weight.add_(along.view_as(weight), alpha=-rate * size)
+            weights = [weight for weight in group["params"] if weight.grad is not None]
+            if not weights:
+                continue
+            for weight in weights:
+                if not self.state[weight]:
+                    self.state[weight]["momentum"] = torch.zeros_like(weight)
+            gradients = [weight.grad for weight in weights]
+            means = [self.state[weight]["momentum"] for weight in weights]
+            torch._foreach_lerp_(means, gradients, 1.0 - keep)
+            ahead = torch._foreach_lerp(gradients, means, keep)
+            torch._foreach_mul_(weights, 1.0 - rate * group["weight_decay"])
+            # On a GPU those of one shape go together: starting its kernels takes longest.
+            alike: dict[object, list[int]] = {}
+            for k, gradient in enumerate(ahead):
+                alike.setdefault(gradient.shape if gradient.is_cuda else k, []).append(k)
+            for members in alike.values():
+                some = torch.stack([ahead[k].flatten(1) for k in members])
+                along, size = orthogonal(some), _RMS * max(some.shape[1:]) ** 0.5
+                steps = [a.view_as(weights[k]) for a, k in zip(along, members, strict=True)]
+                torch._foreach_add_([weights[k] for k in members], steps, alpha=-rate * size)
 
 
-def orthogonal(matrix: Tensor) -> Tensor:
-    """The nearest matrix whose rows (or columns, if fewer) are orthonormal, roughly.
+def orthogonal(matrices: Tensor) -> Tensor:
+    """The nearest matrices (B, n, m) with orthonormal rows (or columns, if fewer), roughly.
 
-    >>> values = torch.linalg.svdvals(orthogonal(torch.randn(20, 50)))
+    >>> values = torch.linalg.svdvals(orthogonal(torch.randn(3, 20, 50)))
     >>> bool((values > 0.5).all() and (values < 1.5).all())
     True
     """
     a, b, c = _QUINTIC
-    tall = matrix.shape[0] > matrix.shape[1]
-    x = matrix.T if tall else matrix
-    x = x / x.norm().clamp_min(1e-12)
+    tall = matrices.shape[-2] > matrices.shape[-1]
+    x = matrices.mT if tall else matrices
+    x = x / x.norm(dim=(-2, -1), keepdim=True).clamp_min(1e-12)
     # Of the iterates p(x x') x only the small factors before x are computed.
-    square, before = x @ x.T, torch.eye(len(x), dtype=x.dtype, device=x.device)
+    square = x @ x.mT
+    before = torch.eye(x.shape[-2], dtype=x.dtype, device=x.device)
     one = a * before
     for _ in range(_ITERATIONS):
-        step = torch.addmm(torch.add(one, square, alpha=b), square, square, alpha=c)
+        step = torch.baddbmm(torch.add(one, square, alpha=b), square, square, alpha=c)
         before = step @ before
         square = step @ square @ step
     x = before @ x
-    return x.T if tall else x
+    return x.mT if tall else x
 
 
 def optimisers(net: nn.Module, kind: str, weight_decay: float) -> list[torch.optim.Optimizer]:

@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from gso.net import denoising
-from gso.net.base import SIZE, Net
+from gso.net.base import SIZE, Net, exact
 from gso.net.catalogue import chain
 from gso.net.weights import cached
 from gso.resample import resample
@@ -143,7 +143,7 @@ def _predicted(
         most = net.passes if passes is None else min(int(passes), net.passes)
         noise = _sigma(net, unit, scale, sigma, device)
         coarse = torch.as_tensor(_resampled(unit), dtype=torch.float32, device=device)
-        with torch.inference_mode():
+        with torch.inference_mode(), exact():
             if unit.shape[1:3] == (SIZE, SIZE):
                 moved = net.displacements(coarse, noise, passes=most)
             else:

@@ -68,9 +68,9 @@ class Run:
         """Take the moving average of the weights a step on."""
         decay = min(self.config.ema, (1 + self.step) / (10 + self.step))
         with torch.no_grad():
-            pairs = zip(self.average.parameters(), self.net.parameters(), strict=True)
-            for mean, value in pairs:
-                mean.lerp_(value, 1.0 - decay)
+            means: list[Tensor] = list(self.average.parameters())
+            values: list[Tensor] = list(self.net.parameters())
+            torch._foreach_lerp_(means, values, 1.0 - decay)
 
     def keep(self) -> None:
         """Write a checkpoint."""
@@ -109,7 +109,8 @@ class Run:
             **self.origin,
         }
         if self.begun_with:
-            card["begun_with"] = {k: self.begun_with.get(k) for k in ("name", "hours", "sha256")}
+            kept = ("name", "hours", "sha256", "hardware")
+            card["begun_with"] = {k: self.begun_with.get(k) for k in kept}
         return card | {"curve": self._curve()}
 
     @property
@@ -198,6 +199,7 @@ def begin(
                 raise OptionError(f"{folder} holds a run with another {other}; take another folder")
         state = checkpoint.load(path, net, average, run.optimisers)
         run.step, run.spent, run.figures = state["step"], state["spent"], state["figures"]
+    run.source = run.source.placed(here.device)
     if here.first:
         run.curves = Curves(folder, run.step)
     return run

@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 from torch.nn.parallel import DistributedDataParallel
 
+from gso.net.base import exact
 from gso.net.config import Config
 from gso.net.objective import Objective
 from gso.net.processes import interruption, processes
@@ -98,7 +99,7 @@ def train(
     """
     if minutes is not None and not minutes > 0:
         raise OptionError(f"minutes is {minutes!r}; it must be positive")
-    with processes(device) as here:
+    with processes(device) as here, exact(tuned=True):
         for phase in config.phases:
             if phase.batch % here.world:
                 raise OptionError(f"batch {phase.batch} is no multiple of {here.world} processes")

@@ -1,0 +1,63 @@
+"""Many surfaces of the recipe, drawn by several processes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.dataset import bezier
+from gso.status import DatasetError
+
+#: Surfaces that are worth several processes: fewer are drawn sooner than those start.
+_MANY = 4096
+
+
+def draw_many(
+    pieces: Sequence[tuple[int, int]], size: int, tick: Callable[[int], None] | None = None
+) -> NDArray[np.float32]:
+    """Surfaces (n, size, size, 3) in the unit ball, of counts and seeds one after the other.
+
+    They are the same whatever the number of processors.
+
+    Parameters
+    ----------
+    pieces : sequence of (int, int)
+        How many surfaces, and the seed of these.
+    size : int
+        Samples along each side.
+    tick : callable, optional
+        Told how many are drawn.
+
+    Raises
+    ------
+    DatasetError
+        A process failed.
+
+    Examples
+    --------
+    >>> draw_many([(2, 7), (1, 8)], 16).shape
+    (3, 16, 16, 3)
+    """
+    from gso.tno import pool
+
+    counts = [count for count, _ in pieces]
+    ends = np.cumsum(counts, dtype=int)
+    drawn = np.empty((sum(counts), size, size, 3), np.float32)
+    workers = 0 if len(drawn) < _MANY else pool.processors()
+    ready = 0
+    for done in pool.spread(partial(_sampled, size=size), pieces, workers=workers):
+        if done.error is not None:
+            raise DatasetError(f"surfaces of seed {pieces[done.index][1]}: {done.error}")
+        drawn[ends[done.index] - counts[done.index] : ends[done.index]] = done.value
+        ready += counts[done.index]
+        if tick is not None:
+            tick(ready)
+    return drawn
+
+
+def _sampled(piece: tuple[int, int], size: int) -> NDArray[np.float32]:
+    count, seed = piece
+    return bezier.sample_many(bezier.generate(count, seed=seed), size).astype(np.float32)
