@@ -93,18 +93,21 @@ class CoarseNet(Net):
             nn.init.zeros_(head.weight)
             nn.init.zeros_(head.bias)  # type: ignore[arg-type]
 
-    def coefficients(self, surface: Tensor, passes: int | None = None) -> tuple[Tensor, Tensor]:
+    def coefficients(
+        self, surface: Tensor, frame: Frame, passes: int | None = None
+    ) -> tuple[Tensor, Tensor]:
         """Coefficients (B, d, n, m) of both fields after some passes, all when not given."""
         passes = self.passes if passes is None else passes
         with torch.no_grad():
-            seen, coarse, fine = self._seen(surface, passes - 1)
+            seen, coarse, fine = self._seen(surface, frame, passes - 1)
         more = self._fields(seen)
         return coarse + more[0], fine + more[1]
 
-    def _seen(self, surface: Tensor, passes: int) -> tuple[Tensor, Tensor | float, Tensor | float]:
+    def _seen(
+        self, surface: Tensor, frame: Frame, passes: int
+    ) -> tuple[Tensor, Tensor | float, Tensor | float]:
         """What the net sees after some passes, and the sums of their coefficients."""
         p = planes(surface)
-        frame = Frame.of(p)
         bent = inputs.bending(p, frame)
         known = torch.stack([*inputs.shape(p, frame), *bent], dim=1)
         start = self.start(surface)
@@ -126,9 +129,9 @@ class CoarseNet(Net):
     def displacements(
         self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
     ) -> Tensor:
-        fields = self.coefficients(surface, passes)
-        shares = self._shares(*fields, *surface.shape[1:3])
-        return self._vectors(shares, Frame.of(planes(surface)))
+        frame = Frame.of(planes(surface))
+        fields = self.coefficients(surface, frame, passes)
+        return self._vectors(self._shares(*fields, *surface.shape[1:3]), frame)
 
     def carried(
         self,
@@ -138,7 +141,8 @@ class CoarseNet(Net):
         *,
         passes: int | None = None,
     ) -> Tensor:
-        first, second = (c.to(fine.dtype) for c in self.coefficients(surface, passes))
+        own = Frame.of(planes(surface))
+        first, second = (c.to(fine.dtype) for c in self.coefficients(surface, own, passes))
         shares = self._shares(first, second, fine.shape[1], fine.shape[2])
         return self._vectors(shares, Frame.of(planes(fine)))
 
