@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from functools import partial
 
 import numpy as np
@@ -48,13 +49,15 @@ def draw_many(
     drawn = np.empty((sum(counts), size, size, 3), np.float32)
     workers = 0 if len(drawn) < _MANY else pool.processors()
     ready = 0
-    for done in pool.spread(partial(_sampled, size=size), pieces, workers=workers):
-        if done.error is not None:
-            raise DatasetError(f"surfaces of seed {pieces[done.index][1]}: {done.error}")
-        drawn[ends[done.index] - counts[done.index] : ends[done.index]] = done.value
-        ready += counts[done.index]
-        if tick is not None:
-            tick(ready)
+    work = partial(_sampled, size=size)
+    with closing(pool.spread(work, pieces, workers=workers)) as results:
+        for done in results:
+            if done.error is not None:
+                raise DatasetError(f"surfaces of seed {pieces[done.index][1]}: {done.error}")
+            drawn[ends[done.index] - counts[done.index] : ends[done.index]] = done.value
+            ready += counts[done.index]
+            if tick is not None:
+                tick(ready)
     return drawn
 
 
