@@ -35,6 +35,7 @@ from tno import progress as watched
 
 import gso
 from gso import hybrid
+from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.net.catalogue import DEFAULTS, available
 from gso.resample import resample
@@ -53,6 +54,10 @@ CASES = {
 POINTS = (0, 1, 2, 3, 4, 6, 8, 12, 18, 24)
 #: Vertices along the sides of the section "sizes", and the presets compared there.
 SIZES, PRESETS = (32, 64, 128, 256), ("balanced", "accurate")
+#: Share by which the sections "guard" and "general" stretch designs along x, to see how far apart
+#: the cold solves of two designs end that nobody can tell apart.
+STRETCH = 1e-6
+_STRETCHED = f"cold, its input stretched by {STRETCH:g}"
 #: Holes of the general meshes, as shares of the side; every other one has none.
 HOLES = (0.0, 0.15)
 
@@ -77,32 +82,42 @@ def energy(result: gso.Result) -> float:
 
 
 def compared(
-    designs: Iterable[Any], task: str, keywords: dict[str, Any], workers: int | None = 0
+    designs: Iterable[Any],
+    task: str,
+    keywords: dict[str, Any],
+    workers: int | None = 0,
+    stretched: bool = False,
 ) -> dict[str, np.ndarray]:
     """Cold and hybrid on every design: milliseconds, energies, and which were started by a net.
 
-    Times mean something without workers only.
+    Times mean something without workers only. When asked for, also energies of cold solves of
+    the stretched designs, which show how far such minima lie apart by chance.
     """
     rows = []
-    with closing(spread(partial(_both, task, keywords), designs, workers=workers)) as results:
+    solved = partial(_solved, task, keywords, stretched)
+    with closing(spread(solved, designs, workers=workers)) as results:
         for done in results:
             if done.error is not None:
                 raise SystemExit(f"design {done.index}: {done.error}")
             rows.append(done.value)
-    names = ("cold", "hybrid", "net", "energy", "started")
+    names = ("cold", "hybrid", "net", "started", "energy", "stretched")[: len(rows[0])]
     return dict(zip(names, np.array(rows, float).T, strict=True))
 
 
-def _both(task: str, keywords: dict[str, Any], design: Any) -> tuple[float, ...]:
+def _solved(task: str, keywords: dict[str, Any], stretched: bool, design: Any) -> tuple[float, ...]:
     cold, slow = timed(optimize, design, task=task, **keywords)
     warm, quick = timed(hybrid.solve, design, task=task, **keywords)
-    ratio = energy(warm) / max(energy(cold), 1e-300)
-    return slow, quick, 1e3 * warm.seconds["net"], ratio, warm.warm_start == "net"
+    others = [warm]
+    if stretched:
+        mesh = as_mesh(design)
+        near = mesh.replaced(mesh.vertices * [1.0 + STRETCH, 1.0, 1.0])
+        others.append(timed(optimize, near, task=task, **keywords)[0])
+    energies = (energy(other) / max(energy(cold), 1e-300) for other in others)
+    return slow, quick, 1e3 * warm.seconds["net"], warm.warm_start == "net", *energies
 
 
-def ratios(found: dict[str, np.ndarray]) -> str:
-    """Energies against the cold solve's, in words."""
-    energies = found["energy"]
+def ratios(energies: np.ndarray) -> str:
+    """Energies over the cold solve's, in words."""
     shares = ", ".join(f"{(energies <= most).mean():.2%} <= {most}" for most in (1.01, 1.05))
     return f"median {np.median(energies):.4f}, {shares}, worst {energies.max():.4f}"
 
@@ -113,7 +128,7 @@ def costs(found: dict[str, np.ndarray]) -> str:
     return (
         f"cold {np.median(found['cold']):6.0f}  hybrid {np.median(found['hybrid']):6.0f} "
         f"(net {np.median(found['net']):.0f})  {share:.2f} of the time; "
-        f"started {found['started'].mean():.0%}; energy {ratios(found)}"
+        f"started {found['started'].mean():.0%}; energy {ratios(found['energy'])}"
     )
 
 
@@ -153,17 +168,19 @@ def guard(splits: dict[str, Surfaces], count: int | None) -> None:
     for name, split in splits.items():
         total = min(count or len(split), len(split))
         designs = (split[k] for k in watched(range(total), name))
-        found = compared(designs, "developable", {}, workers=None)
-        print(f"  {name:6s} {total:5d} surfaces: {ratios(found)}", flush=True)
+        found = compared(designs, "developable", {}, workers=None, stretched=True)
+        print(f"  {name:6s} {total:5d} surfaces: {ratios(found['energy'])}")
+        print(f"  {_STRETCHED}: {ratios(found['stretched'])}", flush=True)
 
 
 def general(test: Surfaces, count: int) -> None:
     """The same on meshes that are no grids."""
     chosen = first(test, count)
     meshes = [patch(p, HOLES[k % len(HOLES)], seed=k) for k, p in enumerate(chosen)]
-    found = compared(watched(meshes, "general"), "developable", {})
+    found = compared(watched(meshes, "general"), "developable", {}, stretched=True)
     print(f"\nGeneral meshes: {len(meshes)}, triangulated in random order, half with a hole")
-    print(f"  started {found['started'].mean():.0%}; energy {ratios(found)}")
+    print(f"  {_STRETCHED}: {ratios(found['stretched'])}")
+    print(f"  started {found['started'].mean():.0%}; energy {ratios(found['energy'])}")
 
 
 def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gso import topology
+from gso import geometry, topology
 from gso.status import MeshError
 
 Array = NDArray[np.float64]
@@ -220,7 +220,7 @@ class Mesh:
     @property
     def diagonal(self) -> float:
         """Length of the bounding box's diagonal, unused vertices not counted."""
-        return float(np.linalg.norm(np.ptp(self.vertices[self.used], axis=0)))
+        return geometry.box_diagonal(self.vertices[self.used])
 
     @cached_property
     def frame(self) -> Frame:
@@ -228,10 +228,7 @@ class Mesh:
 
         A vertex of no face may lie anywhere and does not count.
         """
-        points = self.vertices[self.used]
-        centre = points.mean(axis=0)
-        radius = float(np.sqrt(((points - centre) ** 2).sum(axis=1).max()))
-        return Frame(centre, radius)
+        return Frame(*geometry.ball(self.vertices[self.used]))
 
     @property
     def used(self) -> NDArray[np.bool_]:

@@ -118,8 +118,7 @@ def unit(surface: Any) -> float:
     """Largest distance of a vertex from the centroid: the length that counts as one."""
     if hasattr(surface, "frame"):
         return surface.frame.scale
-    points = _points(surface)
-    return float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).max()))
+    return geometry.ball(_points(surface))[1]
 
 
 def curvature_grid(points: Array) -> Array:
@@ -186,7 +185,7 @@ def d_H(before: Any, after: Any) -> float:
 
     source = _used_points(before)
     distance, _ = cKDTree(source).query(_used_points(after))
-    return float(100.0 * distance.mean() / np.linalg.norm(np.ptp(source, axis=0)))
+    return float(100.0 * distance.mean() / geometry.box_diagonal(source))
 
 
 def point_to_surface(points: Array, mesh: Mesh) -> Array:
@@ -211,7 +210,7 @@ def displacement(before: Any, after: Any) -> tuple[float, float]:
     """
     source = _used_points(before)
     moved = np.linalg.norm(_used_points(after) - source, axis=1)
-    percent = 100.0 / np.linalg.norm(np.ptp(source, axis=0))
+    percent = 100.0 / geometry.box_diagonal(source)
     return float(percent * np.sqrt((moved**2).mean())), float(percent * moved.max())
 
 

@@ -119,7 +119,7 @@ class BSplineSurface:
     @property
     def size(self) -> float:
         """Diagonal of the control net's bounding box, in which the surface lies."""
-        return float(np.linalg.norm(np.ptp(self.net.reshape(-1, 3), axis=0)))
+        return geometry.box_diagonal(self.net.reshape(-1, 3))
 
     def evaluate(self, u: ArrayLike, v: ArrayLike, *, du: int = 0, dv: int = 0) -> Array:
         """Points of the surface, or derivatives.

@@ -1,9 +1,10 @@
 """The package's only definitions of geometric quantities.
 
-Every function takes *component tuples* ``(x, y, z)`` or ``(x, y)`` and uses only
+The functions take *component tuples* ``(x, y, z)`` or ``(x, y)`` and use only
 ``+ - * /`` and the few functions of :mod:`gso.geometry.ops`. The same code runs on
 NumPy arrays (metrics), torch tensors (losses) and CasADi symbols (derivatives), so a
-solver residual, a training loss and a metric cannot drift apart.
+solver residual, a training loss and a metric cannot drift apart. Only the sizes of
+whole surfaces, :mod:`gso.geometry.size`, are of NumPy arrays of points.
 """
 
 from gso.geometry.cells import (
@@ -24,6 +25,7 @@ from gso.geometry.shape import (
     shape_matrix,
     tangent_frame,
 )
+from gso.geometry.size import ball, box_diagonal
 from gso.geometry.strain import rest_frame, singular_values, stretch, turn_and_shear
 from gso.geometry.stretches import first_form, principal_stretches
 from gso.geometry.vector import angle, cross, dot, norm, norm2, sub
@@ -31,6 +33,8 @@ from gso.geometry.vector import angle, cross, dot, norm, norm2, sub
 __all__ = [
     "Matrix",
     "angle",
+    "ball",
+    "box_diagonal",
     "corner_area2",
     "cross",
     "determinant",
