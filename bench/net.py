@@ -25,8 +25,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-# Threads that wait for each other busily slow each other down where cores are shared.
-os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+# What a machine of two cores has when nothing is said.
 os.environ.setdefault("OMP_NUM_THREADS", "2")
 
 import numpy as np

@@ -69,7 +69,8 @@ def main() -> None:
 
 
 def _asked(arguments: argparse.Namespace) -> list[str]:
-    return [name for name in ("quick", "store", "tune", "data") if getattr(arguments, name)]
+    asked = [name for name in ("quick", "store", "tune") if getattr(arguments, name)]
+    return [*asked, "data DIR"] if arguments.data else asked
 
 
 def _screened(out: Path, split: str) -> surfaces.Surfaces:

@@ -225,7 +225,7 @@ def test_surfaces_of_a_set_that_is_built(tmp_path):
     recipe = dataset.Recipe(n=10, size=16, labels=("strain",), extras=False)
     split = dataset.build(tmp_path / "set", recipe, workers=0)["test"]
     some = surfaces.opened(tmp_path, tmp_path / "set")
-    assert len(some) == len(split)
+    assert len(some) == len(split) and some.name == f"test split of seed 0, {len(split)} surfaces"
     np.testing.assert_array_equal(some[0], split["surface"][0])
     np.testing.assert_allclose(some.case(0, 0.01).given, split["noisy_0.010"][0], atol=1e-9)
 

@@ -163,10 +163,12 @@ def screened(folder: Path, split: str, store: Store, tick: Tick | None = None) -
 
 def opened(folder: Path, path: Path, name: str = "test") -> Surfaces:
     """A split of a set that is built; the test split with its noise, others without any."""
-    split = dataset.open(path)[name]
+    whole = dataset.open(path)
+    split = whole[name]
     points = split["surface"][:]
-    if name != "test":
-        return written(folder, f"{name} split of {path.name}", points, np.zeros_like(points))
-    if "noise" not in split.arrays:
+    if name == "test" and "noise" not in split.arrays:
         raise DatasetError(f"{path}: its test split has no noise; give a set of gso dataset build")
-    return written(folder, f"test split of {path.name}", points, split["noise"][:])
+    noise = split["noise"][:] if name == "test" else np.zeros_like(points)
+    home = written(folder, f"{name} split of {path.name}", points, noise).folder
+    source = f"seed {whole.manifest['recipe']['seed']}" if whole.manifest else path.name
+    return Surfaces(f"{name} split of {source}, {len(split):,} surfaces", home)
