@@ -178,8 +178,8 @@ def general(test: Surfaces, count: int) -> None:
     meshes = [patch(p, HOLES[k % len(HOLES)], seed=k) for k, p in enumerate(chosen)]
     found = compared(watched(meshes, "general"), "developable", {}, stretched=True)
     print(f"\nGeneral meshes: {len(meshes)}, triangulated in random order, half with a hole")
-    print(f"  {_STRETCHED}: {ratios(found['stretched'])}")
     print(f"  started {found['started'].mean():.0%}; energy {ratios(found['energy'])}")
+    print(f"  {_STRETCHED}: {ratios(found['stretched'])}")
 
 
 def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:
