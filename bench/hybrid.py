@@ -99,20 +99,26 @@ def compared(
             if done.error is not None:
                 raise SystemExit(f"design {done.index}: {done.error}")
             rows.append(done.value)
-    names = ("cold", "hybrid", "net", "started", "energy", "stretched")[: len(rows[0])]
-    return dict(zip(names, np.array(rows, float).T, strict=True))
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
-def _solved(task: str, keywords: dict[str, Any], stretched: bool, design: Any) -> tuple[float, ...]:
+def _solved(task: str, keywords: dict[str, Any], stretched: bool, design: Any) -> dict[str, float]:
     cold, slow = timed(optimize, design, task=task, **keywords)
     warm, quick = timed(hybrid.solve, design, task=task, **keywords)
-    others = [warm]
+    least = max(energy(cold), 1e-300)
+    found = {
+        "cold": slow,
+        "hybrid": quick,
+        "net": 1e3 * warm.seconds["net"],
+        "started": warm.warm_start == "net",
+        "energy": energy(warm) / least,
+    }
     if stretched:
         mesh = as_mesh(design)
         near = mesh.replaced(mesh.vertices * [1.0 + STRETCH, 1.0, 1.0])
-        others.append(timed(optimize, near, task=task, **keywords)[0])
-    energies = (energy(other) / max(energy(cold), 1e-300) for other in others)
-    return slow, quick, 1e3 * warm.seconds["net"], warm.warm_start == "net", *energies
+        again, _ = timed(optimize, near, task=task, **keywords)
+        found["stretched"] = energy(again) / least
+    return found
 
 
 def ratios(energies: np.ndarray) -> str:

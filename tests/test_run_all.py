@@ -252,7 +252,7 @@ def compared(task, sigma, name, some):
 #: Share by which a figure may differ where a net makes the start: processors round its single
 #: precision otherwise, and |K| has many minima. Cold solves of inputs that differ by
 #: as little end as far apart: ``python bench/hybrid.py guard``.
-MINIMA = {"loss_gc": 0.5}
+MINIMA = {("hybrid", "loss_gc"): 0.5}
 
 
 def check_stored(paces, some, share):
@@ -264,7 +264,7 @@ def check_stored(paces, some, share):
             for found, figures in compared(task, sigma, name, some):
                 for metric, value in figures.items():
                     wrong = abs(found[metric] - value)
-                    most = max(share, MINIMA.get(metric, 0.0) if name == "hybrid" else 0.0)
+                    most = max(share, MINIMA.get((name, metric), 0.0))
                     assert wrong <= most * abs(value) + 1e-5, (task, sigma, name, metric)
 
 
