@@ -84,12 +84,14 @@ def test_losses_are_the_metrics(pair):
         assert float(fair[k]) == pytest.approx(metrics.fairness(result, scale=1.0), rel=1e-6)
 
 
-def test_iso_is_the_squared_defect():
+def test_iso_and_the_metric():
     surface = saddle(9, 8)
     flat = rectangle(surface)
     defect = losses.iso(batch(surface), batch(flat))
     by_hand = metrics.isometry_defect(surface, flat, scale=1.0)
     assert float(defect) <= (by_hand**2).mean() <= 3 * float(defect)
+    cell = float(losses.iso_cell(batch(surface), batch(flat)))
+    assert cell == pytest.approx(metrics.loss_iso_cell(surface, flat, scale=1.0), rel=1e-12)
     bent = cylinder(9)
     assert float(losses.iso(batch(bent), batch(bent))) == 0.0
 

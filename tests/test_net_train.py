@@ -202,7 +202,12 @@ RUNS = {
         phase=[{"batch": 4, "weights": {"in": 1, "fair": 1, "gc": 1}, "decay": 3.0}],
     ),
     "flatten published": config(
-        "flatten", PUBLISHED, phase=[{"batch": 4, "weights": {"iso_w": 1e6, "iso": 1, "fair": 1}}]
+        "flatten",
+        PUBLISHED,
+        phase=[
+            {"batch": 4, "weights": {"iso_w": 1e6, "iso": 1, "fair": 1}},
+            {"batch": 4, "weights": {"iso_cell": 1e4, "iso_cell_w": 1.0}},
+        ],
     ),
     "denoise": config(
         "denoise", {**PUBLISHED, "sigma": True}, phase=[{"loss": "clean", "batch": 4}]

@@ -10,6 +10,40 @@ from torch.nn.functional import silu
 _GROUP = 16
 
 
+class Convolution(nn.Conv2d):
+    """As PyTorch's, but on CPUs single small grids take the fast way, too.
+
+    A single grid with few values PyTorch hands to a loop of its own, which takes up to twice
+    the time of the oneDNN that it uses for all others.
+
+    >>> x, net = torch.ones(1, 4, 8, 8), Convolution(4, 4, 3, padding=1)
+    >>> with torch.inference_mode():
+    ...     alone = net(x)
+    >>> bool((alone - net(x)).abs().max() < 1e-5)
+    True
+    """
+
+    def forward(self, x: Tensor) -> Tensor:
+        if _slow(x, self.weight):
+            pads = [int(n) for n in self.padding]
+            return torch.mkldnn_convolution(
+                x, self.weight, self.bias, pads, self.stride, self.dilation, self.groups
+            )
+        return super().forward(x)
+
+
+def _slow(x: Tensor, weight: Tensor) -> bool:
+    """Whether PyTorch would not give a convolution to oneDNN although that could do it."""
+    return (
+        x.is_cpu
+        and len(x) == 1
+        and x.dtype == weight.dtype == torch.float32
+        and not torch.is_grad_enabled()
+        and torch.backends.mkldnn.is_available()
+        and hasattr(torch, "mkldnn_convolution")
+    )
+
+
 class IMDB(nn.Module):
     """Information multi-distillation block (Hui et al. 2019), without biases.
 
@@ -26,10 +60,10 @@ class IMDB(nn.Module):
         kept, rest = channels // 4, channels - channels // 4
         self.sizes = (kept, rest)
         self.steps = nn.ModuleList(
-            nn.Conv2d(n, channels, 3, padding=1, bias=False) for n in (channels, rest, rest)
+            Convolution(n, channels, 3, padding=1, bias=False) for n in (channels, rest, rest)
         )
-        self.last = nn.Conv2d(rest, kept, 3, padding=1, bias=False)
-        self.mix = nn.Conv2d(channels, channels, 1, bias=False)
+        self.last = Convolution(rest, kept, 3, padding=1, bias=False)
+        self.mix = Convolution(channels, channels, 1, bias=False)
         self.active = nn.LeakyReLU(0.05, inplace=True)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -48,7 +82,7 @@ class Residual(nn.Module):
         super().__init__()
         groups = max(channels // _GROUP, 1)
         self.before, self.between = (nn.GroupNorm(groups, channels) for _ in range(2))
-        self.first, self.second = (nn.Conv2d(channels, channels, 3, padding=1) for _ in range(2))
+        self.first, self.second = (Convolution(channels, channels, 3, padding=1) for _ in range(2))
         self.everywhere = nn.Linear(channels, channels)
 
     def forward(self, x: Tensor) -> Tensor:

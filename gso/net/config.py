@@ -21,8 +21,8 @@ OPTIMISERS = ("muon", "adamw")
 AUGMENTATIONS = ("none", "symmetries", "shear")
 #: Steps of a phase through the vertices that leave a grid worth training on.
 LARGEST_STRIDE = 4
-#: Terms of the published losses.
-TERMS = ("in", "fair", "gc", "iso", "iso_w")
+#: Terms of the published losses, and the figure that flat images are judged by.
+TERMS = ("in", "fair", "gc", "iso", "iso_w", "iso_cell", "iso_cell_w")
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,7 @@ def _fits(config: Config, phase: Phase) -> None:
         raise OptionError("through: there are no labels, nor clean surfaces, of a net's results")
     if phase.loss == "label" and config.augment == "shear":
         raise OptionError("labels do not follow a shear; take augment = 'symmetries'")
-    wrong = {"iso", "iso_w"} if config.task != "flatten" else {"in", "gc"}
+    wrong = {t for t in TERMS if t.startswith("iso")} if config.task != "flatten" else {"in", "gc"}
     if phase.loss == "published" and wrong & {k for k, v in phase.weights.items() if v}:
         raise OptionError(f"{', '.join(sorted(wrong))} do not go with task {config.task!r}")
 

@@ -84,9 +84,11 @@ def normals(p: Planes) -> Planes:
     return unit(tuple(total))
 
 
-def _slope(x: Tensor, axis: int) -> Tensor:
-    """Derivative along an axis whose ends are one apart."""
-    return torch.gradient(x, dim=axis, spacing=1.0 / (x.shape[axis] - 1))[0]
+def _slopes(p: Planes, *axes: int) -> list[Planes]:
+    """Derivatives of components along axes whose ends are one apart."""
+    spacing = [1.0 / (p[0].shape[axis] - 1) for axis in axes]
+    found = torch.gradient(torch.stack(p), dim=[1 + axis for axis in axes], spacing=spacing)
+    return [x.unbind() for x in found]
 
 
 def _bend(x: Tensor, axis: int) -> Tensor:
@@ -113,7 +115,7 @@ class Frame(NamedTuple):
     @classmethod
     def of(cls, p: Planes) -> Frame:
         """Frame of grids."""
-        du, dv = tuple(_slope(c, 1) for c in p), tuple(_slope(c, 2) for c in p)
+        du, dv = _slopes(p, 1, 2)
         return cls(du, dv, unit(du), unit(dv), normals(p))
 
     def combine(self, shares: Tensor) -> Tensor:
@@ -132,7 +134,7 @@ def first_form(frame: Frame) -> Planes:
 def normal_curvatures(p: Planes, frame: Frame) -> Planes:
     """Curvature along both parameter lines, and the twist between them, 1 / length."""
     suu, svv = tuple(_bend(c, 1) for c in p), tuple(_bend(c, 2) for c in p)
-    suv = tuple(_slope(c, 2) for c in frame.du)
+    (suv,) = _slopes(frame.du, 2)
     u, v = (geometry.norm(d).clamp_min(1e-6) for d in (frame.du, frame.dv))
     scales = (u * u, v * v, u * v)
     return tuple(

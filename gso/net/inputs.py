@@ -38,8 +38,13 @@ def shape(p: Planes, frame: Frame) -> list[Tensor]:
 def bending(p: Planes, frame: Frame) -> list[Tensor]:
     """Gaussian curvature on two scales, curvature and twist of the grid lines."""
     k = to_border(curvature(p))
-    gauss = [torch.asinh(k / _SMALL_CURVATURE) / 4.0, torch.tanh(k / _LARGE_CURVATURE)]
-    return gauss + [torch.asinh(c) / 2.0 for c in normal_curvatures(p, frame)]
+    gauss = [_asinh(k / _SMALL_CURVATURE) / 4.0, torch.tanh(k / _LARGE_CURVATURE)]
+    return gauss + [_asinh(c) / 2.0 for c in normal_curvatures(p, frame)]
+
+
+def _asinh(x: Tensor) -> Tensor:
+    """Inverse hyperbolic sine, which PyTorch computes one number at a time on CPUs."""
+    return (x.abs() + torch.hypot(x, torch.ones_like(x))).log().copysign(x)
 
 
 def stretching(frame: Frame, flat: Planes) -> list[Tensor]:

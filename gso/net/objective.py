@@ -55,10 +55,12 @@ def _published(task: str, batch: Batch, start: Tensor, phase: Phase, progress: f
             total = total + w["fair"] * losses.fair(result)
         if w.get("gc"):
             total = total + w["gc"] * losses.gc(result)
-        if w.get("iso"):
-            total = total + w["iso"] * losses.iso(surface, result)
-        if w.get("iso_w"):
-            total = total + w["iso_w"] * losses.iso(surface, result, losses.iso_weights(surface))
+        for name, term in (("iso", losses.iso), ("iso_cell", losses.iso_cell)):
+            if w.get(name):
+                total = total + w[name] * term(surface, result)
+            if w.get(f"{name}_w"):
+                cells = losses.iso_weights(surface)
+                total = total + w[f"{name}_w"] * term(surface, result, cells)
         return total
 
     return cost

@@ -109,8 +109,8 @@ class Run:
             **self.origin,
         }
         if self.begun_with:
-            kept = ("name", "hours", "sha256", "hardware")
-            card["begun_with"] = {k: self.begun_with.get(k) for k in kept}
+            kept = ("name", "hours", "sha256", "hardware", "begun_with")
+            card["begun_with"] = {k: self.begun_with[k] for k in kept if k in self.begun_with}
         return card | {"curve": self._curve()}
 
     @property
