@@ -8,6 +8,8 @@ from torch.nn.functional import silu
 
 #: Channels that are normalised together.
 _GROUP = 16
+#: Whether PyTorch has oneDNN, and lets it be called.
+_ONEDNN = torch.backends.mkldnn.is_available() and hasattr(torch, "mkldnn_convolution")
 
 
 class Convolution(nn.Conv2d):
@@ -24,10 +26,9 @@ class Convolution(nn.Conv2d):
     """
 
     def forward(self, x: Tensor) -> Tensor:
-        if _slow(x, self.weight):
-            pads = [int(n) for n in self.padding]
+        if _slow(x, self.weight) and not isinstance(self.padding, str):
             return torch.mkldnn_convolution(
-                x, self.weight, self.bias, pads, self.stride, self.dilation, self.groups
+                x, self.weight, self.bias, self.padding, self.stride, self.dilation, self.groups
             )
         return super().forward(x)
 
@@ -35,12 +36,11 @@ class Convolution(nn.Conv2d):
 def _slow(x: Tensor, weight: Tensor) -> bool:
     """Whether PyTorch would not give a convolution to oneDNN although that could do it."""
     return (
-        x.is_cpu
+        _ONEDNN
+        and x.is_cpu
         and len(x) == 1
         and x.dtype == weight.dtype == torch.float32
         and not torch.is_grad_enabled()
-        and torch.backends.mkldnn.is_available()
-        and hasattr(torch, "mkldnn_convolution")
     )
 
 

@@ -1,12 +1,10 @@
-"""The published losses (Wang et al. 2024), from the package's own geometry.
+"""The published losses (Wang et al. 2024) and ``iso_cell``, from the package's own geometry.
 
 All take grids (B, H, W, d) and return one number per surface, (B,); the published loss is
 their mean over the batch. None runs in less than single precision.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -43,7 +41,7 @@ def iso(surface: Tensor, flat: Tensor, weights: Tensor | None = None) -> Tensor:
 
     With `weights` (B, H-1, W-1) of the cells, Eq. 13, which makes Net-W: their weighted sum.
     """
-    return _over_cells(sum(r * r for r in _defects(surface, flat)), weights)
+    return _over_cells(_defects(surface, flat).square(), weights)
 
 
 def iso_cell(surface: Tensor, flat: Tensor, weights: Tensor | None = None) -> Tensor:
@@ -52,17 +50,18 @@ def iso_cell(surface: Tensor, flat: Tensor, weights: Tensor | None = None) -> Te
     Not among the published losses: flat images are judged by it, yet only its squares are
     minimised there. `weights` are those of :func:`iso`.
     """
-    return _over_cells(sum(r.abs() for r in _defects(surface, flat)), weights)
+    return _over_cells(_defects(surface, flat).abs(), weights)
 
 
-def _defects(surface: Tensor, flat: Tensor) -> Planes:
+def _defects(surface: Tensor, flat: Tensor) -> Tensor:
+    """The three parts of every cell's isometry defect, (3, B, H-1, W-1)."""
     (a, b), (a2, b2) = (geometry.diagonals(*grids.corners(planes(x))) for x in (surface, flat))
-    return geometry.isometry_defect(a, b, a2, b2)
+    return torch.stack(geometry.isometry_defect(a, b, a2, b2))
 
 
-def _over_cells(cells: Any, weights: Tensor | None) -> Tensor:
-    total: Tensor = cells.mean(dim=(1, 2)) if weights is None else (weights * cells).sum(dim=(1, 2))
-    return total
+def _over_cells(parts: Tensor, weights: Tensor | None) -> Tensor:
+    cells = parts.sum(dim=0)
+    return cells.mean(dim=(1, 2)) if weights is None else (weights * cells).sum(dim=(1, 2))
 
 
 def iso_weights(surface: Tensor) -> Tensor:
