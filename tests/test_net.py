@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import subprocess
 import sys
@@ -26,6 +27,7 @@ from gso.net import (  # noqa: E402
     predict,
     save,
 )
+from gso.net.blocks import Convolution  # noqa: E402
 from gso.net.catalogue import TASKS  # noqa: E402
 
 
@@ -56,6 +58,38 @@ def flatten():
 @pytest.fixture(scope="module")
 def published():
     return shaken(GSONet(channels=8, blocks=1), size=0.01)
+
+
+@pytest.mark.parametrize("size", [(12, 16, 3), (16, 4, 1), (8, 8, 2)])
+def test_single_grids_are_convolved_by_the_weights_of_the_moment(size):
+    inside, outside, width = size
+    conv = Convolution(inside, outside, width, stride=2 if width == 2 else 1, padding=width // 2)
+    wide = torch.randn(1, 2 * inside, 16, 24).contiguous(memory_format=torch.channels_last)
+    grids = [wide[:, inside:], torch.randn(1, inside, 8, 8)]
+
+    def right():
+        for x in grids:
+            with torch.inference_mode():
+                expected = torch.conv2d(x, conv.weight, conv.bias, conv.stride, conv.padding)
+                torch.testing.assert_close(conv(x), expected)
+
+    right()
+    with torch.no_grad():
+        conv.weight.mul_(2.0)
+    right()
+    conv.load_state_dict(Convolution(inside, outside, width).state_dict())
+    right()
+    conv.weight.data = torch.randn_like(conv.weight)
+    right()
+    conv.to(memory_format=torch.channels_last)
+    right()
+    other = copy.deepcopy(conv)
+    with torch.no_grad():
+        other.weight.zero_()
+    right()
+    with torch.inference_mode():
+        conv = Convolution(inside, outside, width, stride=conv.stride, padding=conv.padding)
+    right()
 
 
 @pytest.mark.parametrize(

@@ -77,11 +77,24 @@ def test_strain_energy_is_the_solvers(pair):
 
 
 def test_losses_are_the_metrics(pair):
-    _, results = pair
+    designs, results = pair
     gc, fair = losses.gc(batch(*results)), losses.fair(batch(*results))
-    for k, result in enumerate(results):
+    left, near = (f(batch(*results), batch(*designs)) for f in (losses.k_a, losses.d_h))
+    for k, (design, result) in enumerate(zip(designs, results, strict=True)):
+        assert float(left[k]) == pytest.approx(1.0 - metrics.K_A_r(design, result), rel=1e-12)
+        assert float(near[k]) == pytest.approx(metrics.d_H(design, result), rel=1e-12)
         assert float(gc[k]) == pytest.approx(metrics.loss_gc(result, scale=1.0), rel=1e-12)
         assert float(fair[k]) == pytest.approx(metrics.fairness(result, scale=1.0), rel=1e-6)
+
+
+@pytest.mark.parametrize("steps", [(0, 0), (1, -1), (2, 1)])
+def test_distances_are_to_the_nearest_vertex(steps):
+    design = saddle(12, 9)
+    slid = np.roll(design, steps, axis=(0, 1))[2:-2, 2:-2]
+    result = design.copy()
+    result[2:-2, 2:-2] = slid + 1e-3
+    near = losses.d_h(batch(result), batch(design))
+    assert float(near) == pytest.approx(metrics.d_H(design, result), rel=1e-12)
 
 
 def test_iso_and_the_metric():

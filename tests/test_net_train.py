@@ -30,9 +30,11 @@ from gso.net.config import FOLDER, Config, Phase, from_dict, read  # noqa: E402
 from gso.net.curves import Curves  # noqa: E402
 from gso.net.curves import read as read_curves  # noqa: E402
 from gso.net.data import Batch, Source, fresh, noisy, open_source  # noqa: E402
-from gso.net.grids import normalise  # noqa: E402
+from gso.net.grids import ball, normalise  # noqa: E402
 from gso.net.muon import optimisers, orthogonal  # noqa: E402
 from gso.net.objective import Objective, aligned  # noqa: E402
+from gso.net.processes import Processes  # noqa: E402
+from gso.net.run import begin  # noqa: E402
 from gso.net.schedule import place  # noqa: E402
 from gso.net.validate import SCORE, applied, mean_figures  # noqa: E402
 
@@ -103,6 +105,9 @@ def test_shipped_configurations(path):
         ({"phase": [{"loss": "energy", "weights": 3}]}, "weights is 3"),
         ({"phase": [{"loss": "energy", "share": math.inf}]}, "share is inf"),
         ({"phase": [{"loss": "label"}], "through": "net-c"}, "through"),
+        ({"phase": [{"loss": "energy"}], "against": "designs"}, "goes with through"),
+        ({"against": "labels"}, "against is 'labels'"),
+        ({"task": "flatten", "phase": [{"weights": {"k_a": 1, "d_h": 1}}]}, "do not go with task"),
         ({"model": {"kind": "coarse", "widths": [50, 50, 50]}}, "settings of the net"),
         ({"model": PUBLISHED, "phase": [{"loss": "energy", "stride": 3}]}, "multiple of 8"),
     ],
@@ -166,9 +171,10 @@ def test_augmentation_keeps_what_it_should():
     same = (first == surfaces).all(dim=(1, 2, 3)).float().mean()
     assert 0 < same < 0.4
     assert torch.allclose(losses.fair(first), losses.fair(surfaces), rtol=1e-5)
-    sheared = augment.shear(surfaces, generator)
+    sheared, with_them = augment.shear([surfaces, 2 * surfaces], generator)
     assert torch.allclose(sheared.square().sum(-1).amax((1, 2)), torch.ones(40), atol=1e-5)
     assert not torch.allclose(sheared, surfaces, atol=0.1)
+    assert torch.allclose(torch.diff(with_them, dim=1), 2 * torch.diff(sheared, dim=1), atol=1e-5)
 
 
 def test_noise_has_its_size():
@@ -199,7 +205,10 @@ RUNS = {
     "published": config(
         model=PUBLISHED,
         augment="shear",
-        phase=[{"batch": 4, "weights": {"in": 1, "fair": 1, "gc": 1}, "decay": 3.0}],
+        phase=[
+            {"batch": 4, "weights": {"in": 1, "fair": 1, "gc": 1}, "decay": 3.0},
+            {"batch": 4, "weights": {"k_a": 1, "d_h": 0.4}},
+        ],
     ),
     "flatten published": config(
         "flatten",
@@ -439,6 +448,30 @@ def test_begin_with_a_net_and_learn_from_its_results(folder, tmp_path):
         train(config(model={**PUBLISHED, "channels": 8}, init=net), folder, tmp_path / "other")
     with pytest.raises(OptionError, match="another kind"):
         train(config(init=net), folder, tmp_path / "other")
+
+
+def test_results_stay_close_to_what_surfaces_were(folder, tmp_path):
+    other = GSONet(channels=4, blocks=1)
+    torch.nn.init.normal_(other.tail.weight, std=0.1)
+    save(other, tmp_path / "net.safetensors")
+    net = str(tmp_path / "net.safetensors")
+    phase = [{"batch": 4, "weights": {"d_h": 1}}]
+    made = config(model=PUBLISHED, phase=phase, through=net, against="designs", augment="none")
+    here = Processes(0, 1, torch.device("cpu"))
+    run = begin(made, folder, tmp_path / "run", None, here, None)
+    batch = run.source.batch(made, made.phases[0], 0)
+    assert batch.compared is batch.design and not torch.equal(batch.design, batch.surface)
+    for name, seen, designs in (
+        ("train", run.source.surfaces, run.source.designs),
+        ("validation", *run.check[:2]),
+    ):
+        surfaces = [np.load(path) for path in sorted((folder / name).glob("*.npy"))]
+        before = normalise(torch.from_numpy(np.stack(surfaces))).float()
+        result = torch.from_numpy(applied(load(net), before)).float()
+        # Both were moved and scaled alike, so that the result is in the unit ball.
+        centre, radius = ball(result)
+        torch.testing.assert_close(seen * radius + centre, result, atol=1e-5, rtol=0)
+        torch.testing.assert_close(designs * radius + centre, before, atol=1e-5, rtol=0)
 
 
 def launch(folder, out, path, processes=0):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from gso.net.grids import normalise
+from gso.net.grids import ball
 
 #: Largest off-diagonal element of the random shear.
 _SHEAR = 0.3
@@ -27,14 +27,18 @@ def symmetries(grids: list[Tensor], generator: torch.Generator) -> list[Tensor]:
     return out
 
 
-def shear(grids: Tensor, generator: torch.Generator) -> Tensor:
-    """Surfaces under a random near-diagonal shear and a random turn, in the unit ball again."""
-    count = len(grids)
+def shear(grids: list[Tensor], generator: torch.Generator) -> list[Tensor]:
+    """Surfaces under a random near-diagonal shear and a random turn: the same for all of a row.
+
+    The first ones are in the unit ball again, and the others as they lie to them.
+    """
+    count = len(grids[0])
     off = _SHEAR * torch.rand(count, 3, 3, generator=generator)
     eye = torch.eye(3)
     sheared = torch.where(eye.bool(), eye, off)
     turn, upper = torch.linalg.qr(torch.randn(count, 3, 3, generator=generator))
     # Signs make the distribution uniform (Stewart 1980).
     turn = turn * upper.diagonal(dim1=1, dim2=2).sign()[:, None]
-    change = (sheared @ turn).to(grids)
-    return normalise(torch.einsum("bhwi,bij->bhwj", grids, change))
+    out = [torch.einsum("bhwi,bij->bhwj", x, (sheared @ turn).to(x)) for x in grids]
+    centre, radius = ball(out[0])
+    return [(x - centre) / radius for x in out]

@@ -21,8 +21,11 @@ OPTIMISERS = ("muon", "adamw")
 AUGMENTATIONS = ("none", "symmetries", "shear")
 #: Steps of a phase through the vertices that leave a grid worth training on.
 LARGEST_STRIDE = 4
-#: Terms of the published losses, and the figure that flat images are judged by.
-TERMS = ("in", "fair", "gc", "iso", "iso_w", "iso_cell", "iso_cell_w")
+#: Terms that compare a result with the design, or with the surface in space.
+NEAR = ("in", "k_a", "d_h")
+FLAT = ("iso", "iso_w", "iso_cell", "iso_cell_w")
+#: Terms of the published losses, and the figures that results are judged by.
+TERMS = ("fair", "gc", *NEAR, *FLAT)
 
 
 @dataclass(frozen=True)
@@ -130,6 +133,9 @@ class Config:
         Net to begin with: a name or a .safetensors file.
     through : str
         Net whose results take the surfaces' place: Net-F learns from those of Net-C.
+    against : {"seen", "designs"}
+        With `through`, what results are kept close to: the surfaces that the net sees, as
+        published, or those that they were before.
     ema : float
         Decay of the moving average of the weights, which is what is kept in the end.
     optimiser : {"muon", "adamw"}
@@ -157,6 +163,7 @@ class Config:
     sigma: tuple[float, float] = (0.0005, 0.02)
     init: str = ""
     through: str = ""
+    against: str = "seen"
     ema: float = 0.999
     optimiser: str = "muon"
     weight_decay: float = 1e-2
@@ -168,6 +175,7 @@ class Config:
     def __post_init__(self) -> None:
         _choice("task", self.task, tuple(TASKS))
         _choice("augment", self.augment, AUGMENTATIONS)
+        _choice("against", self.against, ("seen", "designs"))
         _choice("optimiser", self.optimiser, OPTIMISERS)
         _number("steps", self.steps, 1, whole=True)
         _number("validate", self.validate, 1, whole=True)
@@ -199,9 +207,11 @@ def _fits(config: Config, phase: Phase) -> None:
         raise OptionError(f"loss {phase.loss!r} does not go with task {config.task!r}")
     if config.through and (phase.loss == "label" or config.task == "denoise"):
         raise OptionError("through: there are no labels, nor clean surfaces, of a net's results")
+    if config.against == "designs" and not config.through:
+        raise OptionError("against = 'designs' goes with through only")
     if phase.loss == "label" and config.augment == "shear":
         raise OptionError("labels do not follow a shear; take augment = 'symmetries'")
-    wrong = {t for t in TERMS if t.startswith("iso")} if config.task != "flatten" else {"in", "gc"}
+    wrong = set(FLAT) if config.task != "flatten" else {"gc", *NEAR}
     if phase.loss == "published" and wrong & {k for k, v in phase.weights.items() if v}:
         raise OptionError(f"{', '.join(sorted(wrong))} do not go with task {config.task!r}")
 

@@ -25,6 +25,7 @@ _ORDER, _CHANGES, _FRESH = 0, 1, 2
 _DRAWN = 256
 #: Share of a GPU's free memory that a run's surfaces may take.
 _ROOM = 0.5
+_AUGMENTED = {"symmetries": augment.symmetries, "shear": augment.shear}
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class Batch:
         What it is to make of it, where that is known.
     sigma : Tensor, (B,), or None
         Noise of the surfaces.
+    design : Tensor, (B, H, W, 3), or None
+        What the result is kept close to, where that is not the surface.
     step : int
         Step of the run.
     """
@@ -46,7 +49,13 @@ class Batch:
     surface: Tensor
     target: Tensor | None = None
     sigma: Tensor | None = None
+    design: Tensor | None = None
     step: int = 0
+
+    @property
+    def compared(self) -> Tensor:
+        """What results are kept close to."""
+        return self.surface if self.design is None else self.design
 
 
 @dataclass
@@ -58,14 +67,17 @@ class Source:
     surfaces : Tensor, (n, H, W, 3)
     labels : Tensor, (m, H, W, d), or None
         Of the first m.
+    designs : Tensor, (n, H, W, 3), or None
+        What the surfaces were before another net had changed them.
     """
 
     surfaces: Tensor
     labels: Tensor | None = None
+    designs: Tensor | None = None
 
     def placed(self, device: torch.device) -> Source:
         """The same on a GPU, if there is room: to gather batches elsewhere takes longer."""
-        arrays = [self.surfaces, self.labels]
+        arrays = [self.surfaces, self.labels, self.designs]
         size = sum(x.numel() * x.element_size() for x in arrays if x is not None)
         if device.type != "cuda" or size > _ROOM * torch.cuda.mem_get_info(device)[0]:
             return self
@@ -91,29 +103,23 @@ class Source:
         count = len(self.labels) if use_labels and self.labels is not None else len(self.surfaces)
         rows = _rows(count, phase.batch, step, config.seed).to(self.surfaces.device)
         generator = torch.Generator().manual_seed(_seed(config.seed, _CHANGES, step))
-        chosen = [self.surfaces[rows]]
-        if use_labels and self.labels is not None:
-            chosen.append(self.labels[rows])
-        if config.augment == "symmetries":
-            chosen = augment.symmetries(chosen, generator)
-        elif config.augment == "shear":
-            chosen = [augment.shear(chosen[0], generator)]
+        arrays = {
+            "surface": self.surfaces,
+            "target": self.labels if use_labels else None,
+            "design": self.designs if config.against == "designs" else None,
+        }
+        names = [name for name, x in arrays.items() if x is not None]
+        chosen = [x[rows] for x in arrays.values() if x is not None]
+        if config.augment != "none":
+            chosen = _AUGMENTED[config.augment](chosen, generator)
         chosen = [x[:, :: phase.stride, :: phase.stride] for x in chosen]
-        surface, target = chosen[0], chosen[1] if len(chosen) > 1 else None
-        sigma = None
+        found = dict(zip(names, chosen, strict=True))
         if config.task == "denoise":
-            surface, target, sigma = noisy(surface, config.sigma, generator)
+            seen = noisy(found["surface"], config.sigma, generator)
+            found = dict(zip(("surface", "target", "sigma"), seen, strict=True))
         mine = slice(rank, None, world)
-
-        def placed(x: Tensor) -> Tensor:
-            return x[mine].to(device, torch.float32)
-
-        return Batch(
-            placed(surface),
-            None if target is None else placed(target),
-            None if sigma is None else placed(sigma),
-            step,
-        )
+        placed = {k: x[mine].to(device, torch.float32) for k, x in found.items()}
+        return Batch(**placed, step=step)
 
 
 def noisy(

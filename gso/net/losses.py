@@ -1,4 +1,6 @@
-"""The published losses (Wang et al. 2024) and ``iso_cell``, from the package's own geometry.
+"""The published losses (Wang et al. 2024), and the figures that results are judged by.
+
+All from the package's own geometry.
 
 All take grids (B, H, W, d) and return one number per surface, (B,); the published loss is
 their mean over the batch. None runs in less than single precision.
@@ -13,6 +15,11 @@ from torch.nn.functional import pad
 from gso import geometry
 from gso.net import grids
 from gso.net.grids import Planes, planes
+
+#: Least mean |K| of a design, in the unit ball, that shares are taken of.
+_LEAST_CURVATURE = 1e-3
+#: Steps along the grid within which the nearest vertex is looked for.
+_REACH = 2
 
 
 def inside(result: Tensor, target: Tensor) -> Tensor:
@@ -34,6 +41,42 @@ def fair(result: Tensor) -> Tensor:
 def gc(result: Tensor) -> Tensor:
     """``gc``: mean absolute Gaussian curvature, ``loss_gc``."""
     return grids.curvature(planes(result)).abs().mean(dim=(1, 2))
+
+
+def k_a(result: Tensor, design: Tensor) -> Tensor:
+    """``k_a``: share of the design's mean absolute Gaussian curvature that is left, 1 - K_A_r.
+
+    Not among the published losses: curved and nearly flat designs weigh alike.
+    """
+    return gc(result) / gc(design).clamp_min(_LEAST_CURVATURE)
+
+
+def d_h(result: Tensor, design: Tensor) -> Tensor:
+    """``d_h``: mean distance to the nearest vertex of the design, percent of its diagonal, d_H.
+
+    Not among the published losses, whose ``in`` is of squares. The nearest vertex is looked
+    for within `_REACH` steps of a vertex's own.
+    """
+    there, here = result.movedim(-1, 0), design.movedim(-1, 0)
+    nearest = here + _to_nearest(there.detach(), here)
+    distance = geometry.norm(tuple(there - nearest))
+    diagonal = geometry.norm(tuple(here.amax(dim=(2, 3)) - here.amin(dim=(2, 3))))
+    return 100.0 * distance.mean(dim=(1, 2)) / diagonal
+
+
+def _to_nearest(there: Tensor, here: Tensor) -> Tensor:
+    """Vectors (3, B, H, W) from each vertex to the one around it that is nearest a point."""
+    h, w = here.shape[2:]
+    framed = pad(here, (_REACH,) * 4, mode="replicate")
+    best = torch.zeros_like(here)
+    least = (there - here).square().sum(dim=0)
+    for i in range(2 * _REACH + 1):
+        for j in range(2 * _REACH + 1):
+            other = framed[:, :, i : i + h, j : j + w]
+            square = (there - other).square().sum(dim=0)
+            best = torch.where(square < least, other - here, best)
+            least = torch.minimum(square, least)
+    return best
 
 
 def iso(surface: Tensor, flat: Tensor, weights: Tensor | None = None) -> Tensor:

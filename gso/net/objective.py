@@ -45,7 +45,7 @@ class Objective(nn.Module):
 def _published(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
     w = phase.weights
     fade = math.exp(-phase.decay * progress)
-    surface = batch.surface
+    surface = batch.compared
 
     def cost(result: Tensor) -> Tensor:
         total = torch.zeros(len(result), device=result.device)
@@ -55,6 +55,9 @@ def _published(task: str, batch: Batch, start: Tensor, phase: Phase, progress: f
             total = total + w["fair"] * losses.fair(result)
         if w.get("gc"):
             total = total + w["gc"] * losses.gc(result)
+        for name, figure in (("k_a", losses.k_a), ("d_h", losses.d_h)):
+            if w.get(name):
+                total = total + w[name] * figure(result, surface)
         for name, term in (("iso", losses.iso), ("iso_cell", losses.iso_cell)):
             if w.get(name):
                 total = total + w[name] * term(surface, result)
@@ -85,7 +88,7 @@ def _energy(task: str, batch: Batch, start: Tensor, phase: Phase, progress: floa
         return energy.Strain(batch.surface, flatten.Options())
     w: dict[str, Any] = dict(phase.weights)
     balance = w.pop("balance", 0.5)
-    whole = energy.Developable(batch.surface, replace(developable.Options(), **w))
+    whole = energy.Developable(batch.compared, replace(developable.Options(), **w))
     first, last = phase.eps
     eps = last * (first / last) ** max(1.0 - 2.0 * progress, 0.0)
     before = whole.at_start.clamp_min(_LEAST_ENERGY)

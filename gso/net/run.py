@@ -21,7 +21,7 @@ from gso.net.catalogue import located, read_card
 from gso.net.config import Config
 from gso.net.curves import Curves, read
 from gso.net.data import Source, noisy, open_source
-from gso.net.grids import normalise
+from gso.net.grids import ball, normalise
 from gso.net.processes import Processes
 from gso.net.validate import SCORE, applied, mean_figures
 from gso.status import OptionError
@@ -228,23 +228,29 @@ def _sizes_fit(config: Config, net: Net, source: Source) -> None:
 
 
 def _pass_through(run: Run, tick: Tick | None) -> None:
-    """What another net makes of the surfaces takes their place, normalised anew."""
+    """What another net makes of the surfaces takes their place, normalised anew.
+
+    The designs follow: they lie to the new surfaces as they lay to the net's results.
+    """
     net, here = weights.load(run.config.through, device=run.here.device), run.here
 
-    def done(surfaces: Tensor) -> Tensor:
-        out = torch.zeros_like(surfaces)
+    def done(surfaces: Tensor) -> tuple[Tensor, Tensor]:
+        out, designs = torch.zeros_like(surfaces), torch.zeros_like(surfaces)
         mine = range(here.rank * _BLOCK, len(surfaces), here.world * _BLOCK)
         for start in mine:
             block = slice(start, start + _BLOCK)
-            out[block] = normalise(torch.from_numpy(applied(net, surfaces[block]))).float()
+            result = torch.from_numpy(applied(net, surfaces[block]))
+            centre, radius = ball(result)
+            out[block] = ((result - centre) / radius).float()
+            designs[block] = ((surfaces[block] - centre) / radius).float()
             if tick is not None:
                 count = min(start + here.world * _BLOCK, len(surfaces))
                 tick(f"surfaces through {run.config.through}", count, len(surfaces))
-        return here.summed(out)
+        return here.summed(out), here.summed(designs)
 
-    run.source = Source(done(run.source.surfaces))
-    surfaces = done(run.check[0])
-    run.check = surfaces, surfaces, None
+    seen, designs = done(run.source.surfaces)
+    run.source = Source(seen, designs=designs if run.config.against == "designs" else None)
+    run.check = *done(run.check[0]), None
 
 
 def _validation(config: Config, data: Path) -> tuple[Tensor, Tensor, Tensor | None]:
