@@ -25,6 +25,7 @@ _ORDER, _CHANGES, _FRESH = 0, 1, 2
 _DRAWN = 256
 #: Share of a GPU's free memory that a run's surfaces may take.
 _ROOM = 0.5
+#: Changes by their name in a configuration.
 _AUGMENTED = {"symmetries": augment.symmetries, "shear": augment.shear}
 
 
@@ -106,7 +107,7 @@ class Source:
         arrays = {
             "surface": self.surfaces,
             "target": self.labels if use_labels else None,
-            "design": self.designs if config.against == "designs" else None,
+            "design": self.designs,
         }
         names = [name for name, x in arrays.items() if x is not None]
         chosen = [x[rows] for x in arrays.values() if x is not None]

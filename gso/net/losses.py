@@ -1,9 +1,8 @@
 """The published losses (Wang et al. 2024), and the figures that results are judged by.
 
-All from the package's own geometry.
-
-All take grids (B, H, W, d) and return one number per surface, (B,); the published loss is
-their mean over the batch. None runs in less than single precision.
+All are made of the package's own geometry, take grids (B, H, W, d) and return one number per
+surface, (B,); the published loss is their mean over the batch. None runs in less than single
+precision.
 """
 
 from __future__ import annotations
