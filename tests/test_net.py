@@ -22,6 +22,7 @@ from gso.net import (  # noqa: E402
     CoarseNet,
     GSONet,
     available,
+    blocks,
     catalogue,
     load,
     predict,
@@ -63,15 +64,16 @@ def published():
 @pytest.mark.parametrize("size", [(12, 16, 3), (16, 4, 1), (8, 8, 2)])
 def test_single_grids_are_convolved_by_the_weights_of_the_moment(size):
     inside, outside, width = size
-    conv = Convolution(inside, outside, width, stride=2 if width == 2 else 1, padding=width // 2)
+    how = {"stride": 2 if width == 2 else 1, "padding": width // 2}
+    conv = Convolution(inside, outside, width, **how).eval()
     wide = torch.randn(1, 2 * inside, 16, 24).contiguous(memory_format=torch.channels_last)
     grids = [wide[:, inside:], torch.randn(1, inside, 8, 8)]
 
-    def right():
+    def right(conv=conv):
         for x in grids:
             with torch.inference_mode():
-                expected = torch.conv2d(x, conv.weight, conv.bias, conv.stride, conv.padding)
-                torch.testing.assert_close(conv(x), expected)
+                expected = torch.conv2d(x, conv.weight, conv.bias, **how)
+                torch.testing.assert_close(conv(x), expected, atol=1e-3, rtol=0)
 
     right()
     with torch.no_grad():
@@ -79,17 +81,44 @@ def test_single_grids_are_convolved_by_the_weights_of_the_moment(size):
     right()
     conv.load_state_dict(Convolution(inside, outside, width).state_dict())
     right()
-    conv.weight.data = torch.randn_like(conv.weight)
+    for _ in range(20):
+        # The second may well take the place that the first had in memory.
+        conv.weight.data = torch.empty(0)
+        conv.weight.data = torch.randn(outside, inside, width, width)
+        right()
+    conv.weight.data.mul_(2.0)
+    right(conv.eval())
+    conv.train()
+    conv.weight.grad = torch.ones_like(conv.weight)
+    torch.optim.SGD([conv.weight], lr=1.0, fused=True).step()
     right()
-    conv.to(memory_format=torch.channels_last)
-    right()
+    right(conv.eval())
+    right(conv.to(memory_format=torch.channels_last))
     other = copy.deepcopy(conv)
     with torch.no_grad():
         other.weight.zero_()
     right()
+    right(other)
     with torch.inference_mode():
-        conv = Convolution(inside, outside, width, stride=conv.stride, padding=conv.padding)
-    right()
+        right(Convolution(inside, outside, width, **how).eval())
+
+
+def test_weights_are_reordered_once(monkeypatch):
+    if not blocks._REORDERS:
+        pytest.skip("this version of PyTorch does not reorder weights")
+    made = []
+    reordered = blocks._reordered
+    monkeypatch.setattr(blocks, "_reordered", lambda *a: made.append(1) or reordered(*a))
+    conv = Convolution(4, 8, 3, padding=1).eval()
+    with torch.inference_mode():
+        for _ in range(3):
+            conv(torch.randn(1, 4, 8, 8))
+        conv(torch.randn(2, 4, 8, 8))
+    assert len(made) == 1
+    with torch.inference_mode():
+        conv.train()(torch.randn(1, 4, 8, 8))
+        conv(torch.randn(1, 4, 8, 8))
+    assert len(made) == 1
 
 
 @pytest.mark.parametrize(

@@ -79,7 +79,7 @@ def test_strain_energy_is_the_solvers(pair):
 def test_losses_are_the_metrics(pair):
     designs, results = pair
     gc, fair = losses.gc(batch(*results)), losses.fair(batch(*results))
-    left, near = (f(batch(*results), batch(*designs)) for f in (losses.k_a, losses.d_h))
+    left, near = (f(batch(*results), batch(*designs)) for f in (losses.k_left, losses.d_h))
     for k, (design, result) in enumerate(zip(designs, results, strict=True)):
         assert float(left[k]) == pytest.approx(1.0 - metrics.K_A_r(design, result), rel=1e-12)
         assert float(near[k]) == pytest.approx(metrics.d_H(design, result), rel=1e-12)

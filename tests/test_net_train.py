@@ -107,7 +107,12 @@ def test_shipped_configurations(path):
         ({"phase": [{"loss": "label"}], "through": "net-c"}, "through"),
         ({"phase": [{"loss": "energy"}], "against": "designs"}, "goes with through"),
         ({"against": "labels"}, "against is 'labels'"),
-        ({"task": "flatten", "phase": [{"weights": {"k_a": 1, "d_h": 1}}]}, "do not go with task"),
+        (
+            {"task": "flatten", "phase": [{"weights": {"k_left": 1, "fair": 1}}]},
+            "weights k_left do",
+        ),
+        ({"task": "denoise", "phase": [{"weights": {"d_h": 1, "gc": 1}}]}, "weights d_h do not"),
+        ({"task": "flatten", "through": "net-c"}, "'developable' only"),
         ({"model": {"kind": "coarse", "widths": [50, 50, 50]}}, "settings of the net"),
         ({"model": PUBLISHED, "phase": [{"loss": "energy", "stride": 3}]}, "multiple of 8"),
     ],
@@ -207,7 +212,7 @@ RUNS = {
         augment="shear",
         phase=[
             {"batch": 4, "weights": {"in": 1, "fair": 1, "gc": 1}, "decay": 3.0},
-            {"batch": 4, "weights": {"k_a": 1, "d_h": 0.4}},
+            {"batch": 4, "weights": {"k_left": 1, "d_h": 0.4}},
         ],
     ),
     "flatten published": config(
@@ -459,8 +464,16 @@ def test_results_stay_close_to_what_surfaces_were(folder, tmp_path):
     made = config(model=PUBLISHED, phase=phase, through=net, against="designs", augment="none")
     here = Processes(0, 1, torch.device("cpu"))
     run = begin(made, folder, tmp_path / "run", None, here, None)
-    batch = run.source.batch(made, made.phases[0], 0)
+    (phase,) = made.phases
+    batch = run.source.batch(made, phase, 0)
     assert batch.compared is batch.design and not torch.equal(batch.design, batch.surface)
+    changed = run.source.batch(replace(made, augment="symmetries"), phase, 0)
+    assert not torch.equal(changed.surface, batch.surface)
+    moved = [(b.surface - b.design).norm(dim=-1).flatten(1) for b in (changed, batch)]
+    assert torch.equal(*(x.sort(dim=1).values for x in moved))
+    for loss in (phase, Phase("energy")):
+        alone = replace(batch, design=None)
+        assert Objective(run.net)(alone, loss, 0.5) != Objective(run.net)(batch, loss, 0.5)
     for name, seen, designs in (
         ("train", run.source.surfaces, run.source.designs),
         ("validation", *run.check[:2]),

@@ -13,20 +13,24 @@ from torch.nn.functional import silu
 _GROUP = 16
 #: Whether PyTorch has oneDNN, and lets it be called.
 _ONEDNN = torch.backends.mkldnn.is_available() and hasattr(torch, "mkldnn_convolution")
-#: What puts weights into the order that oneDNN computes with, and computes with them; not in
-#: every version of PyTorch.
-_ORDER: Any = getattr(torch._C._nn, "mkldnn_reorder_conv2d_weight", None)
-_CONVOLVE: Any = getattr(torch.ops.mkldnn, "_convolution_pointwise", None)
+#: What puts weights into the order that oneDNN computes with, and what computes with them.
+_reordered: Any = getattr(torch._C._nn, "mkldnn_reorder_conv2d_weight", None)
+_convolved: Any = getattr(torch.ops.mkldnn, "_convolution_pointwise", None)
+#: Whether this version of PyTorch has both.
+_REORDERS = _ONEDNN and _reordered is not None and _convolved is not None
 
 
-class _Ordered(NamedTuple):
-    """A convolution's weights as oneDNN computes with them, and what they were made of."""
+class _Kept(NamedTuple):
+    """A convolution's weights in oneDNN's order, what they were made of, and when."""
 
-    made_of: tuple[Any, ...]
+    made_of: Tensor
+    version: int
+    shape: torch.Size
     weight: Tensor
 
 
-_ORDERED: WeakKeyDictionary[Convolution, _Ordered] = WeakKeyDictionary()
+#: By convolution, and not in it, where copies and files of nets would take them along.
+_KEPT: WeakKeyDictionary[Convolution, _Kept] = WeakKeyDictionary()
 
 
 class Convolution(nn.Conv2d):
@@ -34,9 +38,11 @@ class Convolution(nn.Conv2d):
 
     A single grid with few values PyTorch hands to a loop of its own, which takes up to twice
     the time of the oneDNN that it uses for all others; and that puts the weights in an order of
-    its own at every call, which takes up to half the time. Here they are kept in that order.
+    its own at every call, which takes up to half the time. Outside of training they are kept in
+    that order until they change; changes through ``weight.data`` are not seen before the next
+    call of ``eval()``.
 
-    >>> x, net = torch.ones(1, 4, 8, 8), Convolution(4, 4, 3, padding=1)
+    >>> x, net = torch.ones(1, 4, 8, 8), Convolution(4, 4, 3, padding=1).eval()
     >>> with torch.inference_mode():
     ...     alone = net(x)
     >>> bool((alone - net(x)).abs().max() < 1e-5)
@@ -44,18 +50,40 @@ class Convolution(nn.Conv2d):
     """
 
     def forward(self, x: Tensor) -> Tensor:
-        if not _slow(x, self.weight) or isinstance(self.padding, str):
+        if (
+            not _slow(x, self.weight)
+            or isinstance(self.padding, str)
+            or self.padding_mode != "zeros"
+        ):
             return super().forward(x)
         how = self.padding, self.stride, self.dilation, self.groups
         # Weights made in inference mode do not tell when they change.
-        if _ORDER is None or _CONVOLVE is None or self.weight.is_inference():
+        if not _REORDERS or self.training or self.weight.is_inference():
             return torch.mkldnn_convolution(x, self.weight, self.bias, *how)
-        made_of = self.weight._version, self.weight.data_ptr(), x.shape
-        known = _ORDERED.get(self)
-        if known is None or known.made_of != made_of:
-            plain = self.weight.detach().contiguous().to_mkldnn()
-            known = _ORDERED[self] = _Ordered(made_of, _ORDER(plain, *how, x.shape))
-        return _CONVOLVE(x, known.weight, self.bias, *how, "none", [], "")
+        return _convolved(x, self._kept(x.shape).weight, self.bias, *how, "none", [], "")
+
+    def _kept(self, shape: torch.Size) -> _Kept:
+        w, known = self.weight, _KEPT.get(self)
+        if (
+            known is None
+            or known.made_of.data_ptr() != w.data_ptr()
+            or known.version != w._version
+            or known.shape != shape
+        ):
+            made_of = w.detach()
+            how = self.padding, self.stride, self.dilation, self.groups
+            weight = _reordered(made_of.contiguous().to_mkldnn(), *how, shape)
+            # With what they were made of, whose place in memory no other weights can take then.
+            known = _KEPT[self] = _Kept(made_of, w._version, shape, weight)
+        return known
+
+    def train(self, mode: bool = True) -> Convolution:
+        _KEPT.pop(self, None)
+        return super().train(mode)
+
+    def _apply(self, *given: Any, **keywords: Any) -> Convolution:
+        _KEPT.pop(self, None)
+        return super()._apply(*given, **keywords)
 
 
 def _slow(x: Tensor, weight: Tensor) -> bool:
@@ -66,6 +94,7 @@ def _slow(x: Tensor, weight: Tensor) -> bool:
         and len(x) == 1
         and x.dtype == weight.dtype == torch.float32
         and not torch.is_grad_enabled()
+        and not torch.jit.is_tracing()
     )
 
 

@@ -21,11 +21,16 @@ OPTIMISERS = ("muon", "adamw")
 AUGMENTATIONS = ("none", "symmetries", "shear")
 #: Steps of a phase through the vertices that leave a grid worth training on.
 LARGEST_STRIDE = 4
-#: Terms that compare a result with the design, or with the surface in space.
-NEAR = ("in", "k_a", "d_h")
+#: Figures that developable surfaces and flat images are judged by, and the published losses.
+JUDGED = ("k_left", "d_h")
 FLAT = ("iso", "iso_w", "iso_cell", "iso_cell_w")
-#: Terms of the published losses, and the figures that results are judged by.
-TERMS = ("fair", "gc", *NEAR, *FLAT)
+TERMS = ("in", "fair", "gc", *JUDGED, *FLAT)
+#: Terms that a task does not have.
+_FOREIGN = {
+    "developable": FLAT,
+    "flatten": ("in", "gc", *JUDGED),
+    "denoise": (*JUDGED, *FLAT),
+}
 
 
 @dataclass(frozen=True)
@@ -35,7 +40,8 @@ class Phase:
     Attributes
     ----------
     loss : {"published", "label", "energy", "clean"}
-        "published": the weighted terms of Wang et al. 2024. "label": the distance to the
+        "published": the weighted terms of Wang et al. 2024, and of the figures that results
+        are judged by. "label": the distance to the
         optimiser's result. "energy": the optimiser's own objective. "clean" (denoise): the
         distance to the surface without noise, and the angle of its normals.
     share : float
@@ -134,8 +140,8 @@ class Config:
     through : str
         Net whose results take the surfaces' place: Net-F learns from those of Net-C.
     against : {"seen", "designs"}
-        With `through`, what results are kept close to: the surfaces that the net sees, as
-        published, or those that they were before.
+        With `through`, what results are compared with in training: the surfaces that the net
+        sees, as published, or those that they were before. Validation takes the latter.
     ema : float
         Decay of the moving average of the weights, which is what is kept in the end.
     optimiser : {"muon", "adamw"}
@@ -205,15 +211,17 @@ def _fits(config: Config, phase: Phase) -> None:
     """Refuse losses that a task has not."""
     if (phase.loss == "clean") != (config.task == "denoise" and phase.loss != "published"):
         raise OptionError(f"loss {phase.loss!r} does not go with task {config.task!r}")
-    if config.through and (phase.loss == "label" or config.task == "denoise"):
-        raise OptionError("through: there are no labels, nor clean surfaces, of a net's results")
+    if config.through and (phase.loss == "label" or config.task != "developable"):
+        raise OptionError(
+            "through: of a net's results there are no labels; and it is for task 'developable' only"
+        )
     if config.against == "designs" and not config.through:
         raise OptionError("against = 'designs' goes with through only")
     if phase.loss == "label" and config.augment == "shear":
         raise OptionError("labels do not follow a shear; take augment = 'symmetries'")
-    wrong = set(FLAT) if config.task != "flatten" else {"gc", *NEAR}
-    if phase.loss == "published" and wrong & {k for k, v in phase.weights.items() if v}:
-        raise OptionError(f"{', '.join(sorted(wrong))} do not go with task {config.task!r}")
+    wrong = {k for k, v in phase.weights.items() if v and k in _FOREIGN[config.task]}
+    if phase.loss == "published" and wrong:
+        raise OptionError(f"weights {', '.join(sorted(wrong))} do not go with task {config.task!r}")
 
 
 def read(path: str | PathLike[str], **changes: Any) -> Config:

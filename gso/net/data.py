@@ -104,17 +104,16 @@ class Source:
         count = len(self.labels) if use_labels and self.labels is not None else len(self.surfaces)
         rows = _rows(count, phase.batch, step, config.seed).to(self.surfaces.device)
         generator = torch.Generator().manual_seed(_seed(config.seed, _CHANGES, step))
-        arrays = {
-            "surface": self.surfaces,
-            "target": self.labels if use_labels else None,
-            "design": self.designs,
-        }
-        names = [name for name, x in arrays.items() if x is not None]
-        chosen = [x[rows] for x in arrays.values() if x is not None]
+        arrays = {"surface": self.surfaces}
+        if use_labels and self.labels is not None:
+            arrays["target"] = self.labels
+        if self.designs is not None:
+            arrays["design"] = self.designs
+        chosen = [x[rows] for x in arrays.values()]
         if config.augment != "none":
             chosen = _AUGMENTED[config.augment](chosen, generator)
         chosen = [x[:, :: phase.stride, :: phase.stride] for x in chosen]
-        found = dict(zip(names, chosen, strict=True))
+        found = dict(zip(arrays, chosen, strict=True))
         if config.task == "denoise":
             seen = noisy(found["surface"], config.sigma, generator)
             found = dict(zip(("surface", "target", "sigma"), seen, strict=True))

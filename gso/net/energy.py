@@ -20,8 +20,8 @@ from gso.tasks import developable, flatten
 from gso.terms import curvature, edges, fairness, proximity, stretch
 from gso.terms.losses import Absolute, Distance
 
-#: Least mean |K| that weights are adapted to, as the task does.
-_LEAST_CURVATURE = 1e-3
+#: Designs that are flatter, by mean |K| in the unit ball, count as if they were not.
+LEAST_CURVATURE = 1e-3
 #: Corners of cells flatter than this carry no strain (doubled area over squared sides).
 _FLAT_CORNER = 1e-5
 #: Strain below which a flat image is good enough to be called exact.
@@ -61,7 +61,7 @@ class Developable:
         count = sum(second[0][0].numel() for second in own)
         bending = sum(geometry.norm2(second).sum(dim=(1, 2)) for second in own) * 2.0 / count
         self.w_curvature, self.w_fairness = developable.adapted_weights(
-            self.options, self.curved.clamp_min(_LEAST_CURVATURE), bending
+            self.options, self.curved.clamp_min(LEAST_CURVATURE), bending
         )
 
     @cached_property

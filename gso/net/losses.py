@@ -1,8 +1,7 @@
 """The published losses (Wang et al. 2024), and the figures that results are judged by.
 
 All are made of the package's own geometry, take grids (B, H, W, d) and return one number per
-surface, (B,); the published loss is their mean over the batch. None runs in less than single
-precision.
+surface, (B,). None runs in less than single precision.
 """
 
 from __future__ import annotations
@@ -13,10 +12,9 @@ from torch.nn.functional import pad
 
 from gso import geometry
 from gso.net import grids
+from gso.net.energy import LEAST_CURVATURE
 from gso.net.grids import Planes, planes
 
-#: Least mean |K| of a design, in the unit ball, that shares are taken of.
-_LEAST_CURVATURE = 1e-3
 #: Steps along the grid within which the nearest vertex is looked for.
 _REACH = 2
 
@@ -42,38 +40,38 @@ def gc(result: Tensor) -> Tensor:
     return grids.curvature(planes(result)).abs().mean(dim=(1, 2))
 
 
-def k_a(result: Tensor, design: Tensor) -> Tensor:
-    """``k_a``: share of the design's mean absolute Gaussian curvature that is left, 1 - K_A_r.
+def k_left(result: Tensor, design: Tensor) -> Tensor:
+    """``k_left``: share of the design's mean absolute Gaussian curvature that is left, 1 - K_A_r.
 
-    Not among the published losses: curved and nearly flat designs weigh alike.
+    Not among the published losses: curved and nearly flat designs weigh alike, but for those
+    flatter than `LEAST_CURVATURE`.
     """
-    return gc(result) / gc(design).clamp_min(_LEAST_CURVATURE)
+    return gc(result) / gc(design).clamp_min(LEAST_CURVATURE)
 
 
 def d_h(result: Tensor, design: Tensor) -> Tensor:
-    """``d_h``: mean distance to the nearest vertex of the design, percent of its diagonal, d_H.
+    """``d_h``: mean distance to the nearest vertex of the design, percent of its diagonal.
 
     Not among the published losses, whose ``in`` is of squares. The nearest vertex is looked
-    for within `_REACH` steps of a vertex's own.
+    for within `_REACH` steps of a vertex's own: ``d_H`` is less where it is farther.
     """
     there, here = result.movedim(-1, 0), design.movedim(-1, 0)
-    nearest = here + _to_nearest(there.detach(), here)
-    distance = geometry.norm(tuple(there - nearest))
+    distance = geometry.norm(tuple(there - _nearest(there.detach(), here)))
     diagonal = geometry.norm(tuple(here.amax(dim=(2, 3)) - here.amin(dim=(2, 3))))
     return 100.0 * distance.mean(dim=(1, 2)) / diagonal
 
 
-def _to_nearest(there: Tensor, here: Tensor) -> Tensor:
-    """Vectors (3, B, H, W) from each vertex to the one around it that is nearest a point."""
-    h, w = here.shape[2:]
-    framed = pad(here, (_REACH,) * 4, mode="replicate")
-    best = torch.zeros_like(here)
-    least = (there - here).square().sum(dim=0)
+def _nearest(points: Tensor, vertices: Tensor) -> Tensor:
+    """Which of the vertices (3, B, H, W) around each point's own is nearest to it."""
+    h, w = vertices.shape[2:]
+    framed = pad(vertices, (_REACH,) * 4, mode="replicate")
+    best = vertices
+    least = (points - vertices).square().sum(dim=0)
     for i in range(2 * _REACH + 1):
         for j in range(2 * _REACH + 1):
             other = framed[:, :, i : i + h, j : j + w]
-            square = (there - other).square().sum(dim=0)
-            best = torch.where(square < least, other - here, best)
+            square = (points - other).square().sum(dim=0)
+            best = torch.where(square < least, other, best)
             least = torch.minimum(square, least)
     return best
 

@@ -55,7 +55,7 @@ def _published(task: str, batch: Batch, start: Tensor, phase: Phase, progress: f
             total = total + w["fair"] * losses.fair(result)
         if w.get("gc"):
             total = total + w["gc"] * losses.gc(result)
-        for name, figure in (("k_a", losses.k_a), ("d_h", losses.d_h)):
+        for name, figure in (("k_left", losses.k_left), ("d_h", losses.d_h)):
             if w.get(name):
                 total = total + w[name] * figure(result, surface)
         for name, term in (("iso", losses.iso), ("iso_cell", losses.iso_cell)):

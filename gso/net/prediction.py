@@ -231,6 +231,5 @@ def _sigma(
     else:
         from gso.smoothing import smooth_grid
 
-        # One order does: those of the others differ by a tenth of a per cent.
-        noise = np.array([smooth_grid(grid, order=4).sigma for grid in unit])
+        noise = np.array([smooth_grid(grid).sigma for grid in unit])
     return torch.as_tensor(noise, dtype=torch.float32, device=device)
