@@ -26,13 +26,13 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("safetensors")
 
 from gso.net import GSONet, augment, checkpoint, load, losses, save, train  # noqa: E402
-from gso.net.config import FOLDER, Config, Phase, from_dict, read  # noqa: E402
+from gso.net.config import FOLDER, TERMS, Config, Phase, from_dict, read  # noqa: E402
 from gso.net.curves import Curves  # noqa: E402
 from gso.net.curves import read as read_curves  # noqa: E402
 from gso.net.data import Batch, Source, fresh, noisy, open_source  # noqa: E402
 from gso.net.grids import ball, normalise  # noqa: E402
 from gso.net.muon import optimisers, orthogonal  # noqa: E402
-from gso.net.objective import Objective, aligned  # noqa: E402
+from gso.net.objective import _COSTS, Objective, aligned  # noqa: E402
 from gso.net.processes import Processes  # noqa: E402
 from gso.net.run import begin  # noqa: E402
 from gso.net.schedule import place  # noqa: E402
@@ -157,6 +157,16 @@ def test_batches_are_functions_of_the_step():
         for r in range(2)
     ]
     assert sorted(chain.from_iterable(halves)) == sorted(rows[3])
+
+
+def test_every_term_of_a_configuration_is_a_loss():
+    designs = normalise(torch.rand(2, 9, 8, 3))
+    results = {name: designs + 0.01 * torch.rand_like(designs) for name in TERMS}
+    for name, result in results.items():
+        phase, flat = Phase(weights={name: 2.0}), name.startswith("iso")
+        cost = _COSTS["published"]("", Batch(designs), designs, phase, 0.0)
+        value = cost(result[..., :2] if flat else result)
+        assert value.shape == (2,) and (value > 0).all()
 
 
 def test_strides_leave_out_vertices_of_surfaces_and_labels():

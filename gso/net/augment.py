@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from gso.net.grids import ball
+from gso.net.grids import normalise_with
 
 #: Largest off-diagonal element of the random shear.
 _SHEAR = 0.3
@@ -39,6 +39,6 @@ def shear(grids: list[Tensor], generator: torch.Generator) -> list[Tensor]:
     turn, upper = torch.linalg.qr(torch.randn(count, 3, 3, generator=generator))
     # Signs make the distribution uniform (Stewart 1980).
     turn = turn * upper.diagonal(dim1=1, dim2=2).sign()[:, None]
-    out = [torch.einsum("bhwi,bij->bhwj", x, (sheared @ turn).to(x)) for x in grids]
-    centre, radius = ball(out[0])
-    return [(x - centre) / radius for x in out]
+    change = sheared @ turn
+    out = [torch.einsum("bhwi,bij->bhwj", x, change.to(x)) for x in grids]
+    return list(normalise_with(*out))

@@ -81,10 +81,6 @@ class Convolution(nn.Conv2d):
         _KEPT.pop(self, None)
         return super().train(mode)
 
-    def _apply(self, *given: Any, **keywords: Any) -> Convolution:
-        _KEPT.pop(self, None)
-        return super()._apply(*given, **keywords)
-
 
 def _slow(x: Tensor, weight: Tensor) -> bool:
     """Whether PyTorch would not give a convolution to oneDNN although that could do it."""

@@ -21,15 +21,16 @@ OPTIMISERS = ("muon", "adamw")
 AUGMENTATIONS = ("none", "symmetries", "shear")
 #: Steps of a phase through the vertices that leave a grid worth training on.
 LARGEST_STRIDE = 4
-#: Figures that developable surfaces and flat images are judged by, and the published losses.
-JUDGED = ("k_left", "d_h")
-FLAT = ("iso", "iso_w", "iso_cell", "iso_cell_w")
-TERMS = ("in", "fair", "gc", *JUDGED, *FLAT)
+#: What developable surfaces are judged by, and what there is for flat images only.
+_JUDGED = ("k_left", "d_h")
+_FLAT = ("iso", "iso_w", "iso_cell", "iso_cell_w")
+#: Terms of the published losses, and the figures that results are judged by.
+TERMS = ("in", "fair", "gc", *_JUDGED, *_FLAT)
 #: Terms that a task does not have.
 _FOREIGN = {
-    "developable": FLAT,
-    "flatten": ("in", "gc", *JUDGED),
-    "denoise": (*JUDGED, *FLAT),
+    "developable": _FLAT,
+    "flatten": ("in", "gc", *_JUDGED),
+    "denoise": (*_JUDGED, *_FLAT),
 }
 
 

@@ -38,8 +38,13 @@ def ball(grids: Tensor) -> tuple[Tensor, Tensor]:
 
 def normalise(grids: Tensor) -> Tensor:
     """Grids (B, H, W, 3) moved and scaled to the unit ball, each by itself."""
+    return normalise_with(grids)[0]
+
+
+def normalise_with(grids: Tensor, *others: Tensor) -> tuple[Tensor, ...]:
+    """The same, and others that lie to the results as they lay to the grids."""
     centre, radius = ball(grids)
-    return (grids - centre) / radius
+    return tuple((x - centre) / radius for x in (grids, *others))
 
 
 def curvature(p: Planes) -> Tensor:

@@ -23,6 +23,7 @@ _LEAST = 3e-3
 _LEAST_ENERGY = 3e-5
 
 Cost = Callable[[Tensor], Tensor]
+Term = Callable[[Tensor, Tensor], Tensor]
 
 
 class Objective(nn.Module):
@@ -43,30 +44,34 @@ class Objective(nn.Module):
 
 
 def _published(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
-    w = phase.weights
-    fade = math.exp(-phase.decay * progress)
-    surface = batch.compared
+    weights = dict(phase.weights)
+    if "in" in weights:
+        weights["in"] *= math.exp(-phase.decay * progress)
+    used = [(weight, _TERMS[name]) for name, weight in weights.items() if weight]
 
     def cost(result: Tensor) -> Tensor:
-        total = torch.zeros(len(result), device=result.device)
-        if w.get("in"):
-            total = total + fade * w["in"] * losses.inside(result, surface)
-        if w.get("fair"):
-            total = total + w["fair"] * losses.fair(result)
-        if w.get("gc"):
-            total = total + w["gc"] * losses.gc(result)
-        for name, figure in (("k_left", losses.k_left), ("d_h", losses.d_h)):
-            if w.get(name):
-                total = total + w[name] * figure(result, surface)
-        for name, term in (("iso", losses.iso), ("iso_cell", losses.iso_cell)):
-            if w.get(name):
-                total = total + w[name] * term(surface, result)
-            if w.get(f"{name}_w"):
-                cells = losses.iso_weights(surface)
-                total = total + w[f"{name}_w"] * term(surface, result, cells)
-        return total
+        return torch.stack([weight * term(result, batch.compared) for weight, term in used]).sum(0)
 
     return cost
+
+
+def _weighted(term: Callable[..., Tensor]) -> Term:
+    """A term of flat images with the weights of Eq. 13."""
+    return lambda flat, surface: term(surface, flat, losses.iso_weights(surface))
+
+
+#: Terms of the loss "published", of results and what they are compared with.
+_TERMS: dict[str, Term] = {
+    "in": losses.inside,
+    "fair": lambda result, _: losses.fair(result),
+    "gc": lambda result, _: losses.gc(result),
+    "k_left": losses.k_left,
+    "d_h": losses.d_h,
+    "iso": lambda flat, surface: losses.iso(surface, flat),
+    "iso_w": _weighted(losses.iso),
+    "iso_cell": lambda flat, surface: losses.iso_cell(surface, flat),
+    "iso_cell_w": _weighted(losses.iso_cell),
+}
 
 
 def _label(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:

@@ -21,7 +21,7 @@ from gso.net.catalogue import located, read_card
 from gso.net.config import Config
 from gso.net.curves import Curves, read
 from gso.net.data import Source, noisy, open_source
-from gso.net.grids import ball, normalise
+from gso.net.grids import normalise, normalise_with
 from gso.net.processes import Processes
 from gso.net.validate import SCORE, applied, mean_figures
 from gso.status import OptionError
@@ -240,9 +240,7 @@ def _pass_through(run: Run, tick: Tick | None) -> None:
         for start in mine:
             block = slice(start, start + _BLOCK)
             result = torch.from_numpy(applied(net, surfaces[block]))
-            centre, radius = ball(result)
-            out[block] = ((result - centre) / radius).float()
-            designs[block] = ((surfaces[block] - centre) / radius).float()
+            out[block], designs[block] = normalise_with(result, surfaces[block])
             if tick is not None:
                 count = min(start + here.world * _BLOCK, len(surfaces))
                 tick(f"surfaces through {run.config.through}", count, len(surfaces))
