@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from gso.smoothing import Smoothed, smooth_grid, smooth_mesh
+from gso.smoothing import Smoothed, estimate_sigma, smooth_grid, smooth_mesh
 from gso.smoothing.grid import modes
 from gso.smoothing.patches import boundary_edges, neighbours, residuals, rings, umbrella
 from gso.smoothing.select import best_weight, factor, gcv
@@ -182,7 +182,7 @@ def test_the_criterion_has_the_stated_gradient():
     point = CENTRE + np.array([-3.0, 0.4, 0.1, 0.1, -0.5])
     gradient = -spectrum._expand(point)[1]
     step = 1e-5 * np.eye(5)
-    numeric = [(spectrum._score(point + s) - spectrum._score(point - s)) / 2e-5 for s in step]
+    numeric = (spectrum._scores(point + step) - spectrum._scores(point - step)) / 2e-5
     np.testing.assert_allclose(gradient, numeric, rtol=1e-4, atol=1e-3)
 
 
@@ -198,6 +198,17 @@ def test_noise_is_measured_and_removed_blind(shape, sigma):
     # About as good as the best weight that one could pick knowing the truth.
     plain = [smooth_grid(dirty, order=4, weight=w).points for w in 10.0 ** np.arange(-14, 0)]
     assert theta(clean, result.points) < 1.3 * min(theta(clean, q) for q in plain)
+
+
+@pytest.mark.parametrize("order", [None, 4])
+@pytest.mark.parametrize("sigma", [0.0, 0.001, 0.01])
+def test_waves_are_not_taken_for_noise(order, sigma):
+    u, v = parameters(64, 64)
+    for along, across in [(12, 12), (20, 20), (25, 25), (40, 0), (25, 6)]:
+        clean = np.stack([u, v, 0.06 * np.cos(along * u) * np.cos(across * v)], axis=-1)
+        result = smooth_grid(noisy(clean, sigma=sigma), order=order)
+        assert result.sigma < 1.1 * sigma + 0.0005
+        assert np.std(result.points - clean) < 0.7 * sigma + 0.0005
 
 
 def test_random_polynomials_are_denoised_to_a_fraction_of_a_degree():
@@ -435,6 +446,35 @@ def test_triangles_quads_and_both_give_much_the_same():
     assert np.std(first.points - second.points) < 0.3 * SIGMA
 
 
+@pytest.mark.parametrize("shape", [(64, 64), (120, 50)])
+def test_noise_is_told_from_waves_and_creases(shape):
+    u, v = parameters(*shape)
+    waves = np.stack([u, v, 0.06 * np.sin(20 * u) * np.sin(20 * v)], axis=-1)
+    cliff = np.stack([u, v, np.where(u + 0.3 * v > 0.1, 0.4, 0.0)], axis=-1)
+    for clean in (wavy(*shape), waves, roof(*shape), roof(*shape, slant=0.6), cliff):
+        assert estimate_sigma(clean) < 6e-5
+        for sigma in (0.001, 0.01, 0.1):
+            found = [estimate_sigma(noisy(clean, seed, sigma)) for seed in range(8)]
+            assert np.mean(found) == pytest.approx(sigma, rel=0.06)
+            assert np.std(found) < 0.04 * sigma
+
+
+def test_estimates_do_not_care_for_unit_position_and_direction():
+    dirty = noisy(wavy(20, 28))
+    assert estimate_sigma(motion(dirty)[0]) == pytest.approx(300 * estimate_sigma(dirty), rel=1e-6)
+    for turned in (dirty[::-1], np.swapaxes(dirty, 0, 1)):
+        assert estimate_sigma(turned) == pytest.approx(estimate_sigma(dirty), rel=1e-12)
+    for size in (1e-200, 1e200):
+        assert estimate_sigma(size * dirty) == pytest.approx(size * estimate_sigma(dirty))
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (3, 4), (5, 3), (4, 30)])
+def test_noise_of_small_grids(shape):
+    found = [estimate_sigma(noisy(np.ones((*shape, 3)), seed)) for seed in range(200)]
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(SIGMA, rel=0.15)
+    assert estimate_sigma(np.ones((*shape, 3))) == 0.0
+
+
 def test_a_mesh_without_noise_hardly_moves():
     points, faces = patch_mesh(wavy(24, 24))
     for norm in ("l2", "l1"):
@@ -465,8 +505,9 @@ def test_bad_input_is_named():
     bad[1, 2, 0] = np.nan
     with pytest.raises(MeshError, match=r"vertex \(1, 2\)"):
         smooth_grid(bad)
-    with pytest.raises(MeshError, match="2 x 4"):
-        smooth_grid(wavy(2, 4))
+    for grids in (smooth_grid, estimate_sigma):
+        with pytest.raises(MeshError, match="2 x 4"):
+            grids(wavy(2, 4))
     with pytest.raises(MeshError, match="give"):
         smooth_grid(np.zeros((4, 4)))
     with pytest.raises(OptionError, match="order 1"):

@@ -62,7 +62,8 @@ def predict(
         take time in proportion. All of a net's when not given.
     sigma : float, optional
         "denoise": standard deviation of the noise, in the unit of the input; estimated for
-        each surface when not given. Nets that are not told ignore it.
+        each surface when not given (:func:`gso.smoothing.estimate_sigma`), as is what is left
+        of it when nets are applied again. Nets that are not told ignore it.
     device : str, optional
         "cpu", "cuda" ...; where there is a GPU, that when not given.
 
@@ -128,15 +129,16 @@ def _denoised(
             "vertices along each side; use gso.tno.optimize"
         )
     grids = np.stack([denoising.seen(grid) for grid in batch])
-    if sigma is not None:
-        sigma = sigma * denoising.share(height, width)
-    done = _predicted(grids, nets, passes, sigma, device)
+    # Of the vertices as they are: averages and reflections are not independent of each other.
+    noise = denoising.share(height, width) * (_estimated(batch) if sigma is None else sigma)
+    done = _predicted(grids, nets, passes, noise, device)
     return np.stack([denoising.back(grid, height, width) for grid in done])
 
 
 def _predicted(
-    batch: Array, nets: list[Net], passes: int | None, sigma: float | None, device: str
+    batch: Array, nets: list[Net], passes: int | None, sigma: float | Array | None, device: str
 ) -> Array:
+    """Results of nets one after the other; `sigma` is the noise of what the first one is given."""
     out = batch
     for net in nets:
         unit, centre, scale = _normalised(out)
@@ -153,7 +155,7 @@ def _predicted(
         out = scale * (start.numpy() + moved.double().cpu().numpy())
         if net.task == "flatten":
             return out
-        out = out + centre
+        out, sigma = out + centre, None
     return out
 
 
@@ -221,15 +223,17 @@ def _resampled(unit: Array) -> Array:
 
 
 def _sigma(
-    net: Net, unit: Array, scale: Array, sigma: float | None, device: str
+    net: Net, unit: Array, scale: Array, sigma: float | Array | None, device: str
 ) -> torch.Tensor | None:
     """Noise of each surface in the unit ball, (B,)."""
     if not getattr(net, "sigma", False):
         return None
-    if sigma is not None:
-        noise = sigma / scale.ravel()
-    else:
-        from gso.smoothing import smooth_grid
-
-        noise = np.array([smooth_grid(grid).sigma for grid in unit])
+    noise = _estimated(unit) if sigma is None else sigma / scale.ravel()
     return torch.as_tensor(noise, dtype=torch.float32, device=device)
+
+
+def _estimated(batch: Array) -> Array:
+    """Noise of each surface, (B,)."""
+    from gso.smoothing import estimate_sigma
+
+    return np.array([estimate_sigma(grid) for grid in batch])

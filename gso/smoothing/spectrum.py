@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,13 @@ SPREAD = np.array([20.0, 5.0, 5.0, 0.7, 1.0])
 LOWEST = np.array([0.5, -3.0, -3.0, np.log(0.3), np.log(0.5)])
 HIGHEST = np.array([75.0, 9.0, 9.0, np.log(8.0), np.log(60.0)])
 LARGEST_STEP = np.array([3.0, 0.7, 0.7, 0.4, 0.7])
-STARTS = [(a, m, n) for m in (2, 5, 12) for n in (2, 5, 12) for a in (6.0, 14.0)]
+# Where the fit may begin, from smooth surfaces to waves a few samples long.
+STARTS = np.array(
+    [
+        (a, np.log(m), np.log(n), *CENTRE[3:])
+        for a, m, n in product((3.0, 7.0, 14.0, 25.0), *[(2, 5, 12, 25, 45)] * 2)
+    ]
+)
 
 
 @lru_cache(maxsize=64)
@@ -87,7 +94,7 @@ class Spectrum:
         The criterion is minus twice the restricted log-likelihood, sigma^2 profiled out,
         plus the prior.
         """
-        point = self._best_start() if start is None else start
+        point = STARTS[self._scores(STARTS).argmin()] if start is None else start
         score, gradient, hessian, variance = self._expand(point)
         damping = 1e-2
         for _ in range(steps):
@@ -107,18 +114,13 @@ class Spectrum:
                 break
         return Law(point, variance, score)
 
-    def _best_start(self) -> Array:
-        points = [np.array([a, np.log(m), np.log(n), *CENTRE[3:]]) for a, m, n in STARTS]
-        return min(points, key=self._score)
-
-    def _score(self, point: Array) -> float:
-        v = 1 + np.exp(_log_share(point, self.log_i, self.log_j)).ravel()[self.keep]
-        variance = (self.energy / v).sum() / self.total
-        return float(
-            self.total * np.log(variance)
-            + self.count @ np.log(v)
-            + (((point - CENTRE) / SPREAD) ** 2).sum()
-        )
+    def _scores(self, points: Array) -> Array:
+        """Criterion at each of many points (n, 5)."""
+        share = _log_share(points, self.log_i, self.log_j).reshape(len(points), -1)
+        v = 1 + np.exp(share[:, self.keep])
+        variance = (self.energy / v).sum(axis=1) / self.total
+        away = ((points - CENTRE) / SPREAD) ** 2
+        return self.total * np.log(variance) + np.log(v) @ self.count + away.sum(axis=1)
 
     def _expand(self, point: Array) -> tuple[float, Array, Array, float]:
         """Criterion, minus its gradient, expected Hessian, noise variance at a point."""
@@ -160,16 +162,17 @@ def _log(index: NDArray) -> Array:
 
 
 def _powers(point: Array, log_i: Array, log_j: Array) -> tuple[Array, Array]:
-    q = np.exp(point[3])
-    u = np.exp(np.minimum(q * (log_i - point[1]), 50.0))
-    v = np.exp(np.minimum(q * (log_j - point[2]), 50.0))
+    m, n, q = point[..., 1, None], point[..., 2, None], np.exp(point[..., 3, None])
+    u = np.exp(np.minimum(q * (log_i - m), 50.0))
+    v = np.exp(np.minimum(q * (log_j - n), 50.0))
     return u, v
 
 
 def _log_share(point: Array, log_i: Array, log_j: Array) -> Array:
+    """Logarithm of s_ij / sigma^2, (..., i, j), at points (..., 5)."""
     u, v = _powers(point, log_i, log_j)
-    a, p = point[0], np.exp(point[4])
-    return a - p * np.log1p(np.expm1(a / p) * (u[:, None] + v))
+    a, p = point[..., 0, None, None], np.exp(point[..., 4, None, None])
+    return a - p * np.log1p(np.expm1(a / p) * (u[..., :, None] + v[..., None, :]))
 
 
 def _log_share_and_slope(point: Array, log_i: Array, log_j: Array) -> tuple[Array, Array]:

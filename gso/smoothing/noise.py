@@ -1,0 +1,65 @@
+"""How strong the noise of a grid is, from its differences alone."""
+
+from __future__ import annotations
+
+from math import comb
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import gammaincinv
+
+from gso.smoothing.base import checked_points
+from gso.status import MeshError
+
+#: Order of the differences in each direction.
+_ORDER = 3
+#: Median of the squared length of vectors of three independent standard normal numbers.
+_MEDIAN = 2.0 * float(gammaincinv(1.5, 0.5))
+
+
+def estimate_sigma(points: ArrayLike) -> float:
+    """Standard deviation of a grid's noise, per coordinate.
+
+    The noise is read off mixed differences, of third order in both directions at once, as
+    Immerkaer (1996) does with second ones on images. They leave next to nothing of a smooth
+    surface, or of creases along the grid; their median (Donoho and Johnstone 1994) does not
+    see the few that other creases and steps make large. At 64 x 64 the estimate scatters by
+    1.8 %, more than twice as much as that of :func:`smooth_grid`, in a tenth of its time.
+
+    Parameters
+    ----------
+    points : array_like, (H, W, 3)
+        Noisy surface in any unit of length and any position, from 3 x 3 up; the noise is
+        taken to be independent and equally strong in every coordinate. Orders are lowered
+        to H - 1 and W - 1 on smaller grids.
+
+    Returns
+    -------
+    float
+        In the unit of the input.
+
+    Raises
+    ------
+    MeshError
+        Not an (H, W, 3) array of finite numbers with at least 3 rows and columns.
+
+    Examples
+    --------
+    >>> u, v = np.meshgrid(np.linspace(0, 1, 40), np.linspace(0, 1, 30), indexing="ij")
+    >>> clean = np.stack([u, v, np.sin(9 * u) * np.sin(9 * v)], axis=-1)
+    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(clean.shape)
+    >>> bool(abs(estimate_sigma(clean + noise) - 0.01) < 0.0005)
+    True
+    """
+    rest = checked_points(points, 3)
+    height, width = rest.shape[:2]
+    if min(height, width) < 3:
+        raise MeshError(f"the grid is {height} x {width}: give at least 3 x 3 vertices")
+    size = float(np.abs(rest).max()) or 1.0
+    rest, gain = rest / size, 1
+    for axis, count in enumerate((height, width)):
+        order = min(_ORDER, count - 1)
+        rest = np.diff(rest, order, axis=axis)
+        # The sum of the squared binomial coefficients, by which variances grow.
+        gain *= comb(2 * order, order)
+    return size * float(np.sqrt(np.median((rest**2).sum(axis=-1)) / (gain * _MEDIAN)))
