@@ -22,13 +22,13 @@ from gso.net import (  # noqa: E402
     CoarseNet,
     GSONet,
     available,
-    blocks,
     catalogue,
     load,
+    onednn,
     predict,
     save,
 )
-from gso.net.blocks import Convolution  # noqa: E402
+from gso.net.blocks import IMDB, Convolution  # noqa: E402
 from gso.net.catalogue import TASKS  # noqa: E402
 
 
@@ -103,22 +103,57 @@ def test_single_grids_are_convolved_by_the_weights_of_the_moment(size):
         right(Convolution(inside, outside, width, **how).eval())
 
 
-def test_weights_are_reordered_once(monkeypatch):
-    if not blocks._REORDERS:
+@pytest.mark.parametrize("channels", [4, 16, 24])
+def test_single_grids_go_through_blocks_of_the_weights_of_the_moment(channels):
+    block = IMDB(channels).eval()
+    grids = [torch.randn(1, channels, *size) for size in ((1, 1), (7, 12), (32, 32))]
+    grids.append(grids[-1].contiguous(memory_format=torch.channels_last))
+
+    def right(block=block):
+        for x in grids:
+            expected = block(x.repeat(2, 1, 1, 1))[:1].detach()
+            with torch.inference_mode():
+                torch.testing.assert_close(block(x), expected, atol=1e-4, rtol=0)
+
+    right()
+    for weight in block.parameters():
+        with torch.no_grad():
+            weight.copy_(torch.randn_like(weight) / channels)
+        right()
+    block.load_state_dict(IMDB(channels).state_dict())
+    right()
+    for weight in block.parameters():
+        weight.data = torch.randn_like(weight) / channels
+        right()
+    for weight in block.parameters():
+        weight.data.mul_(0.5)
+    right(block.eval())
+    right(block.train())
+    right(copy.deepcopy(block).to(memory_format=torch.channels_last).eval())
+    with torch.inference_mode():
+        made_there = IMDB(channels).eval()
+    with torch.no_grad():
+        x = grids[1]
+        torch.testing.assert_close(made_there(x), made_there(x.repeat(2, 1, 1, 1))[:1])
+
+
+@pytest.mark.parametrize(("kind", "weights"), [(Convolution, 1), (IMDB, 4)])
+def test_weights_are_reordered_once(kind, weights, monkeypatch):
+    if not onednn.REORDERS:
         pytest.skip("this version of PyTorch does not reorder weights")
     made = []
-    reordered = blocks._reordered
-    monkeypatch.setattr(blocks, "_reordered", lambda *a: made.append(1) or reordered(*a))
-    conv = Convolution(4, 8, 3, padding=1).eval()
+    reordered = onednn._reordered
+    monkeypatch.setattr(onednn, "_reordered", lambda *a: made.append(1) or reordered(*a))
+    module = (IMDB(8) if kind is IMDB else Convolution(8, 8, 3, padding=1)).eval()
     with torch.inference_mode():
         for _ in range(3):
-            conv(torch.randn(1, 4, 8, 8))
-        conv(torch.randn(2, 4, 8, 8))
-    assert len(made) == 1
+            module(torch.randn(1, 8, 8, 8))
+        module(torch.randn(2, 8, 8, 8))
+    assert len(made) == weights
     with torch.inference_mode():
-        conv.train()(torch.randn(1, 4, 8, 8))
-        conv(torch.randn(1, 4, 8, 8))
-    assert len(made) == 1
+        module.train()(torch.randn(1, 8, 8, 8))
+        module(torch.randn(1, 8, 8, 8))
+    assert len(made) == weights
 
 
 @pytest.mark.parametrize(

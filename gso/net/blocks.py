@@ -2,45 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
-
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import silu
 
+from gso.net import onednn
+
 #: Channels that are normalised together.
 _GROUP = 16
-#: Whether PyTorch has oneDNN, and lets it be called.
-_ONEDNN = torch.backends.mkldnn.is_available() and hasattr(torch, "mkldnn_convolution")
-#: What puts weights into the order that oneDNN computes with, and what computes with them.
-_reordered: Any = getattr(torch._C._nn, "mkldnn_reorder_conv2d_weight", None)
-_convolved: Any = getattr(torch.ops.mkldnn, "_convolution_pointwise", None)
-#: Whether this version of PyTorch has both.
-_REORDERS = _ONEDNN and _reordered is not None and _convolved is not None
-
-
-class _Kept(NamedTuple):
-    """A convolution's weights in oneDNN's order, what they were made of, and when."""
-
-    made_of: Tensor
-    version: int
-    shape: torch.Size
-    weight: Tensor
-
-
-#: By convolution, and not in it, where copies and files of nets would take them along.
-_KEPT: WeakKeyDictionary[Convolution, _Kept] = WeakKeyDictionary()
+#: Slope of the LeakyReLU for negative numbers.
+_LEAK = 0.05
 
 
 class Convolution(nn.Conv2d):
-    """As PyTorch's, but on CPUs single small grids take the fast way, too.
+    """As PyTorch's, but on CPUs single grids take the fast way of :mod:`gso.net.onednn`.
 
-    A single grid with few values PyTorch hands to a loop of its own, which takes up to twice
-    the time of the oneDNN that it uses for all others; and that puts the weights in an order of
-    its own at every call, which takes up to half the time. Outside of training they are kept in
-    that order until they change; changes through ``weight.data`` are not seen before the next
-    call of ``eval()``.
+    Changes of the weights through ``weight.data`` are not seen before the next call of ``eval()``.
 
     >>> x, net = torch.ones(1, 4, 8, 8), Convolution(4, 4, 3, padding=1).eval()
     >>> with torch.inference_mode():
@@ -50,48 +27,24 @@ class Convolution(nn.Conv2d):
     """
 
     def forward(self, x: Tensor) -> Tensor:
+        weight = self.weight
         if (
-            not _slow(x, self.weight)
+            not onednn.takes(x, weight)
             or isinstance(self.padding, str)
             or self.padding_mode != "zeros"
         ):
             return super().forward(x)
-        how = self.padding, self.stride, self.dilation, self.groups
-        # Weights made in inference mode do not tell when they change.
-        if not _REORDERS or self.training or self.weight.is_inference():
-            return torch.mkldnn_convolution(x, self.weight, self.bias, *how)
-        return _convolved(x, self._kept(x.shape).weight, self.bias, *how, "none", [], "")
-
-    def _kept(self, shape: torch.Size) -> _Kept:
-        w, known = self.weight, _KEPT.get(self)
-        if (
-            known is None
-            or known.made_of.data_ptr() != w.data_ptr()
-            or known.version != w._version
-            or known.shape != shape
-        ):
-            made_of = w.detach()
-            how = self.padding, self.stride, self.dilation, self.groups
-            weight = _reordered(made_of.contiguous().to_mkldnn(), *how, shape)
-            # With what they were made of, whose place in memory no other weights can take then.
-            known = _KEPT[self] = _Kept(made_of, w._version, shape, weight)
-        return known
+        how = onednn.How(self.padding, self.stride, self.dilation, self.groups)
+        if not onednn.keeps(self, weight):
+            return torch.mkldnn_convolution(x, weight, self.bias, *how)
+        (weight,) = onednn.kept(
+            self, x.shape, (weight,), lambda w: (onednn.reordered(w, x.shape, how),)
+        )
+        return onednn.convolved(x, weight, self.bias, how)
 
     def train(self, mode: bool = True) -> Convolution:
-        _KEPT.pop(self, None)
+        onednn.forget(self)
         return super().train(mode)
-
-
-def _slow(x: Tensor, weight: Tensor) -> bool:
-    """Whether PyTorch would not give a convolution to oneDNN although that could do it."""
-    return (
-        _ONEDNN
-        and x.is_cpu
-        and len(x) == 1
-        and x.dtype == weight.dtype == torch.float32
-        and not torch.is_grad_enabled()
-        and not torch.jit.is_tracing()
-    )
 
 
 class IMDB(nn.Module):
@@ -99,7 +52,8 @@ class IMDB(nn.Module):
 
     Three convolutions with LeakyReLU(0.05) each hand a quarter of their channels to the end
     and the rest on; a fourth makes the last quarter. The quarters are mixed by a 1 x 1
-    convolution and added to the input.
+    convolution and added to the input. For single grids on CPUs the same is computed in fewer
+    steps, which rounds otherwise.
 
     >>> sum(p.numel() for p in IMDB(16).parameters())
     6448
@@ -114,15 +68,54 @@ class IMDB(nn.Module):
         )
         self.last = Convolution(rest, kept, 3, padding=1, bias=False)
         self.mix = Convolution(channels, channels, 1, bias=False)
-        self.active = nn.LeakyReLU(0.05, inplace=True)
+        self.active = nn.LeakyReLU(_LEAK, inplace=True)
 
     def forward(self, x: Tensor) -> Tensor:
+        weights = [*(step.weight for step in self.steps), self.last.weight, self.mix.weight]
+        if onednn.takes(x, weights[0]) and onednn.keeps(self, *weights):
+            return self._at_once(x, weights)
         rest, parts = x, []
         for step in self.steps:
             part, rest = self.active(step(rest)).split(self.sizes, dim=1)
             parts.append(part)
         parts.append(self.last(rest))
         return x + self.mix(torch.cat(parts, dim=1))
+
+    def _at_once(self, x: Tensor, weights: list[Tensor]) -> Tensor:
+        """All channels go on, where zeros meet those that are handed to the end.
+
+        The mixing of the last quarters is in the last convolution.
+        """
+        x = x.contiguous(memory_format=torch.channels_last)
+        *steps, last, one, two = onednn.kept(
+            self, x.shape, weights, lambda *w: self._merged(x.shape, *w)
+        )
+        made = [x]
+        for weight in steps:
+            made.append(onednn.convolved(made[-1], weight, leak=_LEAK))
+        (kept, _), (_, channels, height, width) = self.sizes, x.shape
+        rows, first, second, _ = (y.permute(0, 2, 3, 1).reshape(-1, channels) for y in made)
+        rows = torch.addmm(rows, first[:, :kept], one).addmm_(second[:, :kept], two)
+        total = rows.view(1, height, width, channels).permute(0, 3, 1, 2)
+        return onednn.add_convolved(total, made[-1], last)
+
+    def _merged(self, shape: torch.Size, *weights: Tensor) -> tuple[Tensor, ...]:
+        """Weights of the three steps and the last one, and what mixes the first two quarters."""
+        first, second, third, last, mix = weights
+        one, two, three, four = mix.double()[:, :, 0, 0].split(self.sizes[0], dim=1)
+        whole = torch.einsum("oq,qrij->orij", four, last.double())
+        at_vertex = torch.zeros(*three.shape, 3, 3, dtype=three.dtype)
+        at_vertex[:, :, 1, 1] = three
+        whole = torch.cat([at_vertex, whole], dim=1)
+        wide = [
+            torch.cat([torch.zeros_like(w[:, : self.sizes[0]]), w], dim=1) for w in (second, third)
+        ]
+        convolutions = [onednn.reordered(w.float(), shape) for w in (first, *wide, whole)]
+        return *convolutions, one.t().float().contiguous(), two.t().float().contiguous()
+
+    def train(self, mode: bool = True) -> IMDB:
+        onednn.forget(self)
+        return super().train(mode)
 
 
 class Residual(nn.Module):
