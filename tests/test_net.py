@@ -137,9 +137,32 @@ def test_single_grids_go_through_blocks_of_the_weights_of_the_moment(channels):
         torch.testing.assert_close(made_there(x), made_there(x.repeat(2, 1, 1, 1))[:1])
 
 
+def test_single_grids_keep_single_precision_where_others_choose_half():
+    net = shaken(GSONet(channels=8, blocks=1), size=0.02)
+    points = torch.as_tensor(saddle(32)[None], dtype=torch.float32)
+    with torch.inference_mode():
+        expected = net(points)
+        net.bf16 = True
+        assert (net(points) - expected).abs().max() < 0.02 * (expected - points).abs().max()
+        net.bf16 = False
+        with torch.autocast("cpu", torch.bfloat16):
+            block = IMDB(8).eval()
+            block(torch.randn(1, 8, 8, 8))
+
+
+def test_what_pytorch_does_otherwise_is_not_called(monkeypatch):
+    onednn.reorders.cache_clear()
+    monkeypatch.setattr(onednn, "_added", lambda *a: a[0])
+    block, x = IMDB(8).eval(), torch.randn(1, 8, 8, 8)
+    with torch.inference_mode():
+        assert not onednn.reorders()
+        torch.testing.assert_close(block(x), block(x.repeat(2, 1, 1, 1))[:1])
+    onednn.reorders.cache_clear()
+
+
 @pytest.mark.parametrize(("kind", "weights"), [(Convolution, 1), (IMDB, 4)])
 def test_weights_are_reordered_once(kind, weights, monkeypatch):
-    if not onednn.REORDERS:
+    if not onednn.reorders():
         pytest.skip("this version of PyTorch does not reorder weights")
     made = []
     reordered = onednn._reordered
@@ -256,6 +279,15 @@ def test_noise_goes_from_grids_of_any_size(shape):
         assert gso.metrics.normal_angle(clean, result) < share * before
     with pytest.raises(MeshError, match="16 vertices"):
         predict(noisy[:15], task="denoise")
+
+
+def test_noise_that_averages_keep_is_told():
+    u, v = np.meshgrid(*(np.linspace(-1, 1, 64),) * 2, indexing="ij")
+    clean = np.stack([u, v, 0.4 * u * v], axis=-1)
+    noisy = clean + 0.01 * np.random.default_rng(0).standard_normal(clean.shape)
+    clean, noisy = (gso.resample.resample(x, 150, 150) for x in (clean, noisy))
+    result = predict(noisy, task="denoise")
+    assert gso.metrics.normal_angle(clean, result) < 2.0
 
 
 @pytest.mark.parametrize("sigma", ["a", -1.0, np.nan, [0.1]])

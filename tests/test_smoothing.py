@@ -200,6 +200,16 @@ def test_noise_is_measured_and_removed_blind(shape, sigma):
     assert theta(clean, result.points) < 1.3 * min(theta(clean, q) for q in plain)
 
 
+@pytest.mark.parametrize(("size", "left"), [(4, 0.4), (6, 0.2), (8, 0.12), (12, 0.05)])
+def test_noise_of_small_planes_is_removed(size, left):
+    u, v = parameters(size, size)
+    plane = np.stack([u, v, 0.3 * u - 0.2 * v], axis=-1)
+    results = [smooth_grid(noisy(plane, seed, 0.02)) for seed in range(60)]
+    rest = [np.var(result.points - plane) for result in results]
+    assert np.mean(rest) < left * 0.02**2
+    assert np.median([result.sigma for result in results]) == pytest.approx(0.02, rel=0.2)
+
+
 @pytest.mark.parametrize("order", [None, 4])
 @pytest.mark.parametrize("sigma", [0.0, 0.001, 0.01])
 def test_waves_are_not_taken_for_noise(order, sigma):
@@ -457,6 +467,14 @@ def test_noise_is_told_from_waves_and_creases(shape):
             found = [estimate_sigma(noisy(clean, seed, sigma)) for seed in range(8)]
             assert np.mean(found) == pytest.approx(sigma, rel=0.06)
             assert np.std(found) < 0.04 * sigma
+
+
+@pytest.mark.parametrize("size", [16, 24, 40])
+def test_waves_of_many_vertices_are_not_noise(size):
+    u, v = parameters(size, size)
+    around = np.pi * (size - 1) / 10  # Ten vertices to a wave.
+    clean = np.stack([u, v, 0.06 * np.cos(around * u) * np.cos(around * v)], axis=-1)
+    assert estimate_sigma(clean) < 2e-4
 
 
 def test_estimates_do_not_care_for_unit_position_and_direction():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import silu
@@ -12,12 +14,15 @@ from gso.net import onednn
 _GROUP = 16
 #: Slope of the LeakyReLU for negative numbers.
 _LEAK = 0.05
+#: Vertices up to which fewer steps make up for more multiplications: measured.
+_SMALL = 64 * 64
 
 
 class Convolution(nn.Conv2d):
     """As PyTorch's, but on CPUs single grids take the fast way of :mod:`gso.net.onednn`.
 
-    Changes of the weights through ``weight.data`` are not seen before the next call of ``eval()``.
+    Changes of the weights through ``weight.data`` are not seen before the next call of ``eval()``
+    of this module, or of the :class:`IMDB` that it is in.
 
     >>> x, net = torch.ones(1, 4, 8, 8), Convolution(4, 4, 3, padding=1).eval()
     >>> with torch.inference_mode():
@@ -52,8 +57,10 @@ class IMDB(nn.Module):
 
     Three convolutions with LeakyReLU(0.05) each hand a quarter of their channels to the end
     and the rest on; a fourth makes the last quarter. The quarters are mixed by a 1 x 1
-    convolution and added to the input. For single grids on CPUs the same is computed in fewer
-    steps, which rounds otherwise.
+    convolution and added to the input.
+
+    For single small grids on CPUs the same is computed in fewer steps, which rounds otherwise,
+    and does not call the modules within, nor their hooks.
 
     >>> sum(p.numel() for p in IMDB(16).parameters())
     6448
@@ -71,9 +78,11 @@ class IMDB(nn.Module):
         self.active = nn.LeakyReLU(_LEAK, inplace=True)
 
     def forward(self, x: Tensor) -> Tensor:
-        weights = [*(step.weight for step in self.steps), self.last.weight, self.mix.weight]
-        if onednn.takes(x, weights[0]) and onednn.keeps(self, *weights):
-            return self._at_once(x, weights)
+        if x.shape[2] * x.shape[3] <= _SMALL and onednn.takes(x, self.mix.weight):
+            convolutions: list[Any] = [*self.steps, self.last, self.mix]
+            weights = [c.weight for c in convolutions]
+            if onednn.keeps(self, *weights):
+                return self._at_once(x, weights)
         rest, parts = x, []
         for step in self.steps:
             part, rest = self.active(step(rest)).split(self.sizes, dim=1)
@@ -95,7 +104,8 @@ class IMDB(nn.Module):
             made.append(onednn.convolved(made[-1], weight, leak=_LEAK))
         (kept, _), (_, channels, height, width) = self.sizes, x.shape
         rows, first, second, _ = (y.permute(0, 2, 3, 1).reshape(-1, channels) for y in made)
-        rows = torch.addmm(rows, first[:, :kept], one).addmm_(second[:, :kept], two)
+        # What is changed in place stays in single precision where others have chosen half.
+        rows = rows.clone().addmm_(first[:, :kept], one).addmm_(second[:, :kept], two)
         total = rows.view(1, height, width, channels).permute(0, 3, 1, 2)
         return onednn.add_convolved(total, made[-1], last)
 
@@ -104,7 +114,7 @@ class IMDB(nn.Module):
         first, second, third, last, mix = weights
         one, two, three, four = mix.double()[:, :, 0, 0].split(self.sizes[0], dim=1)
         whole = torch.einsum("oq,qrij->orij", four, last.double())
-        at_vertex = torch.zeros(*three.shape, 3, 3, dtype=three.dtype)
+        at_vertex = three.new_zeros(*three.shape, 3, 3)
         at_vertex[:, :, 1, 1] = three
         whole = torch.cat([at_vertex, whole], dim=1)
         wide = [

@@ -47,6 +47,18 @@ def share(height: int, width: int) -> float:
     return float(np.sqrt(np.prod([SIZE / (n + sum(_margins(n))) for n in (height, width)])))
 
 
+def sigma(grid: Array, seen: Array) -> float:
+    """Standard deviation of the noise of what a net sees of a grid, estimated from both."""
+    from gso.smoothing import estimate_sigma, smooth_grid
+
+    height, width = grid.shape[:2]
+    found = share(height, width) * estimate_sigma(grid)
+    if max(height, width) <= SIZE:
+        return found
+    # Averages have what neighbours have in common, too, which their differences do not show.
+    return max(found, smooth_grid(seen).sigma)
+
+
 def _margins(count: int) -> tuple[int, int]:
     """Vertices that are added before and behind a side."""
     more = max((SIZE if count <= SIZE else _MANY) - count, 0)

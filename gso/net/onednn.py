@@ -4,17 +4,19 @@ A single grid with few values PyTorch hands to a loop of its own, which takes up
 time of the oneDNN that it uses for all others; and that puts the weights in an order of its own
 at every call, which takes up to half the time. Here it gets all grids, and weights are kept in
 that order until they change; changes through ``weight.data`` are not seen before the next call of
-:func:`forget`.
+:func:`forget`, that is, of the module's ``eval()``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import torch
 from torch import Tensor, nn
+from torch.nn.functional import conv2d, leaky_relu
 
 #: Whether PyTorch has oneDNN, and lets it be called.
 _CALLED = torch.backends.mkldnn.is_available() and hasattr(torch, "mkldnn_convolution")
@@ -22,8 +24,6 @@ _CALLED = torch.backends.mkldnn.is_available() and hasattr(torch, "mkldnn_convol
 _reordered: Any = getattr(torch._C._nn, "mkldnn_reorder_conv2d_weight", None)
 _convolved: Any = getattr(torch.ops.mkldnn, "_convolution_pointwise", None)
 _added: Any = getattr(getattr(torch.ops.mkldnn, "_convolution_pointwise_", None), "binary", None)
-#: Whether this version of PyTorch has all of them.
-REORDERS = _CALLED and None not in (_reordered, _convolved, _added)
 
 
 class How(NamedTuple):
@@ -65,7 +65,7 @@ def takes(x: Tensor, weight: Tensor) -> bool:
 
 def keeps(module: nn.Module, *weights: Tensor) -> bool:
     """Whether weights may be kept: outside of training, where they tell when they change."""
-    return REORDERS and not module.training and not any(w.is_inference() for w in weights)
+    return reorders() and not module.training and not any(w.is_inference() for w in weights)
 
 
 def kept(
@@ -116,3 +116,20 @@ def convolved(
 def add_convolved(total: Tensor, x: Tensor, weight: Tensor) -> Tensor:
     """Add a grid convolved by a reordered weight to `total`, which it changes."""
     return _added(total, x, weight, None, *_SAME, "add", None, None, [], None)
+
+
+@lru_cache(maxsize=1)
+def reorders() -> bool:
+    """Whether this version of PyTorch has all that weights in that order need, and as here."""
+    if not _CALLED:
+        return False
+    x, weight = torch.ones(1, 4, 4, 4), -torch.ones(4, 4, 3, 3)
+    x = x.contiguous(memory_format=torch.channels_last)
+    expected = x + conv2d(leaky_relu(conv2d(x, weight, padding=1), 0.5), weight, padding=1)
+    try:
+        with torch.inference_mode():
+            kept = reordered(weight, x.shape)
+            found = add_convolved(x.clone(), convolved(x, kept, leak=0.5), kept)
+    except (AttributeError, RuntimeError, TypeError, ValueError):
+        return False
+    return bool(torch.allclose(found, expected))

@@ -62,8 +62,8 @@ def predict(
         take time in proportion. All of a net's when not given.
     sigma : float, optional
         "denoise": standard deviation of the noise, in the unit of the input; estimated for
-        each surface when not given (:func:`gso.smoothing.estimate_sigma`), as is what is left
-        of it when nets are applied again. Nets that are not told ignore it.
+        each surface when not given (:func:`gso.smoothing.estimate_sigma`). Nets that are not
+        told ignore it.
     device : str, optional
         "cpu", "cuda" ...; where there is a GPU, that when not given.
 
@@ -129,8 +129,11 @@ def _denoised(
             "vertices along each side; use gso.tno.optimize"
         )
     grids = np.stack([denoising.seen(grid) for grid in batch])
-    # Of the vertices as they are: averages and reflections are not independent of each other.
-    noise = denoising.share(height, width) * (_estimated(batch) if sigma is None else sigma)
+    noise: float | Array | None = None
+    if sigma is not None:
+        noise = sigma * denoising.share(height, width)
+    elif _told(nets[0]):
+        noise = np.array([denoising.sigma(*pair) for pair in zip(batch, grids, strict=True)])
     done = _predicted(grids, nets, passes, noise, device)
     return np.stack([denoising.back(grid, height, width) for grid in done])
 
@@ -138,7 +141,6 @@ def _denoised(
 def _predicted(
     batch: Array, nets: list[Net], passes: int | None, sigma: float | Array | None, device: str
 ) -> Array:
-    """Results of nets one after the other; `sigma` is the noise of what the first one is given."""
     out = batch
     for net in nets:
         unit, centre, scale = _normalised(out)
@@ -155,7 +157,7 @@ def _predicted(
         out = scale * (start.numpy() + moved.double().cpu().numpy())
         if net.task == "flatten":
             return out
-        out, sigma = out + centre, None
+        out = out + centre
     return out
 
 
@@ -222,18 +224,19 @@ def _resampled(unit: Array) -> Array:
     return np.stack([resample(grid, SIZE, SIZE) for grid in unit])
 
 
+def _told(net: Net) -> bool:
+    """Whether a net is told how strong the noise is."""
+    return bool(getattr(net, "sigma", False))
+
+
 def _sigma(
     net: Net, unit: Array, scale: Array, sigma: float | Array | None, device: str
 ) -> torch.Tensor | None:
     """Noise of each surface in the unit ball, (B,)."""
-    if not getattr(net, "sigma", False):
+    if not _told(net):
         return None
-    noise = _estimated(unit) if sigma is None else sigma / scale.ravel()
+    if sigma is not None:
+        noise = sigma / scale.ravel()
+    else:
+        noise = np.array([denoising.sigma(grid, grid) for grid in unit])
     return torch.as_tensor(noise, dtype=torch.float32, device=device)
-
-
-def _estimated(batch: Array) -> Array:
-    """Noise of each surface, (B,)."""
-    from gso.smoothing import estimate_sigma
-
-    return np.array([estimate_sigma(grid) for grid in batch])

@@ -2,7 +2,7 @@
 
 :func:`smooth_grid` for grids, in closed form, some milliseconds at 64 x 64;
 :func:`smooth_mesh` for any mesh of triangles and quads. Both keep creases on request.
-:func:`estimate_sigma` tells only how strong a grid's noise is, ten times as fast.
+:func:`estimate_sigma` tells only how strong a grid's noise is, and quickly.
 """
 
 from gso.smoothing.base import Smoothed

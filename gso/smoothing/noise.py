@@ -21,10 +21,11 @@ def estimate_sigma(points: ArrayLike) -> float:
     """Standard deviation of a grid's noise, per coordinate.
 
     The noise is read off mixed differences, of third order in both directions at once, as
-    Immerkaer (1996) does with second ones on images. They leave next to nothing of a smooth
-    surface, or of creases along the grid; their median (Donoho and Johnstone 1994) does not
-    see the few that other creases and steps make large. At 64 x 64 the estimate scatters by
-    1.8 %, more than twice as much as that of :func:`smooth_grid`, in a tenth of its time.
+    Immerkaer (1996) does with second ones on images. They leave next to nothing of a surface
+    whose waves are more than ten vertices long, or of creases along the grid; their median
+    (Donoho and Johnstone 1994) does not see the few that other creases and steps make large.
+    Noise that neighbours share is underestimated. At 64 x 64 the estimate scatters by 1.8 %,
+    more than twice as much as that of :func:`smooth_grid`, which takes over ten times as long.
 
     Parameters
     ----------

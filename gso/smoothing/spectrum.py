@@ -32,7 +32,8 @@ SPREAD = np.array([20.0, 5.0, 5.0, 0.7, 1.0])
 LOWEST = np.array([0.5, -3.0, -3.0, np.log(0.3), np.log(0.5)])
 HIGHEST = np.array([75.0, 9.0, 9.0, np.log(8.0), np.log(60.0)])
 LARGEST_STEP = np.array([3.0, 0.7, 0.7, 0.4, 0.7])
-# Where the fit may begin, from smooth surfaces to waves a few samples long.
+# Where the fit may begin, from smooth surfaces to waves a few samples long, as far as a grid
+# has such modes.
 STARTS = np.array(
     [
         (a, np.log(m), np.log(n), *CENTRE[3:])
@@ -94,7 +95,7 @@ class Spectrum:
         The criterion is minus twice the restricted log-likelihood, sigma^2 profiled out,
         plus the prior.
         """
-        point = STARTS[self._scores(STARTS).argmin()] if start is None else start
+        point = self._best_start() if start is None else start
         score, gradient, hessian, variance = self._expand(point)
         damping = 1e-2
         for _ in range(steps):
@@ -113,6 +114,12 @@ class Spectrum:
             if gain < tolerance:
                 break
         return Law(point, variance, score)
+
+    def _best_start(self) -> Array:
+        # Beyond the last mode signal would be as flat as noise.
+        last = [max(log[-1], np.log(2.5)) for log in (self.log_i, self.log_j)]
+        points = STARTS[(STARTS[:, 1:3] <= last).all(axis=1)]
+        return points[self._scores(points).argmin()]
 
     def _scores(self, points: Array) -> Array:
         """Criterion at each of many points (n, 5)."""
