@@ -123,13 +123,13 @@ def reorders() -> bool:
     """Whether this version of PyTorch has all that weights in that order need, and as here."""
     if not _CALLED:
         return False
-    x, weight = torch.ones(1, 4, 4, 4), -torch.ones(4, 4, 3, 3)
-    x = x.contiguous(memory_format=torch.channels_last)
-    expected = x + conv2d(leaky_relu(conv2d(x, weight, padding=1), 0.5), weight, padding=1)
+    weight = -torch.ones(4, 4, 3, 3, device="cpu")
+    x = torch.ones(1, 4, 4, 4, device="cpu").contiguous(memory_format=torch.channels_last)
     try:
-        with torch.inference_mode():
+        with torch.inference_mode(), torch.autocast("cpu", enabled=False):
+            expected = x + conv2d(leaky_relu(conv2d(x, weight, padding=1), 0.5), weight, padding=1)
             kept = reordered(weight, x.shape)
             found = add_convolved(x.clone(), convolved(x, kept, leak=0.5), kept)
+            return torch.allclose(found, expected)
     except (AttributeError, RuntimeError, TypeError, ValueError):
         return False
-    return bool(torch.allclose(found, expected))
