@@ -16,6 +16,7 @@ linear estimate then keeps s / (1 + s) of a mode (Wiener 1949).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
@@ -32,13 +33,25 @@ SPREAD = np.array([20.0, 5.0, 5.0, 0.7, 1.0])
 LOWEST = np.array([0.5, -3.0, -3.0, np.log(0.3), np.log(0.5)])
 HIGHEST = np.array([75.0, 9.0, 9.0, np.log(8.0), np.log(60.0)])
 LARGEST_STEP = np.array([3.0, 0.7, 0.7, 0.4, 0.7])
-# Where the fit may begin, from smooth surfaces to waves a few samples long, as far as a grid
-# has such modes.
-STARTS = np.array(
-    [
-        (a, np.log(m), np.log(n), *CENTRE[3:])
-        for a, m, n in product((3.0, 7.0, 14.0, 25.0), *[(2, 5, 12, 25, 45)] * 2)
-    ]
+# Modes at which the signal may drown where the fit begins: of surfaces, and of waves a few samples
+# long.
+DROWNED, DROWNED_WAVES = (2, 5, 12), (25, 45)
+# Variance, of a grid of radius one, up to which no waves can be among the noise.
+NO_WAVES = 1e-8
+
+
+def _starts(modes: Iterable[tuple[int, int]], levels: tuple[float, ...]) -> Array:
+    return np.array([(a, np.log(m), np.log(n), *CENTRE[3:]) for m, n in modes for a in levels])
+
+
+STARTS = _starts(product(DROWNED, DROWNED), (6.0, 14.0))
+WAVES = _starts(
+    (
+        pair
+        for pair in product(DROWNED + DROWNED_WAVES, repeat=2)
+        if any(mode in DROWNED_WAVES for mode in pair)
+    ),
+    (6.0, 14.0, 25.0),
 )
 
 
@@ -89,13 +102,28 @@ class Spectrum:
         self.total = self.count.sum()
         self.log_i, self.log_j = _log(ci), _log(cj)
 
-    def fit(self, start: Array | None = None, steps: int = 40, tolerance: float = 1e-2) -> Law:
-        """Find the parameters by Fisher scoring with Levenberg's damping.
+    def fit(self, start: Array | None = None) -> Law:
+        """Find the parameters from a start, or from the likeliest ones.
 
         The criterion is minus twice the restricted log-likelihood, sigma^2 profiled out,
-        plus the prior.
+        plus the prior. Waves a few samples long are a second optimum, apart from that of a smooth
+        surface: where they are a likelier start, and what is taken for noise is enough to be
+        waves, the fit begins there, too.
         """
-        point = self._best_start() if start is None else start
+        if start is not None:
+            return self._improved(start)
+        scores = self._scores(STARTS)
+        law = self._improved(STARTS[scores.argmin()])
+        # Beyond the last mode signal would be as flat as noise.
+        waves = WAVES[(WAVES[:, 1:3] <= [self.log_i[-1], self.log_j[-1]]).all(axis=1)]
+        if law.variance > NO_WAVES and len(waves):
+            among = self._scores(waves)
+            if among.min() < scores.min():
+                law = min(law, self._improved(waves[among.argmin()]), key=lambda law: law.score)
+        return law
+
+    def _improved(self, point: Array, steps: int = 40, tolerance: float = 1e-2) -> Law:
+        """Fisher scoring with Levenberg's damping."""
         score, gradient, hessian, variance = self._expand(point)
         damping = 1e-2
         for _ in range(steps):
@@ -114,12 +142,6 @@ class Spectrum:
             if gain < tolerance:
                 break
         return Law(point, variance, score)
-
-    def _best_start(self) -> Array:
-        # Beyond the last mode signal would be as flat as noise.
-        last = [max(log[-1], np.log(2.5)) for log in (self.log_i, self.log_j)]
-        points = STARTS[(STARTS[:, 1:3] <= last).all(axis=1)]
-        return points[self._scores(points).argmin()]
 
     def _scores(self, points: Array) -> Array:
         """Criterion at each of many points (n, 5)."""
