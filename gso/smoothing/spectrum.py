@@ -16,7 +16,6 @@ linear estimate then keeps s / (1 + s) of a mode (Wiener 1949).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
@@ -33,26 +32,19 @@ SPREAD = np.array([20.0, 5.0, 5.0, 0.7, 1.0])
 LOWEST = np.array([0.5, -3.0, -3.0, np.log(0.3), np.log(0.5)])
 HIGHEST = np.array([75.0, 9.0, 9.0, np.log(8.0), np.log(60.0)])
 LARGEST_STEP = np.array([3.0, 0.7, 0.7, 0.4, 0.7])
-# Modes at which the signal may drown where the fit begins: of surfaces, and of waves a few samples
-# long.
-DROWNED, DROWNED_WAVES = (2, 5, 12), (25, 45)
 # Variance, of a grid of radius one, up to which no waves can be among the noise.
 NO_WAVES = 1e-8
 
 
-def _starts(modes: Iterable[tuple[int, int]], levels: tuple[float, ...]) -> Array:
-    return np.array([(a, np.log(m), np.log(n), *CENTRE[3:]) for m, n in modes for a in levels])
+def _starts(modes: tuple[int, ...], levels: tuple[float, ...]) -> Array:
+    return np.array(
+        [(a, np.log(m), np.log(n), *CENTRE[3:]) for m, n in product(modes, modes) for a in levels]
+    )
 
 
-STARTS = _starts(product(DROWNED, DROWNED), (6.0, 14.0))
-WAVES = _starts(
-    (
-        pair
-        for pair in product(DROWNED + DROWNED_WAVES, repeat=2)
-        if any(mode in DROWNED_WAVES for mode in pair)
-    ),
-    (6.0, 14.0, 25.0),
-)
+# Where the fit begins: with smooth surfaces, and with waves that may be a few samples long.
+STARTS = _starts((2, 5, 12), (6.0, 14.0))
+WAVES = _starts((2, 5, 12, 25, 45), (6.0, 14.0, 25.0))
 
 
 @lru_cache(maxsize=64)
@@ -119,7 +111,7 @@ class Spectrum:
         if law.variance > NO_WAVES and len(waves):
             among = self._scores(waves)
             if among.min() < scores.min():
-                law = min(law, self._improved(waves[among.argmin()]), key=lambda law: law.score)
+                return min(law, self._improved(waves[among.argmin()]), key=lambda x: x.score)
         return law
 
     def _improved(self, point: Array, steps: int = 40, tolerance: float = 1e-2) -> Law:
