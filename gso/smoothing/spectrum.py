@@ -45,6 +45,7 @@ def _starts(modes: tuple[int, ...], levels: tuple[float, ...]) -> Array:
 # Where the fit begins: with smooth surfaces, and with waves that may be a few samples long.
 STARTS = _starts((2, 5, 12), (6.0, 14.0))
 WAVES = _starts((2, 5, 12, 25, 45), (6.0, 14.0, 25.0))
+WAVES = WAVES[WAVES[:, 1:3].max(axis=1) > STARTS[:, 1].max()]
 
 
 @lru_cache(maxsize=64)
