@@ -42,10 +42,10 @@ class Convolution(nn.Conv2d):
         how = onednn.How(self.padding, self.stride, self.dilation, self.groups)
         if not onednn.keeps(self, weight):
             return torch.mkldnn_convolution(x, weight, self.bias, *how)
-        (weight,) = onednn.kept(
+        (kept,) = onednn.kept(
             self, x.shape, (weight,), lambda w: (onednn.reordered(w, x.shape, how),)
         )
-        return onednn.convolved(x, weight, self.bias, how)
+        return onednn.convolved(x, kept, self.bias, how)
 
     def train(self, mode: bool = True) -> Convolution:
         onednn.forget(self)

@@ -10,7 +10,7 @@ that order until they change; changes through ``weight.data`` are not seen befor
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cache
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -118,7 +118,7 @@ def add_convolved(total: Tensor, x: Tensor, weight: Tensor) -> Tensor:
     return _added(total, x, weight, None, *_SAME, "add", None, None, [], None)
 
 
-@lru_cache(maxsize=1)
+@cache
 def reorders() -> bool:
     """Whether this version of PyTorch has all that weights in that order need, and as here."""
     if not _CALLED:

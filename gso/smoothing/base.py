@@ -77,6 +77,21 @@ def checked_points(points: ArrayLike, ndim: int) -> Array:
     return array
 
 
+def checked_grid(points: ArrayLike) -> Array:
+    """Grid as float64 (H, W, 3).
+
+    Raises
+    ------
+    MeshError
+        As of :func:`checked_points`, or fewer than 3 rows or columns.
+    """
+    array = checked_points(points, 3)
+    height, width = array.shape[:2]
+    if min(height, width) < 3:
+        raise MeshError(f"the grid is {height} x {width}: smoothing needs at least 3 x 3 vertices")
+    return array
+
+
 def checked_options(
     order: int | None, orders: tuple[int, ...], weight: float | None, norm: str
 ) -> None:

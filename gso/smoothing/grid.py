@@ -7,9 +7,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gso.smoothing.base import Smoothed, checked_options, checked_points, to_unit
+from gso.smoothing.base import Smoothed, checked_grid, checked_options, to_unit
 from gso.smoothing.spectrum import Law, Spectrum, bins, shrinkage
-from gso.status import MeshError
 
 Array = NDArray[np.float64]
 
@@ -82,10 +81,7 @@ def smooth_grid(
     >>> bool(np.abs(result.points - clean).max() < 0.01)
     True
     """
-    array = checked_points(points, 3)
-    height, width = array.shape[:2]
-    if min(height, width) < 3:
-        raise MeshError(f"the grid is {height} x {width}: smoothing needs at least 3 x 3 vertices")
+    array = checked_grid(points)
     if norm == "l1":
         from gso.smoothing.crease import smooth_creased_grid
 

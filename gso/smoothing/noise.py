@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import gammaincinv
 
-from gso.smoothing.base import checked_points
-from gso.status import MeshError
+from gso.smoothing.base import checked_grid
 
 #: Order of the differences in each direction.
 _ORDER = 3
@@ -52,14 +51,11 @@ def estimate_sigma(points: ArrayLike) -> float:
     >>> bool(abs(estimate_sigma(clean + noise) - 0.01) < 0.0005)
     True
     """
-    rest = checked_points(points, 3)
-    height, width = rest.shape[:2]
-    if min(height, width) < 3:
-        raise MeshError(f"the grid is {height} x {width}: give at least 3 x 3 vertices")
+    rest = checked_grid(points)
     size = float(np.abs(rest).max()) or 1.0
     rest, gain = rest / size, 1
-    for axis, count in enumerate((height, width)):
-        order = min(_ORDER, count - 1)
+    for axis in (0, 1):
+        order = min(_ORDER, rest.shape[axis] - 1)
         rest = np.diff(rest, order, axis=axis)
         # The sum of the squared binomial coefficients, by which variances grow.
         gain *= comb(2 * order, order)
