@@ -9,6 +9,8 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import gso
 from gso.flat_start import rectangle
@@ -30,6 +32,7 @@ from gso.net import (  # noqa: E402
 )
 from gso.net.blocks import IMDB, Convolution  # noqa: E402
 from gso.net.catalogue import TASKS  # noqa: E402
+from gso.net.grids import axes  # noqa: E402
 
 
 def shaken(net, seed=0, size=0.05):
@@ -54,6 +57,16 @@ def coarse():
 @pytest.fixture(scope="module")
 def flatten():
     return shaken(CoarseNet("flatten", widths=(16, 16, 16), depths=(1, 1, 1)))
+
+
+@pytest.fixture(scope="module")
+def aligned():
+    return shaken(GSONet(channels=8, blocks=1, aligned=True), size=0.01)
+
+
+@pytest.fixture(scope="module")
+def aligned_flatten():
+    return shaken(GSONet("flatten", channels=8, blocks=1, aligned=True), size=0.01)
 
 
 @pytest.fixture(scope="module")
@@ -208,16 +221,48 @@ def test_unit_position_and_size_of_the_grid_do_not_matter(kind, shape, request):
     np.testing.assert_allclose((far - [5e4, 0, -3e4]) / 1000.0, result, atol=2e-6)
 
 
-def test_coarse_net_turns_with_the_surface(coarse, flatten):
-    rng = np.random.default_rng(1)
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    turn *= np.sign(np.linalg.det(turn))
+def rotation(seed):
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    return turn * np.sign(np.linalg.det(turn))
+
+
+@pytest.mark.parametrize("kind", ["coarse", "aligned"])
+def test_results_turn_with_the_surface(kind, request):
+    net = request.getfixturevalue(kind)
+    points, turn = saddle(64), rotation(1)
+    result = predict(points, model=net)
+    close(predict(points @ turn, model=net), result @ turn, result - points)
+
+
+@pytest.mark.parametrize("kind", ["flatten", "aligned_flatten"])
+def test_flat_images_stay_where_the_surface_is_turned(kind, request):
+    net = request.getfixturevalue(kind)
     points = saddle(64)
-    result = predict(points, model=coarse)
-    close(predict(points @ turn, model=coarse), result @ turn, result - points)
-    flat = predict(points, task="flatten", model=flatten)
-    turned = predict(points @ turn, task="flatten", model=flatten)
+    flat = predict(points, task="flatten", model=net)
+    turned = predict(points @ rotation(1), task="flatten", model=net)
     close(turned, flat, flat - predict(points, task="flatten", model=CoarseNet("flatten")))
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([(4, 4), (5, 9), (64, 64)]))
+def test_axes_turn_with_grids_of_any_shape(seed, shape):
+    points = np.random.default_rng(seed).normal(size=(1, *shape, 3))
+    first, turned = (
+        axes(torch.from_numpy(x))[0].numpy() for x in (points, points @ rotation(seed))
+    )
+    np.testing.assert_allclose(first.T @ first, np.eye(3), atol=1e-12)
+    assert np.linalg.det(first) > 0
+    np.testing.assert_allclose(turned, rotation(seed).T @ first, atol=1e-6)
+    # Seen along its own axes, the transposed grid is the same with x and y exchanged.
+    swapped = axes(torch.from_numpy(points.swapaxes(1, 2)))[0].numpy()
+    np.testing.assert_allclose(swapped, first @ [[0, 1, 0], [1, 0, 0], [0, 0, -1]], atol=1e-6)
+
+
+def test_grids_without_two_directions_are_not_turned():
+    u, v = np.meshgrid(np.linspace(-1, 1, 8), np.linspace(-1, 1, 8), indexing="ij")
+    line, closed = u + v, np.abs(u) * np.abs(v)
+    grids = [[line, 2 * line, 0 * u], [closed, closed, v], [0 * u, 0 * u, 0 * u]]
+    found = axes(torch.from_numpy(np.moveaxis(grids, 1, -1)))
+    assert bool((found == torch.eye(3)).all())
 
 
 def test_coarse_net_is_one_surface_at_every_resolution(coarse):

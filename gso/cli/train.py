@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Figures that are shown beside the bar, by task.
 _SHOWN = ("loss_gc", "K_A_r", "d_H", "strain_mean", "loss_iso_cell", "theta")
+#: glibc's M_MMAP_THRESHOLD and M_TRIM_THRESHOLD, and bytes up to which it takes the former.
+_MAPPED, _TRIMMED, _LARGE = -3, -1, 2**25
 
 
 @click.command(short_help="Train a net.")
@@ -44,6 +47,7 @@ def train(
     """
     # Read when torch is loaded: threads that wait busily slow each other on shared cores.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    _keep_memory()
     from gso.net.config import read
     from gso.net.training import MODEL
     from gso.net.training import train as run
@@ -62,6 +66,16 @@ def train(
     if not quiet and card:
         found = ", ".join(f"{name} {value:.4g}" for name, value in card["validation"].items())
         click.echo(f"{out}/{MODEL}: {card['steps']} steps, {card['hours']} hours; {found}")
+
+
+def _keep_memory() -> None:
+    """Let glibc keep what is freed: each step wants as much again, and new pages take time."""
+    try:
+        keep = ctypes.CDLL(None).mallopt
+    except (AttributeError, OSError, TypeError):
+        return
+    for setting, value in ((_MAPPED, _LARGE), (_TRIMMED, 2**31 - 1)):
+        keep(setting, value)
 
 
 def _text(report: Report) -> str:

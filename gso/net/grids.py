@@ -17,6 +17,8 @@ Planes = tuple[Tensor, ...]
 
 #: Shortest vector that is divided by: lengths of the unit ball are far above it.
 _SHORTEST = 1e-12
+#: Least length, in the unit ball, of mean directions that make axes, and of their difference.
+_DISTINCT = 1e-5
 
 
 def planes(points: Tensor) -> Planes:
@@ -45,6 +47,41 @@ def normalise_with(grids: Tensor, *others: Tensor) -> tuple[Tensor, ...]:
     """The same, and others that lie to the results as they lay to the grids."""
     centre, radius = ball(grids)
     return tuple((x - centre) / radius for x in (grids, *others))
+
+
+def axes(grids: Tensor) -> Tensor:
+    """Rotations (B, 3, 3) whose columns are the axes that grids (B, H, W, 3) themselves give.
+
+    x and y lie as near as two orthogonal vectors can to the mean directions of both families
+    of grid lines, by linear regression; z is across both. The unit matrix where these
+    directions are one, or none.
+
+    >>> u, v = torch.meshgrid(torch.linspace(0, 1, 4), torch.linspace(0, 1, 5), indexing="ij")
+    >>> axes(torch.stack([v, u, 0 * u], dim=-1)[None])[0].round() + 0.0
+    tensor([[ 0.,  1.,  0.],
+            [ 1.,  0.,  0.],
+            [ 0.,  0., -1.]])
+    """
+    height, width = grids.shape[1:3]
+    rows, columns = (
+        torch.linspace(-1.0, 1.0, n, dtype=grids.dtype, device=grids.device)
+        for n in (height, width)
+    )
+    slopes: list[Planes] = [
+        tuple(torch.einsum("bhwi,h->ib", grids, rows) / (height * width)),
+        tuple(torch.einsum("bhwi,w->ib", grids, columns) / (height * width)),
+    ]
+    along, across = (unit(slope) for slope in slopes)
+    between = tuple(a + b for a, b in zip(along, across, strict=True))
+    beside = geometry.sub(along, across)
+    lengths = [geometry.norm(v) for v in (*slopes, between, beside)]
+    least = torch.stack(lengths).amin(dim=0)
+    between, beside = unit(between), unit(beside)
+    x = tuple((a + b) * 0.5**0.5 for a, b in zip(between, beside, strict=True))
+    y = tuple((a - b) * 0.5**0.5 for a, b in zip(between, beside, strict=True))
+    found = torch.stack([points(v) for v in (x, y, geometry.cross(x, y))], dim=-1)
+    none = torch.eye(3, dtype=grids.dtype, device=grids.device)
+    return torch.where((least > _DISTINCT)[:, None, None], found, none)
 
 
 def curvature(p: Planes) -> Tensor:

@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from gso.net.base import Net
 from gso.net.blocks import IMDB, Convolution
 from gso.net.catalogue import TASKS
+from gso.net.grids import axes
 from gso.net.resampling import resampled
 from gso.status import OptionError
 
@@ -36,6 +37,9 @@ class GSONet(Net):
         code does not.
     sigma : bool
         Whether the net is told the noise, as a constant fourth channel.
+    aligned : bool
+        Whether grids are turned first so that their lines follow the axes, and displacements
+        turned back: the result turns with the input, which the published net's does not.
 
     Raises
     ------
@@ -60,13 +64,15 @@ class GSONet(Net):
         blocks: int = 4,
         tanh: bool = False,
         sigma: bool = False,
+        aligned: bool = False,
     ):
         if channels % 4 or not 4 <= channels <= 256 or not 1 <= blocks <= 64:
             raise OptionError(
                 f"channels {channels}, blocks {blocks}: take a multiple of 4 up to 256, and 1 to 64"
             )
-        super().__init__(task, channels=channels, blocks=blocks, tanh=tanh, sigma=sigma)
-        self.tanh, self.sigma = tanh, sigma
+        settings = {"tanh": tanh, "sigma": sigma, "aligned": aligned}
+        super().__init__(task, channels=channels, blocks=blocks, **settings)
+        self.tanh, self.sigma, self.aligned = tanh, sigma, aligned
         widths = [channels << k for k in range(_LEVELS + 1)]
         steps = list(pairwise(widths))
 
@@ -92,7 +98,9 @@ class GSONet(Net):
     def displacements(
         self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
     ) -> Tensor:
-        x = surface.movedim(-1, 1)
+        turn = axes(surface) if self.aligned else None
+        seen = surface if turn is None else torch.einsum("bhwi,bij->bhwj", surface, turn)
+        x = seen.movedim(-1, 1)
         if self.sigma:
             if sigma is None:
                 raise OptionError("this net must be told sigma")
@@ -112,7 +120,11 @@ class GSONet(Net):
         # Curvature multiplies what is rounded by the square of the samples' number: the layers
         # that take positions and make displacements compute in single precision.
         y = self.tail(finest((y + last).to(x.dtype)) + skips[0])
-        return (torch.tanh(y) if self.tanh else y).movedim(1, -1)
+        moved = (torch.tanh(y) if self.tanh else y).movedim(1, -1)
+        # Flat images lie along the axes of their rectangle.
+        if turn is None or self.task == "flatten":
+            return moved
+        return torch.einsum("bhwj,bij->bhwi", moved, turn)
 
     def carried(
         self,
