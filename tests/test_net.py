@@ -502,6 +502,19 @@ def test_shipped_weights_load(name):
     assert np.isfinite(result).all()
 
 
+@pytest.mark.parametrize("name", available())
+def test_shipped_nets_turn_with_the_surface(name):
+    nets = [load(part) for part in catalogue.CHAINS.get(name, (name,))]
+    if not all(net.settings.get("aligned", True) for net in nets):
+        pytest.skip("it was trained without")
+    points, turn, task = saddle(64), rotation(2), nets[0].task
+    done, turned = (predict(x, task=task, model=name) for x in (points, points @ turn))
+    if task == "flatten":
+        close(turned, done, np.ptp(done))
+    else:
+        close(turned, done @ turn, done - points)
+
+
 def test_shipped_weights_are_small():
     assert sum(p.stat().st_size for p in catalogue.FOLDER.glob("*")) < 60e6
 
