@@ -18,6 +18,12 @@ def saddle(height: int = 9, width: int | None = None, strength: float = 0.4) -> 
     return np.stack([u, v, strength * (u * u - v * v + 0.3 * u * v)], axis=-1)
 
 
+def rotation(seed: int) -> np.ndarray:
+    """A random rotation (3, 3)."""
+    turn = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
+    return turn * np.sign(np.linalg.det(turn))
+
+
 def cylinder(n: int = 33, turn: float = 0.4, radius: float = 0.8) -> np.ndarray:
     """A patch of a cylinder whose rulings cross the grid lines at an angle, (n, n, 3)."""
     u, v = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")

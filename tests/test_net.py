@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import gso
 from gso.flat_start import rectangle
 from gso.status import MeshError, OptionError, WeightsError
-from tests.conftest import cylinder, saddle
+from tests.conftest import cylinder, rotation, saddle
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("safetensors")
@@ -219,11 +219,6 @@ def test_unit_position_and_size_of_the_grid_do_not_matter(kind, shape, request):
     assert np.abs(result - points).max() > 1e-4
     far = predict(1000.0 * points + [5e4, 0, -3e4], model=net)
     np.testing.assert_allclose((far - [5e4, 0, -3e4]) / 1000.0, result, atol=2e-6)
-
-
-def rotation(seed):
-    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
-    return turn * np.sign(np.linalg.det(turn))
 
 
 @pytest.mark.parametrize("kind", ["coarse", "aligned"])

@@ -308,6 +308,15 @@ def test_a_killed_run_ends_with_the_same_weights(folder, tmp_path):
     assert train(made, folder, tmp_path / "killed")["sha256"] == card["sha256"]
 
 
+@pytest.fixture
+def listening():
+    """Ctrl-C as Python has it: a shell has it ignored by what it starts in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("listening")
 def test_ctrl_c_ends_a_run_between_steps(folder, tmp_path):
     made = config(steps=50, augment="symmetries")
     train(made, folder, tmp_path / "whole")
@@ -316,11 +325,9 @@ def test_ctrl_c_ends_a_run_between_steps(folder, tmp_path):
         if report.step == 20:
             os.kill(os.getpid(), signal.SIGINT)
 
-    # A shell lets what it starts in the background ignore the signal.
-    before = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
         train(made, folder, tmp_path / "interrupted", show=interrupt)
-    assert signal.getsignal(signal.SIGINT) is before
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     kept = checkpoint.numbers(tmp_path / "interrupted" / "checkpoint.safetensors")
     assert kept["step"] in (20, 21)
     train(made, folder, tmp_path / "interrupted")

@@ -11,6 +11,8 @@ from gso.smoothing.select import best_weight, factor, gcv
 from gso.smoothing.spectrum import CENTRE, Spectrum
 from gso.status import MeshError, OptionError
 
+from .conftest import rotation
+
 SIGMA = 0.01
 
 
@@ -138,7 +140,7 @@ def sphere(steps=3):
 
 def motion(points, shift=50.0, scale=300.0):
     """The points turned, scaled and moved away, and the way back."""
-    turn = np.linalg.qr(np.random.default_rng(5).standard_normal((3, 3)))[0]
+    turn = rotation(5)
     return scale * points @ turn.T + shift, lambda q: (q - shift) @ turn / scale
 
 
