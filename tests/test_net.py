@@ -30,7 +30,7 @@ from gso.net import (  # noqa: E402
     predict,
     save,
 )
-from gso.net.blocks import IMDB, Convolution  # noqa: E402
+from gso.net.blocks import IMDB, Convolution, Stencils  # noqa: E402
 from gso.net.catalogue import TASKS  # noqa: E402
 from gso.net.grids import axes  # noqa: E402
 
@@ -150,6 +150,40 @@ def test_single_grids_go_through_blocks_of_the_weights_of_the_moment(channels):
         torch.testing.assert_close(made_there(x), made_there(x.repeat(2, 1, 1, 1))[:1])
 
 
+def test_stencils_show_place_slope_and_bending():
+    layer = Stencils(1, 9).requires_grad_(False)
+    layer.weight.copy_(torch.eye(9).view(9, 1, 3, 3))
+    u, v = torch.meshgrid(*(torch.linspace(-0.5, 0.5, 64) for _ in range(2)), indexing="ij")
+    step = 1 / 63
+    plane = layer((0.3 + 0.2 * u - 0.1 * v)[None, None])[0]
+    # To the last vertex of the border.
+    torch.testing.assert_close(plane[0], 2.0 * (0.3 + 0.2 * u - 0.1 * v), atol=1e-5, rtol=0)
+    for k, value in enumerate([-6.4 * step, 0.0, 12.8 * step, 0.0, 0.0, 0.0, 0.0, 0.0], start=1):
+        torch.testing.assert_close(plane[k], torch.full_like(u, value), atol=1e-3, rtol=0)
+    bent = layer((u**2 + 0.5 * u * v - 2.0 * v**2)[None, None])[0, :, 1:-1, 1:-1]
+    for k, value in {2: -4.0, 4: 0.5, 6: 2.0}.items():
+        expected = torch.full_like(bent[k], 2048.0 * value * step**2)
+        torch.testing.assert_close(bent[k], expected, atol=2e-3, rtol=0)
+
+
+def test_stencils_can_be_any_convolution():
+    kernel = torch.randn(4, 3, 3, 3)
+    layer = Stencils(3, 4).eval()
+    x = torch.randn(1, 3, 12, 10)
+
+    def right():
+        with torch.inference_mode():
+            expected = torch.conv2d(x, layer.kernels(layer.weight))
+            torch.testing.assert_close(layer(x)[..., 1:-1, 1:-1], expected, atol=1e-2, rtol=1e-4)
+        torch.testing.assert_close(layer(x), layer(x.repeat(2, 1, 1, 1))[:1], atol=1e-2, rtol=1e-4)
+
+    right()
+    with torch.no_grad():
+        layer.weight.copy_(layer.factors(kernel))
+    torch.testing.assert_close(layer.kernels(layer.weight), kernel, atol=1e-4, rtol=1e-4)
+    right()
+
+
 def test_single_grids_keep_single_precision_where_others_choose_half():
     net = shaken(GSONet(channels=8, blocks=1), size=0.02)
     points = torch.as_tensor(saddle(32)[None], dtype=torch.float32)
@@ -197,6 +231,25 @@ def test_weights_are_reordered_once(kind, weights, monkeypatch):
 )
 def test_published_size(task, count):
     assert sum(p.numel() for p in GSONet(task).parameters()) == count
+
+
+def test_stencils_add_no_parameters():
+    assert sum(p.numel() for p in GSONet(stencils=True).parameters()) == 2820832
+
+
+def test_stencils_take_the_weights_of_a_net_without():
+    one = shaken(GSONet(channels=4, blocks=1), size=0.01)
+    two, three = GSONet(channels=4, blocks=1, stencils=True), GSONet(channels=4, blocks=1)
+    two.begin_with(one)
+    x = torch.randn(2, 3, 16, 16)
+    kernels = two.head.kernels(two.head.weight)
+    torch.testing.assert_close(torch.conv2d(x, kernels), one.head(x)[..., 1:-1, 1:-1])
+    three.begin_with(two)
+    for name, weight in one.state_dict().items():
+        torch.testing.assert_close(three.state_dict()[name], weight, atol=1e-5, rtol=1e-4)
+    two.begin_with(GSONet(channels=4, blocks=1, stencils=True))
+    with pytest.raises(RuntimeError, match="size"):
+        two.begin_with(GSONet(channels=8, blocks=1))
 
 
 def test_published_net_has_no_biases():

@@ -44,6 +44,10 @@ class Net(nn.Module):
             raise OptionError(f"no task {task!r} for a net; there are {', '.join(TASKS)}")
         self.task, self.settings, self.bf16 = task, {"task": task, **settings}, False
 
+    def begin_with(self, other: Net) -> None:
+        """Take the weights of another net of this kind and size; RuntimeError if they don't fit."""
+        self.load_state_dict(other.state_dict())
+
     @abstractmethod
     def displacements(
         self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None

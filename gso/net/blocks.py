@@ -14,6 +14,9 @@ from gso.net import onednn
 _GROUP = 16
 #: Slope of the LeakyReLU for negative numbers.
 _LEAK = 0.05
+#: Positions of the unit ball times the first are near one, and so are their differences of each
+#: order, up to two, times the second once more.
+_PLACE, _SLOPE = 2.0, 32.0
 #: Vertices up to which fewer steps make up for more multiplications: measured.
 _SMALL = 64 * 64
 
@@ -38,18 +41,70 @@ class Convolution(nn.Conv2d):
             or isinstance(self.padding, str)
             or self.padding_mode != "zeros"
         ):
-            return super().forward(x)
+            return self._conv_forward(x, self.kernels(weight), self.bias)
         how = onednn.How(self.padding, self.stride, self.dilation, self.groups)
         if not onednn.keeps(self, weight):
-            return torch.mkldnn_convolution(x, weight, self.bias, *how)
+            return torch.mkldnn_convolution(x, self.kernels(weight), self.bias, *how)
         (kept,) = onednn.kept(
-            self, x.shape, (weight,), lambda w: (onednn.reordered(w, x.shape, how),)
+            self, x.shape, (weight,), lambda w: (onednn.reordered(self.kernels(w), x.shape, how),)
         )
         return onednn.convolved(x, kept, self.bias, how)
+
+    def kernels(self, weight: Tensor) -> Tensor:
+        """What grids are convolved with, by its weights."""
+        return weight
+
+    def factors(self, kernels: Tensor) -> Tensor:
+        """The weights that make kernels."""
+        return kernels
 
     def train(self, mode: bool = True) -> Convolution:
         onednn.forget(self)
         return super().train(mode)
+
+
+class Stencils(Convolution):
+    """A 3 x 3 convolution of positions that sees bending as well as place.
+
+    Its weights are factors of nine stencils: mean, difference and second difference along the
+    rows, times the same along the columns, scaled so that all are near one on surfaces of the
+    unit ball with 64 vertices a side. There second differences are a thousandth of the positions:
+    kernels would need entries in the thousands to show them, which no training finds and half
+    precision does not keep. Beyond its border the grid goes on in straight lines.
+
+    >>> u = torch.linspace(-0.5, 0.5, 64)
+    >>> bowl = (0.5 * u.square() + 0.5 * u.square()[:, None])[None, None]
+    >>> net = Stencils(1, 9).requires_grad_(False)
+    >>> net.weight.copy_(torch.eye(9).view(9, 1, 3, 3)).shape
+    torch.Size([9, 1, 3, 3])
+    >>> bent = net(bowl)[0, [2, 6], 9:-9, 9:-9]
+    >>> bool((bent - 2048 / 63**2).abs().max() < 1e-3)
+    True
+    """
+
+    stencils: Tensor
+
+    def __init__(self, inside: int, outside: int):
+        super().__init__(inside, outside, 3, bias=False)
+        along = torch.tensor([[1 / 3, 1 / 3, 1 / 3], [-0.5, 0.0, 0.5], [1.0, -2.0, 1.0]])
+        order = torch.arange(3)[:, None] + torch.arange(3)
+        scale = _PLACE * _SLOPE ** order.clamp(max=2)
+        both = torch.einsum("ak,bl,ab->abkl", along, along, scale)
+        self.register_buffer("stencils", both, persistent=False)
+
+    def forward(self, x: Tensor) -> Tensor:
+        for dim in (2, 3):
+            first, last = x.narrow(dim, 0, 2), x.narrow(dim, x.shape[dim] - 2, 2)
+            before, after = (2 * a - b for a, b in (first.unbind(dim), last.flip(dim).unbind(dim)))
+            x = torch.cat([before.unsqueeze(dim), x, after.unsqueeze(dim)], dim=dim)
+        return super().forward(x.contiguous(memory_format=torch.channels_last))
+
+    def kernels(self, weight: Tensor) -> Tensor:
+        return torch.einsum("oiab,abkl->oikl", weight, self.stencils)
+
+    def factors(self, kernels: Tensor) -> Tensor:
+        inverse = torch.linalg.inv(self.stencils.double().reshape(9, 9)).view(3, 3, 3, 3)
+        return torch.einsum("oikl,klab->oiab", kernels.double(), inverse).to(kernels.dtype)
 
 
 class IMDB(nn.Module):

@@ -24,13 +24,13 @@ LARGEST_STRIDE = 4
 #: What developable surfaces are judged by, and what there is for flat images only.
 _JUDGED = ("k_left", "d_h")
 _FLAT = ("iso", "iso_w", "iso_cell", "iso_cell_w")
-#: Terms of the published losses, and the figures that results are judged by.
-TERMS = ("in", "fair", "gc", *_JUDGED, *_FLAT)
+#: Terms of the published losses, the figures that results are judged by, and their labels.
+TERMS = ("in", "fair", "gc", *_JUDGED, *_FLAT, "label")
 #: Terms that a task does not have.
 _FOREIGN = {
     "developable": _FLAT,
     "flatten": ("in", "gc", *_JUDGED),
-    "denoise": (*_JUDGED, *_FLAT),
+    "denoise": (*_JUDGED, *_FLAT, "label"),
 }
 
 
@@ -42,9 +42,9 @@ class Phase:
     ----------
     loss : {"published", "label", "energy", "clean"}
         "published": the weighted terms of Wang et al. 2024, and of the figures that results
-        are judged by. "label": the distance to the
-        optimiser's result. "energy": the optimiser's own objective. "clean" (denoise): the
-        distance to the surface without noise, and the angle of its normals.
+        are judged by. "label": the distance to the optimiser's result, or a teacher's.
+        "energy": the optimiser's own objective. "clean" (denoise): the distance to the
+        surface without noise, and the angle of its normals.
     share : float
         Share of the run's steps or minutes, relative to the other phases'.
     rate : float
@@ -56,11 +56,11 @@ class Phase:
     clip : float
         Largest norm of the gradient.
     weights : dict
-        "published": the factor on each term. "energy" (developable): `w_curvature`,
-        `w_fairness`, `w_proximity` replace those of the task's options; `balance` is the power of
-        the design's own energy that each surface's is divided by: 1 lets all surfaces
-        weigh alike, 0 lets the curved ones rule. "clean": `angle`, the factor on the
-        normals' mean angle in degrees.
+        "published": the factor on each term, the loss "label" among them. "energy"
+        (developable): `w_curvature`, `w_fairness`, `w_proximity` replace those of the task's
+        options; `balance` is the power of the design's own energy that each surface's is
+        divided by: 1 lets all surfaces weigh alike, 0 lets the curved ones rule. "clean":
+        `angle`, the factor on the normals' mean angle in degrees.
     decay : float
         "published": the weight of "in" falls as exp(-decay t), with t from 0 to 1.
     eps : tuple of 2 float
@@ -105,6 +105,11 @@ class Phase:
         if self.loss == "published" and not any(self.weights.values()):
             raise OptionError(f"a phase with loss 'published' needs weights: {', '.join(TERMS)}")
 
+    @property
+    def labelled(self) -> bool:
+        """Whether it learns labels, be it among other things."""
+        return self.loss == "label" or bool(self.weights.get("label"))
+
 
 @dataclass(frozen=True)
 class Config:
@@ -128,7 +133,7 @@ class Config:
         Surfaces of the train split that are used; 0 for all.
     fresh : int
         Surfaces that are drawn by the recipe, beside those of the set, for phases that need
-        no labels.
+        no labels, or a teacher's.
     label : str
         Array of the set that phases with labels learn.
     augment : {"none", "symmetries", "shear"}
@@ -138,6 +143,8 @@ class Config:
         "denoise": smallest and largest noise; drawn evenly on a logarithmic scale.
     init : str
         Net to begin with: a name or a .safetensors file.
+    teacher : str
+        Net whose results phases with labels learn, in place of an array of the set.
     through : str
         Net whose results take the surfaces' place: Net-F learns from those of Net-C.
     against : {"seen", "designs"}
@@ -169,6 +176,7 @@ class Config:
     augment: str = "symmetries"
     sigma: tuple[float, float] = (0.0005, 0.02)
     init: str = ""
+    teacher: str = ""
     through: str = ""
     against: str = "seen"
     ema: float = 0.999
@@ -212,13 +220,13 @@ def _fits(config: Config, phase: Phase) -> None:
     """Refuse losses that a task has not."""
     if (phase.loss == "clean") != (config.task == "denoise" and phase.loss != "published"):
         raise OptionError(f"loss {phase.loss!r} does not go with task {config.task!r}")
-    if config.through and (phase.loss == "label" or config.task != "developable"):
-        raise OptionError(
-            "through: of a net's results there are no labels; and it is for task 'developable' only"
-        )
+    if config.through and config.task != "developable":
+        raise OptionError("through is for task 'developable' only")
+    if config.through and phase.labelled and not config.teacher:
+        raise OptionError("through: a net's results have no labels, unless a teacher makes them")
     if config.against == "designs" and not config.through:
         raise OptionError("against = 'designs' goes with through only")
-    if phase.loss == "label" and config.augment == "shear":
+    if phase.labelled and config.augment == "shear":
         raise OptionError("labels do not follow a shear; take augment = 'symmetries'")
     wrong = {k for k, v in phase.weights.items() if v and k in _FOREIGN[config.task]}
     if phase.loss == "published" and wrong:

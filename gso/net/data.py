@@ -98,15 +98,15 @@ class Source:
 
         The surfaces of a step are the same whatever the number of processes.
         """
-        use_labels = phase.loss == "label"
-        if use_labels and self.labels is None:
+        if phase.labelled and self.labels is None:
             raise DatasetError(f"there are no labels {config.label!r} to learn")
-        count = len(self.labels) if use_labels and self.labels is not None else len(self.surfaces)
+        labels = self.labels if phase.labelled else None
+        count = len(self.surfaces if labels is None else labels)
         rows = _rows(count, phase.batch, step, config.seed).to(self.surfaces.device)
         generator = torch.Generator().manual_seed(_seed(config.seed, _CHANGES, step))
         arrays = {"surface": self.surfaces}
-        if use_labels and self.labels is not None:
-            arrays["target"] = self.labels
+        if labels is not None:
+            arrays["target"] = labels
         if self.designs is not None:
             arrays["design"] = self.designs
         chosen = [x[rows] for x in arrays.values()]
@@ -173,7 +173,7 @@ def open_source(config: Config, folder: str | Path, cache: Path, tick: Any = Non
         height, width = given.shape[1:3]
         raise DatasetError(f"{folder} has grids {height} x {width}; nets learn from square ones")
     surfaces, labels = normalise(given).float(), None
-    if any(phase.loss == "label" for phase in config.phases):
+    if not config.teacher and any(phase.labelled for phase in config.phases):
         centre, radius = ball(given)
         labels = torch.from_numpy(split[config.label][rows])
         # A flat image has a place of its own.

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from gso.net.base import Net
-from gso.net.blocks import IMDB, Convolution
+from gso.net.blocks import IMDB, Convolution, Stencils
 from gso.net.catalogue import TASKS
 from gso.net.grids import axes
 from gso.net.resampling import resampled
@@ -40,6 +40,9 @@ class GSONet(Net):
     aligned : bool
         Whether grids are turned first so that their lines follow the axes, and displacements
         turned back: the result turns with the input, which the published net's does not.
+    stencils : bool
+        Whether the first layer has factors of difference stencils for weights, as many as the
+        kernels' entries that the published net has: see :class:`gso.net.blocks.Stencils`.
 
     Raises
     ------
@@ -65,12 +68,13 @@ class GSONet(Net):
         tanh: bool = False,
         sigma: bool = False,
         aligned: bool = False,
+        stencils: bool = False,
     ):
         if channels % 4 or not 4 <= channels <= 256 or not 1 <= blocks <= 64:
             raise OptionError(
                 f"channels {channels}, blocks {blocks}: take a multiple of 4 up to 256, and 1 to 64"
             )
-        settings = {"tanh": tanh, "sigma": sigma, "aligned": aligned}
+        settings = {"tanh": tanh, "sigma": sigma, "aligned": aligned, "stencils": stencils}
         super().__init__(task, channels=channels, blocks=blocks, **settings)
         self.tanh, self.sigma, self.aligned = tanh, sigma, aligned
         widths = [channels << k for k in range(_LEVELS + 1)]
@@ -82,7 +86,7 @@ class GSONet(Net):
         def conv(inside: int, outside: int) -> Convolution:
             return Convolution(inside, outside, 3, padding=1, bias=False)
 
-        self.head = conv(3 + sigma, channels)
+        self.head = Stencils(3 + sigma, channels) if stencils else conv(3 + sigma, channels)
         self.down = nn.ModuleList(
             nn.Sequential(*level(a), Convolution(a, b, 2, stride=2, bias=False)) for a, b in steps
         )
@@ -94,6 +98,13 @@ class GSONet(Net):
         self.tail = conv(channels, TASKS[task])
         # It begins with no change, where random displacements would crumple the surface.
         nn.init.zeros_(self.tail.weight)
+
+    def begin_with(self, other: Net) -> None:
+        """Also of one with the other kind of first layer: inside of grids it computes the same."""
+        state, head = other.state_dict(), other.head
+        if isinstance(head, Convolution) and type(head) is not type(self.head):
+            state["head.weight"] = self.head.factors(head.kernels(head.weight.detach()))
+        self.load_state_dict(state)
 
     def displacements(
         self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None

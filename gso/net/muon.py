@@ -13,7 +13,7 @@ _QUINTIC = (3.4445, -4.7750, 2.0315)
 _ITERATIONS = 5
 #: Root mean square of AdamW's steps, over its rate: with it both take the same rates.
 _RMS = 0.2
-#: Matrices with fewer rows or columns than that are left to AdamW.
+#: Layers with fewer channels than that on either side are left to AdamW: the first and the last.
 _LEAST = 8
 
 
@@ -107,7 +107,7 @@ def optimisers(net: nn.Module, kind: str, weight_decay: float) -> list[torch.opt
     matrices: list[Tensor] = []
     rest: list[Tensor] = []
     for weight in net.parameters():
-        wide = weight.ndim > 1 and min(weight.shape[0], weight[0].numel()) >= _LEAST
+        wide = weight.ndim > 1 and min(weight.shape[:2]) >= _LEAST
         (matrices if wide and kind == "muon" else rest).append(weight)
     kinds = ((Muon, matrices), (torch.optim.AdamW, rest))
     return [make(some, weight_decay=weight_decay) for make, some in kinds if some]

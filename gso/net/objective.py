@@ -47,7 +47,11 @@ def _published(task: str, batch: Batch, start: Tensor, phase: Phase, progress: f
     weights = dict(phase.weights)
     if "in" in weights:
         weights["in"] *= math.exp(-phase.decay * progress)
-    used = [(weight, _TERMS[name]) for name, weight in weights.items() if weight]
+    terms = _TERMS
+    if phase.labelled:
+        label = _label(task, batch, start, phase, progress)
+        terms = terms | {"label": lambda result, _: label(result)}
+    used = [(weight, terms[name]) for name, weight in weights.items() if weight]
 
     def cost(result: Tensor) -> Tensor:
         return torch.stack([weight * term(result, batch.compared) for weight, term in used]).sum(0)

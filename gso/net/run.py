@@ -17,7 +17,7 @@ from torch import Tensor
 from gso import dataset
 from gso.net import checkpoint, muon, weights
 from gso.net.base import Net
-from gso.net.catalogue import located, read_card
+from gso.net.catalogue import TASKS, located, read_card
 from gso.net.config import Config
 from gso.net.curves import Curves, read
 from gso.net.data import Source, noisy, open_source
@@ -190,6 +190,8 @@ def begin(
     )
     if config.through:
         _pass_through(run, tick if here.first else None)
+    if config.teacher:
+        _teach(run, tick if here.first else None)
     path = folder / CHECKPOINT
     if path.exists():
         there, words = checkpoint.numbers(path), {"config": "configuration", "data": "set"}
@@ -210,7 +212,7 @@ def _take(net: Net, other: Net, name: str) -> None:
     if other.settings.keys() != net.settings.keys() or type(other) is not type(net):
         raise OptionError(f"init: {name} is a net of another kind")
     try:
-        net.load_state_dict(other.state_dict())
+        net.begin_with(other)
     except RuntimeError as error:
         raise OptionError(f"init: {name} does not fit: {error}") from None
 
@@ -232,23 +234,36 @@ def _pass_through(run: Run, tick: Tick | None) -> None:
 
     The designs follow: they lie to the new surfaces as they lay to the net's results.
     """
-    net, here = weights.load(run.config.through, device=run.here.device), run.here
+    net = weights.load(run.config.through, device=run.here.device)
 
     def done(surfaces: Tensor) -> tuple[Tensor, Tensor]:
-        out, designs = torch.zeros_like(surfaces), torch.zeros_like(surfaces)
-        mine = range(here.rank * _BLOCK, len(surfaces), here.world * _BLOCK)
-        for start in mine:
-            block = slice(start, start + _BLOCK)
-            result = torch.from_numpy(applied(net, surfaces[block]))
-            out[block], designs[block] = normalise_with(result, surfaces[block])
-            if tick is not None:
-                count = min(start + here.world * _BLOCK, len(surfaces))
-                tick(f"surfaces through {run.config.through}", count, len(surfaces))
-        return here.summed(out), here.summed(designs)
+        what = f"surfaces through {run.config.through}"
+        seen, designs = normalise_with(_results(net, surfaces, run.here, tick, what), surfaces)
+        return seen, designs
 
     seen, designs = done(run.source.surfaces)
     run.source = Source(seen, designs=designs if run.config.against == "designs" else None)
     run.check = *done(run.check[0]), None
+
+
+def _teach(run: Run, tick: Tick | None) -> None:
+    """What another net makes of the surfaces, as they are seen, becomes their labels."""
+    net = weights.load(run.config.teacher, device=run.here.device)
+    if net.task != run.config.task:
+        raise OptionError(f"teacher: {run.config.teacher} is a net for task {net.task!r}")
+    what = f"labels by {run.config.teacher}"
+    run.source.labels = _results(net, run.source.surfaces, run.here, tick, what)
+
+
+def _results(net: Net, surfaces: Tensor, here: Processes, tick: Tick | None, what: str) -> Tensor:
+    """Results (n, H, W, d) of a net, to which each process does its share."""
+    out = torch.zeros(*surfaces.shape[:3], TASKS[net.task])
+    for start in range(here.rank * _BLOCK, len(surfaces), here.world * _BLOCK):
+        block = slice(start, start + _BLOCK)
+        out[block] = torch.from_numpy(applied(net, surfaces[block]))
+        if tick is not None:
+            tick(what, min(start + here.world * _BLOCK, len(surfaces)), len(surfaces))
+    return here.summed(out)
 
 
 def _validation(config: Config, data: Path) -> tuple[Tensor, Tensor, Tensor | None]:
