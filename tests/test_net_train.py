@@ -107,6 +107,8 @@ def test_shipped_configurations(path):
         ({"phase": [{"loss": "label"}], "through": "net-c"}, "through"),
         ({"phase": [{"loss": "energy"}], "against": "designs"}, "goes with through"),
         ({"against": "labels"}, "against is 'labels'"),
+        ({"phase": [{"loss": "energy"}], "teacher": "net-c"}, "no phase learns labels"),
+        ({"task": "denoise", "phase": [{"weights": {"label": 1}}]}, "weights label do not"),
         (
             {"task": "flatten", "phase": [{"weights": {"k_left": 1, "fair": 1}}]},
             "weights k_left do",

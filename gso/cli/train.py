@@ -29,6 +29,7 @@ _MAPPED, _TRIMMED, _LARGE = -3, -1, 2**25
 @click.option("--fresh", metavar="N", type=int, help="Surfaces to draw beside those of the set.")
 @click.option("--init", metavar="NET", help="Net to begin with.")
 @click.option("--through", metavar="NET", help="Net whose results take the surfaces' place.")
+@click.option("--teacher", metavar="NET", help="Net whose results are the labels.")
 @click.option("--device", metavar="NAME", help="cpu, cuda ...; the GPU when there is one.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 def train(

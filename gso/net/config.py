@@ -204,6 +204,8 @@ class Config:
             raise OptionError("ema must be below 1, and sigma two positive numbers that rise")
         if not self.phases:
             raise OptionError("a configuration needs [[phase]] tables")
+        if self.teacher and not any(phase.labelled for phase in self.phases):
+            raise OptionError("teacher: no phase learns labels; give one the weight 'label'")
         if not self.name or Path(self.name).name != self.name:
             raise OptionError(f"name {self.name!r} is no file name")
         for phase in self.phases:
