@@ -108,6 +108,10 @@ def test_shipped_configurations(path):
         ({"phase": [{"loss": "energy"}], "against": "designs"}, "goes with through"),
         ({"against": "labels"}, "against is 'labels'"),
         ({"phase": [{"loss": "energy"}], "teacher": "net-c"}, "no phase learns labels"),
+        (
+            {"task": "denoise", "teacher": "denoise", "phase": [{"loss": "clean"}]},
+            "teacher does not",
+        ),
         ({"task": "denoise", "phase": [{"weights": {"label": 1}}]}, "weights label do not"),
         (
             {"task": "flatten", "phase": [{"weights": {"k_left": 1, "fair": 1}}]},
@@ -166,7 +170,7 @@ def test_every_term_of_a_configuration_is_a_loss():
     results = {name: designs + 0.01 * torch.rand_like(designs) for name in TERMS}
     for name, result in results.items():
         phase, flat = Phase(weights={name: 2.0}), name.startswith("iso")
-        cost = _COSTS["published"]("", Batch(designs), designs, phase, 0.0)
+        cost = _COSTS["published"]("", Batch(designs, designs), designs, phase, 0.0)
         value = cost(result[..., :2] if flat else result)
         assert value.shape == (2,) and (value > 0).all()
 
@@ -420,7 +424,9 @@ def test_matrices_are_made_orthogonal_together_as_alone():
         torch.testing.assert_close(orthogonal(some), alone, atol=1e-5, rtol=0)
 
 
-@pytest.mark.parametrize("name", ["developable", "net-c", "flatten-strain", "flatten", "denoise"])
+@pytest.mark.parametrize(
+    "name", ["developable", "net-c", "net-f", "flatten-strain", "flatten", "denoise"]
+)
 def test_a_step_stays_on_the_device_of_its_batch(name, monkeypatch):
     from gso.net.base import Net
     from gso.net.weights import make
@@ -532,9 +538,25 @@ def test_labels_are_what_a_teacher_makes_of_what_the_net_sees(folder, tmp_path):
     assert Objective(load(net))(batch, made.phases[0], 0.5) < 1e-3
     assert Objective(run.net)(batch, made.phases[0], 0.5) > 0.5
     save(GSONet("flatten", channels=4, blocks=1), tmp_path / "flat.safetensors")
-    other = replace(made, teacher=str(tmp_path / "flat.safetensors"))
-    with pytest.raises(OptionError, match="a net for task 'flatten'"):
-        begin(other, folder, tmp_path / "other", None, here, None)
+    flat = str(tmp_path / "flat.safetensors")
+    for wrong in ({"teacher": flat}, {"through": flat}):
+        with pytest.raises(OptionError, match="a net for task 'flatten'"):
+            begin(replace(made, **wrong), folder, tmp_path / "other", None, here, None)
+
+
+def test_a_teacher_labels_fresh_surfaces_for_every_stride(folder, tmp_path):
+    teacher = GSONet("flatten", channels=4, blocks=1, stencils=True)
+    torch.nn.init.normal_(teacher.tail.weight, std=0.1)
+    save(teacher, tmp_path / "net.safetensors")
+    phases = [{"loss": "label", "batch": 4, "stride": 2}, {"batch": 4, "weights": {"label": 1.0}}]
+    changes = {"teacher": str(tmp_path / "net.safetensors"), "fresh": 3, "augment": "none"}
+    made = config(task="flatten", model=PUBLISHED, phase=phases, **changes)
+    run = begin(made, folder, tmp_path / "run", None, Processes(0, 1, torch.device("cpu")), None)
+    assert len(run.source.labels) == len(run.source.surfaces)
+    for phase in made.phases:
+        batch = run.source.batch(made, phase, 0)
+        assert batch.target.shape == (*batch.surface.shape[:3], 2)
+        assert Objective(run.net)(batch, phase, 0.5).isfinite()
 
 
 def launch(folder, out, path, processes=0):

@@ -153,7 +153,8 @@ class Config:
     ema : float
         Decay of the moving average of the weights, which is what is kept in the end.
     optimiser : {"muon", "adamw"}
-        Muon for the weights that are matrices and AdamW for the rest, or AdamW for all.
+        Muon for the weights of layers with 8 channels or more on both sides and AdamW for the
+        rest, or AdamW for all.
     weight_decay : float
         Share of the weights, over the rate, that each step takes away.
     bf16 : bool or None
@@ -204,6 +205,10 @@ class Config:
             raise OptionError("ema must be below 1, and sigma two positive numbers that rise")
         if not self.phases:
             raise OptionError("a configuration needs [[phase]] tables")
+        if self.teacher and self.task == "denoise":
+            raise OptionError(
+                "teacher does not go with task 'denoise': clean surfaces are its labels"
+            )
         if self.teacher and not any(phase.labelled for phase in self.phases):
             raise OptionError("teacher: no phase learns labels; give one the weight 'label'")
         if not self.name or Path(self.name).name != self.name:

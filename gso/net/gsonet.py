@@ -101,9 +101,11 @@ class GSONet(Net):
 
     def begin_with(self, other: Net) -> None:
         """Also of one with the other kind of first layer: inside of grids it computes the same."""
-        state, head = other.state_dict(), other.head
-        if isinstance(head, Convolution) and type(head) is not type(self.head):
-            state["head.weight"] = self.head.factors(head.kernels(head.weight.detach()))
+        state, mine, its = other.state_dict(), self.head, other.head
+        if isinstance(its, Stencils) and not isinstance(mine, Stencils):
+            state["head.weight"] = its.kernels()
+        elif isinstance(mine, Stencils) and not isinstance(its, Stencils):
+            state["head.weight"] = mine.factors(state["head.weight"])
         self.load_state_dict(state)
 
     def displacements(

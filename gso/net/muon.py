@@ -13,7 +13,8 @@ _QUINTIC = (3.4445, -4.7750, 2.0315)
 _ITERATIONS = 5
 #: Root mean square of AdamW's steps, over its rate: with it both take the same rates.
 _RMS = 0.2
-#: Layers with fewer channels than that on either side are left to AdamW: the first and the last.
+#: Layers with fewer channels than that on either side are left to AdamW, as the first and the last
+#: of the published nets.
 _LEAST = 8
 
 

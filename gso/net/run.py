@@ -163,6 +163,7 @@ def begin(
     net = weights.make(dict(config.model) | {"task": config.task})
     if config.init:
         _take(net, weights.load(config.init), config.init)
+    through, teacher = (_other(config, word, here) for word in ("through", "teacher"))
     net = weights.placed(net, here.device)
     net.bf16 = _fast(here.device) if config.bf16 is None else config.bf16
     average = copy.deepcopy(net).requires_grad_(False)
@@ -188,10 +189,13 @@ def begin(
         _origin(data, here),
         read_card(located(config.init)) if config.init else {},
     )
-    if config.through:
-        _pass_through(run, tick if here.first else None)
-    if config.teacher:
-        _teach(run, tick if here.first else None)
+    if through is not None:
+        _pass_through(run, through, tick if here.first else None)
+    if teacher is not None:
+        what = f"labels by {config.teacher}"
+        run.source.labels = _results(
+            teacher, run.source.surfaces, here, tick if here.first else None, what
+        )
     path = folder / CHECKPOINT
     if path.exists():
         there, words = checkpoint.numbers(path), {"config": "configuration", "data": "set"}
@@ -217,6 +221,17 @@ def _take(net: Net, other: Net, name: str) -> None:
         raise OptionError(f"init: {name} does not fit: {error}") from None
 
 
+def _other(config: Config, word: str, here: Processes) -> Net | None:
+    """Another net that the configuration names, for the same task."""
+    name = getattr(config, word)
+    if not name:
+        return None
+    net = weights.load(name, device=here.device)
+    if net.task != config.task:
+        raise OptionError(f"{word}: {name} is a net for task {net.task!r}")
+    return net
+
+
 def _sizes_fit(config: Config, net: Net, source: Source) -> None:
     """Refuse strides that leave grids which the net cannot take."""
     size = source.surfaces.shape[1]
@@ -229,12 +244,11 @@ def _sizes_fit(config: Config, net: Net, source: Source) -> None:
             )
 
 
-def _pass_through(run: Run, tick: Tick | None) -> None:
+def _pass_through(run: Run, net: Net, tick: Tick | None) -> None:
     """What another net makes of the surfaces takes their place, normalised anew.
 
     The designs follow: they lie to the new surfaces as they lay to the net's results.
     """
-    net = weights.load(run.config.through, device=run.here.device)
 
     def done(surfaces: Tensor) -> tuple[Tensor, Tensor]:
         what = f"surfaces through {run.config.through}"
@@ -244,15 +258,6 @@ def _pass_through(run: Run, tick: Tick | None) -> None:
     seen, designs = done(run.source.surfaces)
     run.source = Source(seen, designs=designs if run.config.against == "designs" else None)
     run.check = *done(run.check[0]), None
-
-
-def _teach(run: Run, tick: Tick | None) -> None:
-    """What another net makes of the surfaces, as they are seen, becomes their labels."""
-    net = weights.load(run.config.teacher, device=run.here.device)
-    if net.task != run.config.task:
-        raise OptionError(f"teacher: {run.config.teacher} is a net for task {net.task!r}")
-    what = f"labels by {run.config.teacher}"
-    run.source.labels = _results(net, run.source.surfaces, run.here, tick, what)
 
 
 def _results(net: Net, surfaces: Tensor, here: Processes, tick: Tick | None, what: str) -> Tensor:
