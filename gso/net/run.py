@@ -189,13 +189,12 @@ def begin(
         _origin(data, here),
         read_card(located(config.init)) if config.init else {},
     )
+    told = tick if here.first else None
     if through is not None:
-        _pass_through(run, through, tick if here.first else None)
+        _pass_through(run, through, told)
     if teacher is not None:
         what = f"labels by {config.teacher}"
-        run.source.labels = _results(
-            teacher, run.source.surfaces, here, tick if here.first else None, what
-        )
+        run.source.labels = _results(teacher, run.source.surfaces, here, told, what)
     path = folder / CHECKPOINT
     if path.exists():
         there, words = checkpoint.numbers(path), {"config": "configuration", "data": "set"}
