@@ -79,12 +79,15 @@ def test_strain_energy_is_the_solvers(pair):
 def test_losses_are_the_metrics(pair):
     designs, results = pair
     gc, fair = losses.gc(batch(*results)), losses.fair(batch(*results))
-    left, near = (f(batch(*results), batch(*designs)) for f in (losses.k_left, losses.d_h))
+    compared = (losses.k_left, losses.d_h, losses.fair_ratio)
+    left, near, ratio = (f(batch(*results), batch(*designs)) for f in compared)
     for k, (design, result) in enumerate(zip(designs, results, strict=True)):
         assert float(left[k]) == pytest.approx(1.0 - metrics.K_A_r(design, result), rel=1e-12)
         assert float(near[k]) == pytest.approx(metrics.d_H(design, result), rel=1e-12)
         assert float(gc[k]) == pytest.approx(metrics.loss_gc(result, scale=1.0), rel=1e-12)
         assert float(fair[k]) == pytest.approx(metrics.fairness(result, scale=1.0), rel=1e-6)
+        grew = metrics.fairness(result, scale=1.0) / metrics.fairness(design, scale=1.0)
+        assert float(ratio[k]) == pytest.approx(grew, rel=1e-6)
 
 
 @pytest.mark.parametrize("steps", [(0, 0), (1, -1), (2, 1)])

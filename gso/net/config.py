@@ -22,7 +22,7 @@ AUGMENTATIONS = ("none", "symmetries", "shear")
 #: Steps of a phase through the vertices that leave a grid worth training on.
 LARGEST_STRIDE = 4
 #: What developable surfaces are judged by, and what there is for flat images only.
-_JUDGED = ("k_left", "d_h")
+_JUDGED = ("k_left", "d_h", "fair_ratio")
 _FLAT = ("iso", "iso_w", "iso_cell", "iso_cell_w")
 #: Terms of the published losses, the figures that results are judged by, and their labels.
 TERMS = ("in", "fair", "gc", *_JUDGED, *_FLAT, "label")

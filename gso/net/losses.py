@@ -17,6 +17,8 @@ from gso.net.grids import Planes, planes
 
 #: Steps along the grid within which the nearest vertex is looked for.
 _REACH = 2
+#: Sum of squared second differences of a design below which `fair_ratio` compares with this.
+_LEAST_FAIR = 1e-4
 
 
 def inside(result: Tensor, target: Tensor) -> Tensor:
@@ -33,6 +35,15 @@ def fair(result: Tensor) -> Tensor:
         triple = [tuple(c.narrow(axis, k, n) for c in x) for k in range(3)]
         total = total + geometry.norm2(geometry.second_difference(*triple)).sum(dim=(1, 2))
     return total
+
+
+def fair_ratio(result: Tensor, design: Tensor) -> Tensor:
+    """``fair_ratio``: sum of the squared second differences, over that of the design.
+
+    Not among the published losses: gently and strongly bent designs weigh alike, but for those
+    flatter than `_LEAST_FAIR`.
+    """
+    return fair(result) / fair(design).clamp_min(_LEAST_FAIR)
 
 
 def gc(result: Tensor) -> Tensor:

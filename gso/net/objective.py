@@ -68,6 +68,7 @@ def _weighted(term: Callable[..., Tensor]) -> Term:
 _TERMS: dict[str, Term] = {
     "in": losses.inside,
     "fair": lambda result, _: losses.fair(result),
+    "fair_ratio": losses.fair_ratio,
     "gc": lambda result, _: losses.gc(result),
     "k_left": losses.k_left,
     "d_h": losses.d_h,
