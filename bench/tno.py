@@ -101,7 +101,7 @@ def quality(before: np.ndarray, after: np.ndarray) -> tuple[float, ...]:
         metrics.loss_gc(after, scale=metrics.unit(before)),
         metrics.K_A_r(before, after),
         metrics.d_H(before, after),
-        metrics.fairness(after, scale=1.0) / metrics.fairness(before, scale=1.0),
+        metrics.fairness_ratio(before, after),
     )
 
 

@@ -241,6 +241,17 @@ def fairness(surface: Any, *, scale: float | None = None) -> float:
     return float(((v[a] + v[b] - v[left] - v[right]) ** 2).sum() / scale**2)
 
 
+def fairness_ratio(before: Any, after: Any) -> float:
+    """:func:`fairness` of a result over that of its input; 1 for a flat input.
+
+    >>> bowl = np.dstack([u := np.mgrid[:3.0, :3.0][0], u.T, u**2 + u.T**2])
+    >>> fairness_ratio(bowl, bowl * [1.0, 1.0, 0.5])
+    0.25
+    """
+    was = fairness(before, scale=1.0)
+    return fairness(after, scale=1.0) / was if was > 0 else 1.0
+
+
 def _flat(surface: Any, flat: Any) -> Array:
     """Flat image as (n, 2), or another surface as (n, 3), in the order of the mesh's vertices."""
     if hasattr(flat, "vertices"):

@@ -35,12 +35,11 @@ def figures(task: str, before: Array, result: Array) -> dict[str, float]:
             "strain_p99": strain.p99,
             "flipped_cells": float(metrics.flipped_cells(result, surface=before)),
         }
-    was = metrics.fairness(before, scale=1.0)
     found = {
         "loss_gc": metrics.loss_gc(result, scale=1.0),
         "K_A_r": metrics.K_A_r(before, result),
         "d_H": metrics.d_H(before, result),
-        "fairness_ratio": metrics.fairness(result, scale=1.0) / was if was > 0 else 1.0,
+        "fairness_ratio": metrics.fairness_ratio(before, result),
     }
     left = 1.0 - found["K_A_r"]
     return found | {"score": left / 0.1232 + found["d_H"] / 0.517 + found["loss_gc"] / 0.0291}

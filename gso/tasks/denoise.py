@@ -86,10 +86,9 @@ def _smoothed(request: Request) -> tuple[Array, dict[str, Any]]:
 
 def metrics(before: Mesh, after: Mesh, flat: None, scale: float) -> dict[str, float]:
     """How much the surface changed, and how much rougher the input was."""
-    rough = measure.fairness(before, scale=scale)
     rms, largest = measure.displacement(before, after)
     return {
-        "roughness_ratio": measure.fairness(after, scale=scale) / rough if rough > 0 else 1.0,
+        "roughness_ratio": measure.fairness_ratio(before, after),
         "normal_change": measure.normal_angle(before, after),
         "displacement_rms": rms,
         "displacement_max": largest,

@@ -478,7 +478,6 @@ def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict
     """Published and corrected metrics of a developable result (units: gso.metrics.INFO)."""
     true = measure.surface_distance(before, after)
     percent = 100.0 / before.diagonal
-    was = measure.fairness(before, scale=scale)
     out = {
         "loss_gc_before": measure.loss_gc(before, scale=scale),
         "loss_gc": measure.loss_gc(after, scale=scale),
@@ -488,6 +487,6 @@ def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict
         "distance_mean": percent * 0.5 * (true.there_mean + true.back_mean),
         "distance_max": percent * max(true.there_max, true.back_max),
         "deviation_max": percent * true.there_max,
-        "fairness_ratio": measure.fairness(after, scale=scale) / was if was > 0 else 1.0,
+        "fairness_ratio": measure.fairness_ratio(before, after),
     }
     return out if flat is None else out | _flat_metrics(after, flat)
