@@ -123,7 +123,7 @@ def unit(surface: Any) -> float:
 
 def curvature_grid(points: Array) -> Array:
     """Discrete Gaussian curvature (H-2, W-2) of the interior vertices of a grid, 1/length^2."""
-    return geometry.gaussian_curvature(*geometry.grid_star(components(np.asarray(points, float))))
+    return geometry.grid_curvature(components(np.asarray(points, float)))
 
 
 def curvature(surface: Any) -> Array:

@@ -434,6 +434,8 @@ def test_bad_options(coarse):
             make()
     with pytest.raises(WeightsError, match="with the package come"):
         predict(points, model="net-x")
+    with pytest.raises(WeightsError, match="take net-c or net-f"):
+        load("net-cf")
 
 
 def test_surfaces_without_area_are_survived(coarse, flatten):

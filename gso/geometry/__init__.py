@@ -14,7 +14,13 @@ from gso.geometry.cells import (
     face_products,
     isometry_defect,
 )
-from gso.geometry.curvature import gaussian_curvature, grid_star, star_area, star_defect
+from gso.geometry.curvature import (
+    gaussian_curvature,
+    grid_curvature,
+    grid_star,
+    star_area,
+    star_defect,
+)
 from gso.geometry.differences import second_difference
 from gso.geometry.parametric import smooth_gaussian_curvature
 from gso.geometry.shape import (
@@ -45,6 +51,7 @@ __all__ = [
     "face_products",
     "first_form",
     "gaussian_curvature",
+    "grid_curvature",
     "grid_star",
     "half_trace",
     "isometry_defect",

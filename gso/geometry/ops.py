@@ -1,4 +1,4 @@
-"""Square root, atan2 and minimum for whatever numbers come in.
+"""Square root, atan2, minimum and stacks for whatever numbers come in.
 
 The kind of number is asked of the argument itself, so that neither torch nor casadi
 is imported here: whoever holds such a number has imported its package already.
@@ -7,6 +7,7 @@ is imported here: whoever holds such a number has imported its package already.
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -47,3 +48,9 @@ def minimum(x: Any, y: Any) -> Any:
     if mod.__name__ != "torch":
         return mod.fmin(x, y)
     return mod.minimum(x, y) if _module_of(y) is mod else mod.clamp(x, max=y)
+
+
+def stack(arrays: Sequence[Any]) -> Any:
+    """Arrays of one shape, NumPy's or torch's, along a new first axis."""
+    mod = _module_of(arrays[0])
+    return np.stack(arrays) if mod is None else mod.stack(tuple(arrays))

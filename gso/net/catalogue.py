@@ -68,6 +68,9 @@ def located(model: str | PathLike[str]) -> Path:
     name = str(model)
     if Path(name).suffix == ".safetensors":
         return Path(name)
+    if name in CHAINS:
+        parts = " or ".join(CHAINS[name])
+        raise WeightsError(f"{name!r} is several nets, one after the other; take {parts}")
     path = FOLDER / f"{name}.safetensors"
     if Path(name).name != name or not path.exists():
         known = ", ".join(available()) or "none"

@@ -86,7 +86,7 @@ def axes(grids: Tensor) -> Tensor:
 
 def curvature(p: Planes) -> Tensor:
     """Gaussian curvature (B, H-2, W-2) of the interior vertices, 1 / length^2."""
-    return geometry.gaussian_curvature(*geometry.grid_star(p))
+    return geometry.grid_curvature(p)
 
 
 def to_border(inner: Tensor) -> Tensor:
@@ -126,11 +126,10 @@ def normals(p: Planes) -> Planes:
     return unit(tuple(total))
 
 
-def _slopes(p: Planes, *axes: int) -> list[Planes]:
-    """Derivatives of components along axes whose ends are one apart."""
-    spacing = [1.0 / (p[0].shape[axis] - 1) for axis in axes]
-    found = torch.gradient(torch.stack(p), dim=[1 + axis for axis in axes], spacing=spacing)
-    return [x.unbind() for x in found]
+def _slopes(x: Tensor, *axes: int) -> list[Tensor]:
+    """Derivatives along axes whose ends are one apart."""
+    spacing = [1.0 / (x.shape[axis] - 1) for axis in axes]
+    return list(torch.gradient(x, dim=axes, spacing=spacing))
 
 
 def _bend(x: Tensor, axis: int) -> Tensor:
@@ -157,7 +156,7 @@ class Frame(NamedTuple):
     @classmethod
     def of(cls, p: Planes) -> Frame:
         """Frame of grids."""
-        du, dv = _slopes(p, 1, 2)
+        du, dv = (d.unbind() for d in _slopes(torch.stack(p), -2, -1))
         return cls(du, dv, unit(du), unit(dv), normals(p))
 
     def combine(self, shares: Tensor) -> Tensor:
@@ -173,16 +172,14 @@ def first_form(frame: Frame) -> Planes:
     return (*lengths, geometry.dot(frame.along, frame.across))
 
 
-def normal_curvatures(p: Planes, frame: Frame) -> Planes:
-    """Curvature along both parameter lines, and the twist between them, 1 / length."""
-    suu, svv = tuple(_bend(c, 1) for c in p), tuple(_bend(c, 2) for c in p)
-    (suv,) = _slopes(frame.du, 2)
+def normal_curvatures(p: Planes, frame: Frame) -> Tensor:
+    """Curvature along both parameter lines, and the twist between them, (3, B, H, W)."""
+    x = torch.stack(p)
+    (twist,) = _slopes(torch.stack(frame.du), -1)
+    bends = torch.stack([_bend(x, -2), _bend(x, -1), twist], dim=1)
     u, v = (geometry.norm(d).clamp_min(1e-6) for d in (frame.du, frame.dv))
-    scales = (u * u, v * v, u * v)
-    return tuple(
-        geometry.dot(s, frame.normal) / scale
-        for s, scale in zip((suu, svv, suv), scales, strict=True)
-    )
+    shares = geometry.dot(bends.unbind(), frame.normal)
+    return shares / torch.stack([u * u, v * v, u * v])
 
 
 def side_lengths(p: Planes) -> tuple[Tensor, Tensor]:

@@ -39,7 +39,7 @@ def bending(p: Planes, frame: Frame) -> list[Tensor]:
     """Gaussian curvature on two scales, curvature and twist of the grid lines."""
     k = to_border(curvature(p))
     gauss = [_asinh(k / _SMALL_CURVATURE) / 4.0, torch.tanh(k / _LARGE_CURVATURE)]
-    return gauss + [_asinh(c) / 2.0 for c in normal_curvatures(p, frame)]
+    return [*gauss, *(_asinh(normal_curvatures(p, frame)) / 2.0)]
 
 
 def _asinh(x: Tensor) -> Tensor:

@@ -116,7 +116,7 @@ def _loop(run: Run, show: Callable[[Report], None] | None, interrupted: Callable
     config, here = run.config, run.here
     objective: Any = Objective(run.net)
     if here.world > 1:
-        objective = DistributedDataParallel(objective, broadcast_buffers=False)
+        objective = DistributedDataParallel(objective)
     start, before = time.monotonic(), run.spent
     validated = kept = run.spent
     losses: list[Tensor] = []
