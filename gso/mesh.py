@@ -148,7 +148,11 @@ class Mesh:
             ids = self.grid_index.ravel()
             quads = ids[topology.grid_faces(*self.grid_index.shape)]
             return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-        return topology.triangulate(self.faces, self.half_edges)
+        return topology.triangulate(self.faces, self._quad_splits)
+
+    @cached_property
+    def _quad_splits(self) -> NDArray[np.bool_]:
+        return topology.quad_splits(self.faces, self.half_edges)
 
     @cached_property
     def triangle_edges(self) -> topology.HalfEdges:
@@ -156,9 +160,21 @@ class Mesh:
         return topology.half_edges(self.triangles, len(self.vertices))
 
     @cached_property
-    def stars(self) -> list[tuple[Ints, Ints]]:
-        """Interior vertices and their rings in the triangulation, grouped by length."""
-        return topology.vertex_stars(self.triangle_edges)
+    def splits(self) -> tuple[topology.Stars, ...]:
+        """Interior vertices and their rings in each triangulation of the quads, by ring length.
+
+        The own one first, then that of the other diagonals (see
+        :func:`gso.topology.vertex_stars`); a mesh of triangles has one.
+        """
+        if self.grid_index is not None:
+            return tuple(topology.grid_stars(self.grid_index, r) for r in geometry.GRID_RINGS)
+        own, other = topology.vertex_stars(self.faces, self.half_edges, self._quad_splits)
+        return (own,) if self.is_triangles else (own, other)
+
+    @property
+    def stars(self) -> topology.Stars:
+        """Interior vertices and their rings in the own triangulation, grouped by length."""
+        return self.splits[0]
 
     @cached_property
     def edges(self) -> Ints:
@@ -254,7 +270,7 @@ _CONNECTIVITY = (
     "grid_index",
     "triangles",
     "triangle_edges",
-    "stars",
+    "splits",
     "edges",
     "boundary_loops",
     "components",

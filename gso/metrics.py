@@ -36,9 +36,17 @@ class Info(NamedTuple):
 
 INFO: dict[str, Info] = {
     "loss_gc": Info("1/size^2", True, "mean |K| over interior vertices (published)"),
-    "loss_gc_before": Info("1/size^2", True, "mean |K| of the input"),
-    "K_A_meyer": Info("1/size^2", True, "mean |K| with Meyer's barycentric area"),
-    "K_A_r": Info("", False, "share of mean |K| removed (published)"),
+    "loss_gc_before": Info("1/size^2", True, "loss_gc of the input"),
+    "loss_gc_worst": Info("1/size^2", True, "loss_gc in the worse of both triangulations of quads"),
+    "loss_gc_worst_before": Info("1/size^2", True, "loss_gc_worst of the input"),
+    "loss_gc_half": Info("1/size^2", True, "loss_gc of every second vertex, both triangulations"),
+    "mean_abs_K": Info("1/size^2", True, "mean |K|, Meyer's area, worse triangulation"),
+    "mean_abs_K_before": Info("1/size^2", True, "mean_abs_K of the input"),
+    "K_A_r": Info("", False, "share of loss_gc removed (published)"),
+    "K_A_r_worst": Info("", False, "share of loss_gc_worst removed"),
+    "nonplanarity_mean": Info("", True, "mean gap of the quads' diagonals / mean edge"),
+    "nonplanarity_max": Info("", True, "largest gap of a quad's diagonals / mean edge"),
+    "nonplanarity_max_before": Info("", True, "nonplanarity_max of the input"),
     "d_H": Info("%", True, "mean distance to the nearest input vertex / diagonal (published)"),
     "distance_mean": Info("%", True, "mean true distance to the surface, both ways / diagonal"),
     "distance_max": Info("%", True, "largest true distance, both ways / diagonal"),
@@ -126,15 +134,22 @@ def curvature_grid(points: Array) -> Array:
     return geometry.grid_curvature(components(np.asarray(points, float)))
 
 
-def curvature(surface: Any) -> Array:
+def curvature(surface: Any, split: int = 0) -> Array:
     """Discrete Gaussian curvature of every vertex (n,); NaN on the boundary, 1/length^2.
 
     Closed stars of the triangulation, of any valence; vertices of a grid in the order of
     the mesh.
+
+    Parameters
+    ----------
+    surface : Mesh or array (H, W, 3)
+    split : {0, 1}
+        Which triangulation of the quads: the own one, or that of the other diagonals, which
+        on a mesh of triangles is the same.
     """
     mesh = _mesh(surface)
     out = np.full(len(mesh.vertices), np.nan)
-    for centre, ring in mesh.stars:
+    for centre, ring in mesh.splits[min(split, len(mesh.splits) - 1)]:
         out[centre] = geometry.gaussian_curvature(
             components(mesh.vertices[centre]),
             [components(mesh.vertices[ring[:, k]]) for k in range(ring.shape[1])],
@@ -142,24 +157,130 @@ def curvature(surface: Any) -> Array:
     return out
 
 
-def _interior_curvature(surface: Any) -> Array:
+def worst_curvature(surface: Any) -> Array:
+    """Gaussian curvature of every vertex in the triangulation where it is larger, (n,).
+
+    By absolute value; NaN on the boundary, 1/length^2, with Meyer's area: 1 on a unit sphere.
+
+    >>> u, v = np.mgrid[-0.2:0.2:9j, -0.2:0.2:9j]
+    >>> ball = np.dstack([u, v, np.sqrt(1.0 - u**2 - v**2)])
+    >>> bool(abs(np.nanmean(worst_curvature(ball)) - 1.0) < 0.02)
+    True
+    """
+    own, other = curvature(surface), curvature(surface, 1)
+    return 3.0 * np.where(np.abs(other) > np.abs(own), other, own)
+
+
+def _interior_curvature(surface: Any, split: int = 0) -> Array:
     grid = _grid(surface)
-    values = curvature(surface) if grid is None else curvature_grid(grid).ravel()
+    if grid is None:
+        values = curvature(surface, split)
+    else:
+        values = geometry.grid_curvature(components(grid), split).ravel()
     values = values[~np.isnan(values)]
     return values if values.size else np.zeros(1)
 
 
-def loss_gc(surface: Any, *, scale: float | None = None) -> float:
+def _mean_abs(surface: Any, split: int) -> float:
+    return float(np.abs(_interior_curvature(surface, split)).mean())
+
+
+def loss_gc(surface: Any, *, scale: float | None = None, split: int = 0) -> float:
     """Mean absolute Gaussian curvature K_A over interior vertices (Wang et al. 2024, Eq. 1).
 
     Times `scale` squared: of the surface in the unit ball when `scale` is not given.
 
+    It sees one triangulation of the quads, the own one, and is blind to what happens along
+    the other diagonals: see :func:`loss_gc_worst`.
+
+    Parameters
+    ----------
+    surface : Mesh or array (H, W, 3)
+    scale : float, optional
+        Length that counts as one.
+    split : {0, 1}
+        Which triangulation; 0 is the published figure.
+
+    Examples
+    --------
     >>> flat = np.zeros((4, 4, 3)); flat[..., :2] = np.mgrid[:4, :4].transpose(1, 2, 0)
     >>> round(loss_gc(flat), 12)
     0.0
     """
     scale = unit(surface) if scale is None else scale
-    return float(np.abs(_interior_curvature(surface)).mean() * scale**2)
+    return _mean_abs(surface, split) * scale**2
+
+
+def loss_gc_worst(surface: Any, *, scale: float | None = None) -> float:
+    """:func:`loss_gc` in that triangulation of the quads in which it is larger.
+
+    On meshes of triangles it is ``loss_gc``.
+
+    >>> crumpled = np.dstack([*np.mgrid[:6.0, :6.0], np.indices((6, 6)).sum(axis=0) % 2])
+    >>> loss_gc_worst(crumpled) >= loss_gc(crumpled)
+    True
+    """
+    scale = unit(surface) if scale is None else scale
+    return max(_mean_abs(surface, split) for split in (0, 1)) * scale**2
+
+
+def loss_gc_both(surface: Any, *, scale: float | None = None) -> float:
+    """:func:`loss_gc`, the mean over both triangulations of the quads: what the energy sees.
+
+    It does not depend on how a mesh is numbered.
+
+    >>> saddle = np.dstack([*np.mgrid[:4.0, :4.0], np.outer(np.arange(4.0), np.arange(4.0))])
+    >>> loss_gc_both(saddle) <= loss_gc_worst(saddle)
+    True
+    """
+    scale = unit(surface) if scale is None else scale
+    return 0.5 * sum(_mean_abs(surface, split) for split in (0, 1)) * scale**2
+
+
+def loss_gc_half(surface: Any, *, scale: float | None = None) -> float:
+    """:func:`loss_gc` seen at half the resolution: a second opinion, which nothing minimises.
+
+    Mean over the four grids of every second vertex, and over both triangulations of each. NaN
+    for meshes that are no grids, and for grids smaller than 6 x 6.
+
+    >>> u, v = np.mgrid[-1:1:16j, -1:1:16j]
+    >>> saddle = np.dstack([u, v, 0.3 * u * v])
+    >>> 0.9 < loss_gc_half(saddle) / loss_gc(saddle) < 1.1
+    True
+    """
+    grid = _grid(surface)
+    if grid is None or min(grid.shape[:2]) < 6:
+        return float("nan")
+    scale = unit(surface) if scale is None else scale
+    some = [grid[i::2, j::2] for i in (0, 1) for j in (0, 1)]
+    return float(np.mean([_mean_abs(g, split) for g in some for split in (0, 1)]) * scale**2)
+
+
+def mean_abs_K(surface: Any, *, scale: float | None = None) -> float:
+    """Mean absolute Gaussian curvature with the area of Meyer et al. 2003: 1 on a unit sphere.
+
+    Of the triangulation of the quads in which it is larger; three times
+    :func:`loss_gc_worst`, whose areas are those of whole stars.
+    """
+    return 3.0 * loss_gc_worst(surface, scale=scale)
+
+
+def nonplanarity(surface: Any) -> Array:
+    """Gap between the diagonals of every quad over the mean length of the edges, (q,).
+
+    Zero for planar quads; those of a mesh that has triangles too come in their order.
+
+    >>> nonplanarity(np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])).max()
+    np.float64(0.0)
+    """
+    mesh = _mesh(surface)
+    v = mesh.vertices
+    a, b = mesh.edges.T
+    length = np.linalg.norm(v[a] - v[b], axis=1).mean()
+    corners = (components(v[c]) for c in _cells(mesh).T)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        gap = np.abs(np.asarray(geometry.diagonal_distance(*corners)))
+    return np.nan_to_num(gap) / length
 
 
 def curvature_features(surface: Any, *, scale: float | None = None) -> tuple[float, float, float]:
@@ -171,8 +292,16 @@ def curvature_features(surface: Any, *, scale: float | None = None) -> tuple[flo
 
 def K_A_r(before: Any, after: Any) -> float:
     """Share of mean |K| removed, (K_A(before) - K_A(after)) / K_A(before); 0 for a flat input."""
-    was = loss_gc(before, scale=1.0)
-    return (was - loss_gc(after, scale=1.0)) / was if was > 0 else 0.0
+    return _removed(loss_gc(before, scale=1.0), loss_gc(after, scale=1.0))
+
+
+def K_A_r_worst(before: Any, after: Any) -> float:
+    """Share of :func:`loss_gc_worst` removed; 0 for a flat input."""
+    return _removed(loss_gc_worst(before, scale=1.0), loss_gc_worst(after, scale=1.0))
+
+
+def _removed(was: float, left: float) -> float:
+    return (was - left) / was if was > 0 else 0.0
 
 
 def d_H(before: Any, after: Any) -> float:

@@ -7,6 +7,7 @@ a vertex or the side of a grid, never over elements.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -280,12 +281,30 @@ def four_corners(faces: Ints) -> Ints:
     return np.c_[faces[:, :3], np.where(last < 0, first, last) if last.size else first]
 
 
-def triangulate(faces: Ints, he: HalfEdges) -> Ints:
-    """Split quads into triangles so that neighbours are split alike.
+def triangulate(faces: Ints, turned: NDArray[np.bool_]) -> Ints:
+    """Triangles (t, 3) of faces whose quads are split as :func:`quad_splits` says."""
+    if faces.shape[1] == 3:
+        return faces
+    quad = faces[:, 3] >= 0
+    corners = np.where(turned[:, None], np.roll(faces, -1, axis=1), faces)
+    tris = np.stack([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]], axis=1)
+    tris[~quad, 0] = faces[~quad, :3]
+    keep = np.ones((len(faces), 2), bool)
+    keep[~quad, 1] = False
+    return tris[keep]
 
-    A grid is split along (i, j)-(i+1, j+1). On other quad meshes the choice spreads from
-    the first face over its neighbours: every regular vertex then has six triangles, the
-    only valence at which the angle defect converges (Borrelli et al. 2003).
+
+def quad_splits(faces: Ints, he: HalfEdges) -> NDArray[np.bool_]:
+    """Which quads are split along the diagonal 1-3 instead of 0-2, so that neighbours are alike.
+
+    The choice spreads from the first face over its neighbours: nearly every regular vertex then
+    has six triangles, the only valence at which the angle defect converges (Borrelli et al.
+    2003). Around vertices of odd valence it cannot go round.
+
+    Returns
+    -------
+    ndarray of bool, (m,)
+        False for triangles.
 
     Raises
     ------
@@ -293,12 +312,11 @@ def triangulate(faces: Ints, he: HalfEdges) -> Ints:
         A quad both of whose diagonals join vertices that are joined already.
     """
     if faces.shape[1] == 3:
-        return faces
+        return np.zeros(len(faces), bool)
     quad = faces[:, 3] >= 0
     inner = np.flatnonzero((he.twin > np.arange(he.twin.size)) & quad[he.face])
     inner = inner[quad[he.face[he.twin[inner]]]]
-    first = np.concatenate([[0], np.cumsum(np.where(quad, 4, 3))[:-1]])
-    local = np.arange(he.face.size) - first[he.face]
+    local = _place_in_face(he, quad)
     # Seen from each face, is the start of this half-edge on the diagonal 0-2?
     here = local[inner] % 2 == 0
     there = local[he.twin[inner]] % 2 == 1
@@ -316,12 +334,13 @@ def triangulate(faces: Ints, he: HalfEdges) -> Ints:
                 f"face {at} = {faces[at].tolist()} cannot be split into triangles: its diagonals "
                 "are edges of other faces; subdivide the mesh there"
             )
-    turned = np.where(turn[:, None], np.roll(faces, -1, axis=1), faces)
-    tris = np.stack([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]], axis=1)
-    tris[~quad, 0] = faces[~quad, :3]
-    keep = np.ones((len(faces), 2), bool)
-    keep[~quad, 1] = False
-    return tris[keep]
+    return turn & quad
+
+
+def _place_in_face(he: HalfEdges, quad: NDArray[np.bool_]) -> Ints:
+    """Which corner of its face every half-edge starts at, 0 to 3."""
+    first = np.concatenate([[0], np.cumsum(np.where(quad, 4, 3))[:-1]])
+    return np.arange(he.face.size) - first[he.face]
 
 
 def _clashing_splits(quads: Ints, turn: NDArray[np.bool_], he: HalfEdges) -> NDArray[np.bool_]:
@@ -344,49 +363,99 @@ def corner_triangles(faces: Ints) -> Ints:
     return np.concatenate([*corners, triangles])
 
 
-def vertex_stars(he: HalfEdges) -> list[tuple[Ints, Ints]]:
-    """Closed stars of the interior vertices of a triangulation, grouped by padded length.
+#: Interior vertices (n,) and their rings (n, k), one entry per length of rings.
+Stars = list[tuple[Ints, Ints]]
+
+
+def grid_stars(ids: Ints, ring: Sequence[tuple[int, int]]) -> Stars:
+    """Stars of the interior vertices of a grid (H, W) whose rings are steps (i, j) away."""
+    h, w = ids.shape
+    if min(h, w) < 3:
+        return []
+    around = [ids[1 + i : h - 1 + i, 1 + j : w - 1 + j].ravel() for i, j in ring]
+    return [(ids[1:-1, 1:-1].ravel(), np.stack(around, axis=1))]
+
+
+def vertex_stars(faces: Ints, he: HalfEdges, turned: NDArray[np.bool_]) -> tuple[Stars, Stars]:
+    """Closed stars of the interior vertices in both triangulations of the quads around them.
+
+    The quads around a vertex are split in turn through the vertex and across from it, and the
+    other way round: two stars that together use both diagonals of every quad, and that do not
+    depend on how the mesh is numbered. The first one is that which agrees with more of the
+    splits in `turned`. Where the number of quads is odd they cannot alternate, and both stars
+    have all quads split through the vertex. Triangles are what they are.
 
     Returns
     -------
-    list of (centres (n,), rings (n, k))
+    (first, second) : lists of (centres (n,), rings (n, k))
         One entry per ring length in use. Rings run anticlockwise; shorter ones repeat
         their last vertex, which adds neither angle nor area.
 
     Raises
     ------
     MeshError
-        Two fans of faces touch in one vertex only.
+        Two fans of faces touch in one vertex only, or a vertex has too many faces.
     """
     interior = np.flatnonzero(~he.boundary_vertex & (he.face_count > 0))
-    if he.face_count[interior].max(initial=0) > RING_SIZES[-1]:
-        at = interior[he.face_count[interior].argmax()]
-        raise MeshError(
-            f"vertex {at} has {he.face_count[at]} triangles, more than {RING_SIZES[-1]}; "
-            "remesh the surface there"
-        )
+    quad = are_quads(faces)
+    through = (_place_in_face(he, quad) % 2 == 0) != turned[he.face]
     start = np.zeros(he.vertex_count, np.int64)
     start[he.origin] = np.arange(he.origin.size)
-    valence = he.face_count[interior]
-    groups = []
-    lengths = np.asarray(RING_SIZES)[np.searchsorted(RING_SIZES, valence)]
-    for length in np.unique(lengths):
-        pick = lengths == length
-        centre, count = interior[pick], valence[pick]
-        h = start[centre].copy()
-        first = h.copy()
-        ring = np.empty((centre.size, length), np.int64)
-        for k in range(int(length)):
-            ring[:, k] = he.dest[h]
-            h = np.where(k < count - 1, he.twin[he.prev[h]], h)
-        closing = he.twin[he.prev[h]]
-        if (closing != first).any():
+    found: tuple[list, list] = ([], [])
+    for valence in np.unique(he.face_count[interior]):
+        centre = interior[he.face_count[interior] == valence]
+        spokes = np.empty((centre.size, valence), np.int64)
+        h = start[centre]
+        for k in range(int(valence)):
+            spokes[:, k] = h
+            h = he.twin[he.prev[h]]
+        if (h != spokes[:, 0]).any():
             raise MeshError(
-                f"vertex {centre[closing != first][0]} joins two parts of the surface that "
+                f"vertex {centre[h != spokes[:, 0]][0]} joins two parts of the surface that "
                 "touch nowhere else: give each part its own copy of the vertex"
             )
-        groups.append((centre, ring))
-    return groups
+        four = quad[he.face[spokes]]
+        count = four.sum(axis=1, keepdims=True)
+        odd = count % 2 == 1
+        even_turn = np.cumsum(four, axis=1) % 2 == 1
+        agrees = ((through[spokes] == even_turn) & four).sum(axis=1, keepdims=True)
+        own = even_turn == (2 * agrees >= count)
+        for stars, split in zip(found, (own, ~own), strict=True):
+            stars += _rings(he, centre, spokes, four & (split | odd))
+    return _merged(found[0]), _merged(found[1])
+
+
+def _rings(he: HalfEdges, centre: Ints, spokes: Ints, through: NDArray[np.bool_]) -> Stars:
+    """Stars of one number of faces; quads split through the centre add their far corner."""
+    both = np.stack([he.dest[spokes], he.dest[he.next[spokes]]], axis=2)
+    wanted = np.stack([np.ones_like(through), through], axis=2)
+    both, wanted = both.reshape(len(centre), -1), wanted.reshape(len(centre), -1)
+    size = wanted.sum(axis=1)
+    if size.max(initial=0) > RING_SIZES[-1]:
+        at = centre[size.argmax()]
+        raise MeshError(
+            f"vertex {at} has {size.max()} triangles, more than {RING_SIZES[-1]}; "
+            "remesh the surface there"
+        )
+    both = np.take_along_axis(both, np.argsort(~wanted, axis=1, kind="stable"), axis=1)
+    lengths = np.asarray(RING_SIZES)[np.searchsorted(RING_SIZES, size)]
+    stars = []
+    for length in np.unique(lengths):
+        pick = lengths == length
+        column = np.minimum(np.arange(length), size[pick][:, None] - 1)
+        stars.append((centre[pick], np.take_along_axis(both[pick], column, axis=1)))
+    return stars
+
+
+def _merged(stars: Stars) -> Stars:
+    """Stars with one entry per length of rings, vertices in their order."""
+    out = []
+    for length in sorted({ring.shape[1] for _, ring in stars}):
+        some = [(c, r) for c, r in stars if r.shape[1] == length]
+        centre = np.concatenate([c for c, _ in some])
+        order = np.argsort(centre, kind="stable")
+        out.append((centre[order], np.concatenate([r for _, r in some])[order]))
+    return out
 
 
 def polyline_triples(he: HalfEdges, faces: Ints) -> Ints:

@@ -64,6 +64,15 @@ def directed(faces):
     return Counter((a, b) for f in rows for a, b in zip(f, f[1:] + f[:1]))
 
 
+def triangulated(faces):
+    return topology.triangulate(faces, topology.quad_splits(faces, half_edges(faces)))
+
+
+def stars_of(faces):
+    he = half_edges(faces)
+    return topology.vertex_stars(faces, he, topology.quad_splits(faces, he))
+
+
 def cycle(face):
     """A face that starts at its smallest corner."""
     k = face.index(min(face))
@@ -73,7 +82,7 @@ def cycle(face):
 @pytest.mark.parametrize("valence", [3, 4, 5, 6, 7, 9, 11, 13, 17, 25, 33, 64, 65, 129, 300])
 def test_star_rings_are_cyclic_and_padded_by_their_last_vertex(valence):
     faces, names = relabelled(fan(valence), seed=valence)
-    ((centre, ring),) = topology.vertex_stars(half_edges(faces))
+    ((centre, ring),) = stars_of(faces)[0]
     assert centre.tolist() == [names[0]]
     ring = ring[0].tolist()
     assert len(ring) in topology.RING_SIZES and len(ring) >= valence
@@ -87,22 +96,58 @@ def test_star_rings_are_cyclic_and_padded_by_their_last_vertex(valence):
 def test_padded_star_of_a_plane_fan_has_no_curvature(valence):
     angle = 2 * np.pi * np.arange(valence) / valence
     points = np.c_[np.r_[0, np.cos(angle)], np.r_[0, np.sin(angle)], np.zeros(valence + 1)]
-    ((centre, ring),) = topology.vertex_stars(half_edges(fan(valence)))
+    ((centre, ring),) = stars_of(fan(valence))[0]
     star = [tuple(points[v]) for v in ring[0]]
     assert abs(geometry.gaussian_curvature(tuple(points[centre[0]]), star)) < 1e-12
 
 
 def test_stars_leave_out_the_boundary_and_group_by_length():
     quads = topology.grid_faces(6, 7)
-    groups = topology.vertex_stars(half_edges(np.r_[quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    groups, _ = stars_of(np.r_[quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     assert [ring.shape for _, ring in groups] == [(20, 6)]
     inner = np.arange(42).reshape(6, 7)[1:-1, 1:-1]
     assert sorted(groups[0][0].tolist()) == inner.ravel().tolist()
 
 
+def test_both_stars_of_grids_are_those_of_their_two_triangulations():
+    faces, _ = relabelled(topology.grid_faces(6, 7), seed=3)
+    ids = topology.recognise_grid(half_edges(faces), faces)
+    given = [topology.grid_stars(ids, ring) for ring in geometry.GRID_RINGS]
+    assert ring_sets(stars_of(faces)) == ring_sets(given)
+    for (centre, own), (_, other) in zip(*given, strict=True):
+        assert own.shape == other.shape == (20, 6)
+        both = [set(a) | set(b) for a, b in zip(own.tolist(), other.tolist(), strict=True)]
+        assert {len(b) for b in both} == {8} and len(set(centre.tolist())) == 20
+
+
+def ring_sets(splits, names=None):
+    """Vertex to the rings that it has, as sets of vertices; `names` turns numbers back."""
+    found = {}
+    for stars in splits:
+        for centre, ring in stars:
+            for c, r in zip(centre.tolist(), ring.tolist(), strict=True):
+                found.setdefault(c, Counter())[frozenset(r)] += 1
+    if names is None:
+        return found
+    back = {int(new): old for old, new in enumerate(names)}
+    return {
+        back[c]: Counter({frozenset(back[v] for v in r): n for r, n in rings.items()})
+        for c, rings in found.items()
+    }
+
+
+def test_stars_do_not_depend_on_the_numbering():
+    expected = ring_sets(stars_of(three_quads()))
+    for seed in range(8):
+        faces, names = relabelled(three_quads(), seed)
+        assert ring_sets(stars_of(faces), names) == expected
+    # Quads around a vertex of odd valence are all split through it.
+    assert Counter(len(r) for rings in expected.values() for r in rings.elements()) == {6: 14}
+
+
 def test_a_star_too_large_for_any_ring_is_refused():
     with pytest.raises(MeshError, match="vertex 0 has 5000 triangles"):
-        topology.vertex_stars(half_edges(fan(5000)))
+        stars_of(fan(5000))
 
 
 @pytest.mark.parametrize(
@@ -227,18 +272,18 @@ def test_polylines_close_on_a_torus_and_end_at_irregular_vertices():
 def test_triangulation_of_regular_quads_has_valence_six(quads):
     for seed in range(5):
         faces, _ = relabelled(quads, seed)
-        he = half_edges(topology.triangulate(faces, half_edges(faces)))
+        he = half_edges(triangulated(faces))
         inner = ~he.boundary_vertex
         assert (he.face_count[inner] == 6).all() and inner.any()
 
 
 def test_triangulation_covers_each_face_once_and_keeps_orientation():
     faces = np.r_[topology.grid_faces(3, 4)[1:], [[0, 4, 5, -1], [0, 5, 1, -1]]]
-    triangles = topology.triangulate(faces, half_edges(faces))
+    triangles = triangulated(faces)
     assert len(triangles) == 2 * 5 + 2
     assert max(directed(triangles).values()) == 1
     assert set(directed(faces)) <= set(directed(triangles))
-    assert np.array_equal(topology.triangulate(fan(4), half_edges(fan(4))), fan(4))
+    assert np.array_equal(triangulated(fan(4)), fan(4))
 
 
 @pytest.mark.parametrize(
@@ -251,7 +296,7 @@ def test_triangulation_covers_each_face_once_and_keeps_orientation():
     ],
 )
 def test_triangulation_of_faces_that_share_two_edges_is_a_surface(faces):
-    triangles = topology.triangulate(np.array(faces), half_edges(faces))
+    triangles = triangulated(np.array(faces))
     edges = Counter(tuple(sorted(e)) for e in directed(triangles).elements())
     assert max(directed(triangles).values()) == 1 and max(edges.values()) == 2
 

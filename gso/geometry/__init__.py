@@ -15,6 +15,7 @@ from gso.geometry.cells import (
     isometry_defect,
 )
 from gso.geometry.curvature import (
+    GRID_RINGS,
     gaussian_curvature,
     grid_curvature,
     grid_star,
@@ -37,6 +38,7 @@ from gso.geometry.stretches import first_form, principal_stretches
 from gso.geometry.vector import angle, cross, dot, norm, norm2, sub
 
 __all__ = [
+    "GRID_RINGS",
     "Matrix",
     "angle",
     "ball",

@@ -43,9 +43,26 @@ def star_area(centre: Vec, ring: Sequence[Vec]) -> Any:
     return 0.5 * _star(centre, ring)[1]
 
 
-def grid_star(points: Vec) -> tuple[Vec, list[Vec]]:
+#: Steps (i, j) from a grid vertex to its ring of six, in both triangulations of the cells: split
+#: along (i, j)-(i+1, j+1) as in the published metric, and along the other diagonals.
+GRID_RINGS = (
+    ((-1, 0), (-1, -1), (0, -1), (1, 0), (1, 1), (0, 1)),
+    ((-1, 0), (-1, 1), (0, 1), (1, 0), (1, -1), (0, -1)),
+)
+
+
+def grid_star(points: Vec, split: int = 0) -> tuple[Vec, list[Vec]]:
     """Interior vertices of grids and their rings of six, of components (..., H, W).
 
+    Parameters
+    ----------
+    points : tuple of 3 arrays, (..., H, W)
+        NumPy's or torch's.
+    split : {0, 1}
+        Which triangulation: an index of :data:`GRID_RINGS`.
+
+    Examples
+    --------
     >>> import numpy as np
     >>> centre, ring = grid_star((np.zeros((2, 5, 4)),) * 3)
     >>> centre[0].shape, len(ring)
@@ -56,8 +73,7 @@ def grid_star(points: Vec) -> tuple[Vec, list[Vec]]:
         rows, columns = slice(1 + i, (i - 1) or None), slice(1 + j, (j - 1) or None)
         return tuple(c[..., rows, columns] for c in points)
 
-    around = ((-1, 0), (-1, -1), (0, -1), (1, 0), (1, 1), (0, 1))
-    return moved(0, 0), [moved(i, j) for i, j in around]
+    return moved(0, 0), [moved(i, j) for i, j in GRID_RINGS[split]]
 
 
 def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
@@ -86,7 +102,7 @@ def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
     return _curvature(*_star(centre, ring))
 
 
-def grid_curvature(points: Vec) -> Any:
+def grid_curvature(points: Vec, split: int = 0) -> Any:
     """:func:`gaussian_curvature` of the interior vertices of grids, 1 / length^2.
 
     The six triangles of all stars are computed at once, where small grids take the time of
@@ -96,6 +112,8 @@ def grid_curvature(points: Vec) -> Any:
     ----------
     points : tuple of 3 arrays, (..., H, W)
         NumPy's or torch's.
+    split : {0, 1}
+        Which triangulation of the cells: an index of :data:`GRID_RINGS`.
 
     Returns
     -------
@@ -108,7 +126,7 @@ def grid_curvature(points: Vec) -> Any:
     >>> grid_curvature((u, v, u * v)).shape, bool((grid_curvature((u, v, u * v)) < 0).all())
     ((3, 2), True)
     """
-    centre, ring = grid_star(points)
+    centre, ring = grid_star(points, split)
     around = zip(*ring, ring[0], strict=True)
     edges = sub(tuple(ops.stack(c) for c in around), centre)
     angles, twice = _wedge(tuple(e[:-1] for e in edges), tuple(e[1:] for e in edges))

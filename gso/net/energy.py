@@ -49,7 +49,7 @@ class Developable:
     def __post_init__(self) -> None:
         self.points = p = planes(self.design)
         self.normals = grids.normals(p)
-        k = grids.to_border(grids.curvature(p)).abs()
+        k = grids.to_border(grids.absolute_curvature(p))
         self.curved = k[:, 1:-1, 1:-1].mean(dim=(1, 2))
         self.spacing = fairness.spacing(*grids.side_lengths(p), p[0].shape[1:])
         own = [_second(p, axis, h) for axis, h in zip((1, 2), self.spacing, strict=True)]
@@ -78,10 +78,12 @@ class Developable:
         """Energy (B,) by term."""
         o = self.options
         x = planes(result)
-        centre, ring = geometry.grid_star(x)
-        (k,) = curvature.residual([centre, *ring], ())
         absolute: Any = Absolute(o.eps if eps is None else eps)
-        bent = absolute.value(k).mean(dim=(1, 2))
+        bent = 0.0
+        for split in range(len(geometry.GRID_RINGS)):
+            centre, ring = geometry.grid_star(x, split)
+            (k,) = curvature.residual([centre, *ring], ())
+            bent = bent + absolute.value(k).mean(dim=(1, 2)) / len(geometry.GRID_RINGS)
         fair = self._fairness(x)
         ones = torch.full_like(x[0], o.tangential)
         moved = proximity.residual([x], [*self.points, *self.normals, ones])

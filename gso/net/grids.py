@@ -89,6 +89,12 @@ def curvature(p: Planes) -> Tensor:
     return geometry.grid_curvature(p)
 
 
+def absolute_curvature(p: Planes) -> Tensor:
+    r"""\|K\| (B, H-2, W-2) of the interior vertices, mean over both triangulations of the cells."""
+    splits = range(len(geometry.GRID_RINGS))
+    return sum(geometry.grid_curvature(p, k).abs() for k in splits) / len(splits)
+
+
 def to_border(inner: Tensor) -> Tensor:
     """Values (B, H-2, W-2) of interior vertices, and of the nearest one on the border."""
     return pad(inner[:, None], (1, 1, 1, 1), mode="replicate")[:, 0]

@@ -47,8 +47,11 @@ def fair_ratio(result: Tensor, design: Tensor) -> Tensor:
 
 
 def gc(result: Tensor) -> Tensor:
-    """``gc``: mean absolute Gaussian curvature, ``loss_gc``."""
-    return grids.curvature(planes(result)).abs().mean(dim=(1, 2))
+    """``gc``: mean absolute Gaussian curvature, over both triangulations of the cells.
+
+    ``loss_gc``, the published loss, is that of one of them.
+    """
+    return grids.absolute_curvature(planes(result)).mean(dim=(1, 2))
 
 
 def k_left(result: Tensor, design: Tensor) -> Tensor:

@@ -156,7 +156,7 @@ def _plan(request: Request) -> Plan:
     if not mesh.stars:
         raise _nothing_inside(mesh)
     start = mesh.vertices if request.start is None else request.start
-    curved = measure.loss_gc(mesh, scale=1.0)
+    curved = measure.loss_gc_both(mesh, scale=1.0)
     spline = splined.controls(request)
     if spline is not None:
         # The usual solve comes first; the spline starts from its result.
@@ -165,7 +165,7 @@ def _plan(request: Request) -> Plan:
     if good and request.start is None and request.constraints.empty:
         return Plan(_layout(mesh), mesh.vertices.ravel(), status=Status.ALREADY_GOOD)
     smooth, sigma = _smoothed(mesh)
-    left = measure.loss_gc(smooth, scale=1.0)
+    left = measure.loss_gc_both(smooth, scale=1.0)
     if request.constraints.empty and left <= min(NOISE_ONLY * curved, FLAT_CURVATURE):
         reach = min(NOISE_REACH * sigma, request.max_deviation or np.inf)
         request = replace(request, max_deviation=reach)
@@ -256,7 +256,7 @@ def _own_bending(mesh: Mesh) -> Array:
     Nearly all where the design is developable already, so that fairness does not pull
     its border in; none where it is curved.
     """
-    k = measure.curvature(mesh)
+    k = 0.5 * (np.abs(measure.curvature(mesh)) + np.abs(measure.curvature(mesh, 1)))
     grid = mesh.grid_index
     if grid is not None:
         inner = grid[1:-1, 1:-1]
@@ -474,15 +474,34 @@ def _flat_metrics(surface: Mesh, flat: Array) -> dict[str, float]:
     return {name: value for name, value in out.items() if not np.isnan(value)}
 
 
+def curvature_metrics(before: Mesh, after: Mesh, scale: float) -> dict[str, float]:
+    """Curvature and planarity of two surfaces, as far as their meshes have them."""
+    found = {
+        "loss_gc_before": measure.loss_gc(before, scale=scale),
+        "loss_gc": measure.loss_gc(after, scale=scale),
+        "loss_gc_worst_before": measure.loss_gc_worst(before, scale=scale),
+        "loss_gc_worst": measure.loss_gc_worst(after, scale=scale),
+        "loss_gc_half": measure.loss_gc_half(after, scale=scale),
+        "mean_abs_K_before": measure.mean_abs_K(before, scale=scale),
+        "mean_abs_K": measure.mean_abs_K(after, scale=scale),
+    }
+    if not before.is_triangles:
+        gap = measure.nonplanarity(after)
+        found |= {
+            "nonplanarity_mean": float(gap.mean()),
+            "nonplanarity_max": float(gap.max()),
+            "nonplanarity_max_before": float(measure.nonplanarity(before).max()),
+        }
+    return {name: value for name, value in found.items() if not np.isnan(value)}
+
+
 def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict[str, float]:
     """Published and corrected metrics of a developable result (units: gso.metrics.INFO)."""
     true = measure.surface_distance(before, after)
     percent = 100.0 / before.diagonal
-    out = {
-        "loss_gc_before": measure.loss_gc(before, scale=scale),
-        "loss_gc": measure.loss_gc(after, scale=scale),
-        "K_A_meyer": 3.0 * measure.loss_gc(after, scale=scale),
+    out = curvature_metrics(before, after, scale) | {
         "K_A_r": measure.K_A_r(before, after),
+        "K_A_r_worst": measure.K_A_r_worst(before, after),
         "d_H": measure.d_H(before, after),
         "distance_mean": percent * 0.5 * (true.there_mean + true.back_mean),
         "distance_max": percent * max(true.there_max, true.back_max),

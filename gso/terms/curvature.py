@@ -9,7 +9,7 @@ import numpy as np
 
 from gso.geometry import gaussian_curvature
 from gso.mesh import Mesh
-from gso.terms.base import Array, Term
+from gso.terms.base import Array, Ints, Term
 
 #: The residual is 1/length^2 and does not change under rigid motions.
 INVARIANT = ("translation", "rotation")
@@ -23,28 +23,39 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 def build(mesh: Mesh) -> list[Term]:
     """One term per ring length; weights sum to one over all interior vertices.
 
+    Each vertex counts half in either triangulation of the quads around it, as residuals of
+    their own: their sum would let them cancel, and one alone is blind to what happens along
+    the other diagonals.
+
     Grid vertices weigh alike, as in the published metric; those of other meshes weigh by
     the area of their star, so that the sum does not depend on how densely a part of the
     surface is meshed.
     """
-    groups = mesh.stars
-    if mesh.grid_index is not None:
-        area = [np.ones(len(centre)) for centre, _ in groups]
-    else:
-        area = [star_areas(mesh.vertices, centre, ring) for centre, ring in groups]
-    total = sum(float(a.sum()) for a in area)
+    terms: dict[int, list[tuple[Ints, Array]]] = {}
+    for stars in mesh.splits:
+        areas = [_weights(mesh, centre, ring) for centre, ring in stars]
+        total = len(mesh.splits) * sum(float(a.sum()) for a in areas)
+        for (centre, ring), area in zip(stars, areas, strict=True):
+            element = np.concatenate([centre[:, None], ring], axis=1)
+            terms.setdefault(ring.shape[1], []).append((element, area / total))
     return [
         Term(
             "curvature",
             residual,
-            (("surface", np.concatenate([centre[:, None], ring], axis=1)),),
-            weights=a / total,
+            (("surface", np.concatenate([element for element, _ in some])),),
+            weights=np.concatenate([weight for _, weight in some]),
         )
-        for (centre, ring), a in zip(groups, area, strict=True)
+        for _, some in sorted(terms.items())
     ]
 
 
-def star_areas(vertices: Array, centre: Any, ring: Any) -> Array:
+def _weights(mesh: Mesh, centre: Ints, ring: Ints) -> Array:
+    if mesh.grid_index is not None:
+        return np.ones(len(centre))
+    return star_areas(mesh.vertices, centre, ring)
+
+
+def star_areas(vertices: Array, centre: Ints, ring: Ints) -> Array:
     """Areas (n,) of vertex stars."""
     from gso.geometry import star_area
 
