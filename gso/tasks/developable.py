@@ -28,7 +28,7 @@ from gso.status import MeshError, OptionError, Status
 from gso.tasks import held, joint, splined
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
-from gso.terms import Weighted, curvature, fairness, proximity
+from gso.terms import Weighted, curvature, elongation, fairness, proximity
 from gso.terms.losses import Absolute, Distance
 from gso.variables import Layout, Variables, free, normal_offsets, spline_offsets, vertex_normals
 
@@ -56,6 +56,9 @@ class Options(BaseOptions):
         Weight of the mean squared second derivative, likewise relative to the design's.
     w_proximity : float
         Weight of the displacement.
+    w_elongation : float
+        Weight of edges that become much shorter or longer than the design's, and of those of
+        its boundary that change at all visibly.
     near : float
         Displacements below it count squared, above it by their length.
     tangential : float
@@ -98,6 +101,7 @@ class Options(BaseOptions):
     w_curvature: float = 1.3e-3
     w_fairness: float = 1.1e-5
     w_proximity: float = 1.0
+    w_elongation: float = 0.1
     near: float = 0.01
     tangential: float = 0.7
     eps: float = 0.01
@@ -310,6 +314,7 @@ def _objective(
     fair = fairness.build(mesh, reference=smooth.vertices, share=_own_bending(smooth))
     items.append(Weighted(fair, w_fairness))
     items.append(Weighted(near, w_proximity, Distance(o.near)))
+    items.append(Weighted(elongation.build(mesh), o.w_elongation))
     return items + (held.pulls(request) if mesh is request.mesh else [])
 
 
