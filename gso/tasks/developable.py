@@ -512,5 +512,11 @@ def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict
         "distance_max": percent * max(true.there_max, true.back_max),
         "deviation_max": percent * true.there_max,
         "fairness_ratio": measure.fairness_ratio(before, after),
+        "edge_ratio_min": float(np.nanmin(measure.edge_ratios(before, after))),
+        "fold_max_before": float(measure.folds(before).max(initial=0.0)),
+        "fold_max": float(measure.folds(after).max(initial=0.0)),
     }
+    if before.boundary_loops:
+        loops = measure.loop_ratios(before, after)
+        out |= {"loop_ratio_min": float(loops.min()), "loop_ratio_max": float(loops.max())}
     return out if flat is None else out | _flat_metrics(after, flat)
