@@ -182,6 +182,11 @@ class Mesh:
         return topology.edges(self.half_edges)
 
     @cached_property
+    def rim(self) -> NDArray[np.bool_]:
+        """Mask over :attr:`edges`: on the boundary."""
+        return topology.rim(self.half_edges)
+
+    @cached_property
     def boundary_loops(self) -> list[Ints]:
         """Vertex ids of each boundary loop, longest first."""
         return topology.boundary_loops(self.half_edges)
@@ -272,6 +277,7 @@ _CONNECTIVITY = (
     "triangle_edges",
     "splits",
     "edges",
+    "rim",
     "boundary_loops",
     "components",
 )

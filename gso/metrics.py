@@ -53,6 +53,11 @@ INFO: dict[str, Info] = {
     "deviation_max": Info("%", True, "largest true distance of a result vertex / diagonal"),
     "displacement_rms": Info("%", True, "root mean square vertex displacement / diagonal"),
     "displacement_max": Info("%", True, "largest vertex displacement / diagonal"),
+    "loop_ratio_min": Info("", None, "smallest length of a boundary loop, out / in"),
+    "loop_ratio_max": Info("", None, "largest length of a boundary loop, out / in"),
+    "edge_ratio_min": Info("", False, "smallest length of an edge, out / in"),
+    "fold_max": Info("deg", True, "largest angle between the normals of neighbouring faces"),
+    "fold_max_before": Info("deg", True, "fold_max of the input"),
     "fairness_ratio": Info("", True, "sum of squared second differences, out / in"),
     "loss_iso_cell": Info("size", True, "isometry defect of the cells (published)"),
     "isometry_energy": Info("", True, "mean E_iso of the faces, relative (Jiang et al. 2020)"),
@@ -379,6 +384,51 @@ def fairness_ratio(before: Any, after: Any) -> float:
     """
     was = fairness(before, scale=1.0)
     return fairness(after, scale=1.0) / was if was > 0 else 1.0
+
+
+def edge_ratios(before: Any, after: Any) -> Array:
+    """Length of every edge (e,) in the result over that in the input; NaN where it had none.
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> edge_ratios(grid, 2.0 * grid).min()
+    np.float64(2.0)
+    """
+    here, there = _mesh(before), _points(after)
+    a, b = here.edges.T
+    was, now = (np.linalg.norm(p[a] - p[b], axis=1) for p in (here.vertices, there))
+    return np.divide(now, was, out=np.full(len(was), np.nan), where=was > 0)
+
+
+def loop_ratios(before: Any, after: Any) -> Array:
+    """Length of every boundary loop in the result over that in the input, longest loop first.
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> loop_ratios(grid, 0.5 * grid)
+    array([0.5])
+    """
+    here, there = _mesh(before), _points(after)
+    loops = here.boundary_loops
+    was, now = (np.array([_around(p[loop]) for loop in loops]) for p in (here.vertices, there))
+    return now / was
+
+
+def _around(points: Array) -> float:
+    """Length of a closed polygon (n, 3)."""
+    return float(np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1).sum())
+
+
+def folds(surface: Any) -> Array:
+    """Angle between the normals of the two faces at every interior edge, degrees, (e,).
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> folds(grid).max()
+    np.float64(0.0)
+    """
+    mesh = _mesh(surface)
+    he, normal = mesh.half_edges, face_normals(mesh)
+    inner = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    a, b = (components(normal[he.face[h]]) for h in (inner, he.twin[inner]))
+    return np.degrees(geometry.angle(a, b))
 
 
 def _flat(surface: Any, flat: Any) -> Array:
