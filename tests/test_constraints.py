@@ -490,7 +490,7 @@ def test_files_of_constraints(tmp_path):
         "{}": "a list",
         '[{"type": "Pink"}]': "Fixed, FixedBoundary",
         '[{"type": []}]': "entry 0 needs",
-        '[{"type": "FixedBoundary", "ids": [0]}]': "it has none",
+        '[{"type": "FixedBoundary", "ids": [0]}]': "takes no 'ids'; there are none",
         '[{"type": "Fixed", "id": [3]}]': "no parameter 'id'",
         '[{"type": "Glue"}]': "pairs",
     }.items():

@@ -16,6 +16,7 @@ from gso.constraints import TIGHT, Constraint
 from gso.fit import describe_spline
 from gso.mesh import Mesh
 from gso.result import Result
+from gso.spelling import known_keywords
 from gso.status import ConvergenceWarning, OptionError, Status
 from gso.tasks.base import Options, Request
 from gso.tno import linear
@@ -28,6 +29,7 @@ from gso.tno.start import Start
 Array = NDArray[np.float64]
 
 
+@known_keywords()
 def optimize(
     mesh: Any,
     *,
@@ -140,7 +142,7 @@ def optimize(
         result.warm_start = given.source
     result.seconds["total"] = time.perf_counter() - clock
     if not result.converged and result.status is not Status.MAX_ITERATIONS:
-        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=2)
+        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=3)
     return result
 
 

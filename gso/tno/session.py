@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from gso.constraints import Constraint, Handle, Pins, listed
 from gso.handle_start import Spread
 from gso.result import Result
+from gso.spelling import known_keywords
 from gso.status import ConvergenceWarning, OptionError, Status
 from gso.tasks.base import Plan, Request, Stage
 from gso.terms import Weighted
@@ -77,6 +78,7 @@ class Session:
     True
     """
 
+    @known_keywords()
     def __init__(
         self,
         mesh: Any,
