@@ -151,7 +151,14 @@ def test_obj_as_other_programs_write_it(tmp_path):
     ]  # fmt: skip
     assert mesh.notes == (
         "1 polygons with more than four corners were cut into triangles (the first is face 3)",
+        "left out: 1 normals (vn), 1 polylines (l), colours of vertices",
     )
+    said = mesh.attributes
+    assert said.libraries == ("x.mtl",)
+    assert {k: v.names for k, v in said.labels.items()} == {
+        "o": ("part",), "g": ("a b",), "s": ("off",), "usemtl": ("m",),
+    }  # fmt: skip
+    assert said.texture_corners.tolist() == [[0, -1, 0, -1], *[[-1] * 4] * 6]
 
 
 def test_obj_with_old_line_ends(tmp_path):

@@ -7,13 +7,14 @@ from typing import BinaryIO
 import numpy as np
 
 from gso.io.source import face_table, ranges
+from gso.io.surface import Surface
 from gso.io.text import Words, write_rows
 from gso.mesh import Mesh
 from gso.status import MeshError
 
 
-def read(data: bytes) -> Mesh:
-    """Mesh in a text OFF file; colours, normals and texture coordinates are ignored."""
+def read(data: bytes) -> Surface:
+    """Surface in a text OFF file; colours, normals and texture coordinates are ignored."""
     words = Words(data, comment=b"#")
     if words.first.size == 0:
         raise MeshError("there is nothing but comments in it")
@@ -51,7 +52,7 @@ def read(data: bytes) -> Mesh:
         at = int(outside.argmax())
         words.fail(corner[at], f"a face refers to vertex {index[at]}, the last one is {n - 1}")
     faces, notes = face_table(index, size, points)
-    return Mesh(points, faces, notes=notes)
+    return Surface(points, faces, notes)
 
 
 def write(mesh: Mesh, file: BinaryIO) -> None:

@@ -103,6 +103,7 @@ def optimize(
     from gso.io import as_mesh
 
     design = as_mesh(mesh)
+    design.check_joined()
     module, formulation, settings = check(
         task, formulation, options, max_deviation, target_curvature
     )

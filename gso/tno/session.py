@@ -92,6 +92,7 @@ class Session:
         from gso.io import as_mesh
 
         self._design = as_mesh(mesh)
+        self._design.check_joined()
         self._module, self._formulation, self._options = check(task, formulation, options)
         if getattr(self._module, "BLOCK", "surface") == "flat":
             raise OptionError(f"task {task!r} makes no surface that handles could move")
