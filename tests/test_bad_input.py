@@ -260,7 +260,11 @@ FILES = [
     ("a.off", "4OFF\n", "starts with OFF"),
     ("a.off", "OFF\n", "numbers of vertices and faces are missing"),
     ("a.off", "# nothing", "nothing but comments"),
-    ("a.off", OFF[:-10], "line 2: 4 vertices and 1 faces are announced, but 4 lines follow"),
+    (
+        "a.off",
+        OFF[:-10],
+        "line 2: 4 vertices and 1 faces are announced, .* ends before face 0; it is cut off",
+    ),
     ("a.off", OFF.replace("4 1 0", "4 999999999999 0"), "line 2: .* cut off"),
     ("a.off", OFF.replace("1 1 0\n", "1 1\n"), "line 5: a vertex needs three numbers"),
     ("a.off", OFF.replace("4 0 1 2 3", "4 0 1 2 4"), "line 7: a face refers to vertex 4, the last"),

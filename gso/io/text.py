@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import BinaryIO, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gso.io.source import Array, Ints
 from gso.status import MeshError
@@ -62,6 +63,10 @@ class Words:
         self.first: Ints = np.flatnonzero(new)
         self.count: Ints = np.diff(self.first, append=line.size)
 
+    def row(self, words: Ints) -> Ints:
+        """Rows that words stand in."""
+        return np.searchsorted(self.first, words, side="right") - 1
+
     def rows(self, keyword: bytes) -> Ints:
         """Rows whose first word is `keyword`."""
         start, stop = self.start[self.first], self.stop[self.first]
@@ -113,22 +118,31 @@ class Words:
 
     def _whole(self, words: Ints, start: Ints, stop: Ints) -> Ints:
         """Whole numbers in parts of words."""
+        values, bad = self._parsed(start, stop)
+        if bad.any():
+            word = words[bad.argmax()]
+            self.fail(word, f"{self.quote(word)} is not a whole number of usual size")
+        return values
+
+    def ints_or(self, words: Ints, otherwise: int) -> Ints:
+        """Whole numbers in the given words, and another number for words that are none."""
+        values, bad = self._parsed(self.start[words], self.stop[words])
+        return np.where(bad, otherwise, values)
+
+    def _parsed(self, start: Ints, stop: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+        """Whole numbers in parts of the text, and which parts are none."""
         sign = self._text[np.minimum(start, self._text.size - 1)]
         start = start + ((sign == ord("-")) | (sign == ord("+")))
         size = stop - start
         bad = (size < 1) | (size > _DIGITS)
-        values = np.zeros(words.size, np.int64)
+        values = np.zeros(start.size, np.int64)
         for k in range(min(int(size.max(initial=0)), _DIGITS)):
             inside = k < size
-            digit = self._text[np.maximum(np.minimum(start + k, stop - 1), 0)].astype(
-                np.int64
-            ) - ord("0")
+            at = np.maximum(np.minimum(start + k, stop - 1), 0)
+            digit = self._text[at].astype(np.int64) - ord("0")
             bad |= inside & ((digit < 0) | (digit > 9))
             values = np.where(inside, 10 * values + digit, values)
-        if bad.any():
-            word = words[bad.argmax()]
-            self.fail(word, f"{self.quote(word)} is not a whole number of usual size")
-        return np.where(sign == ord("-"), -values, values)
+        return np.where(sign == ord("-"), -values, values), bad
 
     def raw(self, word: int | np.integer) -> bytes:
         """A word as it stands in the text."""
