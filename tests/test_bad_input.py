@@ -263,7 +263,7 @@ FILES = [
     (
         "a.off",
         OFF[:-10],
-        "line 2: 4 vertices and 1 faces are announced, .* ends before face 0; it is cut off",
+        "line 2: 4 vertices and 1 faces are announced, .* ends before face 0",
     ),
     ("a.off", OFF.replace("4 1 0", "4 999999999999 0"), "line 2: .* cut off"),
     ("a.off", OFF.replace("1 1 0\n", "1 1\n"), "line 5: a vertex needs three numbers"),

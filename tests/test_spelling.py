@@ -87,7 +87,7 @@ def test_signatures_are_kept():
         "task",
         "formulation",
     ]
-    assert list(inspect.signature(gso.Handle).parameters) == ["ids", "positions", "soft", "weight"]
+    assert list(inspect.signature(gso.Handle).parameters) == ["ids", "positions", "weight"]
     assert "w_curvature" in inspect.signature(gso.DevelopableOptions).parameters
 
 

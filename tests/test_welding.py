@@ -31,7 +31,7 @@ def corner_sets(mesh):
 def test_a_heap_of_faces_is_welded_to_the_mesh_it_was(kind, jitter):
     mesh = meshes()[kind]
     joined = gso.as_mesh(heap(mesh, jitter), weld=4 * jitter)
-    assert len(joined.vertices) == len(mesh.vertices)
+    assert len(joined.vertices) == mesh.used.sum()
     assert joined.faces.shape == mesh.faces.shape
     assert joined.grid_shape == mesh.grid_shape
     assert len(joined.boundary_loops) == len(mesh.boundary_loops)
@@ -62,7 +62,7 @@ def test_heaps_are_refused_by_all_solvers():
 def test_pieces_that_do_not_touch_are_no_heap():
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     apart = Mesh(
-        np.concatenate([square + [2 * k, 0, 0] for k in range(5)]),
+        np.concatenate([square + np.array([2 * k, 0, 0]) for k in range(5)]),
         np.arange(20).reshape(5, 4),
     )
     assert not apart.seams.any()
@@ -96,7 +96,7 @@ def test_faces_that_collapse_are_left_out_with_a_note():
 def test_chains_are_refused():
     grid = Mesh.from_grid(saddle(9))
     for weld in (0.3, 0.6, 1e3):
-        with pytest.raises(MeshError, match=r"weld=\S+ would merge .* length"):
+        with pytest.raises(MeshError, match=r"weld=\S+ (would merge|leaves no face).* length"):
             gso.as_mesh(grid, weld=weld)
     line = np.zeros((30, 3))
     line[:, 0] = np.arange(30)
