@@ -23,6 +23,7 @@ from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_spline
 from gso.io.convert import Unwelded, as_mesh
 from gso.io.lines import save_lines
 from gso.io.source import read_bytes
+from gso.io.surface import checked as checked_weld
 from gso.io.surface import welded
 from gso.io.svg import save_flat
 from gso.mesh import Mesh
@@ -36,6 +37,7 @@ __all__ = [
     "as_mesh",
     "check_spline",
     "check_writable",
+    "checked_weld",
     "left_out",
     "load",
     "replacing",
