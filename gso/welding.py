@@ -52,11 +52,14 @@ def near(points: Array, tolerance: float, names: Ints | None = None) -> Ints:
     from scipy.spatial import cKDTree
 
     kept, index = np.unique(first, return_inverse=True)
-    apart = points[kept]
+    # Squares of lengths must stay within double precision, and not vanish either; a power of
+    # two changes no digit.
+    size = 2.0 ** float(np.floor(np.log2(np.ptp(points, axis=0).max() or 1.0)))
+    apart, weld, tolerance = points[kept] / size, tolerance, min(tolerance / size, 4.0)
     tree = cKDTree(apart)
     if tree.count_neighbors(tree, tolerance) > (1 + 2 * _MOST_PAIRS) * len(apart):
         raise MeshError(
-            f"weld={tolerance:.3g} would merge most vertices with dozens of others; "
+            f"weld={weld:.3g} would merge most vertices with dozens of others; "
             "give a length well below that of the edges"
         )
     pairs = tree.query_pairs(tolerance, output_type="ndarray")
@@ -72,8 +75,8 @@ def near(points: Array, tolerance: float, names: Ints | None = None) -> Ints:
         members = order[np.flatnonzero(label[order] == group)]
         first_one = kept[members.min()]
         raise MeshError(
-            f"weld={tolerance:.3g} would merge a chain of {members.size} vertices that is "
-            f"{wide[group]:.3g} wide (the first is vertex "
+            f"weld={weld:.3g} would merge a chain of {members.size} vertices that is "
+            f"{size * wide[group]:.3g} wide (the first is vertex "
             f"{first_one if names is None else names[first_one]}); give a length "
             "well below that of the edges"
         )

@@ -219,12 +219,21 @@ def surfaces(numbers) -> None:
 
 
 def test_mutated_files(originals, tmp_path):
-    assert files(originals, tmp_path / "a", range(200)) > 30
+    assert files(originals, tmp_path / "a", range(150)) > 20
 
 
-@pytest.mark.parametrize("start", range(0, 200, 50))
+@pytest.mark.parametrize("start", range(0, 150, 50))
 def test_mutated_meshes(start):
     surfaces(range(start, start + 50))
+
+
+@pytest.mark.parametrize("number", [1356, 1463, 1513, 2287, 2455])
+def test_meshes_that_were_too_large_for_their_strains(number):
+    surfaces([number])
+
+
+def test_a_file_that_was_too_large_to_be_welded(originals, tmp_path):
+    files(originals, tmp_path / "a", [1032])
 
 
 @pytest.mark.slow

@@ -127,6 +127,16 @@ def test_broken_input_says_what_is_wrong_with_it_welded_or_not():
         gso.as_mesh((np.eye(3), [[0, 1, 2]]), weld=2.0)
 
 
+@pytest.mark.parametrize("unit", [1e-90, 1e90])
+def test_welding_in_any_unit(unit):
+    points, faces = heap(Mesh.from_grid(saddle(5)), 1e-7)
+    assert gso.as_mesh((unit * points, faces), weld=4e-7 * unit).grid_shape == (5, 5)
+    with pytest.raises(MeshError, match="weld="):
+        gso.as_mesh((unit * points, faces), weld=1e300)
+    with pytest.raises(MeshError, match="unit of length"):
+        gso.as_mesh((1e200 * points, faces), weld=1.0)
+
+
 def test_unused_vertices_merge_with_nothing():
     mesh = Mesh(
         np.r_[saddle(3).reshape(-1, 3), saddle(3).reshape(-1, 3)], topology.grid_faces(3, 3)

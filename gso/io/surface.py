@@ -100,6 +100,8 @@ def _welded(surface: Surface, weld: float) -> Surface:
         with np.errstate(invalid="ignore"):
             points, table = points.astype(np.float64), faces.astype(np.int64)
         sound &= points.ndim == 2 and points.shape[1] == 3 and bool(np.isfinite(points).all())
+        # Too far apart for numbers: the mesh says so.
+        sound &= float(np.abs(points).max(initial=0.0)) < 1e150
         sound &= table.ndim == 2 and table.shape[1] in (3, 4) and bool((table == faces).all())
         corner = np.ones(table.shape, bool)
         corner[:, 3:] = table[:, 3:] != -1
