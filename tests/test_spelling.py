@@ -71,7 +71,7 @@ def test_what_is_like_nothing_lists_what_there_is():
         ({"type": "Handel", "ids": [0]}, "entry 1: .*'Handel'; did you mean 'Handle'"),
         ({"type": "Handle", "id": [0]}, "entry 1: Handle takes no 'id'; did you mean 'ids'"),
         ({"tpye": "Handle"}, "entry 1 needs a \"type\", not 'tpye'"),
-        ({"type": ["Handle"]}, "entry 1: there is no constraint"),
+        ({"type": ["Handle"]}, 'entry 1 needs a "type"'),
     ],
 )
 def test_constraints_in_json(entry, message, tmp_path):
