@@ -542,7 +542,7 @@ def corner_strains(surface: Any, flat: Any) -> Array:
     In the order of :func:`gso.topology.corner_triangles`; NaN where one has no area.
     """
     tri = topology.corner_triangles(_faces(surface))
-    p, q = _points(surface), _flat(surface, flat)
+    p, q = _in_range(_points(surface), _flat(surface, flat))
     area = _space_areas(p, tri)
     keep = area > 1e-12 * area.max()
     here, there = ([components(x[k]) for k in tri[keep].T] for x in (p, q))
@@ -564,7 +564,7 @@ def stretches(surface: Any, flat: Any) -> tuple[Array, Array]:
     Of the parallelograms of a quad's edge midpoints, and of triangles: their product is the
     ratio of areas, their quotient the quasi-conformal ratio. NaN where a face has no area.
     """
-    faces, p, q = _faces(surface), _points(surface), _flat(surface, flat)
+    faces, (p, q) = _faces(surface), _in_range(_points(surface), _flat(surface, flat))
     out = np.full((2, len(faces)), np.nan)
     quad = topology.are_quads(faces)
     for which, some in zip((quad, ~quad), topology.by_size(faces), strict=True):
@@ -591,8 +591,8 @@ def quasi_conformal(surface: Any, flat: Any) -> Array:
 def area_error(surface: Any, flat: Any) -> float:
     """Mean of |A'/A - 1| over the corner triangles, those without area left out."""
     tri = topology.corner_triangles(_faces(surface))
-    before = _space_areas(_points(surface), tri)
-    after = corner_areas(_flat(surface, flat), tri)
+    p, q = _in_range(_points(surface), _flat(surface, flat))
+    before, after = _space_areas(p, tri), corner_areas(q, tri)
     keep = before > 1e-12 * before.max()
     return float(np.abs(after[keep] / before[keep] - 1.0).mean())
 
@@ -632,6 +632,15 @@ def flips(mesh: Mesh, flat: Array) -> int:
     if grid is None:
         return flipped_cells(flat, mesh.faces, surface=mesh)
     return flipped_cells(flat[grid], surface=mesh.grid)
+
+
+def _in_range(p: Array, q: Array) -> tuple[Array, Array]:
+    """A surface and its image in a unit of length whose fourth power is still a number.
+
+    The unit is a power of two, which changes no digit of their ratios.
+    """
+    unit = 2.0 ** np.floor(np.log2(np.ptp(p, axis=0).max() or 1.0))
+    return p / unit, q / unit
 
 
 def _space_areas(points: Array, faces: NDArray[np.int64]) -> Array:

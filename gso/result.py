@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.attributes import Attributes
 from gso.mesh import Mesh
 from gso.spline import BSplineSurface
 from gso.status import MeshError, Progress, Status
@@ -127,7 +128,9 @@ class Result:
         ``.npz`` keeps everything and is read back by :meth:`load`; ``.svg`` is the flat
         image at 1:1, `unit` the unit of the mesh's coordinates; ``.step``, ``.iges`` and
         ``.3dm`` are the spline, in that unit (see :func:`gso.save_spline`); any other suffix
-        of :func:`gso.save` is the surface (the flat image at z = 0 for `flatten`).
+        of :func:`gso.save` is the surface (the flat image at z = 0 for `flatten`). What a
+        format does not hold of an OBJ file's names, materials and texture coordinates is
+        added to the notes.
         """
         from gso import io
 
@@ -150,7 +153,8 @@ class Result:
                 )
             io.save_spline(self.spline, path, unit=unit)
         else:
-            io.save(self.mesh, path)
+            io.write(self.mesh, path)
+        self.notes += tuple(n for n in io.left_out(self.mesh, path) if n not in self.notes)
 
     def _arrays(self) -> dict[str, Any]:
         record = {
@@ -181,6 +185,8 @@ class Result:
             arrays["cell_scale"] = self.cell_scale
         if self.spline is not None:
             arrays |= self.spline.arrays()
+        if self.design.attributes is not None:
+            arrays |= self.design.attributes.arrays()
         return arrays
 
     @classmethod
@@ -205,7 +211,8 @@ class Result:
                 raise MeshError(
                     f"{path} was written by another version (format {record['format']})"
                 )
-            design = Mesh(data["design"], data["faces"])
+            said = Attributes.from_arrays(data, data["faces"])
+            design = Mesh(data["design"], data["faces"], attributes=said)
             result = cls(
                 record["task"],
                 record["formulation"],

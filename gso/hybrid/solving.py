@@ -19,6 +19,7 @@ from gso.hybrid.prediction import Prediction, predictions
 from gso.hybrid.worth import pays
 from gso.mesh import Mesh
 from gso.result import Result
+from gso.spelling import known_keywords
 from gso.status import GSOError, MeshError, OptionError
 from gso.tno import Start, check, optimize
 from gso.tno.batch import Item
@@ -37,6 +38,7 @@ _PASSES = 1
 _NEARLY = 2e-3
 
 
+@known_keywords(optimize)
 def solve(
     mesh: Any,
     *,
@@ -116,6 +118,7 @@ def solve(
     return result
 
 
+@known_keywords(optimize)
 def solve_many(
     meshes: Iterable[Any],
     *,

@@ -25,6 +25,7 @@ from gso.plot.heat import curvatures, distance, numbers, scales, strain, stretch
 from gso.plot.rulings import gauss, ruled
 from gso.plot.view import View
 from gso.result import Result
+from gso.spelling import choices, known_keywords
 from gso.status import GSOError, OptionError
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def require() -> None:
         raise GSOError('plots need Matplotlib: pip install ".[plot]" in the folder of gso')
 
 
+@known_keywords()
 def plot_surface(
     mesh: Any,
     values: str | ArrayLike = "none",
@@ -111,7 +113,7 @@ def _plain(meshes: list[Mesh]) -> list[Panel]:
 
 def _named(name: str, meshes: list[Mesh]) -> list[Panel]:
     if name not in COLOURS:
-        raise OptionError(f"no colour {name!r}; there are {', '.join(COLOURS)}")
+        raise OptionError(f"no colour {name!r}; {choices(name, COLOURS)}")
     if name in ("distance", "strain") and len(meshes) < 2:
         raise OptionError(f"the colour {name!r} needs the surface before")
     panels = _plain(meshes)
@@ -191,6 +193,7 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
     return write(draw(panels), path)
 
 
+@known_keywords()
 def plot_rulings(
     mesh: Any,
     *,
