@@ -4,10 +4,12 @@ from gso.flat_start.align import align, settle
 from gso.flat_start.begin import begin, flips, given, refine, strain, upward
 from gso.flat_start.embed import embed, parts, spanned
 from gso.flat_start.grid import rectangle
+from gso.flat_start.opened import Opened, opened
 from gso.flat_start.place import beside, closest_motion, place, upright
 from gso.flat_start.relax import Relaxed, relax, strain_level
 
 __all__ = [
+    "Opened",
     "Relaxed",
     "align",
     "begin",
@@ -16,6 +18,7 @@ __all__ = [
     "embed",
     "flips",
     "given",
+    "opened",
     "parts",
     "place",
     "rectangle",

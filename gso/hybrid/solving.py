@@ -18,6 +18,7 @@ from gso.constraints import listed
 from gso.hybrid.prediction import Prediction, predictions
 from gso.hybrid.worth import pays
 from gso.mesh import Mesh
+from gso.pattern import Pattern
 from gso.result import Result
 from gso.status import GSOError, MeshError, OptionError
 from gso.tno import Start, check, optimize
@@ -287,4 +288,5 @@ def _place(result: Result) -> None:
     """Put a flat image, which is where the net's was, where the optimiser puts its own."""
     frame, flat = Canonical(result.design), np.asarray(result.flat)
     result.flat = frame.back("flat", flat_start.place(frame.mesh, flat[frame.order]))
+    result.pattern = Pattern.whole(result.design, result.flat)
     result.mesh = result.mesh.replaced(np.pad(result.flat, ((0, 0), (0, 1))))

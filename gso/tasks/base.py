@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.constraints import Compiled
+from gso.cutting import Cut
 from gso.mesh import Mesh
 from gso.status import Status
 from gso.tasks.options import Options
@@ -131,6 +132,8 @@ class Plan:
         begin from.
     refused : str
         Why a start that was given is not used.
+    cut : Cut, optional
+        How the design was cut open: the flat image is that of the cut mesh, in its numbering.
     """
 
     layout: Layout
@@ -145,6 +148,7 @@ class Plan:
     spline: tuple[int, int] | None = None
     unstarted: Callable[[], Array] | None = None
     refused: str = ""
+    cut: Cut | None = None
 
     def entered(self) -> Array:
         """Coordinates of the last stage when nothing is solved before it."""

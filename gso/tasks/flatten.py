@@ -134,11 +134,14 @@ def plan(request: Request) -> Plan:
     MeshError
         A component is closed or has handles: it must be cut open first.
     """
-    mesh, options = request.mesh, request.options
+    options = request.options
+    opened = _opened(request)
+    request = replace(request, mesh=opened.mesh)
+    mesh = request.mesh
     grid = mesh.grid_index is not None and request.constraints.empty
     levels = [*(coarser(mesh, options.coarse_size) if grid else []), mesh]
     start = flat_start.begin(levels[0], iterations=options.relax_iterations)
-    notes = _remarks(mesh, start.level)
+    notes = [*opened.notes, *_remarks(mesh, start.level)]
     given, refused = flat_start.given(mesh, request.start)
     strained = given is not None and flat_start.strain(mesh, given) > _STRAINED * start.level
     below = levels
@@ -150,7 +153,7 @@ def plan(request: Request) -> Plan:
         if strained and request.formulation == "strain":
             stages = [_strain_stage(replace(options, norm="l2"), mesh, 1.0), *stages]
     first = start.flat if given is None else given
-    finish = partial(_place, mesh, given)
+    finish = partial(_finish, opened, given)
     if not request.constraints.empty:
         first = flat_start.align(mesh, first, request.constraints)
         stages = _bound(request, stages)
@@ -162,14 +165,31 @@ def plan(request: Request) -> Plan:
         notes=notes,
         details={"strain_level": start.level},
         finish=finish,
-        remark=partial(_remark, mesh) if request.formulation == "isometry" else None,
+        remark=partial(_remark, opened) if request.formulation == "isometry" else None,
         unstarted=None if given is None else partial(_unstarted, request, below, start.flat),
         refused=refused,
+        cut=opened.cut,
     )
 
 
-def _remark(mesh: Mesh, coordinates: Array) -> list[str]:
-    return lengths_remark(mesh, coordinates.reshape(-1, 2))
+def _opened(request: Request) -> flat_start.Opened:
+    """The surface as it is laid out: cut where it closes around itself.
+
+    Constraints and starts are about vertices of the surface as it is.
+    """
+    if request.start is not None or not request.constraints.empty:
+        return flat_start.Opened(request.mesh)
+    return flat_start.opened(request.mesh, iterations=request.options.relax_iterations)
+
+
+def _finish(opened: flat_start.Opened, given: Array | None, coordinates: Array) -> Array:
+    """The image in its place, in the numbering of the cut mesh where there is one."""
+    return opened.back(_place(opened.mesh, given, coordinates).reshape(-1, 2)).ravel()
+
+
+def _remark(opened: flat_start.Opened, coordinates: Array) -> list[str]:
+    surface = opened.mesh if opened.cut is None else opened.cut.mesh
+    return lengths_remark(surface, coordinates.reshape(-1, 2))
 
 
 def _bound(request: Request, stages: list[Stage]) -> list[Stage]:
@@ -196,8 +216,8 @@ def _remarks(mesh: Mesh, level: float) -> list[str]:
         notes.append("vertices that belong to no face are at the pattern's origin")
     if level > _FAR_FROM_FLAT:
         notes.append(
-            f"the surface is far from any plane (strain about {level:.0%}): cut it open where it "
-            "closes around itself, or cut it into pieces"
+            f"the surface is far from any plane (strain about {level:.0%}): cut it into pieces, or "
+            "cut it open where it closes around itself"
         )
     return notes
 
