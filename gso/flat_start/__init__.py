@@ -2,7 +2,7 @@
 
 from gso.flat_start.align import align, settle
 from gso.flat_start.begin import begin, flips, given, refine, strain, upward
-from gso.flat_start.embed import embed, parts, spanned
+from gso.flat_start.embed import embed, embeddings, parts, spanned
 from gso.flat_start.grid import rectangle
 from gso.flat_start.opened import Opened, opened
 from gso.flat_start.place import beside, closest_motion, place, upright
@@ -16,6 +16,7 @@ __all__ = [
     "beside",
     "closest_motion",
     "embed",
+    "embeddings",
     "flips",
     "given",
     "opened",

@@ -132,7 +132,7 @@ def _level(mesh: Mesh, ids: Ints, edges: Ints, iterations: int) -> float:
     faces = mesh.faces[local[mesh.faces[:, 0]] >= 0]
     part = Mesh(mesh.vertices[ids], np.where(faces < 0, -1, local[faces]))
     ready, _ = by_rows(cut(part, local[edges]).mesh)
-    return begin(ready, iterations=iterations).level
+    return begin(ready, iterations=iterations, doubtful=_SMALL).level
 
 
 def turning(mesh: Mesh, loop: Ints) -> float:

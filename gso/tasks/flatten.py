@@ -24,7 +24,7 @@ from gso.mesh import Mesh
 from gso.resample import coarser
 from gso.status import OptionError
 from gso.tasks import held
-from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.base import Plan, Request, Stage, same
 from gso.tasks.joint import lengths_remark
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import (
@@ -60,6 +60,8 @@ _NEARLY = 1e-2
 _STRAINED = 1.5
 #: Weight of the squeezed triangles in ``lengths``.
 _W_COLLAPSE = 3e-3
+#: Their weights, one after the other, on the way to a much strained image in ``strain``.
+_UNSQUEEZE = (1e-2, 1e-3)
 
 
 @dataclass(frozen=True)
@@ -242,7 +244,28 @@ def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
     # Without a coarser grid before it, the last stage has farther to go.
     closer = 1.0 if levels[-1].grid_index is not None else 0.2
     stages[-1].iterations, stages[-1].tolerance = options.iterations, closer * options.tolerance
+    if request.formulation == "strain" and level > _FAR_FROM_FLAT:
+        stages = [*stages[:-1], *_unsqueezing(mesh, stages[-1])]
     return stages
+
+
+def _unsqueezing(mesh: Mesh, last: Stage) -> list[Stage]:
+    """Stages that keep triangles from being squeezed flat, before the last one.
+
+    Much strain is least where some triangles have no area left. A step ends at the first
+    triangle that would turn over: without resistance the solve comes to a halt there.
+    """
+    resistance = collapse.build(mesh)
+    before = [
+        replace(
+            last,
+            items=[*last.items, *(Weighted(t, weight) for t in resistance)],
+            enter=last.enter if k == 0 else same,
+            tolerance=_NEARLY,
+        )
+        for k, weight in enumerate(_UNSQUEEZE)
+    ]
+    return [*before, replace(last, enter=same)]
 
 
 def _strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
