@@ -23,7 +23,7 @@ Ints = NDArray[np.int64]
 #: Sides up to which a grid's image starts from a rectangle.
 _COARSE = 40
 #: Strain from which on a start may be a bad one.
-_DOUBTFUL = 0.1
+DOUBTFUL = 0.1
 
 
 def carrying(mesh: Mesh) -> Ints:
@@ -61,7 +61,7 @@ def strain(mesh: Mesh, flat: Array) -> float:
     return strain_level(mesh.vertices, carrying(mesh), flat)
 
 
-def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = _DOUBTFUL) -> Relaxed:
+def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> Relaxed:
     """Image without flips, close to the least squared strain, and its strain.
 
     Grids start from their rectangle, fine ones from the image of a coarser copy; other meshes

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gso import geometry
 from gso.cutting import Cut, cut, joining
-from gso.flat_start.begin import begin
+from gso.flat_start.begin import DOUBTFUL, begin
 from gso.flat_start.embed import parts
 from gso.mesh import Mesh
 
@@ -47,12 +47,28 @@ class Opened(NamedTuple):
     order: Ints | None = None
     notes: tuple[str, ...] = ()
 
+    @property
+    def doubtful(self) -> float:
+        """Strain from which on a start may be a bad one; a cut was chosen by its best."""
+        return DOUBTFUL if self.cut is None else _SMALL
+
     def back(self, flat: Array) -> Array:
         """Image of `mesh` in the numbering of ``cut.mesh``, or as it is without a cut."""
         if self.order is None:
             return flat
         out = np.empty_like(flat)
         out[self.order] = flat
+        return out
+
+    def faces_back(self, values: Array) -> Array:
+        """Numbers of the faces of `mesh` in the order of those of ``cut.mesh``, likewise."""
+        if self.order is None or self.cut is None:
+            return values
+        here, there = self.order[self.mesh.faces], self.cut.mesh.faces
+        here = np.where(self.mesh.faces < 0, -1, here)
+        own, wanted = (np.lexsort(np.sort(faces, axis=1).T) for faces in (here, there))
+        out = np.empty_like(values)
+        out[wanted] = values[own]
         return out
 
 

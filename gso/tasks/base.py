@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso import flat_start
 from gso.constraints import Compiled
 from gso.cutting import Cut
 from gso.mesh import Mesh
@@ -158,4 +159,14 @@ class Plan:
         return coordinates
 
 
-__all__ = ["Options", "Plan", "Request", "Stage", "same"]
+def open_up(request: Request) -> flat_start.Opened:
+    """The design as it is laid out: cut where it closes around itself.
+
+    Constraints and starts are about vertices of the design as it is; with them it is not cut.
+    """
+    if request.start is not None or not request.constraints.empty:
+        return flat_start.Opened(request.mesh)
+    return flat_start.opened(request.mesh)
+
+
+__all__ = ["Options", "Plan", "Request", "Stage", "open_up", "same"]

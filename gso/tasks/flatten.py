@@ -24,7 +24,7 @@ from gso.mesh import Mesh
 from gso.resample import coarser
 from gso.status import OptionError
 from gso.tasks import held
-from gso.tasks.base import Plan, Request, Stage, same
+from gso.tasks.base import Plan, Request, Stage, open_up, same
 from gso.tasks.joint import lengths_remark
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import (
@@ -137,12 +137,14 @@ def plan(request: Request) -> Plan:
         A component is closed or has handles: it must be cut open first.
     """
     options = request.options
-    opened = _opened(request)
+    opened = open_up(request)
     request = replace(request, mesh=opened.mesh)
     mesh = request.mesh
     grid = mesh.grid_index is not None and request.constraints.empty
     levels = [*(coarser(mesh, options.coarse_size) if grid else []), mesh]
-    start = flat_start.begin(levels[0], iterations=options.relax_iterations)
+    start = flat_start.begin(
+        levels[0], iterations=options.relax_iterations, doubtful=opened.doubtful
+    )
     notes = [*opened.notes, *_remarks(mesh, start.level)]
     given, refused = flat_start.given(mesh, request.start)
     strained = given is not None and flat_start.strain(mesh, given) > _STRAINED * start.level
@@ -172,16 +174,6 @@ def plan(request: Request) -> Plan:
         refused=refused,
         cut=opened.cut,
     )
-
-
-def _opened(request: Request) -> flat_start.Opened:
-    """The surface as it is laid out: cut where it closes around itself.
-
-    Constraints and starts are about vertices of the surface as it is.
-    """
-    if request.start is not None or not request.constraints.empty:
-        return flat_start.Opened(request.mesh)
-    return flat_start.opened(request.mesh, iterations=request.options.relax_iterations)
 
 
 def _finish(opened: flat_start.Opened, given: Array | None, coordinates: Array) -> Array:
