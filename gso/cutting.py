@@ -81,7 +81,7 @@ def cut(mesh: Mesh, edges: ArrayLike) -> Cut:
 
     he, n = mesh.half_edges, len(mesh.vertices)
     wanted = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
-    keys, own = edge_keys(*wanted.T, n), edge_keys(he.origin, he.dest, n)
+    keys, own = edge_keys(wanted[:, 0], wanted[:, 1], n), edge_keys(he.origin, he.dest, n)
     inside = ((wanted >= 0) & (wanted < n)).all(axis=1)
     missing = np.flatnonzero(~(inside & np.isin(keys, own)))
     if missing.size:
@@ -117,8 +117,8 @@ def joining(mesh: Mesh, loops: Sequence[Ints]) -> Ints:
     """Edges (e, 2) of a tree of shortest lines that joins boundary loops of one component.
 
     From the first loop on, the nearest of the loops that are left is joined to what is joined
-    already, by a shortest line along edges. Cut along it, a surface without handles whose
-    loops are all given is a disk.
+    already, by a shortest line along edges. It keeps away from boundary loops that are not
+    given. Cut along it, a surface without handles whose loops are all given is a disk.
 
     Parameters
     ----------
@@ -142,6 +142,10 @@ def joining(mesh: Mesh, loops: Sequence[Ints]) -> Ints:
 
     n, (a, b) = len(mesh.vertices), mesh.edges.T
     length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
+    others = mesh.half_edges.boundary_vertex.copy()
+    others[np.concatenate(loops)] = False
+    # A way round is shorter, if there is one.
+    length[others[mesh.edges].any(axis=1)] += length.sum()
     graph = coo_matrix((length, (a, b)), shape=(n, n)).tocsr()
     reached, left = np.unique(loops[0]), list(loops[1:])
     lines = [np.empty((0, 2), np.int64)]

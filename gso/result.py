@@ -272,7 +272,7 @@ def _pattern(data: Mapping[str, Any], design: Mesh) -> Pattern | None:
         ("vertex", vertex, len(design.vertices)),
         ("seams", seams, count),
     ):
-        if ids.dtype.kind not in "iu" or ids.size and not 0 <= ids.min() <= ids.max() < end:
+        if ids.dtype.kind not in "iu" or (ids.size and not 0 <= ids.min() <= ids.max() < end):
             raise ValueError(f"pattern_{name} points outside")
     if (vertex[faces[kept]] != design.faces[kept]).any():
         raise ValueError("the pattern's vertices are not those of the surface's faces")

@@ -4,7 +4,7 @@ from gso.flat_start.align import align, settle
 from gso.flat_start.begin import begin, flips, given, refine, strain, upward
 from gso.flat_start.embed import embed, embeddings, parts, spanned
 from gso.flat_start.grid import rectangle
-from gso.flat_start.opened import Opened, opened
+from gso.flat_start.opened import Opened, by_rows, opened, turning
 from gso.flat_start.place import beside, closest_motion, place, upright
 from gso.flat_start.relax import Relaxed, relax, strain_level
 
@@ -14,6 +14,7 @@ __all__ = [
     "align",
     "begin",
     "beside",
+    "by_rows",
     "closest_motion",
     "embed",
     "embeddings",
@@ -29,6 +30,7 @@ __all__ = [
     "spanned",
     "strain",
     "strain_level",
+    "turning",
     "upright",
     "upward",
 ]

@@ -97,14 +97,14 @@ def _check(mesh: Mesh, name: int) -> None:
     if loops == 0:
         raise MeshError(
             f"{where} is closed: it has no boundary to lay it out by; cut it open along edges "
-            "(duplicate their vertices), or delete a face"
+            "(gso.cutting.cut), or delete a face"
         )
     handles = (2 - loops - mesh.euler_characteristic) // 2
     if handles > 0:
         raise MeshError(
             f"{where} has {handles} handle{'s' if handles > 1 else ''} (Euler characteristic "
             f"{mesh.euler_characteristic}, {loops} boundary loop{'s' if loops > 1 else ''}), which "
-            "do not unroll into the plane; cut it open along edges into disks"
+            "do not unroll into the plane; cut it open along edges (gso.cutting.cut) into disks"
         )
 
 

@@ -114,8 +114,9 @@ def opened(mesh: Mesh, *, iterations: int = 100) -> Opened:
 
 def by_rows(mesh: Mesh) -> tuple[Mesh, Ints]:
     """A mesh, renumbered row by row if it is a grid; and the number that each vertex had."""
-    if mesh.grid is None or mesh.grid_index is None:
-        return mesh, np.arange(len(mesh.vertices))
+    same = np.arange(len(mesh.vertices))
+    if mesh.grid is None or mesh.grid_index is None or (mesh.grid_index.ravel() == same).all():
+        return mesh, same
     return Mesh.from_grid(mesh.grid, weld=False), mesh.grid_index.ravel()
 
 
@@ -129,7 +130,8 @@ def _best(mesh: Mesh, ids: Ints, loops: list[Ints], iterations: int) -> tuple[In
     choices = [tube, loops] if 2 <= len(tube) < len(loops) else [loops]
     trees = [joining(mesh, some) for some in choices]
     levels = [_level(mesh, ids, tree, iterations) for tree in trees]
-    which = next(k for k, level in enumerate(levels) if level <= _ALIKE * min(levels))
+    enough = max(_ALIKE * min(levels), _SMALL)
+    which = next(k for k, level in enumerate(levels) if level <= enough)
     if levels[which] > (_BETTER if uncut > _BAD else _MUCH_BETTER) * uncut:
         return None
     between = len(choices[which])
