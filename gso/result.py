@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from gso.attributes import Attributes
 from gso.mesh import Mesh
+from gso.pattern import Pattern
 from gso.spline import BSplineSurface
 from gso.status import MeshError, Progress, Status
 
 Array = NDArray[np.float64]
 
 _FORMAT = 1
+_PATTERN = ("flat", "faces", "vertex", "seams")
 _UNUSABLE = (Status.CANCELLED, Status.TARGET_MISSED, Status.CONSTRAINTS_MISSED)
 
 
@@ -36,9 +38,13 @@ class Result:
         The input.
     mesh : Mesh
         The optimised surface, vertices in the input's order and unit; for `flatten` the
-        flat image at z = 0.
+        pattern at z = 0.
     flat : ndarray, (n, 2), or None
-        The flat image, where the task makes one, in the input's unit of length.
+        The flat image, where the task makes one, in the input's unit of length; None where the
+        surface was cut open for it.
+    pattern : Pattern or None
+        The flat pattern as a mesh of its own, with the surface's vertex that each of its vertices
+        is: of the surface as it is, or cut open.
     cell_scale : ndarray, (m,), or None
         Of `conformal`: the length of a face's diagonals (sides, of a triangle) in the flat
         image over that on the surface, in the order of the input's faces.
@@ -86,6 +92,11 @@ class Result:
     details: dict[str, Any] = field(default_factory=dict)
     spline: BSplineSurface | None = None
     cell_scale: Array | None = None
+    pattern: Pattern | None = None
+
+    def __post_init__(self) -> None:
+        if self.pattern is None and self.flat is not None:
+            self.pattern = Pattern.whole(self.design, self.flat)
 
     @property
     def converged(self) -> bool:
@@ -95,7 +106,7 @@ class Result:
     @property
     def usable(self) -> bool:
         """Whether it can be worked with: complete, as asked for, no cell turned over."""
-        points = self.mesh.vertices if self.flat is None else self.flat
+        points = self.mesh.vertices if self.pattern is None else self.pattern.flat
         return bool(
             self.status not in _UNUSABLE
             and np.isfinite(points).all()
@@ -120,7 +131,14 @@ class Result:
         from gso import metrics, tasks
 
         module = tasks.get(self.task)
-        return module.metrics(self.design, self.mesh, self.flat, metrics.unit(self.design))
+        design, mesh, unit = self.design, self.mesh, metrics.unit(self.design)
+        if self.pattern is None or not self.pattern.is_cut:
+            return module.metrics(design, mesh, self.flat, unit)
+        flat = self.pattern.flat
+        if getattr(module, "BLOCK", "surface") == "flat":
+            return module.metrics(self.pattern.surface(design), None, flat, unit)
+        own = module.metrics(design, mesh, None, unit)
+        return own | module.flat_metrics(self.pattern.surface(mesh), flat)
 
     def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
         """Write the result.
@@ -128,7 +146,7 @@ class Result:
         ``.npz`` keeps everything and is read back by :meth:`load`; ``.svg`` is the flat
         image at 1:1, `unit` the unit of the mesh's coordinates; ``.step``, ``.iges`` and
         ``.3dm`` are the spline, in that unit (see :func:`gso.save_spline`); any other suffix
-        of :func:`gso.save` is the surface (the flat image at z = 0 for `flatten`). What a
+        of :func:`gso.save` is the surface (the pattern at z = 0 for `flatten`). What a
         format does not hold of an OBJ file's names, materials and texture coordinates is
         added to the notes.
         """
@@ -139,12 +157,13 @@ class Result:
             with io.replacing(path) as file:
                 np.savez(file, **self._arrays())
         elif suffix == "svg":
-            if self.flat is None:
+            if self.pattern is None:
                 raise MeshError(
                     f"{path}: this result has no flat image to write as SVG; use task='flatten'"
                 )
             surface = self.mesh if self.task == "developable" else self.design
-            io.save_flat(self.flat, surface, path, unit=unit)
+            outline = self.pattern.surface(surface)
+            io.save_flat(self.pattern.flat, outline, path, unit=unit)
         elif f".{suffix}" in io.SPLINE_SUFFIXES:
             if self.spline is None:
                 raise MeshError(
@@ -181,6 +200,8 @@ class Result:
         }
         if self.flat is not None:
             arrays["flat"] = self.flat
+        elif self.pattern is not None:
+            arrays |= {f"pattern_{name}": getattr(self.pattern, name) for name in _PATTERN}
         if self.cell_scale is not None:
             arrays["cell_scale"] = self.cell_scale
         if self.spline is not None:
@@ -213,11 +234,13 @@ class Result:
                 )
             said = Attributes.from_arrays(data, data["faces"])
             design = Mesh(data["design"], data["faces"], attributes=said)
+            pattern = _pattern(data, design)
+            same = len(data["vertices"]) == len(design.vertices)
             result = cls(
                 record["task"],
                 record["formulation"],
                 design,
-                design.replaced(data["vertices"]),
+                design.replaced(data["vertices"]) if same or pattern is None else pattern.mesh,
                 _checked(data, "flat", (len(design.vertices), 2)),
                 Status[record["status"]],
                 record["iterations"],
@@ -231,6 +254,7 @@ class Result:
                 record["details"],
                 spline=BSplineSurface.from_arrays(data),
                 cell_scale=_checked(data, "cell_scale", (len(design.faces),)),
+                pattern=pattern,
             )
             result.__dict__["metrics"] = record["metrics"]
         except (KeyError, TypeError, ValueError) as error:
@@ -238,6 +262,28 @@ class Result:
                 raise
             raise MeshError(f"{path} is no result of gso: {error}") from None
         return result
+
+
+def _pattern(data: Mapping[str, Any], design: Mesh) -> Pattern | None:
+    """The pattern of a design that was cut open, from a file's arrays; None where there is none."""
+    if "pattern_flat" not in data:
+        return None
+    flat, faces, vertex, seams = (data[f"pattern_{name}"] for name in _PATTERN)
+    count = len(flat)
+    fits = flat.shape == (count, 2) and vertex.shape == (count,) and seams.shape[1:] == (2, 2)
+    kept = faces >= 0
+    if not fits or faces.shape != design.faces.shape or (kept != (design.faces >= 0)).any():
+        raise ValueError("the arrays of the pattern do not fit each other")
+    for name, ids, end in (
+        ("faces", faces[kept], count),
+        ("vertex", vertex, len(design.vertices)),
+        ("seams", seams, count),
+    ):
+        if ids.dtype.kind not in "iu" or (ids.size and not 0 <= ids.min() <= ids.max() < end):
+            raise ValueError(f"pattern_{name} points outside")
+    if (vertex[faces[kept]] != design.faces[kept]).any():
+        raise ValueError("the pattern's vertices are not those of the surface's faces")
+    return Pattern(flat, faces, vertex, seams)
 
 
 def _checked(data: Mapping[str, Array], name: str, shape: tuple[int, ...]) -> Array | None:

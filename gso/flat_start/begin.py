@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gso import geometry
-from gso.flat_start.embed import embed
+from gso.flat_start.embed import embeddings
 from gso.flat_start.grid import rectangle
 from gso.flat_start.relax import Relaxed, relax, strain_level
 from gso.mesh import Mesh
@@ -20,6 +22,8 @@ Ints = NDArray[np.int64]
 
 #: Sides up to which a grid's image starts from a rectangle.
 _COARSE = 40
+#: Strain from which on a start may be a bad one.
+DOUBTFUL = 0.1
 
 
 def carrying(mesh: Mesh) -> Ints:
@@ -57,11 +61,12 @@ def strain(mesh: Mesh, flat: Array) -> float:
     return strain_level(mesh.vertices, carrying(mesh), flat)
 
 
-def begin(mesh: Mesh, *, iterations: int = 100) -> Relaxed:
+def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> Relaxed:
     """Image without flips, close to the least squared strain, and its strain.
 
     Grids start from their rectangle, fine ones from the image of a coarser copy; other meshes
-    from :func:`gso.flat_start.embed`.
+    from the least strained image of :func:`gso.flat_start.embeddings`. Where much strain is left,
+    the other images are relaxed too, and the best result is taken.
 
     Parameters
     ----------
@@ -69,6 +74,8 @@ def begin(mesh: Mesh, *, iterations: int = 100) -> Relaxed:
         Components with a boundary and without handles.
     iterations : int
         Most steps of :func:`gso.flat_start.relax`.
+    doubtful : float
+        Strain from which on other images are tried.
 
     Raises
     ------
@@ -76,11 +83,18 @@ def begin(mesh: Mesh, *, iterations: int = 100) -> Relaxed:
         A component is closed or has handles.
     """
     strained, kept = carrying(mesh), upward(mesh)
+    relaxed = partial(relax, mesh.vertices, strained, upward=kept, iterations=iterations)
     if mesh.grid is not None:
-        flat = _grid_image(mesh, mesh.grid, iterations)
+        first = relaxed(_grid_image(mesh, mesh.grid, iterations))
+        if first.level <= doubtful or max(mesh.grid.shape) > _COARSE:
+            return first
+        images = [flat for flat in embeddings(mesh, strained, kept) if not flips(mesh, flat)]
     else:
-        flat = embed(mesh, strained, kept)
-    return relax(mesh.vertices, strained, flat, upward=kept, iterations=iterations)
+        flat, *images = embeddings(mesh, strained, kept)
+        first = relaxed(flat)
+        if first.level <= doubtful:
+            return first
+    return min([first, *map(relaxed, images)], key=lambda image: image.level)
 
 
 def _grid_image(mesh: Mesh, grid: Array, iterations: int) -> Array:

@@ -14,12 +14,20 @@ Ints = NDArray[np.int64]
 
 
 def embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:
-    """Plane image (n, 2) of a mesh, components over each other.
+    """Plane image (n, 2) of a mesh, components over each other: the best one of :func:`embeddings`.
 
-    Three maps are tried: least-squares conformal (Levy et al. 2002), harmonic to a circle
-    (Eck et al. 1995), and Tutte's, whose faces are convex; holes do not hinder them. Of
-    those that turn no triangle over, the one with the least strain is taken: Tutte's is
-    the one that always exists. All are scaled to the area of the surface.
+    Parameters and errors are the same.
+    """
+    return embeddings(mesh, triangles, upward)[0]
+
+
+def embeddings(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
+    """Plane images (n, 2) of a mesh, components over each other, the least strained first.
+
+    Three maps are made: least-squares conformal (Levy et al. 2002), harmonic to a circle
+    (Eck et al. 1995), and Tutte's, whose faces are convex; holes do not hinder them. Of each
+    component those that turn no triangle over come first, by their strain: Tutte's is the one
+    that always exists. All are scaled to the area of the surface.
 
     Parameters
     ----------
@@ -32,15 +40,16 @@ def embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:
 
     Returns
     -------
-    ndarray, (n, 2)
-        Centred at the origin; vertices of no face are there.
+    list of ndarray, (n, 2)
+        Centred at the origin; vertices of no face are there. Where a component has fewer than
+        another, its last one is repeated.
 
     Raises
     ------
     MeshError
         A component is closed or has handles.
     """
-    flat = np.zeros((len(mesh.vertices), 2))
+    found = []
     for ids in parts(mesh):
         local = np.full(len(mesh.vertices), -1)
         local[ids] = np.arange(len(ids))
@@ -48,8 +57,12 @@ def embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:
         part = Mesh(mesh.vertices[ids], np.where(faces < 0, -1, local[faces]))
         _check(part, int(ids[0]))
         own = (local[t[local[t[:, 0]] >= 0]] for t in (triangles, upward))
-        flat[ids] = _embed(part, *own)
-    return flat
+        found.append((ids, _embed(part, *own)))
+    flat = np.zeros((max(len(images) for _, images in found), len(mesh.vertices), 2))
+    for ids, images in found:
+        for k in range(len(flat)):
+            flat[k, ids] = images[min(k, len(images) - 1)]
+    return list(flat)
 
 
 def flattens(mesh: Mesh) -> bool:
@@ -79,7 +92,7 @@ def parts(mesh: Mesh) -> list[Ints]:
     return [np.flatnonzero(labels == k) for k in np.unique(labels[used])]
 
 
-def _embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:
+def _embed(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
     outer = max(mesh.boundary_loops, key=lambda loop: _perimeter(mesh.vertices[loop]))
     circle = _circle(mesh.vertices[outer])
     images = [
@@ -94,7 +107,8 @@ def _embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:
         scaled = _scaled(mesh, image)
         flipped = int((_areas(scaled, upward) <= 0).sum())
         rated.append((flipped, strain_level(mesh.vertices, triangles, scaled), scaled))
-    return min(rated, key=lambda r: r[:2])[2]
+    rated.sort(key=lambda r: r[:2])
+    return [image for flipped, _, image in rated if flipped == rated[0][0]]
 
 
 def _check(mesh: Mesh, name: int) -> None:
@@ -104,14 +118,14 @@ def _check(mesh: Mesh, name: int) -> None:
     if loops == 0:
         raise MeshError(
             f"{where} is closed: it has no boundary to lay it out by; cut it open along edges "
-            "(duplicate their vertices), or delete a face"
+            "(gso.cutting.cut), or delete a face"
         )
     handles = (2 - loops - mesh.euler_characteristic) // 2
     if handles > 0:
         raise MeshError(
             f"{where} has {handles} handle{'s' if handles > 1 else ''} (Euler characteristic "
             f"{mesh.euler_characteristic}, {loops} boundary loop{'s' if loops > 1 else ''}), which "
-            "do not unroll into the plane; cut it open along edges into disks"
+            "do not unroll into the plane; cut it open along edges (gso.cutting.cut) into disks"
         )
 
 

@@ -18,6 +18,7 @@ from gso.constraints import listed
 from gso.hybrid.prediction import Prediction, predictions
 from gso.hybrid.worth import pays
 from gso.mesh import Mesh
+from gso.pattern import Pattern
 from gso.result import Result
 from gso.spelling import known_keywords
 from gso.status import GSOError, MeshError, OptionError
@@ -72,8 +73,8 @@ def solve(
         options' tolerance, where that is more). A number: at most so many iterations, also
         without a net.
         False: the net's result as it is, whatever its energy, measured; hard constraints
-        and `max_deviation` are kept. With `target_curvature` or `max_strain`, which take many solves, only
-        True.
+        and `max_deviation` are kept. With `target_curvature` or `max_strain`, which take many
+        solves, only True.
     sparing : bool
         Ask the net only where that has been found to save time: on large grids, and by
         curvature. Elsewhere the result is that of :func:`gso.tno.optimize`.
@@ -291,4 +292,5 @@ def _place(result: Result) -> None:
     """Put a flat image, which is where the net's was, where the optimiser puts its own."""
     frame, flat = Canonical(result.design), np.asarray(result.flat)
     result.flat = frame.back("flat", flat_start.place(frame.mesh, flat[frame.order]))
+    result.pattern = Pattern.whole(result.design, result.flat)
     result.mesh = result.mesh.replaced(np.pad(result.flat, ((0, 0), (0, 1))))

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from gso import metrics
 from gso.io import as_mesh
 from gso.mesh import Mesh
+from gso.pattern import Pattern
 from gso.plot.draw import GRAZING, SUFFIXES, Panel, draw, write
 from gso.plot.heat import curvatures, distance, numbers, scales, strain, stretch
 from gso.plot.rulings import gauss, ruled
@@ -124,24 +125,26 @@ def _named(name: str, meshes: list[Mesh]) -> list[Panel]:
         panels[1].heat = distance(*meshes)
         panels[1].title = "distance: " + panels[1].heat.summary
     elif name == "strain":
-        return _flattened(meshes[0], meshes[1].vertices[:, :2])
+        return _flattened(meshes[0], Pattern.whole(meshes[0], meshes[1].vertices[:, :2]))
     return panels
 
 
-def _flattened(design: Mesh, flat: np.ndarray, scale: np.ndarray | None = None) -> list[Panel]:
+def _flattened(design: Mesh, pattern: Pattern, scale: np.ndarray | None = None) -> list[Panel]:
     """A surface and its flat pattern, which is turned like the picture of the surface.
 
     They are coloured by the scale of their faces, if that is given, else by the strain.
     """
-    heat = strain(design, flat) if scale is None else scales(design, flat, scale)
+    flat, opened = pattern.flat, pattern.surface(design)
+    heat = strain(opened, flat) if scale is None else scales(opened, flat, scale)
     surface = _plain([design])[0]
     surface.title, surface.heat = "surface", heat
-    z, w = (p[:, 0] + 1j * p[:, 1] for p in (flat - flat.mean(axis=0), surface.points))
+    seen = surface.points[pattern.vertex]
+    z, w = (p[:, 0] + 1j * p[:, 1] for p in (flat - flat.mean(axis=0), seen))
     turned = z * np.exp(1j * np.angle((np.conj(z) * (w - w.mean())).sum()))
     points = np.stack([turned.real, turned.imag, np.zeros(len(z))], axis=1)
-    pattern = Panel(points / design.frame.scale, design.faces, shaded=False, heat=heat)
-    pattern.title = "flat pattern: " + heat.summary
-    return [surface, pattern]
+    sheet = Panel(points / design.frame.scale, pattern.faces, shaded=False, heat=heat)
+    sheet.title = "flat pattern: " + heat.summary
+    return [surface, sheet]
 
 
 def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figure:
@@ -174,8 +177,8 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
     require()
     design, mesh = result.design, result.mesh
     surface_too = result.task == "developable"
-    if result.flat is not None and not surface_too:
-        return write(draw(_flattened(design, result.flat, result.cell_scale)), path)
+    if result.pattern is not None and not surface_too:
+        return write(draw(_flattened(design, result.pattern, result.cell_scale)), path)
     before, after, apart = panels = _plain([design, mesh, mesh])
     bent = result.task == "bend"
     apart.heat = stretch(design, mesh) if bent else distance(design, mesh)
@@ -188,8 +191,8 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
         before.heat, after.heat = curvatures([design, mesh])
         before.title = f"input: mean |K| {metrics.loss_gc(design, scale=size):.2g}"
         after.title = f"result: mean |K| {metrics.loss_gc(mesh, scale=size):.2g}"
-    if result.flat is not None:
-        panels.append(_flattened(mesh, result.flat)[1])
+    if result.pattern is not None:
+        panels.append(_flattened(mesh, result.pattern)[1])
     return write(draw(panels), path)
 
 

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso import flat_start
 from gso.constraints import Compiled
+from gso.cutting import Cut
 from gso.mesh import Mesh
 from gso.status import Status
 from gso.tasks.options import Options
@@ -136,6 +138,8 @@ class Plan:
         begin from.
     refused : str
         Why a start that was given is not used.
+    cut : Cut, optional
+        How the design was cut open: the flat image is that of the cut mesh, in its numbering.
     """
 
     layout: Layout
@@ -150,6 +154,7 @@ class Plan:
     spline: tuple[int, int] | None = None
     unstarted: Callable[[], Array] | None = None
     refused: str = ""
+    cut: Cut | None = None
 
     def entered(self) -> Array:
         """Coordinates of the last stage when nothing is solved before it."""
@@ -159,4 +164,14 @@ class Plan:
         return coordinates
 
 
-__all__ = ["Options", "Plan", "Request", "Stage", "same"]
+def open_up(request: Request) -> flat_start.Opened:
+    """The design as it is laid out: cut where it closes around itself.
+
+    Constraints and starts are about vertices of the design as it is; with them it is not cut.
+    """
+    if request.start is not None or not request.constraints.empty:
+        return flat_start.Opened(request.mesh)
+    return flat_start.opened(request.mesh)
+
+
+__all__ = ["Options", "Plan", "Request", "Stage", "open_up", "same"]

@@ -14,7 +14,7 @@ triangle over.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
@@ -26,7 +26,7 @@ from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.status import OptionError
 from gso.tasks import held
-from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.base import Plan, Request, Stage, open_up
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, congruence, scale, shear
 from gso.variables import Layout, free
@@ -82,12 +82,17 @@ def plan(request: Request) -> Plan:
     MeshError
         A component is closed or has handles: it must be cut open first.
     """
-    mesh, options = request.mesh, request.options
+    options = request.options
+    opened = open_up(request)
+    request = replace(request, mesh=opened.mesh)
+    mesh = request.mesh
     layout = Layout((("flat", len(mesh.vertices), 2), ("scale", len(mesh.faces), 1)))
     given, refused = flat_start.given(mesh, request.start)
     flat = given
     if flat is None:
-        flat = flat_start.begin(mesh, iterations=options.relax_iterations).flat
+        flat = flat_start.begin(
+            mesh, iterations=options.relax_iterations, doubtful=opened.doubtful
+        ).flat
     items = [Weighted(t, 1.0) for t in congruence.build(mesh, "flat", scale="scale")]
     items += [Weighted(scale.build(mesh), options.w_scale)]
     items += [Weighted(t, options.w_shear) for t in shear.build(mesh)]
@@ -108,8 +113,10 @@ def plan(request: Request) -> Plan:
         layout,
         layout.pack({"flat": flat, "scale": _area_ratios(mesh, flat)}),
         stages,
-        finish=partial(_finish, request, layout, given),
+        notes=list(opened.notes),
+        finish=partial(_finish, request, opened, layout, given),
         refused=refused,
+        cut=opened.cut,
     )
 
 
@@ -119,10 +126,17 @@ def _area_ratios(mesh: Mesh, flat: Array) -> Array:
     return np.where(np.isnan(large), 1.0, large * small)
 
 
-def _finish(request: Request, layout: Layout, given: Array | None, coordinates: Array) -> Array:
+def _finish(
+    request: Request,
+    opened: flat_start.Opened,
+    layout: Layout,
+    given: Array | None,
+    coordinates: Array,
+) -> Array:
     """The image with the surface's area, in its place; as it is when it is tied to one.
 
-    The scales are those of lengths from here on: image over surface.
+    The scales are those of lengths from here on: image over surface. Of a surface that was cut
+    open, both are in the numbering of the cut mesh.
     """
     blocks = layout.split(coordinates)
     flat, ratio = blocks["flat"], blocks["scale"]
@@ -132,7 +146,8 @@ def _finish(request: Request, layout: Layout, given: Array | None, coordinates: 
         factor = _area(request.mesh, request.mesh.vertices) / _area(request.mesh, flat)
         flat = flat_start.place(request.mesh, flat * np.sqrt(factor), given)
         ratio = ratio * factor
-    return layout.pack({"flat": flat, "scale": np.sqrt(np.maximum(ratio, 0.0))})
+    lengths = np.sqrt(np.maximum(ratio, 0.0))
+    return layout.pack({"flat": opened.back(flat), "scale": opened.faces_back(lengths)})
 
 
 def _area(mesh: Mesh, points: Array) -> float:

@@ -470,7 +470,7 @@ def _inside(points: Array, mesh: Mesh, reach: float | None) -> Array:
     return mesh.vertices + u * np.minimum(1.0, reach / np.maximum(length, 1e-300))
 
 
-def _flat_metrics(surface: Mesh, flat: Array) -> dict[str, float]:
+def flat_metrics(surface: Mesh, flat: Array) -> dict[str, float]:
     """How well a flat image (n, 2) keeps the lengths of its surface."""
     strain = measure.principal_strains(surface, flat)
     out = {
@@ -525,4 +525,4 @@ def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict
     if before.boundary_loops:
         loops = measure.loop_ratios(before, after)
         out |= {"loop_ratio_min": float(loops.min()), "loop_ratio_max": float(loops.max())}
-    return out if flat is None else out | _flat_metrics(after, flat)
+    return out if flat is None else out | flat_metrics(after, flat)

@@ -24,7 +24,7 @@ from gso.mesh import Mesh
 from gso.resample import coarser
 from gso.status import OptionError
 from gso.tasks import held
-from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.base import Plan, Request, Stage, open_up, same
 from gso.tasks.joint import lengths_remark
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import (
@@ -60,6 +60,8 @@ _NEARLY = 1e-2
 _STRAINED = 1.5
 #: Weight of the squeezed triangles in ``lengths``.
 _W_COLLAPSE = 3e-3
+#: Their weights, one after the other, on the way to a much strained image in ``strain``.
+_UNSQUEEZE = (1e-2, 1e-3)
 
 
 @dataclass(frozen=True)
@@ -134,11 +136,16 @@ def plan(request: Request) -> Plan:
     MeshError
         A component is closed or has handles: it must be cut open first.
     """
-    mesh, options = request.mesh, request.options
+    options = request.options
+    opened = open_up(request)
+    request = replace(request, mesh=opened.mesh)
+    mesh = request.mesh
     grid = mesh.grid_index is not None and request.constraints.empty
     levels = [*(coarser(mesh, options.coarse_size) if grid else []), mesh]
-    start = flat_start.begin(levels[0], iterations=options.relax_iterations)
-    notes = _remarks(mesh, start.level)
+    start = flat_start.begin(
+        levels[0], iterations=options.relax_iterations, doubtful=opened.doubtful
+    )
+    notes = [*opened.notes, *_remarks(mesh, start.level)]
     given, refused = flat_start.given(mesh, request.start)
     strained = given is not None and flat_start.strain(mesh, given) > _STRAINED * start.level
     below = levels
@@ -150,7 +157,7 @@ def plan(request: Request) -> Plan:
         if strained and request.formulation == "strain":
             stages = [_strain_stage(replace(options, norm="l2"), mesh, 1.0), *stages]
     first = start.flat if given is None else given
-    finish = partial(_place, mesh, given)
+    finish = partial(_finish, opened, given)
     if not request.constraints.empty:
         first = flat_start.align(mesh, first, request.constraints)
         stages = _bound(request, stages)
@@ -162,14 +169,21 @@ def plan(request: Request) -> Plan:
         notes=notes,
         details={"strain_level": start.level},
         finish=finish,
-        remark=partial(_remark, mesh) if request.formulation == "isometry" else None,
+        remark=partial(_remark, opened) if request.formulation == "isometry" else None,
         unstarted=None if given is None else partial(_unstarted, request, below, start.flat),
         refused=refused,
+        cut=opened.cut,
     )
 
 
-def _remark(mesh: Mesh, coordinates: Array) -> list[str]:
-    return lengths_remark(mesh, coordinates.reshape(-1, 2))
+def _finish(opened: flat_start.Opened, given: Array | None, coordinates: Array) -> Array:
+    """The image in its place, in the numbering of the cut mesh where there is one."""
+    return opened.back(_place(opened.mesh, given, coordinates).reshape(-1, 2)).ravel()
+
+
+def _remark(opened: flat_start.Opened, coordinates: Array) -> list[str]:
+    surface = opened.mesh if opened.cut is None else opened.cut.mesh
+    return lengths_remark(surface, coordinates.reshape(-1, 2))
 
 
 def _bound(request: Request, stages: list[Stage]) -> list[Stage]:
@@ -196,8 +210,8 @@ def _remarks(mesh: Mesh, level: float) -> list[str]:
         notes.append("vertices that belong to no face are at the pattern's origin")
     if level > _FAR_FROM_FLAT:
         notes.append(
-            f"the surface is far from any plane (strain about {level:.0%}): cut it open where it "
-            "closes around itself, or cut it into pieces"
+            f"the surface is far from any plane (strain about {level:.0%}): cut it into pieces, or "
+            "cut it open where it closes around itself"
         )
     return notes
 
@@ -222,7 +236,28 @@ def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
     # Without a coarser grid before it, the last stage has farther to go.
     closer = 1.0 if levels[-1].grid_index is not None else 0.2
     stages[-1].iterations, stages[-1].tolerance = options.iterations, closer * options.tolerance
+    if request.formulation == "strain" and level > _FAR_FROM_FLAT:
+        stages = [*stages[:-1], *_unsqueezing(mesh, stages[-1])]
     return stages
+
+
+def _unsqueezing(mesh: Mesh, last: Stage) -> list[Stage]:
+    """Stages that keep triangles from being squeezed flat, before the last one.
+
+    Much strain is least where some triangles have no area left. A step ends at the first
+    triangle that would turn over: without resistance the solve comes to a halt there.
+    """
+    resistance = collapse.build(mesh)
+    before = [
+        replace(
+            last,
+            items=[*last.items, *(Weighted(t, weight) for t in resistance)],
+            enter=last.enter if k == 0 else same,
+            tolerance=_NEARLY,
+        )
+        for k, weight in enumerate(_UNSQUEEZE)
+    ]
+    return [*before, replace(last, enter=same)]
 
 
 def _strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:

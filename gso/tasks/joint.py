@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from gso import flat_start, limits
 from gso import metrics as measure
+from gso.cutting import Cut
 from gso.mesh import Mesh
 from gso.resample import alike, carry, coarser
 from gso.status import OptionError, Status
@@ -157,32 +158,36 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
     mesh, options = request.mesh, request.options
     spline = splined.controls(request)
     _check_bound(request)
+    begun = mesh if request.start is None else mesh.replaced(request.start)
+    opened = flat_start.opened(begun)
+    cut = opened.cut
     own = spline is None and request.start is None and request.constraints.empty
     if own and measure.loss_gc_worst(mesh, scale=1.0) <= options.developable_below:
-        return _unrolling(request)
-    begun = mesh if request.start is None else mesh.replaced(request.start)
+        return _unrolling(request, opened)
     levels = _levels(request, begun)
-    stages = _chain(request, [*levels, mesh])
+    stages = _chain(request, [*levels, mesh], cut)
     before, start = [], [*alike(levels, begun), begun][0].vertices
     if not request.constraints.empty:
         before = [held.approach(request, start)]
     elif request.start is None and options.begin == "curvature":
         first = curvature(request)
         before, start = first.stages, first.start.reshape(-1, 3)
-    stages[0].enter = partial(_with_flat, levels[0] if levels else mesh)
+    stages[0].enter = partial(_with_flat, levels[0] if levels else mesh, cut)
     if spline is not None:
         # The spline comes after all of them.
         stages = [replace(stage, enough=None) for stage in stages]
         stages.append(splined.stage(stages[-1], mesh, spline))
     stages = [*before, *stages]
     return Plan(
-        _layout(mesh),
+        _layout(mesh, cut),
         start.ravel(),
         stages,
-        finish=partial(_place, mesh),
-        remark=partial(_remark, mesh),
+        notes=list(opened.notes),
+        finish=partial(_place, mesh, cut),
+        remark=partial(_remark, mesh, cut),
         spline=spline,
-        unstarted=None if request.start is None else partial(_unstarted, [*levels, mesh]),
+        unstarted=None if request.start is None else partial(_unstarted, [*levels, mesh], cut),
+        cut=cut,
     )
 
 
@@ -203,15 +208,31 @@ def _check_bound(request: Request) -> None:
         )
 
 
-def _layout(mesh: Mesh) -> Layout:
-    return Layout.of(len(mesh.vertices), "surface", "flat")
+def _layout(mesh: Mesh, cut: Cut | None = None) -> Layout:
+    """Vertices of the surface, and of its image: those of the cut mesh where there is one."""
+    count = len(mesh.vertices)
+    flat = count if cut is None else len(cut.vertex)
+    return Layout((("surface", count, 3), ("flat", flat, 2)))
 
 
-def _unrolling(request: Request) -> Plan:
+def _opened(mesh: Mesh, cut: Cut | None, points: Array) -> Mesh:
+    """A surface (n, 3), cut open where it is."""
+    return mesh.replaced(points) if cut is None else cut.mesh.replaced(points[cut.vertex])
+
+
+def _begun(surface: Mesh) -> Array:
+    """Flat image of an open surface, in its numbering."""
+    ready, order = flat_start.by_rows(surface)
+    flat = np.empty((len(order), 2))
+    flat[order] = flat_start.begin(ready).flat
+    return flat
+
+
+def _unrolling(request: Request, opened: flat_start.Opened) -> Plan:
     """The design as it is, and its flat image."""
-    mesh, options = request.mesh, request.options
-    flat = flat_start.begin(mesh).flat
-    stage = _stage(request, mesh, 0.0)
+    mesh, options, cut = request.mesh, request.options, opened.cut
+    flat = _begun(_opened(mesh, cut, mesh.vertices))
+    stage = _stage(request, mesh, 0.0, cut)
     stage = replace(
         stage,
         name="unroll",
@@ -221,8 +242,15 @@ def _unrolling(request: Request) -> Plan:
         tolerance=min(options.tolerance, 1e-8),
     )
     start = stage.layout.pack({"surface": mesh.vertices, "flat": flat})
-    place = partial(_place, mesh)
-    return Plan(stage.layout, start, [stage], status=Status.ALREADY_GOOD, finish=place)
+    return Plan(
+        stage.layout,
+        start,
+        [stage],
+        status=Status.ALREADY_GOOD,
+        notes=list(opened.notes),
+        finish=partial(_place, mesh, cut),
+        cut=cut,
+    )
 
 
 def _flat_only(layout: Layout, coordinates: Array) -> Variables:
@@ -253,7 +281,7 @@ def _levels(request: Request, begun: Mesh) -> list[Mesh]:
     return [] if done else coarser(request.mesh, o.coarse_size)
 
 
-def _chain(request: Request, levels: list[Mesh]) -> list[Stage]:
+def _chain(request: Request, levels: list[Mesh], cut: Cut | None = None) -> list[Stage]:
     """Coarse to fine, on each grid with less and less fairness; with the least from a start."""
     options = request.options
     weights = [options.w_fairness]
@@ -262,29 +290,30 @@ def _chain(request: Request, levels: list[Mesh]) -> list[Stage]:
     stages = []
     for below, mesh in zip([None, *levels], levels, strict=False):
         for k, weight in enumerate(weights):
-            stage = _stage(request, mesh, weight)
+            stage = _stage(request, mesh, weight, cut)
             if k == 0 and below is not None:
                 stage.enter = partial(_refine, below, mesh)
             stage.iterations = options.coarse_iterations
             if mesh is levels[-1]:
                 stage.iterations = options.iterations
-                stage.enough = partial(_isometric, mesh, options.enough)
+                stage.enough = partial(_isometric, mesh, cut, options.enough)
             stages.append(stage)
     stages[-1].tolerance = options.tolerance
     return stages
 
 
-def _stage(request: Request, mesh: Mesh, w_fairness: float) -> Stage:
-    layout, reach = _layout(mesh), request.reach
+def _stage(request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None = None) -> Stage:
+    layout, reach = _layout(mesh, cut), request.reach
     bounds = None if reach is None else partial(_bounds, layout, len(mesh.vertices), reach)
+    sheet = mesh if cut is None else cut.mesh
     name = "x".join(map(str, mesh.grid_shape or ("isometry",)))
     return Stage(
         f"{name}, fairness {w_fairness:.0e}",
         layout,
-        _objective(request, mesh, w_fairness),
+        _objective(request, mesh, w_fairness, cut),
         partial(_unknowns, request, mesh, layout),
         tolerance=_NEARLY,
-        limits=[limits.orientation(flat_start.upward(mesh), layout)],
+        limits=[limits.orientation(flat_start.upward(sheet), layout)],
         bounds=bounds,
     )
 
@@ -293,15 +322,18 @@ def _bounds(layout: Layout, count: int, reach: float, coordinates: Array) -> tup
     return ball_bounds(layout, count, reach)
 
 
-def _objective(request: Request, mesh: Mesh, w_fairness: float) -> list[Weighted]:
+def _objective(request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None) -> list[Weighted]:
     o = request.options
     normals = vertex_normals(mesh)
+    sheet = mesh if cut is None else cut.mesh
     both = {"counterpart": "flat"}
     asked, mapped = request.demand * o.w_isometry, request.demand * o.w_mapping
-    items = [Weighted(t, asked) for t in congruence.build(mesh, "surface", **both)]
-    items += [Weighted(t, mapped) for t in christoffel.build(mesh, "surface", **both)]
+    items = [Weighted(t, asked) for t in congruence.build(sheet, "surface", **both)]
+    items += [Weighted(t, mapped) for t in christoffel.build(sheet, "surface", **both)]
+    if cut is not None:
+        items = [replace(i, term=i.term.renumbered("surface", cut.vertex)) for i in items]
     items.append(Weighted(fairness.build(mesh), w_fairness))
-    items.append(Weighted(fairness.build(mesh, block="flat"), o.w_flat * w_fairness))
+    items.append(Weighted(fairness.build(sheet, block="flat"), o.w_flat * w_fairness))
     if o.w_closest > 0:
         items.append(Weighted(proximity.closest(mesh, normals), o.w_closest))
     items.append(Weighted(proximity.build(mesh, normals), o.w_place))
@@ -316,16 +348,16 @@ def _unknowns(request: Request, mesh: Mesh, layout: Layout, coordinates: Array) 
     return held.unknowns(request, layout, coordinates) if own else free(layout)
 
 
-def _with_flat(mesh: Mesh, coordinates: Array) -> Array:
+def _with_flat(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
     """A surface (n, 3) and a flat image of it."""
     points = coordinates[: 3 * len(mesh.vertices)].reshape(-1, 3)
-    flat = flat_start.begin(mesh.replaced(points)).flat
-    return _layout(mesh).pack({"surface": points, "flat": flat})
+    flat = _begun(_opened(mesh, cut, points))
+    return _layout(mesh, cut).pack({"surface": points, "flat": flat})
 
 
-def _unstarted(levels: list[Mesh]) -> Array:
+def _unstarted(levels: list[Mesh], cut: Cut | None) -> Array:
     """The design (the last of the levels) and a flat image of it, which a coarse one gives."""
-    coordinates = _with_flat(levels[0], levels[0].vertices.ravel())
+    coordinates = _with_flat(levels[0], cut, levels[0].vertices.ravel())
     for coarse, fine in pairwise(levels):
         coordinates = _refine(coarse, fine, coordinates)
     return coordinates
@@ -339,9 +371,10 @@ def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
     return _layout(fine).pack({"surface": points, "flat": flat})
 
 
-def _isometric(mesh: Mesh, enough: float, coordinates: Array) -> bool:
-    blocks = _layout(mesh).split(coordinates)
-    return measure.isometry_energy(mesh.replaced(blocks["surface"]), blocks["flat"]) <= enough
+def _isometric(mesh: Mesh, cut: Cut | None, enough: float, coordinates: Array) -> bool:
+    blocks = _layout(mesh, cut).split(coordinates)
+    surface = _opened(mesh, cut, blocks["surface"])
+    return measure.isometry_energy(surface, blocks["flat"]) <= enough
 
 
 def lengths_remark(surface: Mesh, flat: Array) -> list[str]:
@@ -357,13 +390,14 @@ def lengths_remark(surface: Mesh, flat: Array) -> list[str]:
     ]
 
 
-def _remark(mesh: Mesh, coordinates: Array) -> list[str]:
-    blocks = _layout(mesh).split(coordinates)
-    return lengths_remark(mesh.replaced(blocks["surface"]), blocks["flat"])
+def _remark(mesh: Mesh, cut: Cut | None, coordinates: Array) -> list[str]:
+    blocks = _layout(mesh, cut).split(coordinates)
+    return lengths_remark(_opened(mesh, cut, blocks["surface"]), blocks["flat"])
 
 
-def _place(mesh: Mesh, coordinates: Array) -> Array:
-    blocks = _layout(mesh).split(coordinates)
-    surface = mesh.replaced(blocks["surface"])
-    flat = flat_start.place(surface, blocks["flat"], None)
-    return _layout(mesh).pack({"surface": blocks["surface"], "flat": flat})
+def _place(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
+    blocks = _layout(mesh, cut).split(coordinates)
+    ready, order = flat_start.by_rows(_opened(mesh, cut, blocks["surface"]))
+    flat = np.empty_like(blocks["flat"])
+    flat[order] = flat_start.place(ready, blocks["flat"][order], None)
+    return _layout(mesh, cut).pack({"surface": blocks["surface"], "flat": flat})

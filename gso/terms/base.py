@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -82,6 +82,11 @@ class Term:
     def count(self) -> int:
         """Number of elements."""
         return len(self.weights)
+
+    def renumbered(self, block: str, row: Ints) -> Term:
+        """The term on other rows of a block: what was row k is ``row[k]``."""
+        stencil = tuple((b, row[ids] if b == block else ids) for b, ids in self.stencil)
+        return replace(self, stencil=stencil)
 
 
 def mean_weights(count: int) -> Array:

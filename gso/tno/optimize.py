@@ -16,6 +16,7 @@ from gso import flat_start, tasks
 from gso.constraints import TIGHT, Constraint
 from gso.fit import describe_spline
 from gso.mesh import Mesh
+from gso.pattern import Pattern
 from gso.result import Result
 from gso.spelling import known_keywords
 from gso.status import ConvergenceWarning, OptionError, Status
@@ -272,12 +273,20 @@ def packed(
     run: Run,
 ) -> Result:
     """An outcome in the user's frame and numbering."""
-    blocks = {name: frame.back(name, values) for name, values in outcome.blocks.items()}
+    # The numbering of a cut mesh begins with the user's.
+    own = {"flat"} if outcome.cut is not None else set()
+    blocks = {k: x if k in own else frame.back(k, x) for k, x in outcome.blocks.items()}
     flat = blocks["flat"] * frame.frame.scale if "flat" in blocks else None
+    pattern = None
+    if outcome.cut is not None and flat is not None:
+        pattern = Pattern(flat, outcome.cut.mesh.faces, outcome.cut.vertex, outcome.cut.seams)
+        flat = None
     if outcome.status is Status.ALREADY_GOOD:
         mesh = design
     elif "surface" in blocks:
         mesh = design.replaced(frame.frame.to_user(blocks["surface"]))
+    elif pattern is not None:
+        mesh = pattern.mesh
     else:
         mesh = design.replaced(np.c_[flat, np.zeros(len(design.vertices))])
     seconds = run.timings.as_dict()
@@ -295,6 +304,7 @@ def packed(
         design=design,
         mesh=mesh,
         flat=flat,
+        pattern=pattern,
         cell_scale=blocks["scale"][:, 0] if "scale" in blocks else None,
         status=outcome.status,
         iterations=run.iterations,

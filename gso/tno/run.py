@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.cutting import Cut
 from gso.status import Progress, Status
 from gso.tasks.base import Options, Plan, Request, Stage, same
 from gso.tno.problem import Problem, energies
@@ -25,7 +26,8 @@ class Outcome:
     """Coordinates that a run ended with, and how.
 
     Where the surface is a B-spline: with how many control points, and the coordinates that
-    it was fitted to before its own stage. `stage` is the one that was solved last.
+    it was fitted to before its own stage. Where the flat image is that of the design cut open:
+    how it was cut. `stage` is the one that was solved last.
     """
 
     blocks: dict[str, Array]
@@ -36,6 +38,7 @@ class Outcome:
     details: dict[str, Any] = field(default_factory=dict)
     spline: tuple[int, int] | None = None
     fitted: dict[str, Array] = field(default_factory=dict)
+    cut: Cut | None = None
     stage: Stage | None = None
 
     def move(self, blocks: dict[str, Array]) -> None:
@@ -118,6 +121,7 @@ class Run:
             notes=tuple(plan.notes),
             details=plan.details,
             spline=plan.spline,
+            cut=plan.cut,
         )
         if not plan.stages:
             outcome.blocks = plan.layout.split(plan.start)

@@ -213,6 +213,7 @@ class Session:
             plan.layout.split(finished), self._status, {"objective": 0.0}, notes=tuple(plan.notes)
         )
         outcome.details, outcome.spline = dict(plan.details), plan.spline
+        outcome.cut = plan.cut
         if stage is not None and self._problem is not None:
             aimed = replace(stage, items=self._aimed(stage))
             outcome.energy = objective(aimed, self._coordinates)

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 def lay_out(mesh: Mesh, points: Array) -> tuple[Mesh, Array]:
     """A surface on the faces of a mesh in the unit ball, and its flat pattern (n, 2).
 
+    One that closes around itself is cut open first.
+
     Raises
     ------
     MeshError
@@ -28,7 +30,10 @@ def lay_out(mesh: Mesh, points: Array) -> tuple[Mesh, Array]:
     surface = mesh.replaced(points)
     none = compile_constraints((), surface, flat=True)
     request = Request(surface, module.Options.preset("fast"), "strain", none)
-    return surface, Run(module, None)(request).points
+    outcome = Run(module, None)(request)
+    if outcome.cut is None:
+        return surface, outcome.points
+    return outcome.cut.mesh, outcome.points
 
 
 def largest_strain(mesh: Mesh, points: Array) -> float:

@@ -1,0 +1,74 @@
+"""The flat pattern of a surface: a mesh of its own, cut open where that was needed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.mesh import Mesh
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def _no_seams() -> Ints:
+    return np.empty((0, 2, 2), np.int64)
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """A flat pattern, and where its vertices are on the surface.
+
+    Attributes
+    ----------
+    flat : ndarray, (p, 2)
+        Where its vertices lie in the plane, in the surface's unit of length.
+    faces : ndarray of int, (m, 3) or (m, 4)
+        The surface's faces, in their order, in numbers of the pattern's vertices.
+    vertex : ndarray of int, (p,)
+        The surface's vertex that each of them is; 0 ... n - 1 where nothing is cut.
+    seams : ndarray of int, (s, 2, 2)
+        Edges that are one on the surface, in pairs; their first ends belong together, and so do
+        their second ends.
+
+    Examples
+    --------
+    >>> y, x = np.mgrid[:3.0, :4.0]
+    >>> sheet = Mesh.from_grid(np.stack([x, y, 0 * x], axis=-1))
+    >>> pattern = Pattern.whole(sheet, sheet.vertices[:, :2])
+    >>> pattern.mesh, pattern.is_cut
+    (Mesh(12 vertices, 6 faces, grid 3 x 4), False)
+    """
+
+    flat: Array
+    faces: Ints
+    vertex: Ints
+    seams: Ints = field(default_factory=_no_seams)
+
+    @classmethod
+    def whole(cls, surface: Mesh, flat: Array) -> Pattern:
+        """Pattern of a surface that is not cut, from its flat image (n, 2)."""
+        return cls(flat, surface.faces, np.arange(len(surface.vertices)))
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether a vertex of the surface is there more than once."""
+        return np.unique(self.vertex).size < len(self.vertex)
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The pattern as a mesh at z = 0."""
+        return Mesh(np.pad(self.flat, ((0, 0), (0, 1))), self.faces)
+
+    def surface(self, mesh: Mesh) -> Mesh:
+        """The surface with the pattern's vertices and faces: cut open, where it is in space.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            The surface that the pattern is of.
+        """
+        return Mesh(mesh.vertices[self.vertex], self.faces) if self.is_cut else mesh
