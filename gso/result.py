@@ -65,7 +65,16 @@ class Result:
         "constraints": the largest length by which each is missed, in the input's unit. With
         a spline, "spline": its curvature and distances, see :func:`gso.fit.describe_spline`.
     spline : BSplineSurface or None
-        The surface that `mesh` has samples of, with the option ``variables="surface"``.
+        The surface that `mesh` has samples of, with the option ``variables="surface"``; of
+        several components, each has its own.
+    components : list of Result
+        Of a mesh of several components, that of each one (those that constraints join are
+        one), by their smallest vertices; empty for a mesh of one. In the result of the whole,
+        `metrics` are means weighted by area (or maxima, sums: :data:`gso.metrics.INFO`), and
+        so is `energy`; `status` is the worst one; `iterations` and `seconds` are sums over
+        what was solved: copies are solved once.
+    names : ndarray of int, (n,), or None
+        Of one of those: which vertices of the whole mesh it has.
     """
 
     task: str
@@ -85,6 +94,8 @@ class Result:
     details: dict[str, Any] = field(default_factory=dict)
     spline: BSplineSurface | None = None
     cell_scale: Array | None = None
+    components: list[Result] = field(default_factory=list)
+    names: NDArray[np.int64] | None = None
 
     @property
     def converged(self) -> bool:
@@ -96,7 +107,8 @@ class Result:
         """Whether it can be worked with: complete, as asked for, no cell turned over."""
         points = self.mesh.vertices if self.flat is None else self.flat
         return bool(
-            self.status not in _UNUSABLE
+            all(part.usable for part in self.components)
+            and self.status not in _UNUSABLE
             and np.isfinite(points).all()
             and not self.metrics.get("flipped_cells", 0)
         )
@@ -116,10 +128,9 @@ class Result:
     @cached_property
     def metrics(self) -> dict[str, float]:
         """Metrics of the task, computed at first access; see :data:`gso.metrics.INFO`."""
-        from gso import metrics, tasks
+        from gso.tasks.measured import measured
 
-        module = tasks.get(self.task)
-        return module.metrics(self.design, self.mesh, self.flat, metrics.unit(self.design))
+        return measured(self.task, self.design, self.mesh, self.flat)
 
     def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
         """Write the result.

@@ -102,6 +102,21 @@ class Compiled:
         """In the unit of a frame, with vertex i numbered ``order[i]``."""
         return replace(self, parts=tuple(p.mapped(frame, order) for p in self.parts))
 
+    @property
+    def links(self) -> Ints:
+        """Pairs of vertices (k, 2) that an equation ties to each other."""
+        rows = [p.vertices for p in self.parts]
+        pairs = [np.stack([v[:, 0], v[:, k]], axis=1) for v in rows for k in range(1, v.shape[1])]
+        return np.concatenate(pairs) if pairs else np.zeros((0, 2), np.int64)
+
+    def within(self, ids: Ints, count: int) -> Compiled:
+        """The equations on some of `count` vertices, which get the numbers of their places."""
+        number = np.full(count, -1)
+        number[ids] = np.arange(len(ids))
+        frame = Frame(np.zeros(2 if self.flat else 3), 1.0)
+        kept = (p.kept((number[p.vertices] >= 0).all(axis=1)) for p in self.parts)
+        return replace(self, parts=tuple(p.mapped(frame, number) for p in kept if p.count))
+
     def misses(self, points: Array) -> dict[str, Miss]:
         """How far vertices (n, dim) are from keeping each constraint, by its name."""
         out = {name: Miss(0.0, np.zeros(0, np.int64), False) for name in self.names}

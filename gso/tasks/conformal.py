@@ -129,16 +129,10 @@ def _finish(request: Request, layout: Layout, given: Array | None, coordinates: 
     if not request.constraints.empty:
         flat = flat_start.settle(request.mesh, flat, request.constraints)
     else:
-        factor = _area(request.mesh, request.mesh.vertices) / _area(request.mesh, flat)
+        factor = measure.area(request.mesh) / measure.area(request.mesh, flat)
         flat = flat_start.place(request.mesh, flat * np.sqrt(factor), given)
         ratio = ratio * factor
     return layout.pack({"flat": flat, "scale": np.sqrt(np.maximum(ratio, 0.0))})
-
-
-def _area(mesh: Mesh, points: Array) -> float:
-    """Area of a surface (n, 3) or of its image (n, 2), doubled."""
-    p, q, r = (np.pad(points[k], ((0, 0), (0, 3 - points.shape[1]))) for k in mesh.triangles.T)
-    return float(np.linalg.norm(np.cross(q - p, r - p), axis=1).sum())
 
 
 def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[str, float]:

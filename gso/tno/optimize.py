@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Sequence
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -12,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import tasks
-from gso.constraints import TIGHT, Constraint
+from gso.constraints import TIGHT, Constraint, compile_constraints
 from gso.fit import describe_spline
 from gso.mesh import Mesh
 from gso.result import Result
 from gso.status import ConvergenceWarning, OptionError, Status
 from gso.tasks.base import Options, Request
-from gso.tno import linear
+from gso.tno import components, linear
 from gso.tno.canonical import Canonical
+from gso.tno.components import Job
 from gso.tno.run import Outcome, Run
 from gso.tno.search import reach_target, stay_within
 from gso.tno.solver import Callback
@@ -104,7 +106,6 @@ def optimize(
     module, formulation, settings = check(
         task, formulation, options, max_deviation, target_curvature
     )
-    frame = Canonical(design)
     given = x0 if isinstance(x0, Start) else Start(x0)
     if target_curvature is not None and given.iterations is not None:
         raise OptionError(
@@ -112,11 +113,37 @@ def optimize(
             "leave one of them out"
         )
     flat = getattr(module, "BLOCK", "surface") == "flat"
+    whole = Job(design, compile_constraints(constraints, design, flat=flat), given)
+    wanted = {"max_deviation": max_deviation, "target_curvature": target_curvature}
+    one = partial(_solved, task, formulation, settings, wanted)
+    pieces = components.parts(design, whole.constraints)
+    if pieces:
+        result = components.solve(one, whole, pieces, callback)
+    else:
+        result = one(whole, callback)
+    result.seconds["total"] = time.perf_counter() - clock
+    if not result.converged and result.status is not Status.MAX_ITERATIONS:
+        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=2)
+    return result
+
+
+def _solved(
+    task: str,
+    formulation: str,
+    settings: Options,
+    wanted: dict[str, float | None],
+    job: Job,
+    callback: Callback | None,
+) -> Result:
+    """Solve what nothing can be taken from: one component, or several that are joined."""
+    module, given = tasks.get(task), job.start
+    frame = Canonical(job.design, job.names)
+    flat = job.constraints.flat
     request = Request(
         frame.mesh,
         settings,
         formulation,
-        frame.constraints(constraints, flat=flat),
+        frame.constraints(job.constraints, flat=flat),
         start=frame.start(given.points, flat=flat),
     )
     run = Run(
@@ -126,21 +153,18 @@ def optimize(
         budget=given.iterations,
         tolerance=given.tolerance,
     )
-    if max_deviation is not None:
-        outcome = stay_within(run, request, max_deviation / frame.frame.scale)
-    elif target_curvature is not None:
-        outcome = reach_target(run, request, target_curvature)
+    if wanted["max_deviation"] is not None:
+        outcome = stay_within(run, request, wanted["max_deviation"] / frame.frame.scale)
+    elif wanted["target_curvature"] is not None:
+        outcome = reach_target(run, request, wanted["target_curvature"])
     else:
         outcome = run(request)
     judge(request, frame, outcome)
-    result = packed(task, formulation, design, frame, outcome, run)
+    result = packed(task, formulation, job.design, frame, outcome, run)
     if run.refused:
         result.notes += (f"the start ({given.source}) was not used: {run.refused}",)
     elif given.points is not None:
         result.warm_start = given.source
-    result.seconds["total"] = time.perf_counter() - clock
-    if not result.converged and result.status is not Status.MAX_ITERATIONS:
-        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=2)
     return result
 
 
@@ -195,7 +219,7 @@ def judge(request: Request, frame: Canonical, outcome: Outcome) -> None:
     outcome.details = {**outcome.details, "constraints": lengths}
     broken = [k for k, miss in misses.items() if miss.hard and not miss.length <= TIGHT]
     for name in broken:
-        where = ", ".join(map(str, frame.order[misses[name].vertices]))
+        where = ", ".join(map(str, frame.names[misses[name].vertices]))
         outcome.notes += (f"{name} is missed by {lengths[name]:.3g} (vertices {where})",)
     if broken and outcome.status is not Status.CANCELLED:
         outcome.status = Status.CONSTRAINTS_MISSED
