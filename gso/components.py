@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,7 +110,7 @@ def _grouped(label: Ints) -> list[Ints]:
     """Indices of each label 0, 1 ..., in ascending order."""
     order = np.argsort(label, kind="stable")
     ends = np.searchsorted(label[order], np.arange(label.max() + 2))
-    return [order[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    return [order[a:b] for a, b in pairwise(ends)]
 
 
 def combined(
@@ -140,13 +141,14 @@ def combined(
         values = np.array([several[k][name] for k in have])
         how = (info.get(name) or Info("", None, "")).joined
         if how == "mean":
-            out[name] = _mean(values, np.array([areas[k] for k in have]))
+            out[name] = mean(values, np.array([areas[k] for k in have]))
         else:
             out[name] = float({"sum": np.sum, "max": np.max, "min": np.min}[how](values))
     return out
 
 
-def _mean(values: Array, weights: Array) -> float:
+def mean(values: Array, weights: Array) -> float:
+    """Weighted mean, to the last bit of values that are all the same."""
     if (values == values[0]).all():
         return float(values[0])
     return float(np.average(values, weights=weights))

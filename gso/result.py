@@ -128,8 +128,13 @@ class Result:
     @cached_property
     def metrics(self) -> dict[str, float]:
         """Metrics of the task, computed at first access; see :data:`gso.metrics.INFO`."""
+        from gso.components import combined
+        from gso.metrics import area
         from gso.tasks.measured import measured
 
+        if self.components:
+            areas = [area(part.design) for part in self.components]
+            return combined([part.metrics for part in self.components], areas)
         return measured(self.task, self.design, self.mesh, self.flat)
 
     def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
@@ -163,8 +168,9 @@ class Result:
         else:
             io.save(self.mesh, path)
 
-    def _arrays(self) -> dict[str, Any]:
-        record = {
+    def _record(self) -> dict[str, Any]:
+        """What is no array."""
+        return {
             "format": _FORMAT,
             "task": self.task,
             "formulation": self.formulation,
@@ -179,7 +185,11 @@ class Result:
             "details": self.details,
             "metrics": self.metrics,
             "history": [asdict(p) for p in self.history],
+            "components": [part._record() for part in self.components],
         }
+
+    def _arrays(self) -> dict[str, Any]:
+        record = self._record()
         arrays = {
             "record": np.frombuffer(json.dumps(record, default=float).encode(), np.uint8),
             "design": self.design.vertices,
@@ -192,6 +202,11 @@ class Result:
             arrays["cell_scale"] = self.cell_scale
         if self.spline is not None:
             arrays |= self.spline.arrays()
+        if self.components:
+            label = np.full(len(self.design.vertices), -1)
+            for number, part in enumerate(self.components):
+                label[part.names] = number
+            arrays["component"] = label
         return arrays
 
     @classmethod
@@ -217,31 +232,68 @@ class Result:
                     f"{path} was written by another version (format {record['format']})"
                 )
             design = Mesh(data["design"], data["faces"])
-            result = cls(
-                record["task"],
-                record["formulation"],
+            result = cls._read(
+                record,
                 design,
                 design.replaced(data["vertices"]),
                 _checked(data, "flat", (len(design.vertices), 2)),
-                Status[record["status"]],
-                record["iterations"],
-                record["energy"],
-                [Progress(**p) for p in record["history"]],
-                record["seconds"],
-                record["backend"],
-                record["device"],
-                record["warm_start"],
-                tuple(record["notes"]),
-                record["details"],
-                spline=BSplineSurface.from_arrays(data),
-                cell_scale=_checked(data, "cell_scale", (len(design.faces),)),
+                _checked(data, "cell_scale", (len(design.faces),)),
             )
-            result.__dict__["metrics"] = record["metrics"]
+            result.spline = BSplineSurface.from_arrays(data)
+            label = _checked(data, "component", (len(design.vertices),))
+            if label is not None:
+                result._divide(record.get("components", []), label.astype(np.int64))
         except (KeyError, TypeError, ValueError) as error:
             if isinstance(error, MeshError):
                 raise
             raise MeshError(f"{path} is no result of gso: {error}") from None
         return result
+
+    @classmethod
+    def _read(
+        cls,
+        record: Mapping[str, Any],
+        design: Mesh,
+        mesh: Mesh,
+        flat: Array | None,
+        cell_scale: Array | None,
+    ) -> Result:
+        """A result of its record and arrays."""
+        result = cls(
+            record["task"],
+            record["formulation"],
+            design,
+            mesh,
+            flat,
+            Status[record["status"]],
+            record["iterations"],
+            record["energy"],
+            [Progress(**p) for p in record["history"]],
+            record["seconds"],
+            record["backend"],
+            record["device"],
+            record["warm_start"],
+            tuple(record["notes"]),
+            record["details"],
+            cell_scale=cell_scale,
+        )
+        result.__dict__["metrics"] = record["metrics"]
+        return result
+
+    def _divide(self, records: list[Mapping[str, Any]], label: NDArray[np.int64]) -> None:
+        """Give the components of a result that was read theirs; a flat image is the whole's."""
+        from gso.components import split
+
+        for record, piece in zip(records, split(self.design, label), strict=True):
+            part = self._read(
+                record,
+                piece.mesh,
+                piece.of(self.mesh),
+                None if self.flat is None else self.flat[piece.vertices],
+                None if self.cell_scale is None else self.cell_scale[piece.faces],
+            )
+            part.names = piece.vertices
+            self.components.append(part)
 
 
 def _checked(data: Mapping[str, Array], name: str, shape: tuple[int, ...]) -> Array | None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.components import Component, labels, split
+from gso.components import Component, labels, mean, split
 from gso.constraints import Compiled
 from gso.flat_start import beside
 from gso.mesh import Mesh
@@ -422,19 +422,13 @@ def _details(results: Sequence[Result], areas: Sequence[float]) -> dict[str, Any
     """Numbers that all share, means of those that differ, the largest miss of a constraint."""
     out: dict[str, Any] = {}
     for name in dict.fromkeys(name for result in results for name in result.details):
-        have = [
-            (r.details[name], a) for r, a in zip(results, areas, strict=True) if name in r.details
-        ]
-        values = [value for value, _ in have]
+        have = [k for k, result in enumerate(results) if name in result.details]
+        values = [results[k].details[name] for k in have]
         if name == "constraints":
             every = dict.fromkeys(key for value in values for key in value)
             out[name] = {key: max(value.get(key, 0.0) for value in values) for key in every}
-        elif all(isinstance(v, str | bool | int) or v is None for v in values):
-            if len(set(values)) == 1:
-                out[name] = values[0]
-        elif all(isinstance(v, int | float | np.number) for v in values):
-            same = all(value == values[0] for value in values)
-            out[name] = (
-                values[0] if same else float(np.average(values, weights=[a for _, a in have]))
-            )
+        elif all(isinstance(value, float | np.floating) for value in values):
+            out[name] = mean(np.array(values), np.array([areas[k] for k in have]))
+        elif all(isinstance(value, str | int) for value in values) and len(set(values)) == 1:
+            out[name] = values[0]
     return out
