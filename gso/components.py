@@ -54,7 +54,7 @@ def labels(mesh: Mesh, links: Iterable[tuple[int, int]] | Ints = ()) -> Ints:
 
     Examples
     --------
-    >>> mesh = Mesh(np.eye(6, 3) + np.arange(6)[:, None], [[0, 1, 2], [3, 4, 5]])
+    >>> mesh = Mesh(np.tile(np.eye(3), (2, 1)), [[0, 1, 2], [3, 4, 5]])
     >>> labels(mesh).tolist(), labels(mesh, [(1, 5)]).tolist()
     ([0, 0, 0, 1, 1, 1], [0, 0, 0, 0, 0, 0])
     """
@@ -89,7 +89,7 @@ def split(mesh: Mesh, label: Ints | None = None) -> list[Component]:
 
     Examples
     --------
-    >>> mesh = Mesh(np.eye(6, 3) + np.arange(6)[:, None], [[0, 1, 2], [5, 4, 3]])
+    >>> mesh = Mesh(np.tile(np.eye(3), (2, 1)), [[0, 1, 2], [5, 4, 3]])
     >>> [part.mesh.faces.tolist() for part in split(mesh)]
     [[[0, 1, 2]], [[2, 1, 0]]]
     """

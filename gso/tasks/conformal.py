@@ -25,7 +25,7 @@ from gso import flat_start, limits
 from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.status import OptionError
-from gso.tasks import held
+from gso.tasks import held, joined
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, congruence, scale, shear
@@ -88,13 +88,10 @@ def plan(request: Request) -> Plan:
     flat = given
     if flat is None:
         flat = flat_start.begin(mesh, iterations=options.relax_iterations).flat
-    items = [Weighted(t, 1.0) for t in congruence.build(mesh, "flat", scale="scale")]
-    items += [Weighted(scale.build(mesh), options.w_scale)]
-    items += [Weighted(t, options.w_shear) for t in shear.build(mesh)]
     stage = Stage(
         "conformal",
         layout,
-        items,
+        joined.objective(mesh, partial(_terms, options)),
         lambda _: free(layout),
         iterations=options.iterations,
         tolerance=options.tolerance,
@@ -111,6 +108,12 @@ def plan(request: Request) -> Plan:
         finish=partial(_finish, request, layout, given),
         refused=refused,
     )
+
+
+def _terms(options: Options, mesh: Mesh) -> list[Weighted]:
+    items = [Weighted(t, 1.0) for t in congruence.build(mesh, "flat", scale="scale")]
+    items += [Weighted(scale.build(mesh), options.w_scale)]
+    return items + [Weighted(t, options.w_shear) for t in shear.build(mesh)]
 
 
 def _area_ratios(mesh: Mesh, flat: Array) -> Array:

@@ -28,7 +28,7 @@ from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.resample import alike, carry, coarser
 from gso.status import OptionError, Status
-from gso.tasks import held, splined
+from gso.tasks import held, joined, splined
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, christoffel, congruence, fairness, proximity
@@ -260,7 +260,12 @@ def _stage(request: Request, mesh: Mesh, w_fairness: float) -> Stage:
 
 
 def _objective(request: Request, mesh: Mesh, w_fairness: float) -> list[Weighted]:
-    o = request.options
+    items = joined.objective(mesh, partial(_terms, request.options, w_fairness))
+    return items + (held.pulls(request) if mesh is request.mesh else [])
+
+
+def _terms(o: Options, w_fairness: float, mesh: Mesh) -> list[Weighted]:
+    """Terms of one component."""
     normals = vertex_normals(mesh)
     both = {"counterpart": "flat"}
     items = [Weighted(t, o.w_isometry) for t in congruence.build(mesh, "surface", **both)]
@@ -270,7 +275,7 @@ def _objective(request: Request, mesh: Mesh, w_fairness: float) -> list[Weighted
     if o.w_closest > 0:
         items.append(Weighted(proximity.closest(mesh, normals), o.w_closest))
     items.append(Weighted(proximity.build(mesh, normals), o.w_place))
-    return items + (held.pulls(request) if mesh is request.mesh else [])
+    return items
 
 
 def _unknowns(request: Request, mesh: Mesh, layout: Layout, coordinates: Array) -> Variables:
