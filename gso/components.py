@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from gso.metrics import INFO, Info
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+
+_JOINED: dict[str, Any] = {"sum": np.sum, "max": np.max, "min": np.min}
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,11 @@ def labels(mesh: Mesh, links: Iterable[tuple[int, int]] | Ints = ()) -> Ints:
     rank[np.argsort(first)] = np.arange(len(found))
     out[used] = rank[number]
     return out
+
+
+def several(mesh: Mesh) -> bool:
+    """Whether a mesh has more than one component."""
+    return mesh.grid_index is None and bool(labels(mesh).max() > 0)
 
 
 def split(mesh: Mesh, label: Ints | None = None) -> list[Component]:
@@ -139,11 +148,44 @@ def combined(
     for name in names:
         have = [k for k, metrics in enumerate(several) if name in metrics]
         values = np.array([several[k][name] for k in have])
-        how = (info.get(name) or Info("", None, "")).joined
+        how = info[name].joined if name in info else "mean"
         if how == "mean":
             out[name] = mean(values, np.array([areas[k] for k in have]))
         else:
-            out[name] = float({"sum": np.sum, "max": np.max, "min": np.min}[how](values))
+            out[name] = float(_JOINED[how](values))
+    return out
+
+
+def average(function: Callable[..., Any], mesh: Mesh, *others: Mesh) -> Any:
+    """Mean over the components of a mesh, weighted by area, of what a function says of each.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(mesh, *others)`` of one component returns a number or a tuple of them.
+    mesh : Mesh
+    *others : Mesh
+        Meshes with its faces, whose same parts the function is given.
+
+    Examples
+    --------
+    >>> mesh = Mesh(np.tile(np.eye(3), (2, 1)), [[0, 1, 2], [3, 4, 5]])
+    >>> float(average(lambda part: len(part.faces), mesh))
+    1.0
+    """
+    if not several(mesh):
+        return function(mesh, *others)
+    parts = split(mesh)
+    found = [function(part.mesh, *map(part.of, others)) for part in parts]
+    return np.average(found, axis=0, weights=[part.area for part in parts])
+
+
+def sizes(mesh: Mesh) -> Array:
+    """Size of the component of each vertex (n,): the largest distance from its centroid."""
+    out = np.full(len(mesh.vertices), mesh.frame.scale)
+    if several(mesh):
+        for part in split(mesh):
+            out[part.vertices] = part.mesh.frame.scale
     return out
 
 

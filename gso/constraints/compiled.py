@@ -114,7 +114,7 @@ class Compiled:
         number = np.full(count, -1)
         number[ids] = np.arange(len(ids))
         frame = Frame(np.zeros(2 if self.flat else 3), 1.0)
-        kept = (p.kept((number[p.vertices] >= 0).all(axis=1)) for p in self.parts)
+        kept = (p.kept(np.all(number[p.vertices] >= 0, axis=1)) for p in self.parts)
         return replace(self, parts=tuple(p.mapped(frame, number) for p in kept if p.count))
 
     def misses(self, points: Array) -> dict[str, Miss]:
@@ -159,14 +159,14 @@ def _name(number: int, constraint: object) -> str:
 
 
 def compile_constraints(
-    constraints: Iterable[Constraint] | Constraint, mesh: Mesh, *, flat: bool = False
+    constraints: Iterable[Constraint] | Constraint | Compiled, mesh: Mesh, *, flat: bool = False
 ) -> Compiled:
     """Check constraints against a mesh and against each other, and gather them.
 
     Parameters
     ----------
-    constraints : iterable of Constraint, or one
-        As the user gave them.
+    constraints : iterable of Constraint, or one, or Compiled
+        As the user gave them; those that were gathered for this mesh already are returned.
     mesh : Mesh
         The design.
     flat : bool
@@ -178,6 +178,8 @@ def compile_constraints(
         An index or a shape is wrong, a constraint means nothing for this task, or hard
         linear ones contradict each other; the message names them and a vertex.
     """
+    if isinstance(constraints, Compiled):
+        return constraints
     parts: list[Part] = []
     names = []
     for number, c in enumerate(listed(constraints)):

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gso import metrics as measure
 from gso import tasks
-from gso.components import Component, combined, labels, split
+from gso.components import Component, combined, several, split
 from gso.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -15,9 +15,7 @@ Array = NDArray[np.float64]
 
 def parted(design: Mesh) -> list[Component]:
     """The components of a mesh that has several; none of a mesh that is one."""
-    if design.grid_index is not None or labels(design).max() == 0:
-        return []
-    return split(design)
+    return split(design) if several(design) else []
 
 
 def measured(task: str, design: Mesh, after: Mesh, flat: Array | None) -> dict[str, float]:
@@ -44,7 +42,7 @@ def measured(task: str, design: Mesh, after: Mesh, flat: Array | None) -> dict[s
     parts = parted(design) if np.array_equal(design.faces, after.faces) else []
     if not parts:
         return module.metrics(design, after, flat, measure.unit(design))
-    several = [
+    found = [
         module.metrics(
             part.mesh,
             part.of(after),
@@ -53,4 +51,4 @@ def measured(task: str, design: Mesh, after: Mesh, flat: Array | None) -> dict[s
         )
         for part in parts
     ]
-    return combined(several, [part.area for part in parts])
+    return combined(found, [part.area for part in parts])

@@ -57,9 +57,7 @@ class Canonical:
     def constraints(self, given: Iterable[Constraint] | Compiled, *, flat: bool) -> Compiled:
         """Constraints checked against the design, in this numbering and frame."""
         frame = Frame(np.zeros(2), self.frame.scale) if flat else self.frame
-        if not isinstance(given, Compiled):
-            given = compile_constraints(given, self.design, flat=flat)
-        return given.mapped(frame, self.new_index)
+        return compile_constraints(given, self.design, flat=flat).mapped(frame, self.new_index)
 
     def back(self, block: str, values: Array) -> Array:
         """Rows of a block in this numbering, put in the user's."""

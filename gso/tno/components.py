@@ -116,15 +116,13 @@ def solve(
     watch = None if callback is None else _Watch(callback, len(chosen))
     if workers is None:
         workers = _paying([len(jobs[k].design.vertices) for k in chosen])
-    solved = dict.fromkeys(chosen)
-    if workers > 0:
-        solved |= _spread(one, jobs, chosen, watch, workers)
+    solved = _spread(one, jobs, chosen, watch, workers) if workers > 0 else {}
     for place, k in enumerate(chosen):
-        if solved[k] is None:
+        if k not in solved:
             if watch is not None:
                 watch.place = place
             solved[k] = _named(one, k, len(jobs), jobs[k], watch)
-    results: list[Any] = [
+    results = [
         solved[k] if k == number else _moved(solved[k], jobs[k].design, jobs[number].design)
         for number, k in enumerate(origin)
     ]
@@ -337,7 +335,8 @@ def _laid_out(
     if any(r.flat is None for r in results):
         return None
     out = np.zeros((count, 2))
-    loose, held = [], []
+    loose: list[tuple[Ints, Array]] = []
+    held: list[tuple[Ints, Array]] = []
     for piece, job, result in zip(pieces, jobs, results, strict=True):
         begun = job.start.points is not None and result.warm_start != "cold"
         stays = job.constraints.flat and (begun or bool(job.constraints.anchored))
