@@ -44,6 +44,10 @@ def optimize(
 ) -> Result:
     """Make a surface developable, flatten it, denoise it, bend it, or map it to the plane.
 
+    Of a mesh of several components each is solved by itself, as if it were alone: in its own
+    frame, with its own weights. Constraints that join components (glue, lengths, symmetry)
+    keep those in one solve, in which each has the weights of its own size.
+
     Parameters
     ----------
     mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, or path
@@ -65,7 +69,8 @@ def optimize(
     target_curvature : float, optional
         `developable` by "curvature" only: the mean absolute curvature ``loss_gc`` to reach, in
         1/size^2 as the metrics have it (size: the largest distance from the centroid), with
-        the smallest displacement that does.
+        the smallest displacement that does. Of several components each reaches it by its own
+        size.
     x0 : Mesh, array or Start, optional
         Where to start: vertices (n, 3) or a grid; (n, 2) or (H, W, 2) for a flat image.
         Proximity and lengths stay those of `mesh`. On grids what is wrong with a surface
@@ -73,7 +78,8 @@ def optimize(
         smoothed surface. A :class:`gso.tno.Start` says more about it.
     callback : callable, optional
         Called with a :class:`gso.Progress` after each iteration; returning False stops
-        the solve, and the best iterate so far is returned.
+        the solve, and the best iterate so far is returned. Large meshes of several components
+        are solved in processes: it is then called when a component is done.
 
     Returns
     -------
