@@ -558,8 +558,9 @@ def components() -> dict[str, Any]:
         for number, shifts in enumerate(cases.values()):
             found = solved(shifts, 0.0, wanted)
             if number == 0:
-                far = [np.linalg.norm(p - panel.vertices, axis=1).max() for p in (alone, found[0])]
-                figures += ["-", "-"] if flat else far
+                for points in (alone, found[0]):
+                    far = "-" if flat else np.linalg.norm(points - panel.vertices, axis=1).max()
+                    figures.append(far)
             figures.append(max(float(np.abs(p - alone).max()) for p in found) / size)
         own = solved([[100.0 * size, 0.0, 0.0]], 0.0, wanted)[0]
         figures += [float(np.abs(p - alone).max()) / size for p in (own, shaken)]

@@ -126,8 +126,8 @@ def test_a_panel_far_away_gets_what_it_gets_at_home(shape, asked):
     at = 0.0 if task in FLAT else shift
     off = np.abs(outcome(there) - at - outcome(alone)).max() / size
     spread = np.abs(outcome(shaken) - outcome(alone)).max() / size
-    print(f"{task}: moved by 100 sizes {off:.1e}, perturbed by 1e-12 {spread:.1e}, of the size")
-    assert off < max(1e-6, 10 * spread)
+    said = f"moved by 100 sizes {off:.1e}, perturbed by 1e-12 {spread:.1e}, of the size"
+    assert off < max(1e-6, 10 * spread), said
 
 
 @pytest.mark.parametrize("asked", ASKED, ids=lambda a: "-".join(filter(None, a)))
@@ -189,7 +189,7 @@ def test_bounds_and_targets_are_those_of_every_component():
 def test_starts_and_constraints_are_divided():
     a, b = panel(), moved(irregular(), [5.0, 0, 0])
     whole, n = together(a, b), len(a.vertices)
-    x0 = whole.vertices + [0.0, 0.0, 0.01]
+    x0 = whole.vertices + np.array([0.0, 0.0, 0.01])
     result = gso.tno.optimize(whole, x0=x0, constraints=[gso.Fixed([0, n])], options="fast")
     for k, (part, first) in enumerate([(a, 0), (b, n)]):
         own = x0[first : first + len(part.vertices)]
