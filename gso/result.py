@@ -159,6 +159,11 @@ class Result:
             surface = self.mesh if self.task == "developable" else self.design
             io.save_flat(self.flat, surface, path, unit=unit)
         elif f".{suffix}" in io.SPLINE_SUFFIXES:
+            if any(part.spline is not None for part in self.components):
+                raise MeshError(
+                    f"{path}: every component has a spline of its own; write them one by one, "
+                    "result.components[k].save(...)"
+                )
             if self.spline is None:
                 raise MeshError(
                     f"{path}: this result is a mesh; solve with the option variables='surface', "

@@ -25,6 +25,7 @@ from gso.status import ConvergenceWarning, GSOError, MeshError, OptionError, Sta
 from gso.tno import Start, check, components, optimize
 from gso.tno.batch import Item
 from gso.tno.canonical import Canonical
+from gso.tno.job import Job
 from gso.tno.pool import spread
 
 Array = NDArray[np.float64]
@@ -184,11 +185,11 @@ def _each(design: Mesh, pieces: list[Component], task: str, keywords: dict[str, 
     """Solve every component from a net's result of its own, where there is one."""
     callback, compiled = keywords.pop("callback", None), keywords.pop("constraints")
 
-    def one(job: components.Job, told: Any) -> Result:
+    def one(job: Job, told: Any) -> Result:
         kept = () if job.constraints.empty else job.constraints
         return solve(job.design, task=task, constraints=kept, callback=told, **keywords)
 
-    whole = components.Job(design, compiled, Start(None))
+    whole = Job(design, compiled, Start(None))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         result = components.solve(one, whole, pieces, callback, workers=0)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import tasks
+from gso.components import several
 from gso.constraints import TIGHT, Constraint, compile_constraints
 from gso.fit import describe_spline
 from gso.mesh import Mesh
@@ -21,7 +22,7 @@ from gso.status import ConvergenceWarning, OptionError, Status
 from gso.tasks.base import Options, Request
 from gso.tno import components, linear
 from gso.tno.canonical import Canonical
-from gso.tno.components import Job
+from gso.tno.job import Job
 from gso.tno.run import Outcome, Run
 from gso.tno.search import reach_target, stay_within
 from gso.tno.solver import Callback
@@ -167,6 +168,8 @@ def _solved(
         outcome = run(request)
     judge(request, frame, outcome)
     result = packed(task, formulation, job.design, frame, outcome, run)
+    if several(job.design):
+        result.notes += ("its components are joined by constraints and solved together",)
     if run.refused:
         result.notes += (f"the start ({given.source}) was not used: {run.refused}",)
     elif given.points is not None:
