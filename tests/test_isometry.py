@@ -293,7 +293,10 @@ class TestOptions:
                 {"formulation": "isometry", "options": gso.DevelopableOptions()},
                 r"gso\.tasks\.joint\.Options.*not gso\.tasks\.developable\.Options",
             ),
-            ({"formulation": "isometry", "max_deviation": 0.1}, "curvature"),
+            (
+                {"formulation": "isometry", "max_deviation": 0.1, "target_curvature": 0.1},
+                "curvature",
+            ),
             ({"options": "jiang2020", "target_curvature": 0.1}, "curvature"),
             ({"formulation": "isometrie"}, "no formulation"),
         ],
@@ -343,3 +346,24 @@ class TestNearest:
         residual = term.residual([tuple(slid.T)], constants)
         np.testing.assert_allclose(np.abs(residual[2]), 0.1)
         np.testing.assert_allclose(residual[:2], 0.0, atol=1e-12)
+
+
+class TestBounds:
+    """`max_deviation` and `max_strain` by isometry."""
+
+    def test_the_deviation_is_held_both_ways(self, curved):
+        mesh = gso.Mesh.from_grid(curved)
+        bound = 0.02 * mesh.diagonal
+        result = gso.tno.optimize(mesh, formulation="isometry", max_deviation=bound)
+        far = gso.metrics.surface_distance(mesh, result.mesh)
+        assert max(far.there_max, far.back_max) <= bound * (1 + 1e-6)
+        assert result.metrics["loss_gc_worst"] < 0.5 * result.metrics["loss_gc_worst_before"]
+
+    def test_hard_constraints_are_refused_with_it(self, curved):
+        with pytest.raises(gso.OptionError, match="FixedBoundary"):
+            gso.tno.optimize(
+                curved,
+                formulation="isometry",
+                max_deviation=0.1,
+                constraints=[gso.FixedBoundary()],
+            )

@@ -2,7 +2,7 @@
 
 from gso.flat_start.align import align, settle
 from gso.flat_start.begin import begin, flips, given, refine, strain, upward
-from gso.flat_start.embed import embed, parts, spanned
+from gso.flat_start.embed import embed, flattens, parts, spanned
 from gso.flat_start.grid import rectangle
 from gso.flat_start.place import beside, closest_motion, place, upright
 from gso.flat_start.relax import Relaxed, relax, strain_level
@@ -14,6 +14,7 @@ __all__ = [
     "beside",
     "closest_motion",
     "embed",
+    "flattens",
     "flips",
     "given",
     "parts",

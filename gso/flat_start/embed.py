@@ -52,6 +52,27 @@ def embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:
     return flat
 
 
+def flattens(mesh: Mesh) -> bool:
+    """Whether every component has a boundary and no handle, so that there is a plane image.
+
+    >>> flattens(Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+    True
+    """
+    try:
+        for ids in parts(mesh):
+            _check(_part(mesh, ids), int(ids[0]))
+    except MeshError:
+        return False
+    return True
+
+
+def _part(mesh: Mesh, ids: Ints) -> Mesh:
+    local = np.full(len(mesh.vertices), -1)
+    local[ids] = np.arange(len(ids))
+    faces = mesh.faces[local[mesh.faces[:, 0]] >= 0]
+    return Mesh(mesh.vertices[ids], np.where(faces < 0, -1, local[faces]))
+
+
 def parts(mesh: Mesh) -> list[Ints]:
     """Vertices of each component; those of no face are left out."""
     labels, used = mesh.components, mesh.half_edges.face_count > 0

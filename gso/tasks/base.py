@@ -86,8 +86,8 @@ class Request:
         Where to start: (n, 3), or (n, 2) for a flat image.
     max_deviation : float or None
         Largest distance from the design.
-    curvature_weight : float
-        Factor on the weight of the curvature, for the search for a target.
+    demand : float
+        Factor on the weight of what the task asks for, for searches.
     """
 
     mesh: Mesh
@@ -96,7 +96,12 @@ class Request:
     constraints: Compiled
     start: Array | None = None
     max_deviation: float | None = None
-    curvature_weight: float = 1.0
+    demand: float = 1.0
+
+    @property
+    def reach(self) -> float | None:
+        """Bound on the displacement: a hair inside what was asked for."""
+        return None if self.max_deviation is None else self.max_deviation * (1.0 - 1e-7)
 
 
 @dataclass

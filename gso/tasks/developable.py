@@ -31,7 +31,15 @@ from gso.tasks.measured import parted
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, curvature, fairness, proximity
 from gso.terms.losses import Absolute, Distance
-from gso.variables import Layout, Variables, free, normal_offsets, spline_offsets, vertex_normals
+from gso.variables import (
+    ALONG,
+    Layout,
+    Variables,
+    free,
+    normal_offsets,
+    spline_offsets,
+    vertex_normals,
+)
 
 Array = NDArray[np.float64]
 
@@ -146,7 +154,10 @@ def plan(request: Request) -> Plan:
 
 def _before_joint(request: Request) -> Plan:
     """What the joint solve starts from, of the same request."""
-    return _plan(replace(request, options=Options()))
+    bound = request.max_deviation
+    # What the joint solve can move within is a part of the ball around a vertex.
+    reach = None if bound is None else 0.99 * ALONG * bound
+    return _plan(replace(request, options=Options(), max_deviation=reach))
 
 
 def _plan(request: Request) -> Plan:
@@ -180,10 +191,10 @@ def _plan(request: Request) -> Plan:
     stages = [_coarse_stage(request, level, make, k) for k, level in enumerate(levels)]
     stages += _stages(request, mesh, make, len(levels))
     for k, stage in enumerate(stages[1 : len(levels) + 1]):
-        stage.enter = partial(_carry, starts[k], starts[k + 1], _reach(request))
+        stage.enter = partial(_carry, starts[k], starts[k + 1], request.reach)
     if spline is not None:
         stages.append(splined.stage(stages[-1], mesh, spline))
-    begin = starts[0].vertices if levels else _inside(start, mesh, _reach(request))
+    begin = starts[0].vertices if levels else _inside(start, mesh, request.reach)
     free_to_return = request.constraints.empty
     free_to_return &= request.start is None or request.max_deviation is None
     fallback = start.ravel()
@@ -300,7 +311,7 @@ def _objective(
     """Terms on the design or on a coarser copy of it."""
     o = request.options
     w_curvature, w_fairness = adapted_weights(o, max(curved, 1e-3), bending)
-    w_curvature *= request.curvature_weight
+    w_curvature *= request.demand
     w_proximity = o.w_proximity
     if request.max_deviation is not None:
         # The bound keeps the result close; the terms may ask for more.
@@ -325,11 +336,6 @@ def _joined(request: Request, mesh: Mesh) -> list[Weighted]:
         return _objective(alone, curved, _bending(own), _smoothed(own)[0], own)
 
     return joined.objective(mesh, make) + held.pulls(request)
-
-
-def _reach(request: Request) -> float | None:
-    """Bound on the displacement: a hair inside what was asked for."""
-    return None if request.max_deviation is None else request.max_deviation * (1.0 - 1e-7)
 
 
 def _resampled(source: Mesh, target: Mesh) -> Array:
@@ -378,7 +384,7 @@ def _stages(request: Request, mesh: Mesh, make: Any, coarser_grids: int) -> list
             tolerance=o.tolerance,
             eps=eps,
             robust="curvature",
-            bounds=_bounds(mesh, _reach(request), request.constraints.hard_ids),
+            bounds=_bounds(mesh, request.reach, request.constraints.hard_ids),
         )
 
     if request.max_deviation is not None:
@@ -437,7 +443,7 @@ def _coarse_stage(request: Request, level: Mesh, make: Any, number: int) -> Stag
         tolerance=_LOOSE,
         eps=(10.0 * o.eps, 3.0 * o.eps, o.eps) if first and not begun else (o.eps,),
         robust="curvature",
-        bounds=_bounds(level, _reach(request)),
+        bounds=_bounds(level, request.reach),
     )
 
 

@@ -32,7 +32,14 @@ from gso.tasks import held, joined, splined
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, christoffel, congruence, fairness, proximity
-from gso.variables import Layout, Variables, free, vertex_normals
+from gso.variables import (
+    Layout,
+    Variables,
+    ball_bounds,
+    framed_displacements,
+    free,
+    vertex_normals,
+)
 
 Array = NDArray[np.float64]
 
@@ -146,8 +153,9 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
     """
     mesh, options = request.mesh, request.options
     spline = splined.controls(request)
+    _check_bound(request)
     own = spline is None and request.start is None and request.constraints.empty
-    if own and measure.loss_gc(mesh, scale=1.0) <= options.developable_below:
+    if own and measure.loss_gc_worst(mesh, scale=1.0) <= options.developable_below:
         return _unrolling(request)
     begun = mesh if request.start is None else mesh.replaced(request.start)
     levels = _levels(request, begun)
@@ -173,6 +181,23 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
         spline=spline,
         unstarted=None if request.start is None else partial(_unstarted, [*levels, mesh]),
     )
+
+
+def _check_bound(request: Request) -> None:
+    """Refuse what cannot be kept together with `max_deviation`."""
+    if request.max_deviation is None:
+        return
+    hard = [part for part in request.constraints.parts if part.hard]
+    if hard:
+        raise OptionError(
+            f"{request.constraints.names[hard[0].owner]} cannot be kept with max_deviation by the "
+            "formulation 'isometry'; leave one out, take 'curvature', or give it a weight"
+        )
+    if request.options.variables == "surface":
+        raise OptionError(
+            "max_deviation bounds the vertices of a mesh, not a B-spline; leave out "
+            "variables='surface'"
+        )
 
 
 def _layout(mesh: Mesh) -> Layout:
@@ -247,7 +272,8 @@ def _chain(request: Request, levels: list[Mesh]) -> list[Stage]:
 
 
 def _stage(request: Request, mesh: Mesh, w_fairness: float) -> Stage:
-    layout = _layout(mesh)
+    layout, reach = _layout(mesh), request.reach
+    bounds = None if reach is None else partial(_bounds, layout, len(mesh.vertices), reach)
     name = "x".join(map(str, mesh.grid_shape or ("isometry",)))
     return Stage(
         f"{name}, fairness {w_fairness:.0e}",
@@ -256,20 +282,26 @@ def _stage(request: Request, mesh: Mesh, w_fairness: float) -> Stage:
         partial(_unknowns, request, mesh, layout),
         tolerance=_NEARLY,
         limits=[limits.orientation(flat_start.upward(mesh), layout)],
+        bounds=bounds,
     )
 
 
+def _bounds(layout: Layout, count: int, reach: float, coordinates: Array) -> tuple[Array, Array]:
+    return ball_bounds(layout, count, reach)
+
+
 def _objective(request: Request, mesh: Mesh, w_fairness: float) -> list[Weighted]:
-    items = joined.objective(mesh, partial(_terms, request.options, w_fairness))
+    items = joined.objective(mesh, partial(_terms, request.options, request.demand, w_fairness))
     return items + (held.pulls(request) if mesh is request.mesh else [])
 
 
-def _terms(o: Options, w_fairness: float, mesh: Mesh) -> list[Weighted]:
+def _terms(o: Options, demand: float, w_fairness: float, mesh: Mesh) -> list[Weighted]:
     """Terms of one component."""
     normals = vertex_normals(mesh)
     both = {"counterpart": "flat"}
-    items = [Weighted(t, o.w_isometry) for t in congruence.build(mesh, "surface", **both)]
-    items += [Weighted(t, o.w_mapping) for t in christoffel.build(mesh, "surface", **both)]
+    asked, mapped = demand * o.w_isometry, demand * o.w_mapping
+    items = [Weighted(t, asked) for t in congruence.build(mesh, "surface", **both)]
+    items += [Weighted(t, mapped) for t in christoffel.build(mesh, "surface", **both)]
     items.append(Weighted(fairness.build(mesh), w_fairness))
     items.append(Weighted(fairness.build(mesh, block="flat"), o.w_flat * w_fairness))
     if o.w_closest > 0:
@@ -279,6 +311,8 @@ def _terms(o: Options, w_fairness: float, mesh: Mesh) -> list[Weighted]:
 
 
 def _unknowns(request: Request, mesh: Mesh, layout: Layout, coordinates: Array) -> Variables:
+    if request.reach is not None:
+        return framed_displacements(layout, mesh.vertices, vertex_normals(mesh))
     own = mesh is request.mesh
     return held.unknowns(request, layout, coordinates) if own else free(layout)
 

@@ -172,13 +172,14 @@ def _notes(design: Mesh, results: Sequence[Result]) -> tuple[str, ...]:
     for k, result in enumerate(results):
         for note in dict.fromkeys(result.notes):
             said.setdefault(note, []).append(k)
+        said.setdefault(f"solved by {result.formulation!r}", []).append(k)
         if result.status is bad:
             said.setdefault(str(bad), []).append(k)
     for note, who in said.items():
         if len(who) < len(results):
             numbers = ", ".join(map(str, who[:_NAMED])) + (" ..." if len(who) > _NAMED else "")
             out.append(f"component{'s' if len(who) > 1 else ''} {numbers}: {note}")
-        elif note != str(bad):
+        elif note not in (str(bad), f"solved by {results[0].formulation!r}"):
             out.append(note)
     if any(r.spline is not None for r in results):
         out.append("every component has a spline of its own: result.components[k].spline")

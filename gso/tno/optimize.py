@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from types import ModuleType
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso import tasks
+from gso import flat_start, tasks
 from gso.components import several
 from gso.constraints import TIGHT, Constraint, compile_constraints
 from gso.fit import describe_spline
@@ -24,7 +25,7 @@ from gso.tno import components, linear
 from gso.tno.canonical import Canonical
 from gso.tno.job import Job
 from gso.tno.run import Outcome, Run
-from gso.tno.search import reach_target, stay_within
+from gso.tno.search import of_curvature, of_strain, reach, stay_within, strain_left
 from gso.tno.solver import Callback
 from gso.tno.start import Start
 
@@ -39,6 +40,7 @@ def optimize(
     options: Any = None,
     constraints: Sequence[Constraint] = (),
     max_deviation: float | None = None,
+    max_strain: float | None = None,
     target_curvature: float | None = None,
     x0: Any = None,
     callback: Callback | None = None,
@@ -65,13 +67,17 @@ def optimize(
         `SlidingBoundary`, `Glue`, `SymmetryPlane`, `PlanarFaces`, `FixedLengths`. For
         `flatten` and `conformal` they are about the flat image.
     max_deviation : float, optional
-        `developable` by "curvature" only: no vertex of the result is farther than this from
-        the design, in the mesh's unit; as developable as that allows.
+        `developable`: the result and the design are nowhere farther apart than this, both
+        ways, in the mesh's unit; as developable as that allows.
+    max_strain : float, optional
+        `developable`: the largest strain, max ``|s - 1|``, that the flat pattern of the result may
+        have, such as 0.005; with the smallest displacement that does, or within
+        `max_deviation`.
     target_curvature : float, optional
-        `developable` by "curvature" only: the mean absolute curvature ``loss_gc`` to reach, in
-        1/size^2 as the metrics have it (size: the largest distance from the centroid), with
-        the smallest displacement that does. Of several components each reaches it by its own
-        size.
+        `developable` by "curvature" only: the mean absolute curvature ``loss_gc_worst`` to
+        reach within 5 %, in 1/size^2 as the metrics have it (size: the largest distance from
+        the centroid), with the smallest displacement that does. Of several components each
+        reaches it by its own size.
     x0 : Mesh, array or Start, optional
         Where to start: vertices (n, 3) or a grid; (n, 2) or (H, W, 2) for a flat image.
         Proximity and lengths stay those of `mesh`. On grids what is wrong with a surface
@@ -109,20 +115,26 @@ def optimize(
     clock = time.perf_counter()
     from gso.io import as_mesh
 
-    design = as_mesh(mesh)
+    design, given_formulation = as_mesh(mesh), formulation
     module, formulation, settings = check(
-        task, formulation, options, max_deviation, target_curvature
+        task, formulation, options, max_deviation, target_curvature, max_strain
     )
     given = x0 if isinstance(x0, Start) else Start(x0)
-    if target_curvature is not None and given.iterations is not None:
-        raise OptionError(
-            "target_curvature takes many solves, which the iterations of a start would cut off; "
-            "leave one of them out"
-        )
+    if given.iterations is not None:
+        for name, value in (("target_curvature", target_curvature), ("max_strain", max_strain)):
+            if value is not None:
+                raise OptionError(
+                    f"{name} takes many solves, which the iterations of a start would cut off; "
+                    "leave one of them out"
+                )
     flat = getattr(module, "BLOCK", "surface") == "flat"
     whole = Job(design, compile_constraints(constraints, design, flat=flat), given)
-    wanted = {"max_deviation": max_deviation, "target_curvature": target_curvature}
-    one = partial(_solved, task, formulation, settings, wanted)
+    wanted = {
+        "max_deviation": max_deviation,
+        "max_strain": max_strain,
+        "target_curvature": target_curvature,
+    }
+    one = partial(_solved, task, formulation, given_formulation, settings, wanted)
     pieces = components.parts(design, whole.constraints)
     if pieces:
         result = components.solve(one, whole, pieces, callback)
@@ -137,6 +149,7 @@ def optimize(
 def _solved(
     task: str,
     formulation: str,
+    given_formulation: str | None,
     settings: Options,
     wanted: dict[str, float | None],
     job: Job,
@@ -160,12 +173,16 @@ def _solved(
         budget=given.iterations,
         tolerance=given.tolerance,
     )
-    if wanted["max_deviation"] is not None:
-        outcome = stay_within(run, request, wanted["max_deviation"] / frame.frame.scale)
-    elif wanted["target_curvature"] is not None:
-        outcome = reach_target(run, request, wanted["target_curvature"])
-    else:
-        outcome = run(request)
+    bound = wanted["max_deviation"]
+    outcome, request = _searched(
+        run,
+        request,
+        None if bound is None else bound / frame.frame.scale,
+        wanted["max_strain"],
+        wanted["target_curvature"],
+        others=others(request, given_formulation),
+    )
+    formulation = request.formulation
     judge(request, frame, outcome)
     result = packed(task, formulation, job.design, frame, outcome, run)
     if several(job.design):
@@ -177,12 +194,57 @@ def _solved(
     return result
 
 
+def _searched(
+    run: Run,
+    request: Request,
+    bound: float | None,
+    max_strain: float | None,
+    target_curvature: float | None,
+    *,
+    others: Sequence[Request],
+) -> tuple[Outcome, Request]:
+    """Solve as often as what is asked for takes, and the request that the outcome is of.
+
+    Where a bound on distance or strain is missed, the other formulations are asked too.
+    """
+    if target_curvature is not None:
+        return reach(run, request, of_curvature(request, target_curvature))[0], request
+    if bound is None and max_strain is None:
+        return run(request), request
+    best: Any = None
+    least, chosen = np.inf, request
+    for asked in (request, *others):
+        if bound is not None:
+            outcome, met = stay_within(run, asked, bound, max_strain)
+        else:
+            outcome, met = reach(run, asked, of_strain(asked, max_strain))  # type: ignore[arg-type]
+        if best is not None or not met:
+            value = strain_left(asked, outcome)
+        if best is None or met or value < least:
+            best, chosen = outcome, asked
+        if met:
+            break
+        least = min(least, value)
+    return best, chosen
+
+
+def others(request: Request, formulation: str | None) -> list[Request]:
+    """Requests by the formulation "isometry", where the user named none and it can be asked."""
+    kind = tasks.get("developable").OPTIONS
+    usual = type(request.options) is kind["curvature"] and request.options.variables != "surface"
+    hard = any(part.hard for part in request.constraints.parts)
+    if formulation is not None or not usual or hard or not flat_start.flattens(request.mesh):
+        return []
+    return [replace(request, formulation="isometry", options=kind["isometry"](), start=None)]
+
+
 def check(
     task: str,
     formulation: str | None = None,
     options: Any = None,
     max_deviation: float | None = None,
     target_curvature: float | None = None,
+    max_strain: float | None = None,
 ) -> tuple[ModuleType, str, Options]:
     """Check what can be checked before there is a mesh; arguments as for :func:`optimize`.
 
@@ -203,17 +265,24 @@ def check(
     settings = kind.coerce(options)
     if settings.backend is not None:
         linear.find(settings.backend)
-    for name, value in (("max_deviation", max_deviation), ("target_curvature", target_curvature)):
+    bounds = {
+        "max_deviation": max_deviation,
+        "max_strain": max_strain,
+        "target_curvature": target_curvature,
+    }
+    for name, value in bounds.items():
         if value is None:
             continue
         if task != "developable":
             raise OptionError(f"{name} belongs to task 'developable', not {task!r}")
-        if formulation != "curvature":
+        if name == "target_curvature" and formulation != "curvature":
             raise OptionError(f"{name} belongs to the formulation 'curvature', not {formulation!r}")
         if not (isinstance(value, int | float | np.number) and 0 < value < np.inf):
             raise OptionError(f"{name} is {value!r}; it must be a positive number")
-    if max_deviation is not None and target_curvature is not None:
-        raise OptionError("give max_deviation or target_curvature, not both")
+    if target_curvature is not None:
+        for name in ("max_deviation", "max_strain"):
+            if bounds[name] is not None:
+                raise OptionError(f"give {name} or target_curvature, not both")
     return module, formulation, settings
 
 

@@ -25,7 +25,7 @@ class Outcome:
     """Coordinates that a run ended with, and how.
 
     Where the surface is a B-spline: with how many control points, and the coordinates that
-    it was fitted to before its own stage.
+    it was fitted to before its own stage. `stage` is the one that was solved last.
     """
 
     blocks: dict[str, Array]
@@ -36,6 +36,13 @@ class Outcome:
     details: dict[str, Any] = field(default_factory=dict)
     spline: tuple[int, int] | None = None
     fitted: dict[str, Array] = field(default_factory=dict)
+    stage: Stage | None = None
+
+    def move(self, blocks: dict[str, Array]) -> None:
+        """Take other coordinates, with their own energy."""
+        self.blocks = blocks
+        if self.stage is not None:
+            self.energy = objective(self.stage, self.stage.layout.pack(blocks))
 
     @property
     def points(self) -> Array:
@@ -122,7 +129,7 @@ class Run:
         if plan.spline is not None and end.given is not None:
             outcome.fitted = plan.layout.split(end.given)
         outcome.notes += tuple(plan.remark(coordinates)) if plan.remark is not None else ()
-        outcome.backend = end.solution.backend
+        outcome.backend, outcome.stage = end.solution.backend, end.stage
         if plan.status is None or end.solution.status is Status.CANCELLED:
             outcome.status = end.solution.status
         return outcome
@@ -207,6 +214,8 @@ class Run:
         problem = Problem(stage.items, variables, stage.limits)
         x = variables.project(coordinates)
         bounds = None if stage.bounds is None else stage.bounds(coordinates)
+        if bounds is not None:
+            x = np.clip(x, *bounds)
         self.timings.setup += time.perf_counter() - clock
         most = stage.iterations
         if self.budget is not None:

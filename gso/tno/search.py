@@ -1,124 +1,300 @@
-"""The two questions of the developable task: how close, and how developable."""
+"""The questions of the developable task: how close, how developable, how much strain.
+
+Each is a search over the weight of what makes a surface developable. The smallest weight that
+meets the demand has the smallest displacement.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gso import metrics
+from gso import flat_start, metrics
+from gso.components import average, several
+from gso.mesh import Mesh
 from gso.status import Status
 from gso.tasks.base import Request
+from gso.tno.strain import largest_strain, lay_out
 
-#: Solves of one search, and how far below its target a result may lie.
+Array = NDArray[np.float64]
+Solve = Callable[[Request], Any]
+
+#: Curvature that every design is below.
+_ANY = 1e300
+#: Solves of one search, and steps of the interpolation between two of its results.
 _SOLVES = 10
-_CLOSE = 0.03
-_RANGE = (1e-2, 1e5)
+_BLENDS = 25
+#: Weights beyond which no search goes: fairness counts nothing there, and surfaces crumple.
+_RANGE = (1e-2, 1e3)
+#: A larger weight that leaves more than this share of a value has come to an obstacle; a search
+#: gives up after so many of them.
 _PROGRESS = 0.98
+_OBSTACLES = 3
+#: Weights of the solves within a bound, while the strain is too large.
+_HARDER = (1.0, 6.0, 36.0)
 _ITERATIONS = 25
 _COARSE_ITERATIONS = 15
+#: No result of a search moves a vertex farther than this, in unit balls.
+FARTHEST = 0.25
+#: Largest strain of what is called developable where only a distance is asked for.
+DEVELOPABLE = 5e-3
 
 
-def stay_within(run: Callable[[Request], Any], request: Request, bound: float) -> Any:
-    """The more developable of two solves: one with the bound, one without that meets it."""
-    bounded = run(replace(request, max_deviation=bound))
-    if bounded.status in (Status.ALREADY_GOOD, Status.CANCELLED):
-        return bounded
+@dataclass
+class Demand:
+    """A value of a surface that must fall to a target.
+
+    Attributes
+    ----------
+    value : callable
+        Of the surface (n, 3), in the frame of the request.
+    target : float
+        What it must not pass.
+    close : float
+        Share of the target that a result may stay below it.
+    """
+
+    value: Callable[[Array], float]
+    target: float
+    close: float
+
+    @property
+    def aim(self) -> float:
+        """What the next weight is chosen for."""
+        return (1.0 - 0.5 * self.close) * self.target
+
+    def met(self, value: float) -> bool:
+        """Whether a value does not pass the target."""
+        return value <= self.target
+
+    def near(self, value: float) -> bool:
+        """Whether a value meets the target and is close to it."""
+        return (1.0 - self.close) * self.target <= value <= self.target
+
+
+def of_curvature(request: Request, target: float) -> Demand:
+    """``loss_gc_worst`` of at most `target`, reached within 5 %."""
+
+    def value(points: Array) -> float:
+        return curved(request.mesh, points)
+
+    return Demand(value, target, 0.05)
+
+
+def curved(mesh: Mesh, points: Array) -> float:
+    """``loss_gc_worst`` of a surface (n, 3) in the unit ball; of components by their own sizes."""
+    after = mesh.replaced(points)
+    if not several(mesh):
+        return metrics.loss_gc_worst(after, scale=1.0)
+    return float(average(lambda a, b: metrics.loss_gc_worst(b, scale=metrics.unit(a)), mesh, after))
+
+
+def of_strain(request: Request, target: float) -> Demand:
+    """Largest strain of the flat pattern of at most `target`, reached within 10 %."""
+    return Demand(lambda points: largest_strain(request.mesh, points), target, 0.1)
+
+
+def strain_left(request: Request, outcome: Any) -> float:
+    """Largest strain of the flat pattern of an outcome; infinite where there is no pattern."""
+    if not flat_start.flattens(request.mesh):
+        return np.inf
+    return largest_strain(request.mesh, outcome.points)
+
+
+def stay_within(
+    run: Solve, request: Request, bound: float, strain: float | None
+) -> tuple[Any, bool]:
+    """The most developable of several solves with a bound, and one without that meets it.
+
+    They end when the largest strain is at most `strain`, or `DEVELOPABLE` where it is None;
+    surfaces without a flat pattern are compared by their curvature.
+
+    Returns
+    -------
+    outcome, met
+        Whether nothing is left to ask for.
+    """
+    limit = of_strain(request, DEVELOPABLE if strain is None else strain)
+    if strain is None and not flat_start.flattens(request.mesh):
+        limit = of_curvature(request, 0.0)
+    best, least = None, np.inf
+    for weight in _HARDER:
+        outcome = run(replace(request, max_deviation=bound, demand=weight))
+        if outcome.status in (Status.ALREADY_GOOD, Status.CANCELLED):
+            return _cancelled(best or outcome, outcome), True
+        value = limit.value(outcome.points)
+        if best is not None and not value < _PROGRESS * least:
+            break
+        best, least = outcome, value
+        if limit.met(value):
+            break
     free = run(request)
     if free.status is Status.CANCELLED:
-        bounded.status = Status.CANCELLED
-        return bounded
-    used = request.mesh.used
-    distance = metrics.point_to_surface(free.points[used], request.mesh)
-    if distance.max() > bound or _curvature(request, free) >= _curvature(request, bounded):
-        return bounded
-    return free
+        return _cancelled(best, free), True
+    if _distance(request, free) <= bound and limit.value(free.points) < least:
+        return free, limit.met(limit.value(free.points))
+    return best, limit.met(least)
+
+
+def _cancelled(best: Any, last: Any) -> Any:
+    if last.status is Status.CANCELLED:
+        best.status = Status.CANCELLED
+    return best
 
 
 def _distance(request: Request, outcome: Any) -> float:
-    """``d_H`` of an outcome."""
-    return metrics.d_H(request.mesh, request.mesh.replaced(outcome.points))
+    """Largest distance between the design and an outcome, both ways."""
+    found = metrics.surface_distance(request.mesh, request.mesh.replaced(outcome.points))
+    return max(found.there_max, found.back_max)
 
 
-def _curvature(request: Request, outcome: Any) -> float:
-    """``loss_gc`` of an outcome, in the frame of the request."""
-    return metrics.loss_gc(request.mesh.replaced(outcome.points), scale=1.0)
+def reach(run: Solve, request: Request, demand: Demand) -> tuple[Any, bool]:
+    """Solve with growing or falling weight until the demand is met, and hardly more than met.
 
+    Values fall with the weight, but not steadily: after a search by regula falsi on logarithms,
+    every solve started from the last one that missed, the surface is interpolated between the
+    best one that meets the demand and the last one that does not (or the design), where none is
+    close enough. No result is farther than `FARTHEST` from the design.
 
-def reach_target(run: Callable[[Request], Any], request: Request, target: float) -> Any:
-    """Solve with growing or falling curvature weight until ``loss_gc`` is just below `target`.
-
-    Mean |K| falls steadily with the weight, so the smallest displacement that meets the
-    target belongs to the smallest weight that does: a secant search on their logarithms,
-    every solve started from the last one above the target.
+    Returns
+    -------
+    outcome, met
+        Whether the demand is met, or the search was cancelled.
     """
-    if metrics.loss_gc(request.mesh, scale=1.0) <= target and request.constraints.empty:
-        options = replace(request.options, developable_below=target)
-        return run(replace(request, options=options, start=None))
-    given = request.options
-    best: Any = None
-    distance = np.inf
-    # A preset may meet the target already: nothing farther away is returned.
-    spline = {"variables": "surface"} if given.variables == "surface" else {}
-    presets = (replace(given, **preset | spline) for preset in given.PRESETS.values())
-    for options in dict.fromkeys((given, *presets)):
-        last = run(replace(request, options=options))
-        if last.status is Status.CANCELLED:
-            break
-        if _curvature(request, last) <= target and (moved := _distance(request, last)) < distance:
-            best, distance = last, moved
-    options = replace(
-        given,
-        variables=spline.get("variables", "free"),
-        iterations=max(given.iterations, _ITERATIONS),
-        coarse_iterations=max(given.coarse_iterations, _COARSE_ITERATIONS),
-    )
-    request = replace(request, options=options)
+    design = request.mesh.vertices
+    start = demand.value(design)
+    free = request.constraints.empty
+    if demand.met(start) and free:
+        options = replace(request.options, developable_below=_ANY)
+        return run(replace(request, options=options, start=None)), True
+    found = _Found(request, demand)
+    if free:
+        found.missed = (design, start)
+    weighed = replace(request, options=_patient(request.options))
     weight, low, high = 1.0, 0.0, np.inf
     value_low = value_high = np.nan
+    last, least, obstacles = None, np.inf, 0
     for _ in range(_SOLVES):
+        last = run(replace(weighed, demand=weight))
         if last.status is Status.CANCELLED:
             break
-        last = run(replace(request, curvature_weight=weight))
-        value = _curvature(request, last)
-        if value <= target:
+        value = demand.value(last.points)
+        last.details = {**last.details, "demand": weight}
+        far = found.add(last, value)
+        if demand.near(value) and not far:
+            break
+        if demand.met(value) or far:
             high, value_high = weight, value
-            moved = _distance(request, last)
-            last.details = {**last.details, "curvature_weight": weight}
-            if moved < distance:
-                best, distance = last, moved
-            if value >= (1.0 - _CLOSE) * target:
-                break
         else:
             stuck = value > _PROGRESS * value_low
             low, value_low = weight, value
-            # Curvature that is gone comes back slowly: go on from the side that has more.
+            # What is gone comes back slowly: go on from the side that has more of it.
             # Where more weight changes nothing, a new start gets round the obstacle.
-            request = replace(request, start=None if stuck else last.points)
-        if not _RANGE[0] < weight < _RANGE[1]:
+            weighed = replace(weighed, start=request.start if stuck else last.points)
+        obstacles = 0 if value < _PROGRESS * least else obstacles + 1
+        least = min(least, value)
+        if found.best is None and obstacles == _OBSTACLES:
             break
-        weight = _next(weight, value, target, low, high, value_low, value_high)
-    chosen = last if best is None else best
-    if last.status is Status.CANCELLED:
-        chosen.status = Status.CANCELLED
-    else:
-        chosen.status = Status.TARGET_MISSED if best is None else Status.TARGET_REACHED
-    return chosen
+        if not _RANGE[0] < weight < _RANGE[1] or (np.isfinite(high) and high < 1.02 * low):
+            break
+        weight = _next(weight, value, demand.aim, low, high, value_low, value_high)
+    chosen = found.chosen(last)
+    return chosen, chosen.status is not Status.TARGET_MISSED
+
+
+@dataclass
+class _Found:
+    """The best results of a search so far."""
+
+    request: Request
+    demand: Demand
+    best: Any = None
+    value: float = np.inf
+    moved: float = np.inf
+    missed: tuple[Array, float] | None = None
+    closest: tuple[Any, float] = field(default=(None, np.inf))
+
+    def add(self, outcome: Any, value: float) -> bool:
+        """Take up a result; whether it is too far from the design."""
+        u = outcome.points - self.request.mesh.vertices
+        moved = float(np.sqrt((u * u).sum(axis=1)).max(initial=0.0))
+        if not (np.isfinite(moved) and moved <= FARTHEST):
+            return True
+        if self.demand.met(value):
+            mean = float(np.abs(u).mean())
+            if mean < self.moved:
+                self.best, self.value, self.moved = outcome, value, mean
+        else:
+            if self.missed is None or value < self.missed[1]:
+                self.missed = (outcome.points, value)
+            if value < self.closest[1]:
+                self.closest = (outcome, value)
+        return False
+
+    def chosen(self, last: Any) -> Any:
+        """The result, with its status."""
+        best = self.best
+        if best is None:
+            best = self.closest[0] or last
+            status = Status.TARGET_MISSED
+        else:
+            status = Status.TARGET_REACHED
+            if not self.demand.near(self.value):
+                self._blend(best)
+        best.status = Status.CANCELLED if last.status is Status.CANCELLED else status
+        return best
+
+    def _blend(self, outcome: Any) -> None:
+        """Move an outcome towards the surface that missed, as far as the demand stays met."""
+        linear = not any(part.hard for part in self.request.constraints.parts)
+        if self.missed is None or outcome.spline is not None or not linear:
+            return
+        far, near = self.missed[0], outcome.points
+        low, high = 0.0, 1.0
+        for _ in range(_BLENDS):
+            share = 0.5 * (low + high)
+            value = self.demand.value(far + share * (near - far))
+            if self.demand.met(value):
+                high = share
+                if self.demand.near(value):
+                    break
+            else:
+                low = share
+        if high < 1.0:
+            points = far + high * (near - far)
+            blocks = {"surface": points}
+            if "flat" in outcome.blocks:
+                blocks["flat"] = lay_out(self.request.mesh, points)[1]
+            outcome.move(blocks)
+
+
+def _patient(options: Any) -> Any:
+    """Options with free vertices and iterations enough, but for B-splines."""
+    if not hasattr(options, "coarse_iterations"):
+        return options
+    changes: dict[str, Any] = {
+        "iterations": max(options.iterations, _ITERATIONS),
+        "coarse_iterations": max(options.coarse_iterations, _COARSE_ITERATIONS),
+    }
+    if options.variables != "surface":
+        changes["variables"] = "free"
+    return replace(options, **changes)
 
 
 def _next(
     weight: float,
     value: float,
-    target: float,
+    aim: float,
     low: float,
     high: float,
     value_low: float,
     value_high: float,
 ) -> float:
     """Next weight: regula falsi in logarithms inside a bracket, a power law outside."""
-    aim = 0.985 * target
     if low > 0 and np.isfinite(high):
         a, b = np.log(low), np.log(high)
         share = (np.log(value_low) - np.log(aim)) / max(
@@ -126,4 +302,4 @@ def _next(
         )
         return float(np.exp(a + np.clip(share, 0.1, 0.9) * (b - a)))
     factor = float(np.clip((max(value, 1e-12) / aim) ** 1.2, 0.1, 10.0))
-    return weight * factor
+    return weight * (min(factor, 0.5) if np.isfinite(high) else max(factor, 1.5))

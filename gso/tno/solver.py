@@ -203,5 +203,6 @@ def _says_no(answer: object) -> bool:
 def _held(x: Array, gradient: Array, bounds: tuple[Array, Array]) -> NDArray[np.bool_]:
     """Unknowns at a bound that the gradient pushes against."""
     low, high = bounds
-    margin = 1e-6 * (high - low)
+    width = high - low
+    margin = 1e-6 * np.where(np.isfinite(width), width, 0.0)
     return ((x <= low + margin) & (gradient > 0)) | ((x >= high - margin) & (gradient < 0))
