@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gso import metrics
 from gso.mesh import Mesh
+from gso.spelling import known_keywords
 from gso.spline import BSplineSurface, Gap, basis, clamped_knots
 from gso.status import MeshError, OptionError
 
@@ -20,6 +21,7 @@ _REFINED = 4
 _LARGE = 100_000
 
 
+@known_keywords()
 def fit_spline(surface: Any, controls: int | tuple[int, int] = 16) -> BSplineSurface:
     """Bicubic B-spline closest to a grid at uniform parameters, by least squares.
 

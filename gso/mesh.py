@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gso import geometry, topology
+from gso.attributes import Attributes
 from gso.status import MeshError
+from gso.welding import collapse, seams
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -47,6 +49,8 @@ class Mesh:
         triangle ends in -1.
     notes : sequence of str
         What was changed on the way in, for the user to read.
+    attributes : Attributes, optional
+        Names and texture coordinates of these faces.
 
     Attributes
     ----------
@@ -55,7 +59,10 @@ class Mesh:
     grid_index : ndarray of int, (H, W), or None
         Vertex ids by row and column when the mesh is a grid, whatever its numbering.
     notes : tuple of str
-        What was repaired: orientation, welded poles, unused vertices.
+        What was repaired: orientation, welded poles, unused vertices; edges that lie on
+        each other without being joined.
+    attributes : Attributes or None
+        What a file said of the faces, to be written with them again.
 
     Raises
     ------
@@ -71,13 +78,22 @@ class Mesh:
     ((12, 4), (4, 5, 3))
     """
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, notes: tuple[str, ...] = ()):
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        *,
+        notes: tuple[str, ...] = (),
+        attributes: Attributes | None = None,
+    ):
         points = _checked_vertices(vertices)
-        table, said = _checked_faces(faces, points)
+        table, flipped, said = _checked_faces(faces, points)
         self.vertices: Array = points
         self.faces: Ints = table
         topology.check_vertices(self.half_edges)
-        self.notes: tuple[str, ...] = tuple(notes) + said
+        self.given_notes: tuple[str, ...] = tuple(notes)
+        self.notes: tuple[str, ...] = self.given_notes + _unjoined(self) + said
+        self.attributes = None if attributes is None else _turned(attributes, table, flipped)
         self.vertices.flags.writeable = False
         self.faces.flags.writeable = False
 
@@ -118,6 +134,8 @@ class Mesh:
         other.__dict__.update(
             {k: v for k, v in self.__dict__.items() if k in _CONNECTIVITY},
             vertices=points,
+            attributes=self.attributes,
+            given_notes=self.given_notes,
             notes=self.notes + tuple(notes),
         )
         return other
@@ -182,6 +200,11 @@ class Mesh:
         return topology.edges(self.half_edges)
 
     @cached_property
+    def rim(self) -> NDArray[np.bool_]:
+        """Mask over :attr:`edges`: on the boundary."""
+        return topology.rim(self.half_edges)
+
+    @cached_property
     def boundary_loops(self) -> list[Ints]:
         """Vertex ids of each boundary loop, longest first."""
         return topology.boundary_loops(self.half_edges)
@@ -196,6 +219,32 @@ class Mesh:
         e = self.edges
         links = coo_matrix((np.ones(len(e)), (e[:, 0], e[:, 1])), shape=(n, n))
         return connected_components(links, directed=False)[1].astype(np.int64)
+
+    @property
+    def seams(self) -> NDArray[np.bool_]:
+        """Mask over half-edges: on the boundary, and on top of another such edge."""
+        he = self.half_edges
+        mask = he.twin < 0
+        # Programs round what they write: so far apart is still on top of each other.
+        step = _JOINED * np.ptp(self.vertices[self.used], axis=0).max()
+        origin, dest = he.origin[mask], he.dest[mask]
+        mask[mask] = seams(np.round((self.vertices - self.frame.centre) / step), origin, dest)
+        return mask
+
+    def check_joined(self) -> None:
+        """Refuse a heap of faces that touch and share no vertices: nothing holds it together.
+
+        Raises
+        ------
+        MeshError
+            Most faces have vertices of their own, where those of their neighbours are.
+        """
+        touching = np.unique(self.components[self.half_edges.origin[self.seams]]).size
+        if touching >= max(2, _HEAP * len(self.faces)):
+            raise MeshError(
+                f"the {len(self.faces)} faces are {touching} separate pieces that touch: each "
+                f"has vertices of its own. {_advice(self)}"
+            )
 
     @property
     def euler_characteristic(self) -> int:
@@ -264,6 +313,33 @@ def _grid_template(height: int, width: int) -> Mesh:
     return mesh
 
 
+#: Vertices closer than this share of the size are taken to be at one place.
+_JOINED = 1e-7
+#: Pieces that touch, by face, from which on a mesh is a heap of them.
+_HEAP = 0.4
+
+
+def _unjoined(mesh: Mesh) -> tuple[str, ...]:
+    """What is to be said of edges that lie on each other without being joined."""
+    count = int(mesh.seams.sum())
+    if not count:
+        return ()
+    return (f"{count} edges lie on others without being joined to them. {_advice(mesh)}",)
+
+
+def _advice(mesh: Mesh) -> str:
+    least = 10 * _JOINED * mesh.diagonal
+    return f"Merge their vertices with weld={least:.1g} of gso.load, --weld {least:.1g} of gso"
+
+
+def _turned(attributes: Attributes, table: Ints, flipped: NDArray[np.bool_]) -> Attributes:
+    """Attributes of faces some of which were reversed."""
+    corners = np.broadcast_to(np.arange(table.shape[1]), table.shape).copy()
+    corners[table < 0] = -1
+    corners[flipped] = topology.reverse(corners[flipped])
+    return attributes.taken(np.arange(len(table)), corners)
+
+
 _CONNECTIVITY = (
     "faces",
     "half_edges",
@@ -272,6 +348,7 @@ _CONNECTIVITY = (
     "triangle_edges",
     "splits",
     "edges",
+    "rim",
     "boundary_loops",
     "components",
 )
@@ -302,7 +379,8 @@ def _checked_vertices(vertices: ArrayLike) -> Array:
     return points
 
 
-def _checked_faces(faces: Any, points: Array) -> tuple[Ints, tuple[str, ...]]:
+def _checked_faces(faces: Any, points: Array) -> tuple[Ints, NDArray[np.bool_], tuple[str, ...]]:
+    """The faces as integers, consistently oriented; which were reversed; what was found."""
     try:
         given = np.asarray(faces)
     except ValueError:
@@ -327,11 +405,12 @@ def _checked_faces(faces: Any, points: Array) -> tuple[Ints, tuple[str, ...]]:
             f"({bad.size} such faces)"
         )
     _check_corners(table)
-    table, flipped, components = topology.orient(table, len(points))
+    given_table = table
+    table, flips, components = topology.orient(table, len(points))
     _check_area(table, points)
     said = []
-    if flipped:
-        said.append(f"{flipped} faces were reversed to make the orientation consistent")
+    if flips:
+        said.append(f"{flips} faces were reversed to make the orientation consistent")
     if components > 1:
         said.append(f"the mesh has {components} components; each is treated on its own")
     unused = np.ones(len(points), bool)
@@ -341,7 +420,7 @@ def _checked_faces(faces: Any, points: Array) -> tuple[Ints, tuple[str, ...]]:
             f"{int(unused.sum())} vertices belong to no face and stay as they are "
             f"(the first is vertex {np.flatnonzero(unused)[0]})"
         )
-    return table, tuple(said)
+    return table, table[:, 1] != given_table[:, 1], tuple(said)
 
 
 def _check_corners(table: Ints) -> None:
@@ -409,13 +488,7 @@ def _weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]]
         # A corner may have been welded to another side already: take that side along.
         target[np.isin(target, target[sides[name]])] = target[sides[name]].min()
     kept, new = np.unique(target, return_inverse=True)
-    table = new[faces]
-    repeat = table == np.roll(table, -1, axis=1)
-    table = table[repeat.sum(axis=1) <= 1]
-    tri = np.flatnonzero((table == np.roll(table, -1, axis=1)).any(axis=1))
-    at = (table[tri] == np.roll(table[tri], -1, axis=1)).argmax(axis=1)
-    table[tri] = np.take_along_axis(table[tri], (at[:, None] + np.arange(4)) % 4, axis=1)
-    table[tri] = np.c_[table[tri][:, 1:], np.full(tri.size, -1)]
+    table = collapse(faces, new).faces
     verb = "is one point" if len(poles) == 1 else "are one point each"
     note = f"the {' and the '.join(poles)} of the grid {verb}: welded to a pole"
     return points[kept], table, (note,)

@@ -58,6 +58,11 @@ INFO: dict[str, Info] = {
     "deviation_max": Info("%", True, "largest true distance of a result vertex / diagonal", "max"),
     "displacement_rms": Info("%", True, "root mean square vertex displacement / diagonal"),
     "displacement_max": Info("%", True, "largest vertex displacement / diagonal", "max"),
+    "loop_ratio_min": Info("", None, "smallest length of a boundary loop, out / in", "min"),
+    "loop_ratio_max": Info("", None, "largest length of a boundary loop, out / in", "max"),
+    "edge_ratio_min": Info("", False, "smallest length of an edge, out / in", "min"),
+    "fold_max": Info("deg", True, "largest angle between the normals of neighbouring faces", "max"),
+    "fold_max_before": Info("deg", True, "fold_max of the input", "max"),
     "fairness_ratio": Info("", True, "sum of squared second differences, out / in"),
     "loss_iso_cell": Info("size", True, "isometry defect of the cells (published)"),
     "isometry_energy": Info("", True, "mean E_iso of the faces, relative (Jiang et al. 2020)"),
@@ -388,6 +393,51 @@ def fairness_ratio(before: Any, after: Any) -> float:
     return fairness(after, scale=1.0) / was if was > 0 else 1.0
 
 
+def edge_ratios(before: Any, after: Any) -> Array:
+    """Length of every edge (e,) in the result over that in the input; NaN where it had none.
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> edge_ratios(grid, 2.0 * grid).min()
+    np.float64(2.0)
+    """
+    here, there = _mesh(before), _points(after)
+    a, b = here.edges.T
+    was, now = (np.linalg.norm(p[a] - p[b], axis=1) for p in (here.vertices, there))
+    return np.divide(now, was, out=np.full(len(was), np.nan), where=was > 0)
+
+
+def loop_ratios(before: Any, after: Any) -> Array:
+    """Length of every boundary loop in the result over that in the input, longest loop first.
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> loop_ratios(grid, 0.5 * grid)
+    array([0.5])
+    """
+    here, there = _mesh(before), _points(after)
+    loops = here.boundary_loops
+    was, now = (np.array([_around(p[loop]) for loop in loops]) for p in (here.vertices, there))
+    return now / was
+
+
+def _around(points: Array) -> float:
+    """Length of a closed polygon (n, 3)."""
+    return float(np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1).sum())
+
+
+def folds(surface: Any) -> Array:
+    """Angle between the normals of the two faces at every interior edge, degrees, (e,).
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> folds(grid).max()
+    np.float64(0.0)
+    """
+    mesh = _mesh(surface)
+    he, normal = mesh.half_edges, face_normals(mesh)
+    inner = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    a, b = (components(normal[he.face[h]]) for h in (inner, he.twin[inner]))
+    return np.degrees(geometry.angle(a, b))
+
+
 def _flat(surface: Any, flat: Any) -> Array:
     """Flat image as (n, 2), or another surface as (n, 3), in the order of the mesh's vertices."""
     if hasattr(flat, "vertices"):
@@ -499,7 +549,7 @@ def corner_strains(surface: Any, flat: Any) -> Array:
     In the order of :func:`gso.topology.corner_triangles`; NaN where one has no area.
     """
     tri = topology.corner_triangles(_faces(surface))
-    p, q = _points(surface), _flat(surface, flat)
+    p, q = _in_range(_points(surface), _flat(surface, flat))
     area = _space_areas(p, tri)
     keep = area > 1e-12 * area.max()
     here, there = ([components(x[k]) for k in tri[keep].T] for x in (p, q))
@@ -521,7 +571,7 @@ def stretches(surface: Any, flat: Any) -> tuple[Array, Array]:
     Of the parallelograms of a quad's edge midpoints, and of triangles: their product is the
     ratio of areas, their quotient the quasi-conformal ratio. NaN where a face has no area.
     """
-    faces, p, q = _faces(surface), _points(surface), _flat(surface, flat)
+    faces, (p, q) = _faces(surface), _in_range(_points(surface), _flat(surface, flat))
     out = np.full((2, len(faces)), np.nan)
     quad = topology.are_quads(faces)
     for which, some in zip((quad, ~quad), topology.by_size(faces), strict=True):
@@ -548,8 +598,8 @@ def quasi_conformal(surface: Any, flat: Any) -> Array:
 def area_error(surface: Any, flat: Any) -> float:
     """Mean of |A'/A - 1| over the corner triangles, those without area left out."""
     tri = topology.corner_triangles(_faces(surface))
-    before = _space_areas(_points(surface), tri)
-    after = corner_areas(_flat(surface, flat), tri)
+    p, q = _in_range(_points(surface), _flat(surface, flat))
+    before, after = _space_areas(p, tri), corner_areas(q, tri)
     keep = before > 1e-12 * before.max()
     return float(np.abs(after[keep] / before[keep] - 1.0).mean())
 
@@ -601,6 +651,15 @@ def area(mesh: Mesh, points: Array | None = None) -> float:
     v = mesh.vertices if points is None else points
     p, q, r = (np.pad(v[k], ((0, 0), (0, 3 - v.shape[1]))) for k in mesh.triangles.T)
     return float(0.5 * np.linalg.norm(np.cross(q - p, r - p), axis=1).sum())
+
+
+def _in_range(p: Array, q: Array) -> tuple[Array, Array]:
+    """A surface and its image in a unit of length whose fourth power is still a number.
+
+    The unit is a power of two, which changes no digit of their ratios.
+    """
+    unit = 2.0 ** np.floor(np.log2(np.ptp(p, axis=0).max() or 1.0))
+    return p / unit, q / unit
 
 
 def _space_areas(points: Array, faces: NDArray[np.int64]) -> Array:

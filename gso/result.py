@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.attributes import Attributes
 from gso.mesh import Mesh
 from gso.spline import BSplineSurface
 from gso.status import MeshError, Progress, Status
@@ -143,7 +144,9 @@ class Result:
         ``.npz`` keeps everything and is read back by :meth:`load`; ``.svg`` is the flat
         image at 1:1, `unit` the unit of the mesh's coordinates; ``.step``, ``.iges`` and
         ``.3dm`` are the spline, in that unit (see :func:`gso.save_spline`); any other suffix
-        of :func:`gso.save` is the surface (the flat image at z = 0 for `flatten`).
+        of :func:`gso.save` is the surface (the flat image at z = 0 for `flatten`). What a
+        format does not hold of an OBJ file's names, materials and texture coordinates is
+        added to the notes.
         """
         from gso import io
 
@@ -171,7 +174,8 @@ class Result:
                 )
             io.save_spline(self.spline, path, unit=unit)
         else:
-            io.save(self.mesh, path)
+            io.write(self.mesh, path)
+        self.notes += tuple(n for n in io.left_out(self.mesh, path) if n not in self.notes)
 
     def _record(self) -> dict[str, Any]:
         """What is no array."""
@@ -212,6 +216,8 @@ class Result:
             for number, part in enumerate(self.components):
                 label[part.names] = number
             arrays["component"] = label
+        if self.design.attributes is not None:
+            arrays |= self.design.attributes.arrays()
         return arrays
 
     @classmethod
@@ -236,7 +242,8 @@ class Result:
                 raise MeshError(
                     f"{path} was written by another version (format {record['format']})"
                 )
-            design = Mesh(data["design"], data["faces"])
+            said = Attributes.from_arrays(data, data["faces"])
+            design = Mesh(data["design"], data["faces"], attributes=said)
             result = cls._read(
                 record,
                 design,

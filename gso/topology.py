@@ -500,8 +500,17 @@ def hinges(he: HalfEdges) -> Ints:
 
 def edges(he: HalfEdges) -> Ints:
     """Each undirected edge once, (e, 2)."""
-    once = (he.twin < 0) | (he.twin > np.arange(he.twin.size))
+    once = _once(he)
     return np.stack([he.origin[once], he.dest[once]], axis=1)
+
+
+def rim(he: HalfEdges) -> NDArray[np.bool_]:
+    """Which of :func:`edges` belong to one face only, (e,)."""
+    return he.twin[_once(he)] < 0
+
+
+def _once(he: HalfEdges) -> NDArray[np.bool_]:
+    return (he.twin < 0) | (he.twin > np.arange(he.twin.size))
 
 
 def boundary_loops(he: HalfEdges) -> list[Ints]:

@@ -572,3 +572,85 @@ def test_optimising_imports_what_it_needs(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.fixture
+def heap(tmp_path):
+    """A small surface whose faces share no vertices, in a file."""
+    mesh = gso.as_mesh(bump(5))
+    path = tmp_path / "heap.obj"
+    corners = mesh.vertices[mesh.faces].reshape(-1, 3)
+    gso.save((corners, np.arange(len(corners)).reshape(-1, 4)), path)
+    return path
+
+
+def test_faces_that_share_no_vertices_are_welded(run, heap, small):
+    done = run("optimize", heap, "-o", "out.obj", "--method", "tno")
+    assert refused(done, "16 separate pieces", "--weld")
+    done = run("optimize", heap, "-o", "out.obj", "--weld", "1e-6")
+    assert done.exit_code == 0
+    assert "note: weld=1e-06 merged 39 of 64 vertices with others" in done.stdout
+    assert gso.load("out.obj").grid_shape == (5, 5)
+    done = run("optimize", heap, small, "-o", "out", "--weld", 0, "--workers", 0)
+    assert done.exit_code == 0
+    assert "note 48 edges lie on others" in " ".join(run("info", heap).stdout.split())
+    assert "grid 5 x 5" in run("info", heap, "--weld", 0).stdout
+    assert run("metrics", heap, heap, "--weld", 0).exit_code == 0
+    for bad in (-1, "nan"):
+        assert refused(run("info", heap, "--weld", bad), "weld")
+
+
+def test_heaps_among_many_are_reported(run, heap, small):
+    done = run("optimize", heap, small, "-o", "out", "--workers", 0)
+    assert done.exit_code == 1
+    assert "--weld" in done.stderr
+    assert os.listdir("out") == ["small.obj"]
+
+
+def test_an_input_is_replaced_only_by_force(run, small):
+    before = small.read_bytes()
+    os.symlink(small, "soft.obj")
+    os.link(small, "hard.obj")
+    Path("c.json").write_text("[]")
+    for arguments in (
+        ("optimize", small, "-o", "small.obj"),
+        ("optimize", small, "-o", "./../" + os.path.basename(os.getcwd()) + "/small.obj"),
+        ("optimize", small, "-o", "soft.obj"),
+        ("optimize", small, "-o", "hard.obj"),
+        ("optimize", "soft.obj", "-o", "hard.obj"),
+        ("optimize", small, "-o", "out.obj", "--metrics", "small.obj"),
+        ("optimize", small, "-o", "out.obj", "--constraints", "c.json", "--metrics", "c.json"),
+        ("optimize", small, "-o", "."),
+    ):
+        assert refused(run(*arguments), "would replace an input", "--force")
+    assert small.read_bytes() == before
+    assert run("optimize", small, "-o", "small.obj", "--force").exit_code == 0
+    assert small.read_bytes() != before
+    assert run("optimize", "soft.obj", "-o", ".", "--force", "--workers", 0).exit_code == 0
+
+
+def test_pictures_do_not_replace_inputs(run, small):
+    pytest.importorskip("matplotlib")
+    os.symlink(small, "link.png")
+    assert refused(run("plot", small, "-o", "link.png"), "would replace an input")
+    assert refused(run("plot", PANEL, "-o", "link.png", "--before", small), "would replace")
+    assert refused(
+        run("optimize", small, "-o", "out.obj", "--plot", "link.png"), "would replace an input"
+    )
+
+
+def test_what_a_format_drops_is_a_note(run):
+    Path("a.obj").write_text("".join(["g one\n", *_lines(bump(5))]))
+    done = run("optimize", "a.obj", "-o", "out.ply", "--metrics", "m.json")
+    assert "note: a .ply file holds no 1 groups (g): left out" in done.stdout
+    assert any("groups" in note for note in json.loads(Path("m.json").read_text())["notes"])
+    done = run("optimize", "a.obj", "-o", "out.obj")
+    assert "left out" not in done.stdout
+    assert "g one\n" in Path("out.obj").read_text()
+    assert "1 groups (g)" in run("info", "out.obj").stdout
+
+
+def _lines(grid):
+    mesh = gso.as_mesh(grid)
+    yield from ("v {} {} {}\n".format(*p) for p in mesh.vertices)
+    yield from ("f {} {} {} {}\n".format(*f) for f in mesh.faces + 1)

@@ -490,8 +490,8 @@ def test_files_of_constraints(tmp_path):
         "{}": "a list",
         '[{"type": "Pink"}]': "Fixed, FixedBoundary",
         '[{"type": []}]': "entry 0 needs",
-        '[{"type": "FixedBoundary", "ids": [0]}]': "it has none",
-        '[{"type": "Fixed", "id": [3]}]': "no parameter 'id'",
+        '[{"type": "FixedBoundary", "ids": [0]}]': "takes no 'ids'; there are none",
+        '[{"type": "Fixed", "id": [3]}]': "takes no 'id'; did you mean 'ids'",
         '[{"type": "Glue"}]': "pairs",
     }.items():
         path.write_text(text)

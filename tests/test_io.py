@@ -151,7 +151,14 @@ def test_obj_as_other_programs_write_it(tmp_path):
     ]  # fmt: skip
     assert mesh.notes == (
         "1 polygons with more than four corners were cut into triangles (the first is face 3)",
+        "left out: 1 normals (vn), 1 polylines (l), colours of vertices",
     )
+    said = mesh.attributes
+    assert said.libraries == ("x.mtl",)
+    assert {k: v.names for k, v in said.labels.items()} == {
+        "o": ("part",), "g": ("a b",), "s": ("off",), "usemtl": ("m",),
+    }  # fmt: skip
+    assert said.texture_corners.tolist() == [[0, -1, 0, -1], *[[-1] * 4] * 6]
 
 
 def test_obj_with_old_line_ends(tmp_path):
@@ -203,6 +210,44 @@ def test_off_as_other_programs_write_it(head, tmp_path):
     text = f"{head}\n{vertices}\n3 0 1 2 255 0 0\n3 0 2 3\n"
     (tmp_path / "a.off").write_text(text)
     assert gso.load(tmp_path / "a.off").faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
+SQUARE_POINTS = ["0", "0", "0", "1", "0", "0", "1", "1", "0", "0", "1", "0"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "OFF4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3",
+        "OFF\n4\n2\n0\n" + "\n".join(SQUARE_POINTS) + "\n3\n0\n1\n2\n3\n0 2\n3",
+        "OFF 4 2 5 " + " ".join(SQUARE_POINTS) + " 3 0 1 2 3 0 2 3",
+        "OFF 4 2 5 " + " ".join(SQUARE_POINTS) + " 3 0 1 2 255 0 0 3 0 2 3 0 0 255",
+        "OFF # all\n4 2 5 # counts\n0 0 0 1 0 0\n1 1 0 0 1 0\n3 0 1 2 0.5 0 0 1\n3 0 2 3 1 1 1 1",
+        "COFF 4 2 5 0 0 0 9 9 9 9 1 0 0 9 9 9 9 1 1 0 9 9 9 9 0 1 0 9 9 9 9 3 0 1 2 3 0 2 3",
+        "COFF 4 2 5 0 0 0 9 9 9 1 0 0 9 9 9\n1 1 0 9 9 9 0 1 0 9 9 9 3 0 1\n2 3 0 2 3",
+        "NOFF 4 2 5\n0 0 0 0 0 1 1 0 0 0 0 1\n1 1 0 0 0 1 0 1 0 0 0 1\n3 0 1 2 7\n3 0 2 3 8\n",
+        "off\r\n4 2\r\n0 0 0\r\n1 0 0\r\n1 1 0\r\n0 1 0\r\n3 0 1 2\r\n3 0 2 3\r\n",
+        "OFF\n4 2 5\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0\n1 2 0.1 0.2 0.3\n3 0 2 3 0.5\n",
+    ],
+)
+def test_off_is_read_by_numbers_whatever_its_lines(text, tmp_path):
+    (tmp_path / "a.off").write_text(text)
+    mesh = gso.load(tmp_path / "a.off")
+    assert mesh.vertices.ravel().tolist() == [float(x) for x in SQUARE_POINTS]
+    assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_off_with_random_line_breaks_is_the_same_mesh(seed, tmp_path):
+    mesh = mixed()
+    gso.save(mesh, tmp_path / "a.off")
+    words = (tmp_path / "a.off").read_text().split()
+    breaks = np.random.default_rng(seed).choice([" ", "\n", " # x 1\n", "\n\n"], len(words))
+    breaks[:3] = " "
+    (tmp_path / "b.off").write_text("".join(w + b for w, b in zip(words, breaks, strict=True)))
+    back = gso.load(tmp_path / "b.off")
+    assert np.array_equal(back.vertices, mesh.vertices)
+    assert np.array_equal(back.faces, mesh.faces)
 
 
 def test_stl_text_is_welded_and_collapsed_triangles_left_out(tmp_path):

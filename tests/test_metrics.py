@@ -124,3 +124,12 @@ def test_wrong_input_is_named():
     for measure in (metrics.isometry_energy, metrics.stretches, metrics.principal_strains):
         with pytest.raises(MeshError, match="12 vertices and the surface 20"):
             measure(grid, grid[:, :3, :2])
+
+
+@pytest.mark.parametrize("unit", [2.0**-290, 2.0**290])
+def test_strains_do_not_depend_on_the_unit(unit):
+    grid = Mesh.from_grid(saddle(5))
+    flat = grid.vertices[:, :2] * [1.1, 0.9]
+    scaled = grid.replaced(unit * grid.vertices)
+    for measure in (metrics.corner_strains, metrics.stretches, metrics.area_error):
+        assert np.array_equal(measure(scaled, unit * flat), measure(grid, flat))

@@ -432,7 +432,7 @@ def test_bad_options(coarse):
     ):
         with pytest.raises(OptionError):
             make()
-    with pytest.raises(WeightsError, match="with the package come"):
+    with pytest.raises(WeightsError, match="comes with the package; did you mean"):
         predict(points, model="net-x")
     with pytest.raises(WeightsError, match="take net-c or net-f"):
         load("net-cf")

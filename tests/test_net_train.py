@@ -79,7 +79,7 @@ def test_shipped_configurations(path):
     ("change", "says"),
     [
         ({"task": "bend"}, "task is 'bend'"),
-        ({"colour": 3}, "unknown: colour"),
+        ({"colour": 3}, "Config takes no 'colour'"),
         ({"optimiser": "sgd"}, "optimiser is 'sgd'"),
         ({"phase": []}, "phase"),
         ({"phase": 3}, "phase"),

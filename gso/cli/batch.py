@@ -30,6 +30,7 @@ def many(
     outs = _outputs(files, folder, suffix)
     pictures = [None if plots is None else str(Path(plots, f"{Path(o).stem}.png")) for o in outs]
     _each_its_own(files, [p for p in pictures if p is not None])
+    job.spare(files, *outs, *pictures, table)
     for path in filter(None, (folder, plots)):
         _make_folder(path)
     for out, picture in zip(outs, pictures, strict=True):
@@ -69,7 +70,7 @@ def _outputs(files: tuple[str, ...], folder: str, suffix: str | None) -> list[st
     Raises
     ------
     OptionError
-        Two inputs would be written to one file, or an output would replace an input.
+        Two inputs would be written to one file.
     """
     if suffix is not None and not suffix.startswith("."):
         suffix = f".{suffix}"
@@ -78,10 +79,6 @@ def _outputs(files: tuple[str, ...], folder: str, suffix: str | None) -> list[st
         for f in files
     ]
     _each_its_own(files, outs)
-    inputs = set(map(os.path.realpath, files))
-    for out in outs:
-        if os.path.realpath(out) in inputs:
-            raise OptionError(f"{out} would replace an input; give another folder for -o")
     return outs
 
 

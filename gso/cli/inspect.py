@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gso.cli import files
 from gso.status import GSOError, OptionError
 
 if TYPE_CHECKING:
@@ -15,8 +16,9 @@ if TYPE_CHECKING:
 @click.command(short_help="Compare two surfaces.")
 @click.argument("before", type=click.Path())
 @click.argument("after", type=click.Path())
+@files.weld
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def metrics(before: str, after: str, as_json: bool) -> None:
+def metrics(before: str, after: str, weld: float | None, as_json: bool) -> None:
     """Measure the surface AFTER against the surface BEFORE.
 
     When AFTER is flat (one z everywhere) and has the faces of BEFORE, it is measured as
@@ -24,10 +26,9 @@ def metrics(before: str, after: str, as_json: bool) -> None:
     """
     import json
 
-    from gso import io
     from gso.cli import report
 
-    design, result = io.load(before), io.load(after)
+    design, result = files.load(before, weld), files.load(after, weld)
     values, notes = _compare(design, result)
     if as_json:
         record = {"before": before, "after": after, "metrics": values, "notes": notes}
@@ -66,19 +67,19 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
 
 
 @click.command(short_help="Say what a mesh file holds.")
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path())
-def info(files: tuple[str, ...]) -> None:
+@click.argument("names", metavar="FILE...", nargs=-1, required=True, type=click.Path())
+@files.weld
+def info(names: tuple[str, ...], weld: float | None) -> None:
     """Say what mesh files hold: size, connectivity, curvature.
 
     A file that cannot be read is reported; the exit code is then 1.
     """
-    from gso import io
     from gso.cli import report
 
     failed = False
-    for number, file in enumerate(files):
+    for number, file in enumerate(names):
         try:
-            rows = _facts(io.load(file))
+            rows = _facts(files.load(file, weld))
         except GSOError as error:
             click.echo(f"gso: error: {' '.join(str(error).split())}", err=True)
             failed = True
@@ -125,6 +126,8 @@ def _facts(mesh: Mesh) -> list[tuple[str, str]]:
         ]
     else:
         rows.append(("loss_gc", "- (no interior vertex)"))
+    if mesh.attributes is not None:
+        rows.append(("attributes", str(mesh.attributes)))
     return rows + [("note", note) for note in mesh.notes]
 
 
@@ -169,7 +172,17 @@ def _point(point: Any) -> str:
     type=click.IntRange(min=1),
     help="Draw so many ruling lines instead, and the Gauss image: a curve if developable.",
 )
-def plot(file: str, out: str, before: str | None, colour: str | None, rulings: int | None) -> None:
+@files.weld
+@files.force
+def plot(
+    file: str,
+    out: str,
+    before: str | None,
+    colour: str | None,
+    rulings: int | None,
+    weld: float | None,
+    force: bool,
+) -> None:
     """Draw the surface FILE as a picture (.png, .pdf, .svg).
 
     A full result (.npz of gso optimize) is drawn beside its design, unless --before or
@@ -181,6 +194,7 @@ def plot(file: str, out: str, before: str | None, colour: str | None, rulings: i
 
     pictures.require()
     io.check_writable(out, pictures.SUFFIXES)
+    files.spare((file, before), [out], force)
     if rulings is not None and colour is not None:
         raise OptionError("--rulings and --color cannot be drawn in one picture; give one of them")
     if before is None and colour is None and file.lower().endswith(".npz"):
@@ -194,8 +208,8 @@ def plot(file: str, out: str, before: str | None, colour: str | None, rulings: i
             else:
                 pictures.plot_rulings(result.mesh, path=out, count=rulings, before=result.design)
             return
-    first = None if before is None else io.load(before)
+    first = None if before is None else files.load(before, weld)
     if rulings is not None:
-        pictures.plot_rulings(io.load(file), path=out, count=rulings, before=first)
+        pictures.plot_rulings(files.load(file, weld), path=out, count=rulings, before=first)
         return
-    pictures.plot_surface(io.load(file), colour or "curvature", before=first, path=out)
+    pictures.plot_surface(files.load(file, weld), colour or "curvature", before=first, path=out)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gso import tasks
+from gso.cli import files
+from gso.cli.files import source, spare
 from gso.status import MeshError, OptionError
 
 if TYPE_CHECKING:
@@ -39,6 +41,12 @@ class Job:
         Unit of the coordinates, for drawings.
     quiet : bool
         Print nothing but errors.
+    weld : float, optional
+        Vertices closer than this are merged.
+    force : bool
+        Outputs may replace inputs.
+    inputs : tuple of str
+        Files that are read besides the surfaces.
     """
 
     keywords: dict[str, Any] = field(default_factory=dict)
@@ -46,6 +54,13 @@ class Job:
     net: str | None = None
     unit: str = "mm"
     quiet: bool = False
+    weld: float | None = None
+    force: bool = False
+    inputs: tuple[str, ...] = ()
+
+    def spare(self, files: Iterable[str], *outputs: str | None) -> None:
+        """Refuse outputs that are inputs."""
+        spare((*files, *self.inputs), outputs, self.force)
 
     def solve(self, mesh: Any, **more: Any) -> Result:
         """Optimise one surface."""
@@ -57,8 +72,9 @@ class Job:
 
         return solve(mesh, **self._with_net(), **more)
 
-    def solve_many(self, meshes: Iterable[Any], workers: int | None) -> Iterator[Item]:
+    def solve_many(self, files: Iterable[str], workers: int | None) -> Iterator[Item]:
         """Optimise many surfaces in parallel."""
+        meshes = [source(file, self.weld) for file in files]
         if self.method == "tno":
             from gso.tno import optimize_many
 
@@ -115,7 +131,7 @@ class Job:
 
 
 @click.command(short_help="Make surfaces developable, flatten or denoise them.")
-@click.argument("files", metavar="IN...", nargs=-1, required=True, type=click.Path())
+@click.argument("names", metavar="IN...", nargs=-1, required=True, type=click.Path())
 @click.option(
     "-o",
     "--output",
@@ -204,8 +220,10 @@ class Job:
     show_default=True,
     help="Unit of the coordinates, for .svg, .step, .iges and .3dm.",
 )
+@files.weld
+@files.force
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
-def optimize(files: tuple[str, ...], out: str, **given: Any) -> None:
+def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
     """Optimise the surface IN and write it to OUT.
 
     Several inputs are worked on in parallel; OUT is then a folder. The exit code is 0 only
@@ -220,17 +238,20 @@ def optimize(files: tuple[str, ...], out: str, **given: Any) -> None:
         given["net"],
         given["unit"],
         given["quiet"],
+        given["weld"],
+        given["force"],
+        tuple(name for name in (given["constraints"], given["net"]) if name is not None),
     )
     if given["table"] is not None:
         from gso.io import check_writable
 
         check_writable(given["table"])
-    if len(files) > 1 or os.path.isdir(out) or out.endswith(("/", os.sep)):
+    if len(names) > 1 or os.path.isdir(out) or out.endswith(("/", os.sep)):
         from gso.cli.batch import many
 
         good = many(
             job,
-            files,
+            names,
             out,
             suffix=given["suffix"],
             plots=given["plot"],
@@ -240,7 +261,7 @@ def optimize(files: tuple[str, ...], out: str, **given: Any) -> None:
     else:
         if given["suffix"] is not None:
             raise OptionError("--suffix is for many inputs; name the format in -o")
-        good = _single(job, files[0], out, given["plot"], given["table"])
+        good = _single(job, names[0], out, given["plot"], given["table"])
     click.get_current_context().exit(0 if good else 1)
 
 
@@ -290,12 +311,12 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
 
 def _single(job: Job, file: str, out: str, plot: str | None, table: str | None) -> bool:
     """Optimise one surface; whether the result is usable."""
-    from gso import io
     from gso.cli import report
     from gso.cli.progress import iterations
 
     job.check(out, plot)
-    mesh = io.load(file)
+    job.spare([file], out, plot, table)
+    mesh = files.load(file, job.weld)
     _check_grid(mesh, out)
     with iterations() as callback, report.status_only():
         result = job.solve(mesh, callback=callback)

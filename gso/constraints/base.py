@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gso.mesh import Mesh
+from gso.spelling import KnownFields
 from gso.status import OptionError
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class Constraint:
+class Constraint(KnownFields):
     """Something that a result must keep. Kinds of it say what, in :meth:`parts`."""
 
     def parts(self, subject: Subject) -> list[Part]:

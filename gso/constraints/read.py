@@ -13,6 +13,7 @@ from gso.constraints.glue import Glue
 from gso.constraints.positions import Fixed, FixedBoundary, Handle
 from gso.constraints.shape import FixedLengths, PlanarFaces
 from gso.constraints.symmetry import SymmetryPlane
+from gso.spelling import check_keywords, choices, nearest
 from gso.status import OptionError
 
 KINDS: dict[str, type[Constraint]] = {
@@ -58,17 +59,19 @@ def read_constraints(path: str | PathLike[str]) -> list[Constraint]:
 
 
 def _constraint(entry: Any, where: str) -> Constraint:
-    if not isinstance(entry, dict) or entry.get("type") not in list(KINDS):
-        raise OptionError(f'{where} needs a "type": {", ".join(KINDS)}')
+    if not isinstance(entry, dict) or not isinstance(entry.get("type"), str):
+        # A misspelt "type" is a field that there is not.
+        wrong = [repr(k) for k in entry if nearest(k, ["type"])] if isinstance(entry, dict) else []
+        instead = f", not {wrong[0]}" if wrong else ""
+        raise OptionError(f'{where} needs a "type"{instead}: {", ".join(KINDS)}')
+    if entry["type"] not in KINDS:
+        raise OptionError(
+            f"{where}: there is no constraint {entry['type']!r}; {choices(entry['type'], KINDS)}"
+        )
     kind = KINDS[entry["type"]]
     given = {name: value for name, value in entry.items() if name != "type"}
     known = [f.name for f in fields(kind)]  # type: ignore[arg-type]
-    for name in given:
-        if name not in known:
-            others = ", ".join(known) or "none"
-            raise OptionError(
-                f"{where}: {kind.__name__} has no parameter {name!r}; it has {others}"
-            )
+    check_keywords(f"{where}: {kind.__name__}", given, known)
     try:
         return kind(**given)
     except TypeError as error:

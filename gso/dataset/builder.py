@@ -26,6 +26,7 @@ from gso.dataset.screen import Selection, select
 from gso.dataset.store import Dataset
 from gso.dataset.summary import summarise
 from gso.io import replacing
+from gso.spelling import choices, known_keywords
 from gso.status import DatasetError, MeshError, OptionError
 from gso.tno import pool
 from gso.tno.linear import blas_threads
@@ -37,6 +38,7 @@ _OTHER_VERSIONS = "install what it was begun with, or build in another folder"
 Tick = Callable[[str, int, int], None]
 
 
+@known_keywords()
 def build(
     folder: str | PathLike[str],
     recipe: Recipe | None = None,
@@ -187,7 +189,7 @@ def _references(
         if name not in REFERENCES:
             raise OptionError(f"no reference {name!r}; there is {', '.join(REFERENCES)}")
         if split not in recipe.splits:
-            raise OptionError(f"no split {split!r}; there are {', '.join(recipe.splits)}")
+            raise OptionError(f"no split {split!r}; {choices(split, recipe.splits)}")
         tno.check(**KINDS[name].arguments)
     return asked
 

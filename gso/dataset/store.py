@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gso.dataset import folder, hdf, manifest, noise
 from gso.dataset.lazy import LazyArray, Part
 from gso.dataset.screen import FEATURES, features
+from gso.spelling import choices
 from gso.status import DatasetError
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ class Split:
                 return self.arrays[key]
             except KeyError:
                 raise DatasetError(
-                    f"split {self.name!r} has no array {key!r}; it has {', '.join(self.arrays)}"
+                    f"split {self.name!r} has no array {key!r}; {choices(key, self.arrays)}"
                 ) from None
         return {name: array[key] for name, array in self.arrays.items()}
 
@@ -141,7 +142,7 @@ class Dataset(Mapping[str, Split]):
             return self._splits[name]
         except KeyError:
             raise DatasetError(
-                f"{self.path} has no split {name!r}; it has {', '.join(self._splits)}"
+                f"{self.path} has no split {name!r}; {choices(name, self._splits)}"
             ) from None
 
     def __iter__(self) -> Iterator[str]:

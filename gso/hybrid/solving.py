@@ -21,6 +21,7 @@ from gso.hybrid.prediction import Prediction, predictions
 from gso.hybrid.worth import pays
 from gso.mesh import Mesh
 from gso.result import Result
+from gso.spelling import known_keywords
 from gso.status import ConvergenceWarning, GSOError, MeshError, OptionError, Status
 from gso.tno import Start, check, components, optimize
 from gso.tno.batch import Item
@@ -40,6 +41,7 @@ _PASSES = 1
 _NEARLY = 2e-3
 
 
+@known_keywords(optimize)
 def solve(
     mesh: Any,
     *,
@@ -124,6 +126,7 @@ def solve(
     return result
 
 
+@known_keywords(optimize)
 def solve_many(
     meshes: Iterable[Any],
     *,
@@ -194,7 +197,7 @@ def _each(design: Mesh, pieces: list[Component], task: str, keywords: dict[str, 
         warnings.simplefilter("ignore", ConvergenceWarning)
         result = components.solve(one, whole, pieces, callback, workers=0)
     if not result.converged and result.status is not Status.MAX_ITERATIONS:
-        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=3)
+        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=4)
     return result
 
 

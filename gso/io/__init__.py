@@ -13,31 +13,40 @@ from __future__ import annotations
 
 import importlib
 import os
+import warnings
 from collections.abc import Callable
 from os import PathLike
 from typing import Any, NamedTuple
 
 from gso.io.atomic import check_writable, replacing
 from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_spline
-from gso.io.convert import as_mesh
+from gso.io.convert import Unwelded, as_mesh
 from gso.io.lines import save_lines
 from gso.io.source import read_bytes
+from gso.io.surface import checked as checked_weld
+from gso.io.surface import welded
 from gso.io.svg import save_flat
 from gso.mesh import Mesh
+from gso.spelling import known_keywords
 from gso.status import MeshError
 
 __all__ = [
     "SPLINE_SUFFIXES",
     "SUFFIXES",
+    "Unwelded",
     "as_mesh",
     "check_spline",
     "check_writable",
+    "checked_weld",
+    "left_out",
     "load",
     "replacing",
     "save",
     "save_flat",
     "save_lines",
     "save_spline",
+    "welded",
+    "write",
 ]
 
 
@@ -66,7 +75,8 @@ SUFFIXES = tuple(_FORMATS)
 """Suffixes of the mesh files that are read and written."""
 
 
-def load(path: str | PathLike[str]) -> Mesh:
+@known_keywords()
+def load(path: str | PathLike[str], *, weld: float | None = None) -> Mesh:
     """Read a mesh file; its suffix says which format it is.
 
     Parameters
@@ -75,17 +85,25 @@ def load(path: str | PathLike[str]) -> Mesh:
         An .obj, .ply or .off file (quads are kept), .stl or .glb (triangles, single
         precision, equal vertices merged), .npy (a grid of points (H, W, 3)) or .npz
         (`vertices` and `faces`, or one grid).
+    weld : float, optional
+        Merge vertices that lie within this distance of each other, in the file's unit of
+        length (see :func:`welded`): for faces that have vertices of their own, as
+        exporters write them at seams, or everywhere. 0 merges equal vertices.
 
     Returns
     -------
     Mesh
-        In the file's own unit and order of vertices. `notes` say what was changed.
+        In the file's own unit and order of vertices. `notes` say what was changed or left
+        out; `attributes` are an OBJ file's names of faces and texture coordinates, which
+        :func:`save` writes again.
 
     Raises
     ------
     MeshError
         The file is missing, of an unknown kind, damaged, or has a mesh that is refused.
         The message names the file, and the line of a text file.
+    OptionError
+        `weld` is no length.
     """
     name = os.fsdecode(path)
     suffix = os.path.splitext(name)[1].lower()
@@ -95,7 +113,7 @@ def load(path: str | PathLike[str]) -> Mesh:
             raise MeshError(f"cannot read {what}; use {', '.join(SUFFIXES)}")
         data = read_bytes(name)
         form = _FORMATS[suffix]
-        return form.function(form.read)(data)
+        return form.function(form.read)(data).mesh(weld)
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from error.__cause__
     except MemoryError:
@@ -116,19 +134,40 @@ def save(mesh: Any, path: str | PathLike[str]) -> None:
         An .obj, .ply, .off or .npz file (quads kept, exact), .npy (grids, exact; row by
         row), .stl or .glb (triangles in single precision).
 
+    Warns
+    -----
+    UserWarning
+        The mesh has names of faces, materials or texture coordinates from an OBJ file, which
+        .obj and .npz keep and the other formats do not.
+
     Raises
     ------
     MeshError
         Unknown suffix, no such folder, no permission, or a mesh that the format cannot
         hold. The message names the file.
     """
+    for note in write(mesh, path):
+        warnings.warn(note, stacklevel=2)
+
+
+def write(mesh: Any, path: str | PathLike[str]) -> tuple[str, ...]:
+    """As :func:`save`, which warns of what this returns: what the format cannot hold."""
     check_writable(path, SUFFIXES)
     name = os.fsdecode(path)
     surface = as_mesh(mesh)
     form = _FORMATS[os.path.splitext(name)[1].lower()]
-    write = form.function(form.write)
+    writer = form.function(form.write)
     with replacing(path) as file:
         try:
-            write(surface, file)
+            writer(surface, file)
         except MeshError as error:
             raise MeshError(f"{name}: {error}") from None
+    return left_out(surface, path)
+
+
+def left_out(mesh: Mesh, path: str | PathLike[str]) -> tuple[str, ...]:
+    """What a file of this name does not hold of a mesh, for the user to read."""
+    suffix = os.path.splitext(os.fsdecode(path))[1].lower()
+    if mesh.attributes is None or mesh.attributes.empty or suffix in (".obj", ".npz"):
+        return ()
+    return (f"a {suffix} file holds no {mesh.attributes}: left out, an .obj file keeps them",)

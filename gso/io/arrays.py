@@ -8,10 +8,12 @@ import struct
 import tokenize
 import zipfile
 import zlib
-from typing import IO, BinaryIO
+from typing import IO, Any, BinaryIO
 
 import numpy as np
 
+from gso.attributes import Attributes
+from gso.io.surface import Surface
 from gso.mesh import Mesh
 from gso.status import MeshError
 
@@ -34,9 +36,9 @@ _DAMAGE = (
 )
 
 
-def read_npy(data: bytes) -> Mesh:
-    """Mesh of a grid of points (H, W, 3) in a .npy file."""
-    return Mesh.from_grid(_array(io.BytesIO(data), len(data)))
+def read_npy(data: bytes) -> Surface:
+    """A grid of points (H, W, 3) in a .npy file."""
+    return Surface(_array(io.BytesIO(data), len(data)), None)
 
 
 def write_npy(mesh: Mesh, file: BinaryIO) -> None:
@@ -46,20 +48,20 @@ def write_npy(mesh: Mesh, file: BinaryIO) -> None:
     np.lib.format.write_array(file, mesh.grid, allow_pickle=False)
 
 
-def read_npz(data: bytes) -> Mesh:
-    """Mesh in a .npz file: `vertices` and `faces` (or V and F), or one grid (H, W, 3)."""
+def read_npz(data: bytes) -> Surface:
+    """Surface in a .npz file: `vertices` and `faces` (or V and F), or one grid (H, W, 3)."""
     members = read_arrays(data)
     chosen = {name.lower(): array for name, array in members.items()}
     v = next((chosen[k] for k in ("vertices", "v") if k in chosen), None)
     f = next((chosen[k] for k in ("faces", "f") if k in chosen), None)
     if v is not None and f is not None:
-        return Mesh(v, f)
+        return Surface(v, f, attributes=_attributes(members, f))
     if len(members) != 1:
         names = ", ".join(sorted(members)) or "nothing"
         raise MeshError(
             f"a .npz file holds 'vertices' and 'faces', or one grid (H, W, 3); this one has {names}"
         )
-    return Mesh.from_grid(next(iter(members.values())))
+    return Surface(next(iter(members.values())), None)
 
 
 def read_arrays(data: bytes) -> dict[str, np.ndarray]:
@@ -75,8 +77,17 @@ def read_arrays(data: bytes) -> dict[str, np.ndarray]:
 
 
 def write_npz(mesh: Mesh, file: BinaryIO) -> None:
-    """Write `vertices` and `faces`."""
-    np.savez(file, vertices=mesh.vertices, faces=mesh.faces)
+    """Write `vertices` and `faces`, and what else is known of the faces."""
+    more: dict[str, Any] = {} if mesh.attributes is None else mesh.attributes.arrays()
+    np.savez(file, vertices=mesh.vertices, faces=mesh.faces, **more)
+
+
+def _attributes(members: dict[str, np.ndarray], faces: np.ndarray) -> Attributes | None:
+    """What a file says of the faces, where it was written here."""
+    try:
+        return Attributes.from_arrays(members, faces)
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise MeshError(f"the attributes of its faces are damaged: {error}") from None
 
 
 def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:

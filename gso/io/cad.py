@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from gso.io.atomic import check_writable, replacing
 from gso.io.svg import MILLIMETRES
+from gso.spelling import choices
 from gso.spline import BSplineSurface
 from gso.status import GSOError, MeshError, OptionError
 
@@ -46,7 +47,7 @@ def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
     """
     check_writable(path, SPLINE_SUFFIXES)
     if unit not in MILLIMETRES:
-        raise OptionError(f"unknown unit {unit!r}; use {', '.join(MILLIMETRES)}")
+        raise OptionError(f"unknown unit {unit!r}; {choices(unit, MILLIMETRES)}")
     form = _FORMATS[_suffix(path)]
     try:
         importlib.import_module(form.package)

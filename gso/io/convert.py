@@ -4,21 +4,42 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from gso.io.surface import Surface, welded
 from gso.mesh import Mesh
 from gso.status import MeshError
 
 
-def as_mesh(x: Any) -> Mesh:
+@dataclass(frozen=True)
+class Unwelded:
+    """Something to be made a mesh by merging its vertices; :func:`as_mesh` takes it.
+
+    Attributes
+    ----------
+    surface : Any
+        Whatever :func:`as_mesh` takes.
+    weld : float
+        Vertices within this distance of each other are merged.
+    """
+
+    surface: Any
+    weld: float
+
+
+def as_mesh(x: Any, *, weld: float | None = None) -> Mesh:
     """Mesh from a mesh, a grid of points, vertices and faces, or a file.
 
     Parameters
     ----------
     x : Mesh, array_like (H, W, 3), (vertices, faces), trimesh.Trimesh, str or PathLike
-        A `Mesh` comes back as it is.
+        A `Mesh` comes back as it is, unless it is to be welded.
+    weld : float, optional
+        Merge vertices that lie within this distance of each other (see
+        :func:`gso.io.welded`).
 
     Returns
     -------
@@ -28,32 +49,36 @@ def as_mesh(x: Any) -> Mesh:
     ------
     MeshError
         `x` is none of these, or its geometry is refused (see :class:`gso.Mesh`).
+    OptionError
+        `weld` is no length.
 
     Examples
     --------
     >>> as_mesh(([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]]))
     Mesh(4 vertices, 1 faces, quads)
     """
+    if isinstance(x, Unwelded):
+        return as_mesh(x.surface, weld=x.weld)
     if isinstance(x, Mesh):
-        return x
+        return x if weld is None else welded(x, weld)
     if isinstance(x, (str, bytes, os.PathLike)):
         from gso.io import load
 
-        return load(os.fsdecode(x))
+        return load(os.fsdecode(x), weld=weld)
     # Whoever holds a Trimesh has imported trimesh: no need to do it here.
     trimesh = sys.modules.get("trimesh")
     if trimesh is not None and isinstance(x, trimesh.Trimesh):
-        return Mesh(x.vertices, x.faces)
+        return Surface(x.vertices, x.faces).mesh(weld)
     if trimesh is not None and isinstance(x, trimesh.Scene):
         raise MeshError("a trimesh.Scene is no single mesh; give scene.to_mesh()")
     if isinstance(x, (tuple, list)) and len(x) == 2:
-        return Mesh(*x)
+        return Surface(*x).mesh(weld)
     try:
         points = np.asarray(x)
     except (TypeError, ValueError):
         points = np.empty(0, object)
     if points.ndim == 3 and points.shape[2] == 3 and points.dtype.kind in "iuf":
-        return Mesh.from_grid(points)
+        return Surface(points, None).mesh(weld)
     what = f"an array {points.shape}" if points.dtype.kind in "iuf" else f"{type(x).__name__}"
     raise MeshError(
         f"{what} is no surface: give a Mesh, an array (H, W, 3), a pair (vertices, faces), a "

@@ -8,7 +8,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from gso.io.source import doubles, weld
+from gso.io.source import doubles
+from gso.io.surface import Surface, merged
 from gso.mesh import Mesh
 from gso.status import MeshError
 
@@ -17,7 +18,7 @@ _HEAD = 20
 _MOST_VERTICES = 50_000_000
 
 
-def read(data: bytes) -> Mesh:
+def read(data: bytes) -> Surface:
     """All meshes of a GLB file in one, each where its node puts it.
 
     Vertices that a mesh repeats at seams of texture or shading are merged; different
@@ -47,7 +48,7 @@ def read(data: bytes) -> Mesh:
             corners = np.asarray(part.faces, np.int64)
             if corners.size and not 0 <= corners.min() <= corners.max() < len(part.vertices):
                 raise MeshError(f"the mesh {name!r} has corners outside its vertices")
-            v, f, said = weld(doubles(np.asarray(part.vertices)), corners)
+            v, f, said = merged(doubles(np.asarray(part.vertices)), corners)
             if total + len(v) > _MOST_VERTICES:
                 raise MeshError(f"the scene has more than {_MOST_VERTICES} vertices")
             mirrored = np.linalg.det(transform[:3, :3]) < 0
@@ -62,7 +63,7 @@ def read(data: bytes) -> Mesh:
         raise MeshError(f"is no intact GLB file: {type(error).__name__}: {error}") from error
     if not faces:
         raise MeshError("the GLB file has no triangles; export the scene with its meshes")
-    return Mesh(np.concatenate(points), np.concatenate(faces), notes=notes)
+    return Surface(np.concatenate(points), np.concatenate(faces), notes)
 
 
 def _check(data: bytes) -> None:

@@ -1,4 +1,4 @@
-"""Wavefront OBJ: vertices and polygons, quads kept as quads."""
+"""Wavefront OBJ: vertices and polygons, quads kept as quads, and what names the faces."""
 
 from __future__ import annotations
 
@@ -6,19 +6,32 @@ from typing import BinaryIO
 
 import numpy as np
 
-from gso.io.source import Array, Ints, face_table, ranges
+from gso.attributes import LABELS, Attributes, Labels
+from gso.io.source import Array, Ints, face_corners, ranges
+from gso.io.surface import Surface
 from gso.io.text import Words, write_rows
 from gso.mesh import Mesh
 from gso.status import MeshError
 
+# What is read and has no place in a mesh: keyword, and what it is.
+_LEFT_OUT = {
+    b"vn": "normals",
+    b"vp": "points of curves",
+    b"l": "polylines",
+    b"p": "points",
+    b"curv": "curves",
+    b"surf": "surfaces",
+}
 
-def read(data: bytes) -> Mesh:
-    """Mesh in an OBJ file.
+
+def read(data: bytes) -> Surface:
+    """Surface in an OBJ file.
 
     Read are ``v x y z`` (a fourth number is a weight by which the others are divided;
-    more numbers are colours and ignored) and ``f`` with any of ``1``, ``1/2``, ``1//3``,
-    ``1/2/3``, counted from the front or, when negative, from the last vertex before the
-    line. Groups, objects, normals, textures, materials and curves are ignored.
+    more numbers are colours and left out) and ``f`` with any of ``1``, ``1/2``, ``1//3``,
+    ``1/2/3``, counted from the front or, when negative, from the last one before the
+    line; what ``o``, ``g``, ``s`` and ``usemtl`` call the faces, ``mtllib`` and ``vt``. Notes
+    say what else there was.
     """
     words = Words(data, comment=b"#", joined=True)
     v, f = words.rows(b"v"), words.rows(b"f")
@@ -27,9 +40,20 @@ def read(data: bytes) -> Mesh:
     if f.size == 0:
         raise MeshError("there is no face (a line 'f a b c d') in it; export the mesh's faces")
     points = _vertices(words, v)
-    corners, count = _polygons(words, v, f)
-    faces, notes = face_table(corners, count, points)
-    return Mesh(points, faces, notes=notes)
+    corners, index, count = _polygons(words, v, f)
+    place, polygon, notes = face_corners(index, count, points)
+    faces = np.where(place < 0, -1, index[place])
+    texture, texture_corners, said = _texture(words, f, corners, count)
+    if texture_corners is not None:
+        texture_corners = np.where(place < 0, -1, texture_corners[place])
+    libraries = tuple(filter(None, map(words.rest, words.rows(b"mtllib"))))
+    attributes = Attributes(libraries, _labels(words, f, polygon), texture, texture_corners)
+    return Surface(
+        points,
+        faces,
+        notes + said + _left_out(words, v),
+        None if attributes.empty else attributes,
+    )
 
 
 def _vertices(words: Words, v: Ints) -> Array:
@@ -44,19 +68,20 @@ def _vertices(words: Words, v: Ints) -> Array:
         weight = words.floats(first[weighted] + 3)
         if (weight == 0).any():
             words.fail_row(v[weighted[(weight == 0).argmax()]], "a vertex has the weight 0")
-        points[weighted] /= weight[:, None]
+        with np.errstate(over="ignore"):
+            points[weighted] /= weight[:, None]
     return points
 
 
-def _polygons(words: Words, v: Ints, f: Ints) -> tuple[Ints, Ints]:
+def _polygons(words: Words, v: Ints, f: Ints) -> tuple[Ints, Ints, Ints]:
+    """Words of all corners, the vertices that they refer to, and corners by polygon."""
     count = words.count[f] - 1
     if (count < 3).any():
         row = f[(count < 3).argmax()]
         words.fail_row(row, f"a face needs three corners or more, not {words.count[row] - 1}")
     corner = ranges(words.first[f] + 1, count)
     number = words.ints(corner, until=b"/")
-    before = np.repeat(np.searchsorted(v, f), count)
-    index = np.where(number < 0, before + number, number - 1)
+    index = _from_front(number, v, f, count)
     outside = (index < 0) | (index >= v.size)
     if outside.any():
         at = int(outside.argmax())
@@ -66,15 +91,122 @@ def _polygons(words: Words, v: Ints, f: Ints) -> tuple[Ints, Ints]:
             + ("vertices count from 1" if number[at] == 0 else f"the file has {v.size} vertices")
             + "; is the file cut off?",
         )
-    return index, count
+    return corner, index, count
+
+
+def _from_front(number: Ints, rows: Ints, f: Ints, count: Ints) -> Ints:
+    """Places, counted from 0, of what the corners of faces in rows `f` refer to."""
+    before = np.repeat(np.searchsorted(rows, f), count)
+    return np.where(number < 0, before + number, number - 1)
+
+
+def _texture(
+    words: Words, f: Ints, corner: Ints, count: Ints
+) -> tuple[Array | None, Ints | None, tuple[str, ...]]:
+    """Texture coordinates, their row for each corner or -1, and what is wrong with them."""
+    vt = words.rows(b"vt")
+    if vt.size == 0:
+        return None, None, ()
+    try:
+        width = words.count[vt] - 1
+        least, most = int(width.min()), int(width.max())
+        if not 1 <= least <= most <= 3:
+            row = vt[((width < 1) | (width > 3)).argmax()]
+            words.fail_row(row, "texture coordinates are one to three numbers")
+        texture = np.zeros((vt.size, most))
+        inside = np.arange(most) < width[:, None]
+        texture[inside] = words.floats(ranges(words.first[vt] + 1, width))
+        number = words.second_ints(corner, b"/")
+        index = np.where(number == 0, -1, _from_front(number, vt, f, count))
+        outside = (number != 0) & ((index < 0) | (index >= vt.size))
+        if outside.any():
+            at = int(outside.argmax())
+            words.fail(
+                corner[at],
+                f"a face refers to texture coordinates {number[at]}, but the file has {vt.size}",
+            )
+    except MeshError as error:
+        return None, None, (f"the texture coordinates (vt) were left out: {error}",)
+    return (texture, index, ()) if (index >= 0).any() else (None, None, ())
+
+
+def _labels(words: Words, f: Ints, polygon: Ints) -> dict[str, Labels]:
+    """What the faces are called, by keyword."""
+    labels = {}
+    for keyword in LABELS:
+        rows = words.rows(keyword.encode())
+        which = np.searchsorted(rows, f) - 1
+        said, of_face = np.unique(which, return_inverse=True)
+        if said[-1] < 0:
+            continue
+        # Names that no face has are left out.
+        named = said[said >= 0]
+        names = tuple(words.rest(row) for row in rows[named])
+        labels[keyword] = Labels(names, (of_face.ravel() - (said[0] < 0))[polygon])
+    return labels
+
+
+def _left_out(words: Words, v: Ints) -> tuple[str, ...]:
+    found = {keyword.decode(): words.rows(keyword).size for keyword in _LEFT_OUT}
+    parts = [
+        f"{size} {_LEFT_OUT[keyword.encode()]} ({keyword})"
+        for keyword, size in found.items()
+        if size
+    ]
+    if (words.count[v] > 5).any():
+        parts.append("colours of vertices")
+    return (f"left out: {', '.join(parts)}",) if parts else ()
 
 
 def write(mesh: Mesh, file: BinaryIO) -> None:
-    """Write a mesh as OBJ; coordinates read back exactly."""
+    """Write a mesh as OBJ; coordinates read back exactly, and so do names and texture."""
+    said = mesh.attributes or Attributes()
+    for name in said.libraries:
+        _write_name(file, "mtllib", name)
     write_rows(file, "v %.17g %.17g %.17g\n", mesh.vertices)
-    tri, quad = "f %d %d %d\n", "f %d %d %d %d\n"
+    corners = said.texture_corners if said.texture is not None else None
+    if said.texture is not None and corners is not None:
+        write_rows(file, "vt" + " %.17g" * said.texture.shape[1] + "\n", said.texture)
     number = np.where(mesh.faces < 0, -1, mesh.faces + 1)
-    if mesh.is_triangles:
-        write_rows(file, tri, number)
-    else:
-        write_rows(file, np.where(number[:, 3] < 0, tri, quad).tolist(), number)
+    formats, values = _face_formats(number, corners)
+    begin = 0
+    for end in (*_changes(said).tolist(), len(number)):
+        if end > begin:
+            write_rows(file, formats[begin:end], values[begin:end])
+        if end < len(number):
+            _write_changed(file, said, end)
+        begin = end
+
+
+def _face_formats(number: Ints, corners: Ints | None) -> tuple[list[str], Ints]:
+    """One printf format a face, and its numbers; negative ones are padding."""
+    size = (number >= 0).sum(axis=1)
+    if corners is None:
+        plain = {3: "f %d %d %d\n", 4: "f %d %d %d %d\n"}
+        return [plain[k] for k in size.tolist()], number
+    codes = np.where(number < 0, 0, 1 + (corners >= 0))
+    kinds, which = np.unique(codes, axis=0, return_inverse=True)
+    words = ("", " %d", " %d/%d")
+    texts = ["f" + "".join(words[c] for c in kind) + "\n" for kind in kinds.tolist()]
+    values = np.stack([number, np.where(corners < 0, -1, corners + 1)], axis=-1)
+    return [texts[k] for k in which.ravel().tolist()], values.reshape(len(number), -1)
+
+
+def _changes(said: Attributes) -> Ints:
+    """Faces before which a name changes."""
+    every = [np.flatnonzero(np.diff(k.of_face, prepend=-1)) for k in said.labels.values()]
+    return np.unique(np.concatenate(every)) if every else np.empty(0, np.int64)
+
+
+def _write_changed(file: BinaryIO, said: Attributes, face: int) -> None:
+    for keyword in LABELS:
+        names = said.labels.get(keyword)
+        if names is None:
+            continue
+        now = int(names.of_face[face])
+        if now >= 0 and (face == 0 or now != names.of_face[face - 1]):
+            _write_name(file, keyword, names.names[now])
+
+
+def _write_name(file: BinaryIO, keyword: str, name: str) -> None:
+    file.write(f"{keyword} {name}".rstrip().encode("utf-8", "surrogateescape") + b"\n")

@@ -9,6 +9,7 @@ from typing import BinaryIO
 import numpy as np
 
 from gso.io.source import Array, Ints, doubles, face_table, ranges
+from gso.io.surface import Surface
 from gso.io.text import Words
 from gso.mesh import Mesh
 from gso.status import MeshError
@@ -58,8 +59,8 @@ class _Header:
     lines: int
 
 
-def read(data: bytes) -> Mesh:
-    """Mesh in a PLY file; properties other than coordinates and corners are ignored."""
+def read(data: bytes) -> Surface:
+    """Surface in a PLY file; properties other than coordinates and corners are ignored."""
     header = _header(data)
     names = [e.name for e in header.elements]
     for name in ("vertex", "face"):
@@ -82,7 +83,7 @@ def read(data: bytes) -> Mesh:
             f"{len(points) - 1}"
         )
     faces, notes = face_table(corners, count, points)
-    return Mesh(points, faces, notes=notes)
+    return Surface(points, faces, notes)
 
 
 def _header(data: bytes) -> _Header:

@@ -1,4 +1,4 @@
-"""What the readers of all formats share: bytes in, polygons to faces, equal vertices."""
+"""What the readers of all formats share: bytes in, polygons to faces."""
 
 from __future__ import annotations
 
@@ -75,6 +75,12 @@ def face_table(corners: Ints, count: Ints, points: Array) -> tuple[Ints, tuple[s
            [1, 4, 0]])
     """
     corners = corners.astype(np.int64, copy=False)
+    place, _, notes = face_corners(corners, count, points)
+    return np.where(place < 0, -1, corners[place]), notes
+
+
+def face_corners(corners: Ints, count: Ints, points: Array) -> tuple[Ints, Ints, tuple[str, ...]]:
+    """As :func:`face_table`, by places in `corners`: (m, k), and the polygon of each face (m,)."""
     first = np.cumsum(count) - count
     many = count > 4
     apex = np.zeros_like(count)
@@ -90,14 +96,14 @@ def face_table(corners: Ints, count: Ints, points: Array) -> tuple[Ints, tuple[s
         inside = k < size
         p = polygon[inside]
         turn = apex[p] + (piece[inside] + k if k else 0)
-        table[inside, k] = corners[first[p] + turn % count[p]]
+        table[inside, k] = first[p] + turn % count[p]
     if not many.any():
-        return table, ()
+        return table, polygon, ()
     note = (
         f"{int(many.sum())} polygons with more than four corners were cut into triangles "
         f"(the first is face {int(many.argmax())})"
     )
-    return table, (note,)
+    return table, polygon, (note,)
 
 
 def _fan_apex(rings: Array) -> Ints:
@@ -114,24 +120,3 @@ def _fan_apex(rings: Array) -> Ints:
             better = smallest > best
             best[better], apex[better] = smallest[better], k
     return apex
-
-
-def weld(points: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]]:
-    """Merge vertices with equal coordinates; triangles that collapse are left out.
-
-    Vertices keep the order in which they first occur.
-    """
-    order = np.lexsort(points.T)
-    fresh = np.ones(len(points), bool)
-    fresh[1:] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
-    # lexsort is stable: the first of each run is the one that occurs first.
-    run = np.cumsum(fresh) - 1
-    kept, rank = np.unique(order[fresh], return_inverse=True)
-    ids = np.empty(len(points), np.int64)
-    ids[order] = rank[run]
-    table = ids[faces]
-    flat = (table == np.roll(table, -1, axis=1)).any(axis=1)
-    if not flat.any():
-        return points[kept], table, ()
-    note = f"{int(flat.sum())} triangles with two equal corners were left out"
-    return points[kept], table[~flat], (note,)

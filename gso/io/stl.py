@@ -6,7 +6,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from gso.io.source import doubles, weld
+from gso.io.source import doubles
+from gso.io.surface import Surface, merged
 from gso.io.text import Words
 from gso.mesh import Mesh
 from gso.status import MeshError
@@ -15,8 +16,8 @@ _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribut
 _HEAD = 84
 
 
-def read(data: bytes) -> Mesh:
-    """Mesh in an STL file; vertices with equal coordinates become one."""
+def read(data: bytes) -> Surface:
+    """Surface in an STL file; vertices with equal coordinates become one."""
     announced = int.from_bytes(data[80:_HEAD], "little") if len(data) >= _HEAD else -1
     # Binary files may start with "solid" too: their length tells.
     if announced >= 0 and len(data) == _HEAD + announced * _RECORD.itemsize:
@@ -34,8 +35,7 @@ def read(data: bytes) -> Mesh:
         )
     if len(corners) == 0:
         raise MeshError("the STL file has no triangles")
-    points, faces, notes = weld(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
-    return Mesh(points, faces, notes=notes)
+    return Surface(*merged(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)))
 
 
 def _read_text(data: bytes) -> np.ndarray:

@@ -14,6 +14,7 @@ from gso.io.atomic import check_writable, replacing
 from gso.io.lines import polyline
 from gso.io.source import Array, Ints
 from gso.mesh import Mesh
+from gso.spelling import choices, known_keywords
 from gso.status import MeshError, OptionError
 
 MILLIMETRES = {
@@ -33,6 +34,7 @@ _LINE = 0.1
 _FINEST = 1 / 500
 
 
+@known_keywords()
 def save_flat(
     flat: ArrayLike,
     mesh: Mesh,
@@ -82,7 +84,7 @@ def save_flat(
     """
     check_writable(path, (".svg",))
     if unit not in MILLIMETRES:
-        raise OptionError(f"unknown unit {unit!r}; use {', '.join(MILLIMETRES)}")
+        raise OptionError(f"unknown unit {unit!r}; {choices(unit, MILLIMETRES)}")
     points = np.array(flat, dtype=np.float64)
     if points.shape != (len(mesh.vertices), 2):
         raise MeshError(

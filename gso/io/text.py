@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import BinaryIO, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gso.io.source import Array, Ints
 from gso.status import MeshError
@@ -62,6 +63,10 @@ class Words:
         self.first: Ints = np.flatnonzero(new)
         self.count: Ints = np.diff(self.first, append=line.size)
 
+    def row(self, words: Ints) -> Ints:
+        """Rows that words stand in."""
+        return np.searchsorted(self.first, words, side="right") - 1
+
     def rows(self, keyword: bytes) -> Ints:
         """Rows whose first word is `keyword`."""
         start, stop = self.start[self.first], self.stop[self.first]
@@ -89,29 +94,70 @@ class Words:
         """Whole numbers in the given words, each read up to the character `until`."""
         start, stop = self.start[words], self.stop[words]
         if until:
-            marks = np.flatnonzero(self._text == ord(until))
-            if marks.size:
-                at = np.searchsorted(marks, start)
-                cut = marks[np.minimum(at, marks.size - 1)]
-                stop = np.where((cut >= start) & (cut < stop), cut, stop)
-        sign = self._text[start]
-        start = start + ((sign == ord("-")) | (sign == ord("+")))
-        size = stop - start
-        bad = (size < 1) | (size > _DIGITS)
+            stop = self._next(start, stop, until)
+        return self._whole(words, start, stop)
+
+    def second_ints(self, words: Ints, between: bytes) -> Ints:
+        """Whole numbers behind the first character `between`, up to the next; 0 where none is."""
+        stop = self.stop[words]
+        start = np.minimum(self._next(self.start[words], stop, between) + 1, stop)
+        stop = self._next(start, stop, between)
+        there = stop > start
         values = np.zeros(words.size, np.int64)
-        for k in range(min(int(size.max(initial=0)), _DIGITS)):
-            inside = k < size
-            digit = self._text[np.minimum(start + k, stop - 1)].astype(np.int64) - ord("0")
-            bad |= inside & ((digit < 0) | (digit > 9))
-            values = np.where(inside, 10 * values + digit, values)
+        values[there] = self._whole(words[there], start[there], stop[there])
+        return values
+
+    def _next(self, start: Ints, stop: Ints, mark: bytes) -> Ints:
+        """Where a character stands first, from `start` up; `stop` where it does not."""
+        marks = np.flatnonzero(self._text == ord(mark))
+        if not marks.size:
+            return stop
+        at = np.searchsorted(marks, start)
+        cut = marks[np.minimum(at, marks.size - 1)]
+        return np.where((cut >= start) & (cut < stop), cut, stop)
+
+    def _whole(self, words: Ints, start: Ints, stop: Ints) -> Ints:
+        """Whole numbers in parts of words."""
+        values, bad = self._parsed(start, stop)
         if bad.any():
             word = words[bad.argmax()]
             self.fail(word, f"{self.quote(word)} is not a whole number of usual size")
-        return np.where(sign == ord("-"), -values, values)
+        return values
+
+    def ints_or(self, words: Ints, otherwise: int) -> Ints:
+        """Whole numbers in the given words, and another number for words that are none."""
+        values, bad = self._parsed(self.start[words], self.stop[words])
+        return np.where(bad, otherwise, values)
+
+    def _parsed(self, start: Ints, stop: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+        """Whole numbers in parts of the text, and which parts are none."""
+        sign = self._text[np.minimum(start, self._text.size - 1)]
+        start = start + ((sign == ord("-")) | (sign == ord("+")))
+        size = stop - start
+        bad = (size < 1) | (size > _DIGITS)
+        values = np.zeros(start.size, np.int64)
+        for k in range(min(int(size.max(initial=0)), _DIGITS)):
+            inside = k < size
+            at = np.maximum(np.minimum(start + k, stop - 1), 0)
+            digit = self._text[at].astype(np.int64) - ord("0")
+            bad |= inside & ((digit < 0) | (digit > 9))
+            values = np.where(inside, 10 * values + digit, values)
+        return np.where(sign == ord("-"), -values, values), bad
 
     def raw(self, word: int | np.integer) -> bytes:
         """A word as it stands in the text."""
         return self._data[self.start[word] : self.stop[word]]
+
+    def rest(self, row: int | np.integer) -> str:
+        """What a row says behind its first word, to the end of the line or to a comment."""
+        if self.count[row] < 2:
+            return ""
+        begin = self.start[self.first[row] + 1]
+        end = self._data.find(b"\n", begin)
+        text = self._data[begin : len(self._data) if end < 0 else end].replace(b"\t", b" ")
+        # A # within a word is part of a name. A backslash would join lines.
+        text = text.split(b" #")[0].strip().rstrip(b"\\").rstrip()
+        return text.decode("utf-8", "surrogateescape")
 
     def quote(self, word: int | np.integer) -> str:
         """A word as shown in messages."""

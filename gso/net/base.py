@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from gso.net.catalogue import TASKS
 from gso.net.grids import planes, rectangle
+from gso.spelling import choices
 from gso.status import OptionError
 
 #: Samples along each side that nets are trained at.
@@ -41,7 +42,7 @@ class Net(nn.Module):
     def __init__(self, task: str, **settings: Any):
         super().__init__()
         if task not in TASKS:
-            raise OptionError(f"no task {task!r} for a net; there are {', '.join(TASKS)}")
+            raise OptionError(f"no task {task!r} for a net; {choices(task, TASKS)}")
         self.task, self.settings, self.bf16 = task, {"task": task, **settings}, False
 
     def begin_with(self, other: Net) -> None:

@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from gso.spelling import choices
 from gso.status import OptionError, WeightsError
 
 #: Nets that come with the package: NAME.safetensors and NAME.json.
@@ -73,9 +74,9 @@ def located(model: str | PathLike[str]) -> Path:
         raise WeightsError(f"{name!r} is several nets, one after the other; take {parts}")
     path = FOLDER / f"{name}.safetensors"
     if Path(name).name != name or not path.exists():
-        known = ", ".join(available()) or "none"
         raise WeightsError(
-            f"no net {name!r}; with the package come: {known}; or give a .safetensors file"
+            f"no net {name!r} comes with the package; {choices(name, available())}; "
+            "or give a .safetensors file"
         )
     return path
 
@@ -83,7 +84,7 @@ def located(model: str | PathLike[str]) -> Path:
 def chain(model: str | PathLike[str] | None, task: str) -> tuple[Path, ...]:
     """Files of the nets that a name stands for, in the order in which they are applied."""
     if task not in TASKS:
-        raise OptionError(f"no task {task!r} for a net; there are {', '.join(TASKS)}")
+        raise OptionError(f"no task {task!r} for a net; {choices(task, TASKS)}")
     name = DEFAULTS[task] if model is None else model
     parts = CHAINS.get(name, (name,)) if isinstance(name, str) else (name,)
     return tuple(located(part) for part in parts)

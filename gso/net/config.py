@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gso.net.catalogue import TASKS
+from gso.spelling import check_keywords, choices
 from gso.status import OptionError
 
 #: Configurations that come with the package.
@@ -291,12 +292,7 @@ def from_dict(given: Mapping[str, Any]) -> Config:
 
 
 def _made(cls: Any, given: Mapping[str, Any]) -> Any:
-    names = {f.name for f in fields(cls)}
-    unknown = set(given) - names
-    if unknown:
-        raise OptionError(
-            f"unknown: {', '.join(sorted(unknown))}; there are {', '.join(sorted(names))}"
-        )
+    check_keywords(f"a configuration's {cls.__name__}", given, [f.name for f in fields(cls)])
     values = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
     try:
         return cls(**values)
@@ -316,7 +312,7 @@ def _toml(text: str) -> Any:
 
 def _choice(what: str, value: Any, known: tuple[str, ...]) -> None:
     if value not in known:
-        raise OptionError(f"{what} is {value!r}; there are {', '.join(known) or 'none'}")
+        raise OptionError(f"{what} is {value!r}; {choices(value, known)}")
 
 
 def _number(what: str, value: Any, least: float, *, whole: bool = False) -> None:

@@ -17,8 +17,8 @@ from gso import geometry
 from gso.net import grids
 from gso.net.grids import Planes, planes
 from gso.tasks import developable, flatten
-from gso.terms import curvature, edges, fairness, proximity, stretch
-from gso.terms.losses import Absolute, Distance
+from gso.terms import curvature, edges, elongation, fairness, proximity, stretch
+from gso.terms.losses import Absolute, Distance, Squared
 
 #: Designs that are flatter, by mean |K| in the unit ball, count as if they were not.
 LEAST_CURVATURE = 1e-3
@@ -52,6 +52,8 @@ class Developable:
         k = grids.to_border(grids.absolute_curvature(p))
         self.curved = k[:, 1:-1, 1:-1].mean(dim=(1, 2))
         self.spacing = fairness.spacing(*grids.side_lengths(p), p[0].shape[1:])
+        self.lengths = [1.0 / geometry.norm(d).clamp_min(1e-9) for d in _edges(p)]
+        self.bands = [_bands(d[0], axis) for d, axis in zip(_edges(p), (2, 1), strict=True)]
         own = [_second(p, axis, h) for axis, h in zip((1, 2), self.spacing, strict=True)]
         kept = developable.kept_bending(k)
         self.wanted = [
@@ -93,7 +95,17 @@ class Developable:
             "curvature": self.w_curvature * bent,
             "fairness": self.w_fairness * fair,
             "proximity": o.w_proximity * near,
+            "elongation": o.w_elongation * self._elongation(x),
         }
+
+    def _elongation(self, x: Planes) -> Tensor:
+        squared, total, count = Squared(), torch.zeros_like(self.curved), 0
+        for d, inverse, band in zip(_edges(x), self.lengths, self.bands, strict=True):
+            origin = tuple(torch.zeros_like(c) for c in d)
+            (r,) = elongation.residual([origin, d], [inverse, *band])
+            total = total + squared.value(r).sum(dim=(1, 2))  # type: ignore[arg-type]
+            count += r[0].numel()
+        return total / count
 
     def _fairness(self, x: Planes) -> Tensor:
         total, count = torch.zeros_like(self.curved), 0
@@ -111,6 +123,17 @@ def _second(x: Planes, axis: int, spacing: Tensor) -> Planes:
     scale = (spacing**-2)[:, None, None].expand_as(triple[0][0])
     zeros = [scale.new_zeros(())] * len(x)
     return fairness.residual(triple, [scale, -2.0 * scale, scale, *zeros])
+
+
+def _bands(like: Tensor, across: int) -> tuple[Tensor, Tensor]:
+    """Ratios (1, ., .) between which edges (B, ., .) are free; the outer ones lie on the border."""
+    bands = []
+    for inside, boundary in zip(elongation.INSIDE, elongation.BOUNDARY, strict=True):
+        band = torch.full_like(like[:1], inside)
+        for outer in (0, like.shape[across] - 1):
+            band.select(across, outer).fill_(boundary)
+        bands.append(band)
+    return bands[0], bands[1]
 
 
 def _mean_of_three(x: Tensor, axis: int) -> Tensor:

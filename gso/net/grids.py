@@ -5,6 +5,7 @@ Inside they are component tuples of planes (B, H, W), on which :mod:`gso.geometr
 
 from __future__ import annotations
 
+from operator import add
 from typing import NamedTuple
 
 import torch
@@ -117,19 +118,29 @@ def corners(p: Planes) -> tuple[Planes, Planes, Planes, Planes]:
 def normals(p: Planes) -> Planes:
     """Area-weighted unit normals of the vertices, as :func:`gso.variables.vertex_normals`."""
     v0, v1, v2, v3 = corners(p)
+    whole = geometry.cross(geometry.sub(v2, v0), geometry.sub(v3, v1))
+    at = [
+        geometry.cross(geometry.sub(b, a), geometry.sub(c, a))
+        for a, b, c in ((v0, v1, v3), (v1, v2, v0), (v2, v3, v1), (v3, v0, v2))
+    ]
+    return unit(_gathered([tuple(map(add, whole, corner)) for corner in at]))
+
+
+def split_normals(p: Planes) -> Planes:
+    """The same of one triangulation, the published one: what the nets measure along."""
+    v0, v1, v2, v3 = corners(p)
     diagonal = geometry.sub(v2, v0)
     lower = geometry.cross(geometry.sub(v1, v0), diagonal)
     upper = geometry.cross(diagonal, geometry.sub(v3, v0))
-    total = []
-    for a, b in zip(lower, upper, strict=True):
-        both = a + b
-        total.append(
-            pad(both, (0, 1, 0, 1))
-            + pad(both, (1, 0, 1, 0))
-            + pad(a, (0, 1, 1, 0))
-            + pad(b, (1, 0, 0, 1))
-        )
-    return unit(tuple(total))
+    whole = tuple(map(add, lower, upper))
+    return unit(_gathered([whole, lower, whole, upper]))
+
+
+def _gathered(at: list[Planes]) -> Planes:
+    """Sums at the vertices of what the cells have at their four corners."""
+    sides = ((0, 1, 0, 1), (0, 1, 1, 0), (1, 0, 1, 0), (1, 0, 0, 1))
+    placed = [[pad(c, side) for c in corner] for corner, side in zip(at, sides, strict=True)]
+    return tuple(a + b + c + d for a, b, c, d in zip(*placed, strict=True))
 
 
 def _slopes(x: Tensor, *axes: int) -> list[Tensor]:
@@ -163,7 +174,7 @@ class Frame(NamedTuple):
     def of(cls, p: Planes) -> Frame:
         """Frame of grids."""
         du, dv = (d.unbind() for d in _slopes(torch.stack(p), -2, -1))
-        return cls(du, dv, unit(du), unit(dv), normals(p))
+        return cls(du, dv, unit(du), unit(dv), split_normals(p))
 
     def combine(self, shares: Tensor) -> Tensor:
         """Vectors (B, H, W, 3) with shares (B, 3, H, W) of normal, along and across."""

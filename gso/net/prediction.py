@@ -15,6 +15,7 @@ from gso.net.base import SIZE, Net, exact
 from gso.net.catalogue import chain
 from gso.net.weights import cached
 from gso.resample import resample
+from gso.spelling import known_keywords
 from gso.status import MeshError, OptionError
 
 Array = NDArray[np.float64]
@@ -25,6 +26,7 @@ SMALLEST = 4
 _BATCH = 64
 
 
+@known_keywords()
 def predict(
     surface: Any,
     *,

@@ -16,6 +16,7 @@ from gso.net.base import Net
 from gso.net.catalogue import FORMAT, located, read_card
 from gso.net.coarse import CoarseNet
 from gso.net.gsonet import GSONet
+from gso.spelling import choices
 from gso.status import GSOError, OptionError, WeightsError
 
 #: Kinds of nets, as cards and configurations name them.
@@ -40,7 +41,7 @@ def make(settings: dict[str, Any]) -> Net:
     rest = dict(settings)
     kind = rest.pop("kind", None)
     if not isinstance(kind, str) or kind not in KINDS:
-        raise OptionError(f"no kind {kind!r} of net; there are {', '.join(KINDS)}")
+        raise OptionError(f"no kind {kind!r} of net; {choices(kind, KINDS)}")
     try:
         return KINDS[kind](**rest)
     except (TypeError, ValueError, AttributeError) as error:

@@ -26,6 +26,7 @@ from gso.plot.heat import curvatures, distance, numbers, scales, strain, stretch
 from gso.plot.rulings import gauss, ruled
 from gso.plot.view import View
 from gso.result import Result
+from gso.spelling import choices, known_keywords
 from gso.status import GSOError, OptionError
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def require() -> None:
         raise GSOError('plots need Matplotlib: pip install ".[plot]" in the folder of gso')
 
 
+@known_keywords()
 def plot_surface(
     mesh: Any,
     values: str | ArrayLike = "none",
@@ -112,7 +114,7 @@ def _plain(meshes: list[Mesh]) -> list[Panel]:
 
 def _named(name: str, meshes: list[Mesh]) -> list[Panel]:
     if name not in COLOURS:
-        raise OptionError(f"no colour {name!r}; there are {', '.join(COLOURS)}")
+        raise OptionError(f"no colour {name!r}; {choices(name, COLOURS)}")
     if name in ("distance", "strain") and len(meshes) < 2:
         raise OptionError(f"the colour {name!r} needs the surface before")
     panels = _plain(meshes)
@@ -196,6 +198,7 @@ def _curved(design: Mesh, mesh: Mesh) -> float:
     return metrics.loss_gc(mesh, scale=metrics.unit(design))
 
 
+@known_keywords()
 def plot_rulings(
     mesh: Any,
     *,

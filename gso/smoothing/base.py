@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gso.spelling import choices
 from gso.status import MeshError, OptionError
 
 Array = NDArray[np.float64]
@@ -103,7 +104,7 @@ def checked_options(
         `order` is not in `orders`, `weight` is negative or not finite, or `norm` is unknown.
     """
     if norm not in NORMS:
-        raise OptionError(f"norm {norm!r} is unknown; choose one of {', '.join(NORMS)}")
+        raise OptionError(f"norm {norm!r} is unknown; {choices(norm, NORMS)}")
     if order is not None and order not in orders:
         known = ", ".join(map(str, orders))
         raise OptionError(f"order {order} does not exist for norm {norm!r}; choose one of {known}")

@@ -17,8 +17,9 @@ from gso.smoothing.patches import (
     residuals,
     rings,
     umbrella,
+    used_only,
 )
-from gso.smoothing.select import Choice, best_weight, factor, gcv, unbiased_risk
+from gso.smoothing.select import Choice, best_weight, factor, gcv, largest_weight, unbiased_risk
 
 Array = NDArray[np.float64]
 
@@ -65,6 +66,7 @@ def smooth_mesh(
         independent and equally strong in every coordinate.
     faces : array_like of int, (m, 3) or (m, 4)
         Vertex indices; a triangle among quads ends in -1. Boundaries and holes are free.
+        Vertices of no face stay where they are and count in nothing.
     order : {2, 3, 4}, optional
         2 has patches of one ring of faces, 3 and 4 of two. 4 by default; for
         ``norm="l1"`` 2 or 3, whichever spends fewer degrees of freedom.
@@ -97,9 +99,12 @@ def smooth_mesh(
     >>> bool((z - x * y).std() < 0.003)
     True
     """
-    points = checked_points(vertices, 2)
-    table = checked_faces(faces, len(points))
+    given = checked_points(vertices, 2)
+    every = checked_faces(faces, len(given))
     checked_options(order, ORDERS if norm == "l2" else ORDERS[:2], weight, norm)
+    # A vertex of no face may lie anywhere: it must not count in sizes, medians and traces.
+    used, table = used_only(every)
+    points = given[used]
     unit, frame = to_unit(points)
     near = neighbours(table, len(points))
     flat = umbrella(near, boundary_edges(table, len(points)))
@@ -112,8 +117,10 @@ def smooth_mesh(
         trials = [_creased(unit, pilot, near, k, weight, at_most) for k in orders]
         # Both leave residuals as large as the noise; fewer degrees of freedom explain it.
         done, order, sigma = min(trials, key=lambda trial: trial[0].dof)
+    smoothed = given.copy()
+    smoothed[used] = frame.to_user(done.points)
     return Smoothed(
-        points=frame.to_user(done.points),
+        points=smoothed,
         order=order,
         weight=done.weight,
         sigma=frame.scale * sigma,
@@ -162,7 +169,7 @@ def _solve(penalty: Any, unit: Array, start: float, sigma: float, weight: float 
         return Choice(unit, 0.0, float(len(unit)))
     if weight is None:
         return best_weight(penalty, unit, start, unbiased_risk(sigma**2))
-    solve = factor(penalty, weight)
+    solve = factor(penalty, min(weight, largest_weight(penalty)))
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(unit), 3))
     dof = float((signs * solve(signs)).sum()) / signs.shape[1]
     return Choice(solve(unit), weight, dof)

@@ -48,6 +48,20 @@ def checked_faces(faces: Any, count: int) -> Ints:
     return table
 
 
+def used_only(faces: Ints) -> tuple[Ints, Ints]:
+    """Vertices that faces refer to, ascending, and the faces in terms of them.
+
+    >>> used, table = used_only(np.array([[7, 3, 5, -1], [3, 7, 9, 4]]))
+    >>> used, table.tolist()
+    (array([3, 4, 5, 7, 9]), [[3, 0, 2, -1], [0, 3, 4, 1]])
+    """
+    real = faces >= 0
+    used, index = np.unique(faces[real], return_inverse=True)
+    table = np.full_like(faces, -1)
+    table[real] = index.ravel()
+    return used, table
+
+
 def neighbours(faces: Ints, count: int) -> Any:
     """Sparse (n, n) pattern of ones: vertices that share a face, each with itself."""
     from scipy.sparse import csr_matrix, identity

@@ -24,6 +24,7 @@ ROUNDS = 6
 REACH = np.arange(-1.5, 3.05, 0.1)  # decades around the shift that are looked at
 BAND = 500  # widest band that is factored as one
 NEAR = 1.2  # an optimum within so many decades is final
+STEEPEST = 1e14  # larger entries of weight K leave no digit of the data
 
 
 class Family:
@@ -106,9 +107,16 @@ class Choice:
 Criterion = Callable[[Array, Array, int], Array]
 
 
+def largest_weight(penalty: Any) -> float:
+    """Largest weight with which I + weight K still has digits of I; inf without a penalty."""
+    steepest = float(np.abs(penalty.diagonal()).max())
+    return STEEPEST / steepest if steepest > 0 else np.inf
+
+
 def best_weight(penalty: Any, points: Array, start: float, criterion: Criterion) -> Choice:
     """Minimise a criterion of (sum of squared residuals, trace of I - H, n) over weights."""
-    shift, low, high = start, 0.0, np.inf
+    most = largest_weight(penalty)
+    shift, low, high = min(start, most), 0.0, np.inf
     for _ in range(ROUNDS):
         family = Family(penalty, points, shift)
         residual, trace = family.removed()
@@ -120,7 +128,9 @@ def best_weight(penalty: Any, points: Array, start: float, criterion: Criterion)
         if abs(np.log10(weight / shift)) < NEAR:
             break
         low, high = (shift, high) if weight > shift else (low, shift)
-        shift = weight
+        if weight >= most and shift >= most:
+            break
+        shift = min(weight, most)
     return Choice(family.smooth(weight), weight, len(points) - float(trace[best]))
 
 

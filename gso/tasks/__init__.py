@@ -11,6 +11,7 @@ import pkgutil
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from gso.spelling import choices
 from gso.status import OptionError
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def choose(module: ModuleType, formulation: str | None, options: Any) -> tuple[s
     if formulation not in module.FORMULATIONS:
         raise OptionError(
             f"task {module.__name__.rpartition('.')[2]!r} has no formulation {formulation!r}; "
-            f"there are {', '.join(module.FORMULATIONS)}"
+            + choices(formulation, module.FORMULATIONS)
         )
     if implied not in (None, formulation):
         raise OptionError(
@@ -49,5 +50,5 @@ def choose(module: ModuleType, formulation: str | None, options: Any) -> tuple[s
 def get(name: str) -> ModuleType:
     """Module of a task."""
     if name not in names():
-        raise OptionError(f"no task {name!r}; there are {', '.join(names())}")
+        raise OptionError(f"no task {name!r}; {choices(name, names())}")
     return importlib.import_module(f"{__name__}.{name}")

@@ -29,7 +29,7 @@ from gso.tasks import held, joined, joint, splined
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.measured import parted
 from gso.tasks.options import Options as BaseOptions
-from gso.terms import Weighted, curvature, fairness, proximity
+from gso.terms import Weighted, curvature, elongation, fairness, proximity
 from gso.terms.losses import Absolute, Distance
 from gso.variables import (
     ALONG,
@@ -65,6 +65,9 @@ class Options(BaseOptions):
         Weight of the mean squared second derivative, likewise relative to the design's.
     w_proximity : float
         Weight of the displacement.
+    w_elongation : float
+        Weight of edges that become much shorter or longer than the design's, and of those of
+        its boundary that change at all visibly.
     near : float
         Displacements below it count squared, above it by their length.
     tangential : float
@@ -107,6 +110,7 @@ class Options(BaseOptions):
     w_curvature: float = 1.3e-3
     w_fairness: float = 1.1e-5
     w_proximity: float = 1.0
+    w_elongation: float = 0.1
     near: float = 0.01
     tangential: float = 0.7
     eps: float = 0.01
@@ -324,6 +328,7 @@ def _objective(
     fair = fairness.build(mesh, reference=smooth.vertices, share=_own_bending(smooth))
     items.append(Weighted(fair, w_fairness))
     items.append(Weighted(near, w_proximity, Distance(o.near)))
+    items.append(Weighted(elongation.build(mesh), o.w_elongation))
     return items + (held.pulls(request) if mesh is request.mesh else [])
 
 
@@ -527,5 +532,11 @@ def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict
         "distance_max": percent * max(true.there_max, true.back_max),
         "deviation_max": percent * true.there_max,
         "fairness_ratio": measure.fairness_ratio(before, after),
+        "edge_ratio_min": float(np.nanmin(measure.edge_ratios(before, after))),
+        "fold_max_before": float(measure.folds(before).max(initial=0.0)),
+        "fold_max": float(measure.folds(after).max(initial=0.0)),
     }
+    if before.boundary_loops:
+        loops = measure.loop_ratios(before, after)
+        out |= {"loop_ratio_min": float(loops.min()), "loop_ratio_max": float(loops.max())}
     return out if flat is None else out | _flat_metrics(after, flat)

@@ -31,7 +31,7 @@ from gso.status import OptionError, Status
 from gso.tasks import held, joined, splined
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
-from gso.terms import Weighted, christoffel, congruence, fairness, proximity
+from gso.terms import Weighted, christoffel, congruence, elongation, fairness, proximity
 from gso.variables import (
     Layout,
     Variables,
@@ -77,6 +77,8 @@ class Options(BaseOptions):
         design.
     w_place : float
         Weight of the squared displacement from where a vertex was.
+    w_elongation : float
+        Weight of edges of the surface that become much shorter or longer than the design's.
     enough : float
         Fairness falls no further when the mean squared isometry defect is this small.
     begin : {"curvature", "design"}
@@ -100,7 +102,7 @@ class Options(BaseOptions):
         "fast": {"iterations": 6},
         "balanced": {},
         "accurate": {"iterations": 40, "tolerance": 1e-5},
-        "jiang2020": {"begin": "design", "iterations": 15},
+        "jiang2020": {"begin": "design", "iterations": 15, "w_elongation": 0.0},
     }
 
     iterations: int = 15
@@ -113,6 +115,7 @@ class Options(BaseOptions):
     w_flat: float = 0.01
     w_closest: float = 0.5
     w_place: float = 0.5
+    w_elongation: float = 1.0
     enough: float = 1e-8
     begin: str = "curvature"
     variables: str = "free"
@@ -307,6 +310,7 @@ def _terms(o: Options, demand: float, w_fairness: float, mesh: Mesh) -> list[Wei
     if o.w_closest > 0:
         items.append(Weighted(proximity.closest(mesh, normals), o.w_closest))
     items.append(Weighted(proximity.build(mesh, normals), o.w_place))
+    items.append(Weighted(elongation.build(mesh), o.w_elongation))
     return items
 
 

@@ -7,11 +7,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from gso.spelling import KnownFields, choices
 from gso.status import OptionError
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(KnownFields):
     """Settings of the solver; every task adds its own.
 
     Change some of a preset's fields with :func:`dataclasses.replace`.
@@ -45,14 +46,15 @@ class Options:
             _check_number(f.name, str(f.type), getattr(self, f.name))
         if self.method not in ("gauss-newton", "levenberg-marquardt"):
             raise OptionError(
-                f"method is {self.method!r}; take 'gauss-newton' or 'levenberg-marquardt'"
+                f"no method {self.method!r}; "
+                + choices(self.method, ("gauss-newton", "levenberg-marquardt"))
             )
 
     @classmethod
     def preset(cls, name: str) -> Options:
         """Settings of a named preset."""
         if name not in cls.PRESETS:
-            raise OptionError(f"no preset {name!r}; there are {', '.join(cls.PRESETS)}")
+            raise OptionError(f"no preset {name!r}; {choices(name, cls.PRESETS)}")
         return cls(**cls.PRESETS[name])
 
     @classmethod

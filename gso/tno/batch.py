@@ -9,6 +9,8 @@ from functools import partial
 from typing import Any
 
 from gso.result import Result
+from gso.spelling import known_keywords
+from gso.tno.optimize import optimize
 from gso.tno.pool import spread
 
 
@@ -27,13 +29,12 @@ class Item:
 
 
 def _one(keywords: dict[str, Any], mesh: Any) -> Result:
-    from gso.tno.optimize import optimize
-
     result = optimize(mesh, **keywords)
     result.metrics  # noqa: B018 - computed here, where there is a processor for it
     return result
 
 
+@known_keywords(optimize)
 def optimize_many(
     meshes: Iterable[Any], *, workers: int | None = None, **keywords: Any
 ) -> Iterator[Item]:

@@ -19,6 +19,7 @@ from gso.constraints import TIGHT, Constraint, compile_constraints
 from gso.fit import describe_spline
 from gso.mesh import Mesh
 from gso.result import Result
+from gso.spelling import known_keywords
 from gso.status import ConvergenceWarning, OptionError, Status
 from gso.tasks.base import Options, Request
 from gso.tno import components, linear
@@ -32,6 +33,7 @@ from gso.tno.start import Start
 Array = NDArray[np.float64]
 
 
+@known_keywords()
 def optimize(
     mesh: Any,
     *,
@@ -116,6 +118,7 @@ def optimize(
     from gso.io import as_mesh
 
     design, given_formulation = as_mesh(mesh), formulation
+    design.check_joined()
     module, formulation, settings = check(
         task, formulation, options, max_deviation, target_curvature, max_strain
     )
@@ -142,7 +145,7 @@ def optimize(
         result = one(whole, callback)
     result.seconds["total"] = time.perf_counter() - clock
     if not result.converged and result.status is not Status.MAX_ITERATIONS:
-        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=2)
+        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=3)
     return result
 
 

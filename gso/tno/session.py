@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from gso.constraints import Constraint, Handle, Pins, listed
 from gso.handle_start import Spread
 from gso.result import Result
+from gso.spelling import known_keywords
 from gso.status import ConvergenceWarning, OptionError, Status
 from gso.tasks.base import Plan, Request, Stage
 from gso.terms import Weighted
@@ -78,6 +79,7 @@ class Session:
     True
     """
 
+    @known_keywords()
     def __init__(
         self,
         mesh: Any,
@@ -91,6 +93,7 @@ class Session:
         from gso.io import as_mesh
 
         self._design = as_mesh(mesh)
+        self._design.check_joined()
         self._module, self._formulation, self._options = check(task, formulation, options)
         if getattr(self._module, "BLOCK", "surface") == "flat":
             raise OptionError(f"task {task!r} makes no surface that handles could move")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso import topology
 from gso.mesh import Mesh
 from gso.variables.base import Array, Layout, Variables
 
@@ -11,14 +12,19 @@ from gso.variables.base import Array, Layout, Variables
 def vertex_normals(mesh: Mesh) -> Array:
     """Area-weighted unit normals (n, 3) at the vertices of a mesh.
 
-    Vertices without an area around them get the z direction.
+    Mean of both triangulations of the quads: split through the vertex, a quad counts whole,
+    otherwise with the corner at the vertex. So a symmetric surface has symmetric normals,
+    however it is numbered. Vertices without an area around them get the z direction.
     """
-    v, t = mesh.vertices, mesh.triangles
-    face = np.cross(v[t[:, 1]] - v[t[:, 0]], v[t[:, 2]] - v[t[:, 0]])
-    total = np.stack(
-        [sum(np.bincount(t[:, k], face[:, d], len(v)) for k in range(3)) for d in range(3)],
-        axis=1,
-    )
+    v, he = mesh.vertices, mesh.half_edges
+    four = topology.four_corners(mesh.faces)
+    whole = np.cross(v[four[:, 2]] - v[four[:, 0]], v[four[:, 3]] - v[four[:, 1]])
+    # A triangle is the same in both, and stands for two.
+    whole[~topology.are_quads(mesh.faces)] *= 2.0
+    tri = topology.corner_triangles(topology.by_size(mesh.faces)[0])
+    corner = np.cross(v[tri[:, 1]] - v[tri[:, 0]], v[tri[:, 2]] - v[tri[:, 0]])
+    at, area = np.r_[he.origin, tri[:, 0]], np.concatenate([whole[he.face], corner])
+    total = np.stack([np.bincount(at, area[:, d], len(v)) for d in range(3)], axis=1)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     up = np.broadcast_to([0.0, 0.0, 1.0], total.shape)
     return np.divide(total, length, out=up.copy(), where=length > 0)

@@ -12,6 +12,7 @@ import pkgutil
 from types import ModuleType
 from typing import Any
 
+from gso.spelling import choices
 from gso.status import BackendError, OptionError
 from gso.tno.linear.base import Pattern, SingularError, blas_threads
 
@@ -39,7 +40,7 @@ def find(name: str) -> ModuleType:
     """
     found = backends()
     if name not in found:
-        raise OptionError(f"no linear backend {name!r}; there are {', '.join(sorted(found))}")
+        raise OptionError(f"no linear backend {name!r}; {choices(name, sorted(found))}")
     if not found[name].available():
         raise BackendError(f"backend {name!r} needs a package: pip install {found[name].PACKAGE}")
     return found[name]

@@ -1,0 +1,144 @@
+"""What a file says of a mesh beyond its geometry, kept to be written with it again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Keywords of OBJ that name the faces after them, and what they name.
+LABELS = {"o": "objects", "g": "groups", "s": "smoothing groups", "usemtl": "materials"}
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """Names that stand before runs of faces.
+
+    Attributes
+    ----------
+    names : tuple of str
+        As the file has them, one for each time that a name is said.
+    of_face : ndarray of int, (m,)
+        Place in `names` of each face's name; -1 before the first.
+    """
+
+    names: tuple[str, ...]
+    of_face: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Attributes:
+    """Names of faces and texture coordinates of their corners.
+
+    They belong to faces and corners, not to vertices: they stay valid while vertices move,
+    are merged or doubled.
+
+    Attributes
+    ----------
+    libraries : tuple of str
+        Files of materials (``mtllib``), as written in the file.
+    labels : dict of str to Labels
+        By the keywords of OBJ: "o", "g", "s", "usemtl".
+    texture : ndarray, (t, 1 to 3), or None
+        Texture coordinates (``vt``).
+    texture_corners : ndarray of int, shaped like the faces, or None
+        Row of `texture` of each corner; -1 for none.
+    """
+
+    libraries: tuple[str, ...] = ()
+    labels: Mapping[str, Labels] = field(default_factory=dict)
+    texture: Array | None = None
+    texture_corners: Ints | None = None
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing is said."""
+        return not (self.libraries or self.labels or self.texture_corners is not None)
+
+    def taken(self, faces: Ints, turns: Ints | None = None) -> Attributes:
+        """Those of some of the faces.
+
+        Parameters
+        ----------
+        faces : ndarray of int, (p,)
+            Which faces, in the new order.
+        turns : ndarray of int, (p, k), optional
+            For each new corner the column of the old one; -1 where there is no corner.
+        """
+        corners = self.texture_corners
+        if corners is not None:
+            corners = corners[faces]
+            if turns is not None:
+                corners = np.where(turns < 0, -1, np.take_along_axis(corners, turns, axis=1))
+        labels = {k: replace(said, of_face=said.of_face[faces]) for k, said in self.labels.items()}
+        return replace(self, labels=labels, texture_corners=corners)
+
+    def __str__(self) -> str:
+        parts = [
+            f"{len(set(said.names))} {LABELS[k]} ({k})"
+            for k, said in self.labels.items()
+            if k in LABELS
+        ]
+        parts += ["files of materials (mtllib)"] if self.libraries else []
+        parts += ["texture coordinates (vt)"] if self.texture_corners is not None else []
+        return ", ".join(parts) or "nothing"
+
+    def arrays(self) -> dict[str, Array | Ints]:
+        """Plain arrays, for a .npz file."""
+        words = {
+            "libraries": self.libraries,
+            "labels": {k: v.names for k, v in self.labels.items()},
+        }
+        out: dict[str, Any] = {"attributes": np.frombuffer(json.dumps(words).encode(), np.uint8)}
+        out |= {f"attributes_{k}": said.of_face for k, said in self.labels.items()}
+        if self.texture is not None and self.texture_corners is not None:
+            out |= {"texture": self.texture, "texture_corners": self.texture_corners}
+        return out
+
+    @classmethod
+    def from_arrays(cls, data: Mapping[str, Any], faces: Ints) -> Attributes | None:
+        """What :meth:`arrays` made, for a mesh with these faces; None where there is nothing.
+
+        Raises
+        ------
+        ValueError
+            The arrays do not fit the faces, or each other.
+
+        Examples
+        --------
+        >>> panels = Labels(("left", "right"), np.array([0, 1]))
+        >>> data = Attributes(labels={"g": panels}).arrays()
+        >>> str(Attributes.from_arrays(data, np.array([[0, 1, 2], [2, 1, 3]])))
+        '2 groups (g)'
+        """
+        if "attributes" not in data:
+            return None
+        said = json.loads(data["attributes"].tobytes())
+        labels = {}
+        for keyword, names in said["labels"].items():
+            of_face = _checked(data[f"attributes_{keyword}"], (len(faces),), len(names))
+            if keyword not in LABELS:
+                raise ValueError(f"there are no labels {keyword!r}")
+            labels[keyword] = Labels(tuple(map(str, names)), of_face)
+        texture = corners = None
+        if "texture" in data:
+            texture = np.array(data["texture"], np.float64)
+            if texture.ndim != 2 or not 1 <= texture.shape[1] <= 3:
+                raise ValueError(f"texture coordinates are an array {texture.shape}")
+            corners = _checked(data["texture_corners"], faces.shape, len(texture))
+        return cls(tuple(map(str, said["libraries"])), labels, texture, corners)
+
+
+def _checked(index: Any, shape: tuple[int, ...], count: int) -> Ints:
+    """Indices of this shape below a count, -1 for none."""
+    table = np.array(index, np.int64)
+    if table.shape != shape or (table >= count).any() or (table < -1).any():
+        raise ValueError(f"attributes are an array {table.shape} that does not fit the faces")
+    return table

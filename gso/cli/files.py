@@ -1,0 +1,79 @@
+"""Options about files that several commands have, and outputs that must not be inputs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gso.status import OptionError
+
+if TYPE_CHECKING:
+    from gso.mesh import Mesh
+
+
+def _length(ctx: click.Context, option: click.Parameter, value: float | None) -> float | None:
+    from gso.io import checked_weld
+
+    return None if value is None else checked_weld(value)
+
+
+#: ``--weld TOL``
+weld = click.option(
+    "--weld",
+    metavar="TOL",
+    type=float,
+    callback=_length,
+    help="Merge vertices closer than this, in the input's unit of length: for faces that have "
+    "vertices of their own. 0 merges equal ones.",
+)
+
+#: ``--force``
+force = click.option("--force", is_flag=True, help="Let an output replace an input.")
+
+
+def load(file: str, weld: float | None = None) -> Mesh:
+    """A mesh from a file, its vertices merged if asked for."""
+    from gso import io
+
+    return io.load(file, weld=weld)
+
+
+def source(file: str, weld: float | None) -> Any:
+    """A file as :func:`gso.as_mesh` takes it, to be read elsewhere."""
+    from gso.io import Unwelded
+
+    return file if weld is None else Unwelded(file, weld)
+
+
+def spare(inputs: Iterable[str | None], outputs: Iterable[str | None], force: bool) -> None:
+    """Refuse outputs that are inputs, by whatever name: links of both kinds are followed.
+
+    Raises
+    ------
+    OptionError
+        An output would replace an input, and nobody insists.
+    """
+    if force:
+        return
+    taken = {key: name for name in inputs if name is not None for key in _keys(name)}
+    for out in filter(None, outputs):
+        name = next((taken[key] for key in _keys(out) if key in taken), None)
+        if name is not None:
+            called = "" if name == out else f" ({name})"
+            raise OptionError(
+                f"{out} would replace an input{called}; give another name or folder, or --force"
+            )
+
+
+def _keys(name: str) -> list[Any]:
+    """What files that are one and the same have in common, one of them at least."""
+    keys: list[Any] = []
+    with suppress(OSError, ValueError):
+        keys.append(os.path.realpath(name))
+        seen = os.stat(name)
+        keys.append((seen.st_dev, seen.st_ino))
+    return keys

@@ -1,0 +1,152 @@
+"""What readers find in a file, before it is a mesh: vertices that lie on each other are merged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.attributes import Attributes
+from gso.mesh import Mesh
+from gso.status import MeshError, OptionError
+from gso.welding import collapse, equal, near
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Vertices and faces that nobody has checked.
+
+    Attributes
+    ----------
+    vertices, faces : ndarray
+        As :class:`gso.Mesh` takes them; `faces` None with a grid (H, W, 3) as vertices.
+    notes : tuple of str
+        What was changed or left out.
+    attributes : Attributes, optional
+        Names and texture coordinates of the faces.
+    """
+
+    vertices: Any
+    faces: Any
+    notes: tuple[str, ...] = ()
+    attributes: Attributes | None = None
+
+    def mesh(self, weld: float | None = None) -> Mesh:
+        """The mesh, its vertices merged up to a distance first."""
+        if self.faces is None:
+            grid = Mesh.from_grid(self.vertices)
+            return grid if weld is None else welded(grid, weld)
+        if weld is not None:
+            return _welded(self, checked(weld)).mesh()
+        return Mesh(self.vertices, self.faces, notes=self.notes, attributes=self.attributes)
+
+
+def checked(weld: Any) -> float:
+    """Refuse a distance that is none.
+
+    Raises
+    ------
+    OptionError
+        It is no number from 0 up.
+    """
+    number = isinstance(weld, int | float | np.number) and not isinstance(weld, bool)
+    if not number or not 0 <= weld < np.inf:
+        raise OptionError(f"weld is {weld!r}; it must be a length, 0 or more")
+    return float(weld)
+
+
+def welded(mesh: Mesh, weld: float) -> Mesh:
+    """A mesh with the vertices merged that lie within a distance of each other.
+
+    Vertices keep the order in which they first occur, and the first of those that are merged
+    stays where it is. Quads stay quads; one that loses an edge becomes a triangle, and
+    faces that lose more are left out. The notes say how many.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    weld : float
+        The distance, in the mesh's unit of length; 0 merges equal vertices.
+
+    Raises
+    ------
+    OptionError
+        `weld` is no length.
+    MeshError
+        `weld` is so large that chains of vertices or all faces collapse, or the joined
+        surface is refused (see :class:`gso.Mesh`).
+
+    Examples
+    --------
+    >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    >>> apart = Mesh([*corners, *np.add(corners, [1, 0, 0])], [[0, 1, 2, 3], [4, 5, 6, 7]])
+    >>> welded(apart, 1e-6)
+    Mesh(6 vertices, 2 faces, quads)
+    """
+    # What the notes say of the unjoined surface is no longer so.
+    surface = Surface(mesh.vertices, mesh.faces, mesh.given_notes, mesh.attributes)
+    return surface.mesh(weld)
+
+
+def _welded(surface: Surface, weld: float) -> Surface:
+    try:
+        points, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
+        sound = points.dtype.kind in "iuf" and faces.dtype.kind in "iuf"
+        with np.errstate(invalid="ignore"):
+            points, table = points.astype(np.float64), faces.astype(np.int64)
+        sound &= points.ndim == 2 and points.shape[1] == 3 and bool(np.isfinite(points).all())
+        # Too far apart for numbers: the mesh says so.
+        sound &= float(np.abs(points).max(initial=0.0)) < 1e150
+        sound &= table.ndim == 2 and table.shape[1] in (3, 4) and bool((table == faces).all())
+        corner = np.ones(table.shape, bool)
+        corner[:, 3:] = table[:, 3:] != -1
+        sound &= bool(((table >= 0) & (table < len(points)))[corner].all()) and len(table) > 0
+    except (TypeError, ValueError, IndexError, OverflowError):
+        sound = False
+    if not sound:
+        # The mesh says what is wrong with it.
+        return surface
+    used = np.unique(table[corner])
+    target = np.arange(len(points))
+    target[used] = used[near(points[used], weld, used)]
+    merged = int((target != np.arange(len(points))).sum())
+    if not merged:
+        note = f"weld={weld:.3g} merged nothing: no two vertices are that close"
+        return Surface(points, table, (*surface.notes, note), surface.attributes)
+    done = collapse(table, target)
+    if not len(done.faces):
+        raise MeshError(f"weld={weld:.3g} leaves no face; give a length below that of the edges")
+    new = np.cumsum(target == np.arange(len(points))) - 1
+    notes = [f"weld={weld:.3g} merged {merged} of {len(points)} vertices with others"]
+    triangles = int(((done.turns[:, 3:] < 0) & corner[done.kept, 3:]).sum())
+    if triangles:
+        notes.append(f"{triangles} quads lost an edge by that and are triangles now")
+    lost = np.delete(np.arange(len(table)), done.kept)
+    if lost.size:
+        notes.append(
+            f"{lost.size} faces collapsed and were left out (the first was face {lost[0]})"
+        )
+    said = surface.attributes
+    return Surface(
+        points[target == np.arange(len(points))],
+        np.where(done.faces < 0, -1, new[done.faces]),
+        (*surface.notes, *notes),
+        None if said is None else said.taken(done.kept, done.turns),
+    )
+
+
+def merged(points: Array, triangles: Ints) -> tuple[Array, Ints, tuple[str, ...]]:
+    """Merge vertices with equal coordinates; triangles that collapse are left out.
+
+    For formats that have a vertex for each corner.
+    """
+    kept, index = np.unique(equal(points), return_inverse=True)
+    done = collapse(triangles, index.ravel())
+    lost = len(triangles) - len(done.kept)
+    notes = (f"{lost} triangles with two equal corners were left out",) if lost else ()
+    return points[kept], done.faces, notes
