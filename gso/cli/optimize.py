@@ -164,14 +164,20 @@ class Job:
     "--max-deviation",
     metavar="L",
     type=float,
-    help="developable: largest distance from the input, in its unit of length.",
+    help="developable: largest distance from the input, both ways, in its unit of length.",
+)
+@click.option(
+    "--max-strain",
+    metavar="S",
+    type=float,
+    help="developable: largest strain of the flat pattern, such as 0.005.",
 )
 @click.option(
     "--target-curvature",
     metavar="K",
     type=float,
-    help="developable: mean |K| to reach with the smallest displacement: the loss_gc that gso info "
-    "prints, in 1/size^2.",
+    help="developable: mean |K| to reach with the smallest displacement: the loss_gc_worst that "
+    "gso info prints, in 1/size^2.",
 )
 @click.option(
     "--fix-boundary", is_flag=True, help="Keep the boundary where it is; not for flat images."
@@ -284,14 +290,15 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
         settings = replace(settings, backend=given["backend"])
     # What a spline cannot keep is solved as a mesh, and the spline fitted to the result.
     apart = given["max_deviation"] is not None or given["fix_boundary"]
+    apart |= given["max_strain"] is not None
     apart |= given["constraints"] is not None
     if _is_cad(out) and given["task"] == "developable" and not apart:
         settings = replace(settings, variables="surface")
-    questions = {k: given[k] for k in ("max_deviation", "target_curvature")}
+    questions = {k: given[k] for k in ("max_deviation", "max_strain", "target_curvature")}
     check(given["task"], formulation, settings, **questions)
     keywords = {
         "task": given["task"],
-        "formulation": formulation,
+        "formulation": given["formulation"],
         "options": settings,
         **questions,
     }

@@ -75,14 +75,14 @@ def solve(
         options' tolerance, where that is more). A number: at most so many iterations, also
         without a net.
         False: the net's result as it is, whatever its energy, measured; hard constraints
-        and `max_deviation` are kept. With `target_curvature`, which takes many solves, only
-        True.
+        and `max_deviation` are kept. With `target_curvature` or `max_strain`, which take many
+        solves, only True.
     sparing : bool
         Ask the net only where that has been found to save time: on large grids, and by
         curvature. Elsewhere the result is that of :func:`gso.tno.optimize`.
     **keywords
         Passed to :func:`gso.tno.optimize`: `formulation`, `options`, `constraints`,
-        `max_deviation`, `target_curvature`, `callback`.
+        `max_deviation`, `max_strain`, `target_curvature`, `callback`.
 
     Returns
     -------
@@ -253,14 +253,15 @@ def _checked(task: str, polish: Any, keywords: dict[str, Any]) -> bool | int:
         raise OptionError(f"polish is {polish!r}; take True, False, or a number of iterations")
     if "x0" in keywords:
         raise OptionError("the net makes the start; for one of your own call gso.tno.optimize")
-    names = ("formulation", "options", "max_deviation", "target_curvature")
+    names = ("formulation", "options", "max_deviation", "max_strain", "target_curvature")
     check(task, **{name: keywords[name] for name in names if name in keywords})
     polish = bool(polish) if isinstance(polish, bool | np.bool_) else int(polish)
-    if polish is not True and keywords.get("target_curvature") is not None:
-        raise OptionError(
-            "target_curvature takes many solves: it needs the optimiser, without a limit of "
-            f"iterations; leave it out, or polish={polish!r} (a net alone)"
-        )
+    for name in ("max_strain", "target_curvature"):
+        if polish is not True and keywords.get(name) is not None:
+            raise OptionError(
+                f"{name} takes many solves: it needs the optimiser, without a limit of "
+                f"iterations; leave it out, or polish={polish!r} (a net alone)"
+            )
     given = keywords.get("constraints", ())
     keywords["constraints"] = given if isinstance(given, Compiled) else listed(given)
     return polish

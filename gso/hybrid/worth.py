@@ -31,7 +31,8 @@ def pays(design: Mesh, task: str, keywords: dict[str, Any], *, many: bool = Fals
     _, formulation, options = check(task, **asked)
     if (task, formulation) != ("developable", "curvature") or design.grid_index is None:
         return False
-    if any(keywords.get(name) is not None for name in ("max_deviation", "target_curvature")):
+    bounds = ("max_deviation", "max_strain", "target_curvature")
+    if any(keywords.get(name) is not None for name in bounds):
         return False
     if keywords.get("constraints"):
         return False
