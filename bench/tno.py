@@ -500,6 +500,81 @@ def sizes() -> dict[str, Any]:
     return out
 
 
+def components() -> dict[str, Any]:
+    """A panel of 4 m alone and beside copies: what it gets must not depend on them."""
+    grid = bezier.generate(1, seed=5)[0].sample(33)
+    panel = gso.Mesh.from_grid(4000.0 * grid / metrics.unit(grid))
+    size, count = panel.frame.scale, len(panel.vertices)
+    noise = 1e-12 * size * np.random.default_rng(0).standard_normal((count, 3))
+    asked = [
+        *(("developable", "curvature", o) for o in PRESETS),
+        ("developable", "isometry", "balanced"),
+        ("developable", "isometry", "jiang2020"),
+        *(("flatten", f, "balanced") for f in ("strain", "lengths", "isometry")),
+        *(("denoise", f, "balanced") for f in ("smooth", "crease")),
+        ("bend", "isometry", "balanced"),
+        ("conformal", "isometry", "balanced"),
+    ]
+
+    def solved(shifts: list[list[float]], added: Any, wanted: tuple[str, str, str]) -> list[Any]:
+        """What each copy gets, in its own place."""
+        points = panel.vertices + added
+        mesh = gso.Mesh(
+            np.concatenate([points + s for s in shifts]),
+            np.concatenate([panel.faces + k * count for k in range(len(shifts))]),
+        )
+        task, formulation, options = wanted
+        constraints = []
+        if task == "bend":
+            rows = np.arange(count).reshape(33, 33)
+            every = count * np.arange(len(shifts))
+            held, lifted = ((rows[r] + every[:, None]).ravel() for r in (0, -1))
+            places = mesh.vertices[lifted] + np.array([-0.05, 0.0, 0.1]) * size
+            constraints = [gso.Fixed(held), gso.Handle(lifted, places)]
+        result = gso.tno.optimize(
+            mesh, task=task, formulation=formulation, options=options, constraints=constraints
+        )
+        flat = task in ("flatten", "conformal")
+        parts = result.components or [result]
+        return [
+            np.asarray(part.flat) if flat else part.mesh.vertices - s
+            for part, s in zip(parts, shifts, strict=True)
+        ]
+
+    here = [0.0, 0.0, 0.0]
+    beside = [[3.0 * size * k, 0.0, 0.0] for k in range(8)]
+    cases = {
+        "100 m away": [here, [1e5, 0.0, 0.0]],
+        "duplicated": [here, here],
+        "eight": beside,
+        "100 sizes": [here, [100.0 * size, 0.0, 0.0]],
+    }
+    rows, out = [], {}
+    for wanted in progress(asked, "components"):
+        alone = solved([here], 0.0, wanted)[0]
+        shaken = solved([here], noise, wanted)[0]
+        flat = alone.shape[1] == 2
+        figures: list[Any] = []
+        for number, shifts in enumerate(cases.values()):
+            found = solved(shifts, 0.0, wanted)
+            if number == 0:
+                for points in (alone, found[0]):
+                    far = "-" if flat else np.linalg.norm(points - panel.vertices, axis=1).max()
+                    figures.append(far)
+            figures.append(max(float(np.abs(p - alone).max()) for p in found) / size)
+        own = solved([[100.0 * size, 0.0, 0.0]], 0.0, wanted)[0]
+        figures += [float(np.abs(p - alone).max()) / size for p in (own, shaken)]
+        rows.append([" ".join(wanted), *figures])
+        out[rows[-1][0]] = figures
+    table(
+        "A panel of 4 m and copies of it: largest displacement in mm, alone and with a copy 100 m "
+        "away;\n  then the largest difference to the panel alone, in sizes",
+        ["task", "alone", "with copy", *cases, "moved alone", "1e-12 noise"],
+        rows,
+    )
+    return out
+
+
 def startup() -> dict[str, Any]:
     """A cold process, and what `import gso` costs."""
 
@@ -540,6 +615,7 @@ SECTIONS: dict[str, Callable[[], dict[str, Any]]] = {
         questions,
         general,
         sizes,
+        components,
         startup,
     )
 }

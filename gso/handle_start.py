@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.components import Component, several, split
 from gso.mesh import Mesh
 from gso.terms import fairness
 from gso.variables import vertex_normals
@@ -54,6 +55,14 @@ class Spread:
 
         n = len(mesh.vertices)
         self.mesh, self.ids = mesh, ids
+        #: Components, which of the handles they have, and their own fields.
+        self.parts: list[tuple[Component, NDArray[np.bool_], Spread]] = []
+        if several(mesh):
+            for part in split(mesh):
+                own = np.searchsorted(part.vertices, ids).clip(max=len(part.vertices) - 1)
+                here = part.vertices[own] == ids
+                self.parts.append((part, here, Spread(part.mesh, own[here])))
+            return
         self.free = np.setdiff1d(np.arange(n), ids)
         stencil, coefficients = fairness.differences(mesh)
         count, width = stencil.shape
@@ -85,6 +94,10 @@ class Spread:
         """Field (n, 3) from the displacement (k, 3) of the handles."""
         field = np.zeros((len(self.mesh.vertices), displacement.shape[1]))
         field[self.ids] = displacement
+        if self.parts:
+            for part, here, own in self.parts:
+                field[part.vertices] = own(displacement[here])
+            return field
         if self._factor is not None:
             field[self.free] = self._factor.solve(-(self._coupling @ displacement))
         return field
@@ -92,6 +105,10 @@ class Spread:
     def deflection(self) -> Array:
         """Shape (n,) under an even load, largest value one; zero at the handles."""
         out = np.zeros(len(self.mesh.vertices))
+        if self.parts:
+            for part, _, own in self.parts:
+                out[part.vertices] = own.deflection()
+            return out
         if self._factor is not None:
             load = np.where(self.mesh.used[self.free], 1.0, 0.0)
             out[self.free] = self._factor.solve(load)
@@ -115,6 +132,10 @@ def follow(mesh: Mesh, spread: Spread, targets: Array) -> Array:
         Where they go.
     """
     points = mesh.vertices.copy()
+    if spread.parts:
+        for piece, here, own in spread.parts:
+            points[piece.vertices] = follow(piece.mesh, own, targets[here])
+        return points
     for part in np.unique(mesh.components[spread.ids]):
         which = mesh.components[spread.ids] == part
         inside = mesh.components == part

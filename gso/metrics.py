@@ -27,11 +27,16 @@ Array = NDArray[np.float64]
 
 
 class Info(NamedTuple):
-    """What a metric means: its unit, whether lower is better (None: neither is), a line of text."""
+    """What a metric means: its unit, whether lower is better (None: neither is), a line of text.
+
+    `joined` says how those of several components become one: "mean" (weighted by area), "max",
+    "min" or "sum".
+    """
 
     unit: str
     lower_is_better: bool | None
     text: str
+    joined: str = "mean"
 
 
 INFO: dict[str, Info] = {
@@ -45,19 +50,19 @@ INFO: dict[str, Info] = {
     "K_A_r": Info("", False, "share of loss_gc removed (published)"),
     "K_A_r_worst": Info("", False, "share of loss_gc_worst removed"),
     "nonplanarity_mean": Info("", True, "mean gap of the quads' diagonals / mean edge"),
-    "nonplanarity_max": Info("", True, "largest gap of a quad's diagonals / mean edge"),
-    "nonplanarity_max_before": Info("", True, "nonplanarity_max of the input"),
+    "nonplanarity_max": Info("", True, "largest gap of a quad's diagonals / mean edge", "max"),
+    "nonplanarity_max_before": Info("", True, "nonplanarity_max of the input", "max"),
     "d_H": Info("%", True, "mean distance to the nearest input vertex / diagonal (published)"),
     "distance_mean": Info("%", True, "mean true distance to the surface, both ways / diagonal"),
-    "distance_max": Info("%", True, "largest true distance, both ways / diagonal"),
-    "deviation_max": Info("%", True, "largest true distance of a result vertex / diagonal"),
+    "distance_max": Info("%", True, "largest true distance, both ways / diagonal", "max"),
+    "deviation_max": Info("%", True, "largest true distance of a result vertex / diagonal", "max"),
     "displacement_rms": Info("%", True, "root mean square vertex displacement / diagonal"),
-    "displacement_max": Info("%", True, "largest vertex displacement / diagonal"),
-    "loop_ratio_min": Info("", None, "smallest length of a boundary loop, out / in"),
-    "loop_ratio_max": Info("", None, "largest length of a boundary loop, out / in"),
-    "edge_ratio_min": Info("", False, "smallest length of an edge, out / in"),
-    "fold_max": Info("deg", True, "largest angle between the normals of neighbouring faces"),
-    "fold_max_before": Info("deg", True, "fold_max of the input"),
+    "displacement_max": Info("%", True, "largest vertex displacement / diagonal", "max"),
+    "loop_ratio_min": Info("", None, "smallest length of a boundary loop, out / in", "min"),
+    "loop_ratio_max": Info("", None, "largest length of a boundary loop, out / in", "max"),
+    "edge_ratio_min": Info("", False, "smallest length of an edge, out / in", "min"),
+    "fold_max": Info("deg", True, "largest angle between the normals of neighbouring faces", "max"),
+    "fold_max_before": Info("deg", True, "fold_max of the input", "max"),
     "fairness_ratio": Info("", True, "sum of squared second differences, out / in"),
     "loss_iso_cell": Info("size", True, "isometry defect of the cells (published)"),
     "isometry_energy": Info("", True, "mean E_iso of the faces, relative (Jiang et al. 2020)"),
@@ -65,13 +70,15 @@ INFO: dict[str, Info] = {
     "edge_length_error": Info("", True, "mean |l'/l - 1| over edges"),
     "strain_mean": Info("", True, "mean of the larger principal strain"),
     "strain_p99": Info("", True, "99th percentile of the larger principal strain"),
-    "strain_max": Info("", True, "largest principal strain"),
+    "strain_max": Info("", True, "largest principal strain", "max"),
     "area_error": Info("", True, "mean |A'/A - 1| over corner triangles"),
-    "flipped_cells": Info("", True, "cells turned over (of grids: with a corner turned over)"),
+    "flipped_cells": Info(
+        "", True, "cells turned over (of grids: with a corner turned over)", "sum"
+    ),
     "angle_distortion_mean": Info("", True, "mean over faces of s1/s2 - 1, principal stretches"),
     "angle_distortion_p99": Info("", True, "99th percentile of s1/s2 - 1"),
-    "scale_min": Info("", False, "smallest ratio of lengths, flat over surface"),
-    "scale_max": Info("", True, "largest ratio of lengths, flat over surface"),
+    "scale_min": Info("", False, "smallest ratio of lengths, flat over surface", "min"),
+    "scale_max": Info("", True, "largest ratio of lengths, flat over surface", "max"),
     "theta": Info("deg", True, "mean angle of the cell normals to the clean surface's (published)"),
     "normal_change": Info("deg", None, "mean angle of the cell normals to the input's; no error"),
     "roughness_ratio": Info("", True, "sum of squared second differences, out / in"),
@@ -632,6 +639,18 @@ def flips(mesh: Mesh, flat: Array) -> int:
     if grid is None:
         return flipped_cells(flat, mesh.faces, surface=mesh)
     return flipped_cells(flat[grid], surface=mesh.grid)
+
+
+def area(mesh: Mesh, points: Array | None = None) -> float:
+    """Area of a surface, or of an image (n, 2) or (n, 3) of it that is given.
+
+    >>> from gso.mesh import Mesh
+    >>> area(Mesh.from_grid(np.dstack([*np.mgrid[:3.0, :4.0], np.zeros((3, 4))])))
+    6.0
+    """
+    v = mesh.vertices if points is None else points
+    p, q, r = (np.pad(v[k], ((0, 0), (0, 3 - v.shape[1]))) for k in mesh.triangles.T)
+    return float(0.5 * np.linalg.norm(np.cross(q - p, r - p), axis=1).sum())
 
 
 def _in_range(p: Array, q: Array) -> tuple[Array, Array]:

@@ -72,7 +72,16 @@ class Result:
         "constraints": the largest length by which each is missed, in the input's unit. With
         a spline, "spline": its curvature and distances, see :func:`gso.fit.describe_spline`.
     spline : BSplineSurface or None
-        The surface that `mesh` has samples of, with the option ``variables="surface"``.
+        The surface that `mesh` has samples of, with the option ``variables="surface"``; of
+        several components, each has its own.
+    components : list of Result
+        Of a mesh of several components, that of each one (those that constraints join are
+        one), by their smallest vertices; empty for a mesh of one. In the result of the whole,
+        `metrics` are means weighted by area (or maxima, sums: :data:`gso.metrics.INFO`), and
+        so is `energy`; `status` is the worst one; `iterations` and `seconds` are sums over
+        what was solved: copies are solved once.
+    names : ndarray of int, (n,), or None
+        Of one of those: which vertices of the whole mesh it has.
     """
 
     task: str
@@ -93,6 +102,8 @@ class Result:
     spline: BSplineSurface | None = None
     cell_scale: Array | None = None
     pattern: Pattern | None = None
+    components: list[Result] = field(default_factory=list)
+    names: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         if self.pattern is None and self.flat is not None:
@@ -108,7 +119,8 @@ class Result:
         """Whether it can be worked with: complete, as asked for, no cell turned over."""
         points = self.mesh.vertices if self.pattern is None else self.pattern.flat
         return bool(
-            self.status not in _UNUSABLE
+            all(part.usable for part in self.components)
+            and self.status not in _UNUSABLE
             and np.isfinite(points).all()
             and not self.metrics.get("flipped_cells", 0)
         )
@@ -128,17 +140,21 @@ class Result:
     @cached_property
     def metrics(self) -> dict[str, float]:
         """Metrics of the task, computed at first access; see :data:`gso.metrics.INFO`."""
-        from gso import metrics, tasks
+        from gso import tasks
+        from gso.components import combined
+        from gso.metrics import area
+        from gso.tasks.measured import measured
 
-        module = tasks.get(self.task)
-        design, mesh, unit = self.design, self.mesh, metrics.unit(self.design)
+        if self.components:
+            areas = [area(part.design) for part in self.components]
+            return combined([part.metrics for part in self.components], areas)
         if self.pattern is None or not self.pattern.is_cut:
-            return module.metrics(design, mesh, self.flat, unit)
-        flat = self.pattern.flat
+            return measured(self.task, self.design, self.mesh, self.flat)
+        module, flat = tasks.get(self.task), self.pattern.flat
         if getattr(module, "BLOCK", "surface") == "flat":
-            return module.metrics(self.pattern.surface(design), None, flat, unit)
-        own = module.metrics(design, mesh, None, unit)
-        return own | module.flat_metrics(self.pattern.surface(mesh), flat)
+            return measured(self.task, self.pattern.surface(self.design), self.pattern.mesh, flat)
+        own = measured(self.task, self.design, self.mesh, None)
+        return own | module.flat_metrics(self.pattern.surface(self.mesh), flat)
 
     def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
         """Write the result.
@@ -165,6 +181,11 @@ class Result:
             outline = self.pattern.surface(surface)
             io.save_flat(self.pattern.flat, outline, path, unit=unit)
         elif f".{suffix}" in io.SPLINE_SUFFIXES:
+            if any(part.spline is not None for part in self.components):
+                raise MeshError(
+                    f"{path}: every component has a spline of its own; write them one by one, "
+                    "result.components[k].save(...)"
+                )
             if self.spline is None:
                 raise MeshError(
                     f"{path}: this result is a mesh; solve with the option variables='surface', "
@@ -175,8 +196,9 @@ class Result:
             io.write(self.mesh, path)
         self.notes += tuple(n for n in io.left_out(self.mesh, path) if n not in self.notes)
 
-    def _arrays(self) -> dict[str, Any]:
-        record = {
+    def _record(self) -> dict[str, Any]:
+        """What is no array."""
+        return {
             "format": _FORMAT,
             "task": self.task,
             "formulation": self.formulation,
@@ -191,7 +213,11 @@ class Result:
             "details": self.details,
             "metrics": self.metrics,
             "history": [asdict(p) for p in self.history],
+            "components": [part._record() for part in self.components],
         }
+
+    def _arrays(self) -> dict[str, Any]:
+        record = self._record()
         arrays = {
             "record": np.frombuffer(json.dumps(record, default=float).encode(), np.uint8),
             "design": self.design.vertices,
@@ -206,6 +232,11 @@ class Result:
             arrays["cell_scale"] = self.cell_scale
         if self.spline is not None:
             arrays |= self.spline.arrays()
+        if self.components:
+            label = np.full(len(self.design.vertices), -1)
+            for number, part in enumerate(self.components):
+                label[part.names] = number
+            arrays["component"] = label
         if self.design.attributes is not None:
             arrays |= self.design.attributes.arrays()
         return arrays
@@ -236,32 +267,71 @@ class Result:
             design = Mesh(data["design"], data["faces"], attributes=said)
             pattern = _pattern(data, design)
             same = len(data["vertices"]) == len(design.vertices)
-            result = cls(
-                record["task"],
-                record["formulation"],
+            result = cls._read(
+                record,
                 design,
                 design.replaced(data["vertices"]) if same or pattern is None else pattern.mesh,
                 _checked(data, "flat", (len(design.vertices), 2)),
-                Status[record["status"]],
-                record["iterations"],
-                record["energy"],
-                [Progress(**p) for p in record["history"]],
-                record["seconds"],
-                record["backend"],
-                record["device"],
-                record["warm_start"],
-                tuple(record["notes"]),
-                record["details"],
-                spline=BSplineSurface.from_arrays(data),
-                cell_scale=_checked(data, "cell_scale", (len(design.faces),)),
-                pattern=pattern,
+                _checked(data, "cell_scale", (len(design.faces),)),
+                pattern,
             )
-            result.__dict__["metrics"] = record["metrics"]
+            result.spline = BSplineSurface.from_arrays(data)
+            label = _checked(data, "component", (len(design.vertices),))
+            if label is not None:
+                result._divide(record.get("components", []), label.astype(np.int64))
         except (KeyError, TypeError, ValueError) as error:
             if isinstance(error, MeshError):
                 raise
             raise MeshError(f"{path} is no result of gso: {error}") from None
         return result
+
+    @classmethod
+    def _read(
+        cls,
+        record: Mapping[str, Any],
+        design: Mesh,
+        mesh: Mesh,
+        flat: Array | None,
+        cell_scale: Array | None,
+        pattern: Pattern | None = None,
+    ) -> Result:
+        """A result of its record and arrays."""
+        result = cls(
+            record["task"],
+            record["formulation"],
+            design,
+            mesh,
+            flat,
+            Status[record["status"]],
+            record["iterations"],
+            record["energy"],
+            [Progress(**p) for p in record["history"]],
+            record["seconds"],
+            record["backend"],
+            record["device"],
+            record["warm_start"],
+            tuple(record["notes"]),
+            record["details"],
+            cell_scale=cell_scale,
+            pattern=pattern,
+        )
+        result.__dict__["metrics"] = record["metrics"]
+        return result
+
+    def _divide(self, records: list[Mapping[str, Any]], label: NDArray[np.int64]) -> None:
+        """Give the components of a result that was read theirs; a flat image is the whole's."""
+        from gso.components import split
+
+        for record, piece in zip(records, split(self.design, label), strict=True):
+            part = self._read(
+                record,
+                piece.mesh,
+                piece.of(self.mesh),
+                None if self.flat is None else self.flat[piece.vertices],
+                None if self.cell_scale is None else self.cell_scale[piece.faces],
+            )
+            part.names = piece.vertices
+            self.components.append(part)
 
 
 def _pattern(data: Mapping[str, Any], design: Mesh) -> Pattern | None:

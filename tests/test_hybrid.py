@@ -467,9 +467,13 @@ def test_what_is_no_disk_is_the_optimisers():
     both = Mesh(
         np.concatenate([grid.vertices, other]), np.concatenate([grid.faces, grid.faces + 81])
     )
-    cold, result = optimize(both), hybrid.solve(both, net=made(size=0.01))
+    tied = {"constraints": [gso.Glue([[80, 81]])]}
+    cold, result = optimize(both, **tied), hybrid.solve(both, net=made(size=0.01), **tied)
     assert same(cold, result)
     assert "one piece" in result.notes[-1]
+    apart, alone = (hybrid.solve(mesh, net=made(size=0.01)) for mesh in (both, grid))
+    assert all(part.warm_start == alone.warm_start for part in apart.components)
+    assert np.array_equal(apart.components[0].mesh.vertices, alone.mesh.vertices)
 
 
 @needs_torch

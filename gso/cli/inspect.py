@@ -46,17 +46,17 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
     import numpy as np
 
     from gso import metrics as measure
-    from gso import tasks
+    from gso.components import average
+    from gso.tasks.measured import measured
 
-    size = measure.unit(before)
-    values = dict(tasks.get("developable").metrics(before, after, None, size))
+    values = dict(measured("developable", before, after, None))
     notes = []
     same = np.array_equal(before.faces, after.faces)
     flat = np.ptp(after.vertices[:, 2]) <= 1e-9 * after.diagonal
     if same and not flat:
-        values["theta"] = measure.normal_angle(before, after)
+        values["theta"] = float(average(measure.normal_angle, before, after))
     if same and flat:
-        values |= tasks.get("flatten").metrics(before, after, after.vertices[:, :2], size)
+        values |= measured("flatten", before, after, after.vertices[:, :2])
         notes.append(
             "AFTER is flat: measured as the flat pattern of BEFORE too; how far it lies from "
             "BEFORE means nothing then"
@@ -97,6 +97,7 @@ def _facts(mesh: Mesh) -> list[tuple[str, str]]:
     import numpy as np
 
     from gso import metrics as measure
+    from gso.components import average
 
     used = mesh.used
     points = mesh.vertices[used]
@@ -114,11 +115,11 @@ def _facts(mesh: Mesh) -> list[tuple[str, str]]:
         ("bounding box", " x ".join(f"{side:.6g}" for side in np.ptp(points, axis=0))),
         ("from, to", " ".join(map(_point, (points.min(axis=0), points.max(axis=0))))),
         ("diagonal", f"{mesh.diagonal:.6g}"),
-        ("size", f"{mesh.frame.scale:.6g} (farthest vertex from the centroid)"),
+        ("size", f"{_sizes(mesh)} (farthest vertex from the centroid)"),
         ("edge length", f"{length.min():.4g} to {length.max():.4g}, mean {length.mean():.4g}"),
     ]
     if mesh.stars:
-        positive, negative, absolute = measure.curvature_features(mesh)
+        positive, negative, absolute = average(measure.curvature_features, mesh)
         rows += [
             ("loss_gc", f"{absolute:.4g} 1/size^2 (mean |K|)"),
             ("K_P, K_N", f"{positive:.4g}, {negative:.4g} 1/size^2 (mean K > 0, mean K < 0)"),
@@ -128,6 +129,16 @@ def _facts(mesh: Mesh) -> list[tuple[str, str]]:
     if mesh.attributes is not None:
         rows.append(("attributes", str(mesh.attributes)))
     return rows + [("note", note) for note in mesh.notes]
+
+
+def _sizes(mesh: Mesh) -> str:
+    """Size of a mesh, or the range of its components'."""
+    from gso.components import several, split
+
+    if not several(mesh):
+        return f"{mesh.frame.scale:.6g}"
+    found = [part.mesh.frame.scale for part in split(mesh)]
+    return f"components of {min(found):.6g} to {max(found):.6g}"
 
 
 def _kind(mesh: Mesh) -> str:

@@ -102,6 +102,21 @@ class Compiled:
         """In the unit of a frame, with vertex i numbered ``order[i]``."""
         return replace(self, parts=tuple(p.mapped(frame, order) for p in self.parts))
 
+    @property
+    def links(self) -> Ints:
+        """Pairs of vertices (k, 2) that an equation ties to each other."""
+        rows = [p.vertices for p in self.parts]
+        pairs = [np.stack([v[:, 0], v[:, k]], axis=1) for v in rows for k in range(1, v.shape[1])]
+        return np.concatenate(pairs) if pairs else np.zeros((0, 2), np.int64)
+
+    def within(self, ids: Ints, count: int) -> Compiled:
+        """The equations on some of `count` vertices, which get the numbers of their places."""
+        number = np.full(count, -1)
+        number[ids] = np.arange(len(ids))
+        frame = Frame(np.zeros(2 if self.flat else 3), 1.0)
+        kept = (p.kept(np.all(number[p.vertices] >= 0, axis=1)) for p in self.parts)
+        return replace(self, parts=tuple(p.mapped(frame, number) for p in kept if p.count))
+
     def misses(self, points: Array) -> dict[str, Miss]:
         """How far vertices (n, dim) are from keeping each constraint, by its name."""
         out = {name: Miss(0.0, np.zeros(0, np.int64), False) for name in self.names}
@@ -144,14 +159,14 @@ def _name(number: int, constraint: object) -> str:
 
 
 def compile_constraints(
-    constraints: Iterable[Constraint] | Constraint, mesh: Mesh, *, flat: bool = False
+    constraints: Iterable[Constraint] | Constraint | Compiled, mesh: Mesh, *, flat: bool = False
 ) -> Compiled:
     """Check constraints against a mesh and against each other, and gather them.
 
     Parameters
     ----------
-    constraints : iterable of Constraint, or one
-        As the user gave them.
+    constraints : iterable of Constraint, or one, or Compiled
+        As the user gave them; those that were gathered for this mesh already are returned.
     mesh : Mesh
         The design.
     flat : bool
@@ -163,6 +178,8 @@ def compile_constraints(
         An index or a shape is wrong, a constraint means nothing for this task, or hard
         linear ones contradict each other; the message names them and a vertex.
     """
+    if isinstance(constraints, Compiled):
+        return constraints
     parts: list[Part] = []
     names = []
     for number, c in enumerate(listed(constraints)):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,14 +63,10 @@ def _worst(parts: Sequence[Part], tolerance: float) -> tuple[float, int, Ints] |
 
 def _within(parts: Sequence[Part], ids: Ints) -> list[Part]:
     """The linear parts on some vertices."""
-    out: list[Part] = []
-    for p in parts:
-        if isinstance(p, Pins) and p.hard:
-            keep = np.isin(p.ids, ids)
-            out.append(replace(p, ids=p.ids[keep], positions=p.positions[keep]))
-        elif isinstance(p, OnPlane):
-            out.append(replace(p, ids=p.ids[np.isin(p.ids, ids)]))
-        elif isinstance(p, Relations):
-            keep = np.isin(p.first, ids)
-            out.append(replace(p, first=p.first[keep], second=p.second[keep]))
+    linear = (p for p in parts if isinstance(p, OnPlane | Relations) or _pinned(p))
+    out = [p.kept(np.isin(p.vertices[:, 0], ids)) for p in linear]
     return [p for p in out if p.count]
+
+
+def _pinned(part: Part) -> bool:
+    return isinstance(part, Pins) and part.hard

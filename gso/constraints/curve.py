@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.parts import OnLines, Part, Pins
 from gso.constraints.polyline import CORNER, Polylines, turns
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,22 +91,32 @@ class SlidingBoundary(Constraint):
         corner, weight = subject.positive(self.corner, "corner"), subject.weight(self.weight)
         if corner > 180:
             raise subject.refuse(f"has corner {self.corner!r}; it is at most 180 degrees")
-        vertices = subject.mesh.vertices
-        lines, held, sliding = [], [], []
-        for loop in subject.mesh.boundary_loops:
-            points = vertices[loop]
-            way = np.roll(points, -1, axis=0) - points
-            length = np.linalg.norm(way, axis=1, keepdims=True)
-            # A vertex on top of the one before it stays: it has no direction.
-            sharp = turns(way / np.maximum(length, 1e-300)) > corner
-            sharp |= (np.minimum(length, np.roll(length, 1, axis=0)) == 0)[:, 0]
-            held.append(loop[sharp])
-            sliding.append(loop[~sharp])
-            lines.append(Polylines.of(points[length[:, 0] > 0], closed=True, corner=corner))
-        if not lines:
-            return []
-        fixed, free = np.concatenate(held), np.concatenate(sliding)
-        return [
-            Pins(subject.number, fixed, vertices[fixed], weight),
-            OnLines(subject.number, free, Polylines.join(lines), weight),
-        ]
+        mesh = subject.mesh
+        found: list[Part] = []
+        # A boundary slides along that of its own component.
+        for number in dict.fromkeys(int(mesh.components[loop[0]]) for loop in mesh.boundary_loops):
+            loops = [loop for loop in mesh.boundary_loops if mesh.components[loop[0]] == number]
+            found += _along(subject.number, mesh.vertices, loops, corner, weight)
+        return found
+
+
+def _along(
+    owner: int, vertices: Array, loops: list[Ints], corner: float, weight: float | None
+) -> list[Part]:
+    """Vertices of loops on the curves that these are; their corners stay."""
+    lines, held, sliding = [], [], []
+    for loop in loops:
+        points = vertices[loop]
+        way = np.roll(points, -1, axis=0) - points
+        length = np.linalg.norm(way, axis=1, keepdims=True)
+        # A vertex on top of the one before it stays: it has no direction.
+        sharp = turns(way / np.maximum(length, 1e-300)) > corner
+        sharp |= (np.minimum(length, np.roll(length, 1, axis=0)) == 0)[:, 0]
+        held.append(loop[sharp])
+        sliding.append(loop[~sharp])
+        lines.append(Polylines.of(points[length[:, 0] > 0], closed=True, corner=corner))
+    fixed, free = np.concatenate(held), np.concatenate(sliding)
+    return [
+        Pins(owner, fixed, vertices[fixed], weight),
+        OnLines(owner, free, Polylines.join(lines), weight),
+    ]

@@ -35,6 +35,10 @@ class Part:
         """In the unit of a frame and with vertex i numbered ``order[i]``."""
         raise NotImplementedError
 
+    def kept(self, rows: NDArray[np.bool_]) -> Part:
+        """Those of the equations (k,) alone."""
+        raise NotImplementedError
+
     def violation(self, points: Array) -> Array:
         """By what length each equation is missed by vertices (n, dim)."""
         raise NotImplementedError
@@ -70,6 +74,9 @@ class Pins(Part):
     def mapped(self, frame: Frame, order: Ints) -> Pins:
         return replace(self, ids=order[self.ids], positions=frame.to_unit(self.positions))
 
+    def kept(self, rows: NDArray[np.bool_]) -> Pins:
+        return replace(self, ids=self.ids[rows], positions=self.positions[rows])
+
     def violation(self, points: Array) -> Array:
         return np.linalg.norm(points[self.ids] - self.positions, axis=1)
 
@@ -95,6 +102,9 @@ class Relations(Part):
             anchor=frame.to_unit(self.anchor),
         )
 
+    def kept(self, rows: NDArray[np.bool_]) -> Relations:
+        return replace(self, first=self.first[rows], second=self.second[rows])
+
     def violation(self, points: Array) -> Array:
         image = self.anchor + (points[self.first] - self.anchor) @ self.matrix.T
         return np.linalg.norm(points[self.second] - image, axis=1)
@@ -115,6 +125,9 @@ class OnPlane(Part):
     def mapped(self, frame: Frame, order: Ints) -> OnPlane:
         return replace(self, ids=order[self.ids], anchor=frame.to_unit(self.anchor))
 
+    def kept(self, rows: NDArray[np.bool_]) -> OnPlane:
+        return replace(self, ids=self.ids[rows])
+
     def violation(self, points: Array) -> Array:
         return np.abs((points[self.ids] - self.anchor) @ self.normal)
 
@@ -133,6 +146,9 @@ class OnLines(Part):
 
     def mapped(self, frame: Frame, order: Ints) -> OnLines:
         return replace(self, ids=order[self.ids], lines=self.lines.mapped(frame))
+
+    def kept(self, rows: NDArray[np.bool_]) -> OnLines:
+        return replace(self, ids=self.ids[rows])
 
     def violation(self, points: Array) -> Array:
         return np.linalg.norm(
@@ -154,6 +170,9 @@ class Planar(Part):
     def mapped(self, frame: Frame, order: Ints) -> Planar:
         return replace(self, quads=order[self.quads])
 
+    def kept(self, rows: NDArray[np.bool_]) -> Planar:
+        return replace(self, quads=self.quads[rows])
+
     def violation(self, points: Array) -> Array:
         corners = (tuple(points[self.quads[:, k]].T) for k in range(4))
         return np.abs(geometry.diagonal_distance(*corners))
@@ -173,6 +192,9 @@ class Lengths(Part):
 
     def mapped(self, frame: Frame, order: Ints) -> Lengths:
         return replace(self, pairs=order[self.pairs], lengths=self.lengths / frame.scale)
+
+    def kept(self, rows: NDArray[np.bool_]) -> Lengths:
+        return replace(self, pairs=self.pairs[rows], lengths=self.lengths[rows])
 
     def violation(self, points: Array) -> Array:
         a, b = (points[self.pairs[:, k]] for k in (0, 1))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.components import labels
 from gso.constraints import Compiled, OnLines, Part, Pins, Relations
 from gso.constraints.compiled import is_glue
 from gso.constraints.linear import reduce
@@ -56,7 +57,8 @@ def settle(mesh: Mesh, flat: Array, constraints: Compiled) -> Array:
 
     Parts of the mesh that constraints tie to each other move together.
     """
-    groups = _groups(mesh, constraints)
+    label = labels(mesh, constraints.links)
+    groups = [np.flatnonzero(label == k) for k in range(label.max() + 1)]
     fixed = np.zeros(len(flat), bool)
     for part in constraints.anchored:
         fixed[part.vertices] = True
@@ -72,23 +74,6 @@ def settle(mesh: Mesh, flat: Array, constraints: Compiled) -> Array:
     for ids, image in zip(loose, images, strict=True):
         out[ids] = image
     return out
-
-
-def _groups(mesh: Mesh, constraints: Compiled) -> list[Ints]:
-    """Vertices of the parts of a mesh, those that are tied to each other together."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    rows = [p.vertices for p in constraints.parts]
-    first = np.concatenate([np.repeat(v[:, 0], v.shape[1]) for v in rows])
-    a, b = mesh.components[first], mesh.components[np.concatenate([v.ravel() for v in rows])]
-    count = int(mesh.components.max()) + 1
-    links = coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
-    label = connected_components(links, directed=False)[1]
-    out: dict[int, list[Ints]] = {}
-    for ids in parts(mesh):
-        out.setdefault(int(label[mesh.components[ids[0]]]), []).append(ids)
-    return [np.concatenate(group) for group in out.values()]
 
 
 def _turn(flat: Array, k: int) -> Array:

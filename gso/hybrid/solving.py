@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
@@ -13,18 +14,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso import flat_start
-from gso.constraints import listed
+from gso import flat_start, tasks
+from gso.components import Component, several
+from gso.constraints import Compiled, compile_constraints, listed
 from gso.hybrid.prediction import Prediction, predictions
 from gso.hybrid.worth import pays
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.result import Result
 from gso.spelling import known_keywords
-from gso.status import GSOError, MeshError, OptionError
-from gso.tno import Start, check, optimize
+from gso.status import ConvergenceWarning, GSOError, MeshError, OptionError, Status
+from gso.tno import Start, check, components, optimize
 from gso.tno.batch import Item
 from gso.tno.canonical import Canonical
+from gso.tno.job import Job
 from gso.tno.pool import spread
 
 Array = NDArray[np.float64]
@@ -110,6 +113,11 @@ def solve(
     clock = time.perf_counter()
     polish = _checked(task, polish, keywords)
     design = as_mesh(mesh)
+    pieces = _pieces(design, task, sparing, keywords)
+    if pieces:
+        result = _each(design, pieces, task, keywords | {"net": net, "polish": polish})
+        result.seconds["total"] = time.perf_counter() - clock
+        return result
     prediction = Prediction()
     if not sparing or pays(design, task, keywords):
         asked = {"task": task, "net": net, "passes": _passes(polish), "alone": polish is False}
@@ -162,6 +170,36 @@ def solve_many(
     with closing(spread(work, _started(meshes, worth, ask), workers=workers)) as results:
         for done in results:
             yield Item(done.index, done.value, done.error)
+
+
+def _pieces(design: Mesh, task: str, sparing: bool, keywords: dict[str, Any]) -> list[Component]:
+    """The components of a design for each of which a net is asked; none where it is not."""
+    if not several(design):
+        return []
+    flat = getattr(tasks.get(task), "BLOCK", "surface") == "flat"
+    compiled = compile_constraints(keywords["constraints"], design, flat=flat)
+    pieces = components.parts(design, compiled)
+    if sparing and not any(pays(piece.mesh, task, keywords) for piece in pieces):
+        return []
+    keywords["constraints"] = compiled
+    return pieces
+
+
+def _each(design: Mesh, pieces: list[Component], task: str, keywords: dict[str, Any]) -> Result:
+    """Solve every component from a net's result of its own, where there is one."""
+    callback, compiled = keywords.pop("callback", None), keywords.pop("constraints")
+
+    def one(job: Job, told: Any) -> Result:
+        kept = () if job.constraints.empty else job.constraints
+        return solve(job.design, task=task, constraints=kept, callback=told, **keywords)
+
+    whole = Job(design, compiled, Start(None))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        result = components.solve(one, whole, pieces, callback, workers=0)
+    if not result.converged and result.status is not Status.MAX_ITERATIONS:
+        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=4)
+    return result
 
 
 @dataclass(frozen=True)
@@ -225,7 +263,8 @@ def _checked(task: str, polish: Any, keywords: dict[str, Any]) -> bool | int:
                 f"{name} takes many solves: it needs the optimiser, without a limit of "
                 f"iterations; leave it out, or polish={polish!r} (a net alone)"
             )
-    keywords["constraints"] = listed(keywords.get("constraints", ()))
+    given = keywords.get("constraints", ())
+    keywords["constraints"] = given if isinstance(given, Compiled) else listed(given)
     return polish
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso import metrics
+from gso.components import average
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pattern import Pattern
@@ -187,13 +188,17 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
         before.title, after.title = "input", "denoised"
         before.light = after.light = GRAZING
     else:
-        size = metrics.unit(design)
         before.heat, after.heat = curvatures([design, mesh])
-        before.title = f"input: mean |K| {metrics.loss_gc(design, scale=size):.2g}"
-        after.title = f"result: mean |K| {metrics.loss_gc(mesh, scale=size):.2g}"
+        before.title = f"input: mean |K| {average(_curved, design, design):.2g}"
+        after.title = f"result: mean |K| {average(_curved, design, mesh):.2g}"
     if result.pattern is not None:
         panels.append(_flattened(mesh, result.pattern)[1])
     return write(draw(panels), path)
+
+
+def _curved(design: Mesh, mesh: Mesh) -> float:
+    """Mean curvature of a surface by the size of its design."""
+    return metrics.mean_abs_K(mesh, scale=metrics.unit(design))
 
 
 @known_keywords()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import metrics, topology
+from gso.components import average, several, sizes, split
 from gso.mesh import Mesh
 from gso.status import OptionError
 
@@ -71,20 +72,38 @@ def _rising(values: Sequence[Array], label: str, colours: str, top: float = _TOP
 
 
 def curvatures(meshes: Sequence[Mesh]) -> list[Heat]:
-    """Absolute Gaussian curvature times the squared size of the first mesh, in one scale."""
-    size = metrics.unit(meshes[0])
+    """Absolute Gaussian curvature times the squared size of the first mesh, in one scale.
+
+    Where all have its faces, that is the size of each of its components.
+    """
+    alike = all(np.array_equal(m.faces, meshes[0].faces) for m in meshes)
+    size = sizes(meshes[0]) if alike else metrics.unit(meshes[0])
     values = [per_face(m, np.abs(metrics.curvature(m)) * size**2) for m in meshes]
     scale = _rising(values, "|K| · size²", "OrRd")
     return [Heat(v, scale) for v in values]
 
 
 def distance(before: Mesh, after: Mesh) -> Heat:
-    """Distance of a surface to the one before, percent of that one's diagonal."""
-    percent = 100.0 / before.diagonal * metrics.point_to_surface(after.vertices, before)
+    """Distance of a surface to the one before, percent of that one's diagonal.
+
+    Of several components, each by its own, where the faces are the same.
+    """
+    if several(before) and np.array_equal(before.faces, after.faces):
+        percent = np.zeros(len(after.vertices))
+        for part in split(before):
+            percent[part.vertices] = _percent(part.mesh, part.of(after))
+        mean = average(lambda one, other: _percent(one, other).mean(), before, after)
+    else:
+        percent = _percent(before, after)
+        mean = percent.mean()
     values = per_face(after, percent)
-    summary = f"mean {percent.mean():.2g} %, largest {percent.max():.2g} %"
+    summary = f"mean {mean:.2g} %, largest {percent.max():.2g} %"
     scale = _rising([values], "distance (% of the diagonal)", "GnBu", top=100.0)
     return Heat(values, scale, summary)
+
+
+def _percent(before: Mesh, after: Mesh) -> Array:
+    return 100.0 / before.diagonal * metrics.point_to_surface(after.vertices, before)
 
 
 def strain(design: Mesh, flat: Array) -> Heat:

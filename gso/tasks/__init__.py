@@ -17,7 +17,7 @@ from gso.status import OptionError
 if TYPE_CHECKING:
     from gso.tasks.options import Options
 
-_SUPPORT = ("base", "held", "joint", "options", "splined")
+_SUPPORT = ("base", "held", "joined", "joint", "measured", "options", "splined")
 
 
 def names() -> list[str]:

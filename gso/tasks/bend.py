@@ -16,7 +16,7 @@ their shape in few steps, pliable ones keep their lengths.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
@@ -27,7 +27,7 @@ from gso import metrics as measure
 from gso.handle_start import Spread, follow
 from gso.mesh import Mesh
 from gso.status import OptionError, Status
-from gso.tasks import held
+from gso.tasks import held, joined
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, bending, congruence
@@ -87,15 +87,14 @@ def plan(request: Request) -> Plan:
     weights = [options.w_bending]
     while request.start is None and weights[-1] < 0.3 * options.stiff:
         weights.append(10.0 * weights[-1])
-    lengths = [Weighted(t, 1.0) for t in congruence.build(mesh, "surface")]
-    lengths.append(Weighted(congruence.edges(mesh, "surface"), options.w_edges))
-    change = bending.build(mesh)
+    lengths = joined.objective(mesh, partial(_lengths, options))
+    change = joined.objective(mesh, _change)
     pulls = held.pulls(request)
     stages = [
         Stage(
             f"bending {weight:.0e}",
             layout,
-            [*lengths, *(Weighted(t, weight) for t in change), *pulls],
+            [*lengths, *(replace(item, weight=weight) for item in change), *pulls],
             partial(held.unknowns, request, layout),
             iterations=options.iterations,
             tolerance=_NEARLY,
@@ -104,6 +103,15 @@ def plan(request: Request) -> Plan:
     ]
     stages[-1].tolerance = options.tolerance
     return Plan(layout, _start(request).ravel(), stages)
+
+
+def _lengths(options: Options, mesh: Mesh) -> list[Weighted]:
+    items = [Weighted(t, 1.0) for t in congruence.build(mesh, "surface")]
+    return [*items, Weighted(congruence.edges(mesh, "surface"), options.w_edges)]
+
+
+def _change(mesh: Mesh) -> list[Weighted]:
+    return [Weighted(t, 1.0) for t in bending.build(mesh)]
 
 
 def _start(request: Request) -> Array:

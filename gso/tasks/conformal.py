@@ -25,7 +25,7 @@ from gso import flat_start, limits
 from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.status import OptionError
-from gso.tasks import held
+from gso.tasks import held, joined
 from gso.tasks.base import Plan, Request, Stage, open_up
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, congruence, scale, shear
@@ -93,13 +93,10 @@ def plan(request: Request) -> Plan:
         flat = flat_start.begin(
             mesh, iterations=options.relax_iterations, doubtful=opened.doubtful
         ).flat
-    items = [Weighted(t, 1.0) for t in congruence.build(mesh, "flat", scale="scale")]
-    items += [Weighted(scale.build(mesh), options.w_scale)]
-    items += [Weighted(t, options.w_shear) for t in shear.build(mesh)]
     stage = Stage(
         "conformal",
         layout,
-        items,
+        joined.objective(mesh, partial(_terms, options)),
         lambda _: free(layout),
         iterations=options.iterations,
         tolerance=options.tolerance,
@@ -118,6 +115,12 @@ def plan(request: Request) -> Plan:
         refused=refused,
         cut=opened.cut,
     )
+
+
+def _terms(options: Options, mesh: Mesh) -> list[Weighted]:
+    items = [Weighted(t, 1.0) for t in congruence.build(mesh, "flat", scale="scale")]
+    items += [Weighted(scale.build(mesh), options.w_scale)]
+    return items + [Weighted(t, options.w_shear) for t in shear.build(mesh)]
 
 
 def _area_ratios(mesh: Mesh, flat: Array) -> Array:
@@ -143,17 +146,11 @@ def _finish(
     if not request.constraints.empty:
         flat = flat_start.settle(request.mesh, flat, request.constraints)
     else:
-        factor = _area(request.mesh, request.mesh.vertices) / _area(request.mesh, flat)
+        factor = measure.area(request.mesh) / measure.area(request.mesh, flat)
         flat = flat_start.place(request.mesh, flat * np.sqrt(factor), given)
         ratio = ratio * factor
     lengths = np.sqrt(np.maximum(ratio, 0.0))
     return layout.pack({"flat": opened.back(flat), "scale": opened.faces_back(lengths)})
-
-
-def _area(mesh: Mesh, points: Array) -> float:
-    """Area of a surface (n, 3) or of its image (n, 2), doubled."""
-    p, q, r = (np.pad(points[k], ((0, 0), (0, 3 - points.shape[1]))) for k in mesh.triangles.T)
-    return float(np.linalg.norm(np.cross(q - p, r - p), axis=1).sum())
 
 
 def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[str, float]:

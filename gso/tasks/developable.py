@@ -20,13 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import metrics as measure
-from gso.constraints import Pins
+from gso.constraints import Compiled, Pins
 from gso.mesh import Mesh
 from gso.resample import alike, carry, coarser, resample
 from gso.smoothing import smooth_grid
 from gso.status import MeshError, OptionError, Status
-from gso.tasks import held, joint, splined
+from gso.tasks import held, joined, joint, splined
 from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.measured import parted
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, curvature, elongation, fairness, proximity
 from gso.terms.losses import Absolute, Distance
@@ -187,6 +188,8 @@ def _plan(request: Request) -> Plan:
         if spline is None:
             notes.append("the design is developable but for noise: it moves no further than that")
     make = partial(_objective, request, curved, _bending(mesh), smooth)
+    if parted(mesh):
+        make = partial(_joined, request)
     levels = _levels(request)
     starts = _starts(request, levels)
     stages = [_coarse_stage(request, level, make, k) for k, level in enumerate(levels)]
@@ -327,6 +330,17 @@ def _objective(
     items.append(Weighted(near, w_proximity, Distance(o.near)))
     items.append(Weighted(elongation.build(mesh), o.w_elongation))
     return items + (held.pulls(request) if mesh is request.mesh else [])
+
+
+def _joined(request: Request, mesh: Mesh) -> list[Weighted]:
+    """Terms of components that constraints join, each by its own size and curvature."""
+
+    def make(own: Mesh) -> list[Weighted]:
+        alone = replace(request, mesh=own, constraints=Compiled())
+        curved = measure.loss_gc_worst(own, scale=1.0)
+        return _objective(alone, curved, _bending(own), _smoothed(own)[0], own)
+
+    return joined.objective(mesh, make) + held.pulls(request)
 
 
 def _resampled(source: Mesh, target: Mesh) -> Array:

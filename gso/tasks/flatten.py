@@ -23,9 +23,10 @@ from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.resample import coarser
 from gso.status import OptionError
-from gso.tasks import held
+from gso.tasks import held, joined
 from gso.tasks.base import Plan, Request, Stage, open_up, same
 from gso.tasks.joint import lengths_remark
+from gso.tasks.measured import parted
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import (
     Weighted,
@@ -261,6 +262,22 @@ def _unsqueezing(mesh: Mesh, last: Stage) -> list[Stage]:
 
 
 def _strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
+    alone = not parted(mesh)
+    return _stage(
+        "strain",
+        mesh,
+        joined.objective(
+            mesh, lambda own: _strain_terms(options, own, level if alone else _level(own))
+        ),
+    )
+
+
+def _level(mesh: Mesh) -> float:
+    """Typical strain of a component among others."""
+    return max(flat_start.begin(mesh).level, _SMALLEST_LEVEL)
+
+
+def _strain_terms(options: Options, mesh: Mesh, level: float) -> list[Weighted]:
     items = _fair(mesh, options.w_fairness)
     if options.norm == "l2":
         items += [Weighted(t, 1.0) for t in stretch.build(mesh)]
@@ -272,7 +289,7 @@ def _strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
         # Level times the size is what `Spread` costs at small strains, too.
         items.append(Weighted(edges.build(mesh), options.w_edges * level, Absolute(0.1 * level)))
-    return _stage("strain", mesh, items)
+    return items
 
 
 def bent(level: Any) -> Any:
@@ -281,24 +298,37 @@ def bent(level: Any) -> Any:
 
 
 def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:
+    # Of several components, sizes are those of their cells, each in its own unit ball.
+    sizes = [isometry.typical_length(p.mesh) / p.mesh.frame.scale for p in parted(mesh)]
+    size = float(np.mean(sizes)) if sizes else isometry.typical_length(mesh)
+    eps = options.eps * size
+    items = joined.objective(mesh, partial(_length_terms, options, level, eps))
+    stage = _stage("lengths", mesh, items)
+    if options.norm == "l2":
+        return stage
+    return replace(stage, eps=(10.0 * eps, eps), robust="isometry")
+
+
+def _length_terms(options: Options, level: float, eps: float, mesh: Mesh) -> list[Weighted]:
     items = _fair(mesh, options.w_fairness)
     items += [Weighted(t, options.w_shear) for t in shear.build(mesh)]
     items += [Weighted(t, _W_COLLAPSE) for t in collapse.build(mesh)]
     terms = isometry.build(mesh)
     if options.norm == "l2":
         # Divided by the level it is as large as with "l1", and so are the other weights.
-        return _stage("lengths", mesh, items + [Weighted(t, 1.0 / level) for t in terms])
+        return items + [Weighted(t, 1.0 / level) for t in terms]
     size = isometry.typical_length(mesh)
-    eps = options.eps * size
-    stage = _stage("lengths", mesh, items + [Weighted(t, size, Absolute(eps)) for t in terms])
-    return replace(stage, eps=(10.0 * eps, eps), robust="isometry")
+    return items + [Weighted(t, size, Absolute(eps)) for t in terms]
 
 
 def _isometry_stage(options: Options, mesh: Mesh) -> Stage:
+    return _stage("isometry", mesh, joined.objective(mesh, partial(_isometry_terms, options)))
+
+
+def _isometry_terms(options: Options, mesh: Mesh) -> list[Weighted]:
     items = _fair(mesh, options.w_fairness)
     items += [Weighted(t, 1.0) for t in congruence.build(mesh, "flat")]
-    items += [Weighted(t, options.w_mapping) for t in christoffel.build(mesh, "flat")]
-    return _stage("isometry", mesh, items)
+    return items + [Weighted(t, options.w_mapping) for t in christoffel.build(mesh, "flat")]
 
 
 def _fair(mesh: Mesh, weight: float) -> list[Weighted]:

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.constraints import Lengths, OnLines, OnPlane, Pins, Planar, Relations
+from gso.mesh import Mesh
+from gso.tasks import joined
 from gso.tasks.base import Request, Stage
 from gso.terms import Weighted, curve, equation, fairness, length, planarity, position, proximity
 from gso.terms.multipliers import STIFF, hardened
@@ -45,14 +47,18 @@ def approach(request: Request, points: Array, *, iterations: int = 10) -> Stage:
     """
     layout = Layout.of(len(points), "surface")
     mesh = request.mesh
-    normals = np.zeros_like(points)
-    items = [
-        Weighted(proximity.build(mesh.replaced(points), normals), 1.0),
-        Weighted(fairness.build(mesh, reference=points), _REACH**4),
-        *pulls(request),
-    ]
+    items = joined.objective(mesh, _smallest, points) + pulls(request)
     variables = partial(unknowns, request, layout)
     return Stage("approach", layout, items, variables, iterations=iterations)
+
+
+def _smallest(mesh: Mesh, points: Array) -> list[Weighted]:
+    """What keeps a mesh near points (n, 3), and what is between near and far smooth."""
+    near = proximity.build(mesh.replaced(points), np.zeros_like(points))
+    return [
+        Weighted(near, 1.0),
+        Weighted(fairness.build(mesh, reference=points), _REACH**4),
+    ]
 
 
 def drawing(request: Request, stage: Stage) -> list[Stage]:

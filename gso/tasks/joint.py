@@ -29,7 +29,7 @@ from gso.cutting import Cut
 from gso.mesh import Mesh
 from gso.resample import alike, carry, coarser
 from gso.status import OptionError, Status
-from gso.tasks import held, splined
+from gso.tasks import held, joined, splined
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, christoffel, congruence, elongation, fairness, proximity
@@ -323,11 +323,20 @@ def _bounds(layout: Layout, count: int, reach: float, coordinates: Array) -> tup
 
 
 def _objective(request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None) -> list[Weighted]:
-    o = request.options
+    make = partial(_terms, request.options, request.demand, w_fairness, cut)
+    # The cut is that of the whole.
+    items = joined.objective(mesh, make) if cut is None else make(mesh)
+    return items + (held.pulls(request) if mesh is request.mesh else [])
+
+
+def _terms(
+    o: Options, demand: float, w_fairness: float, cut: Cut | None, mesh: Mesh
+) -> list[Weighted]:
+    """Terms of one component."""
     normals = vertex_normals(mesh)
     sheet = mesh if cut is None else cut.mesh
     both = {"counterpart": "flat"}
-    asked, mapped = request.demand * o.w_isometry, request.demand * o.w_mapping
+    asked, mapped = demand * o.w_isometry, demand * o.w_mapping
     items = [Weighted(t, asked) for t in congruence.build(sheet, "surface", **both)]
     items += [Weighted(t, mapped) for t in christoffel.build(sheet, "surface", **both)]
     if cut is not None:
@@ -338,7 +347,7 @@ def _objective(request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None)
         items.append(Weighted(proximity.closest(mesh, normals), o.w_closest))
     items.append(Weighted(proximity.build(mesh, normals), o.w_place))
     items.append(Weighted(elongation.build(mesh), o.w_elongation))
-    return items + (held.pulls(request) if mesh is request.mesh else [])
+    return items
 
 
 def _unknowns(request: Request, mesh: Mesh, layout: Layout, coordinates: Array) -> Variables:

@@ -17,9 +17,16 @@ Array = NDArray[np.float64]
 
 
 class Canonical:
-    """A mesh in the unit ball, grids numbered row by row, and the way back."""
+    """A mesh in the unit ball, grids numbered row by row, and the way back.
 
-    def __init__(self, design: Mesh):
+    Parameters
+    ----------
+    design : Mesh
+    names : ndarray of int, (n,), optional
+        What messages call its vertices, where it is a part of the user's mesh.
+    """
+
+    def __init__(self, design: Mesh, names: NDArray[np.int64] | None = None):
         self.design = design
         self.frame: Frame = design.frame
         if not self.frame.scale > 0:
@@ -33,32 +40,21 @@ class Canonical:
             self.mesh = Mesh.from_grid(self.frame.to_unit(design.grid), weld=False)  # type: ignore[arg-type]
         self.new_index = np.empty(n, np.int64)
         self.new_index[self.order] = np.arange(n)
+        #: What messages call the vertices of this numbering.
+        self.names = self.order if names is None else names[self.order]
 
     def start(self, x0: Any, *, flat: bool) -> Array | None:
         """Coordinates of a warm start in this numbering and frame."""
         if x0 is None:
             return None
-        try:
-            points = np.asarray(getattr(x0, "vertices", x0), dtype=np.float64)
-        except (TypeError, ValueError):
-            raise MeshError("x0 must be a mesh or an array of numbers") from None
-        n, shape = len(self.order), self.mesh.grid_shape
-        columns = (2, 3) if flat else (3,)
-        ordered = points.ndim == 3
-        fits = points.shape[:1] == (n,) if not ordered else points.shape[:2] == shape
-        if points.ndim not in (2, 3) or not fits or points.shape[-1] not in columns:
-            grid = "" if shape is None else f" or {(*shape, columns[0])}"
-            raise MeshError(f"x0 has shape {points.shape}; it must be {(n, columns[0])}{grid}")
-        points = points.reshape(n, -1)
-        if not np.isfinite(points).all():
-            raise MeshError("x0 has coordinates that are not finite")
+        points, ordered = given_points(x0, len(self.order), self.mesh.grid_shape, flat=flat)
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         if not spread[1] > 1e-9 * spread[0]:
             raise MeshError("x0 has no area: all its vertices are on one line")
         points = points if ordered else points[self.order]
         return points[:, :2] / self.frame.scale if flat else self.frame.to_unit(points)
 
-    def constraints(self, given: Iterable[Constraint], *, flat: bool) -> Compiled:
+    def constraints(self, given: Iterable[Constraint] | Compiled, *, flat: bool) -> Compiled:
         """Constraints checked against the design, in this numbering and frame."""
         frame = Frame(np.zeros(2), self.frame.scale) if flat else self.frame
         return compile_constraints(given, self.design, flat=flat).mapped(frame, self.new_index)
@@ -78,3 +74,31 @@ class Canonical:
         new = np.empty(len(there), np.int64)
         new[users] = own
         return new
+
+
+def given_points(
+    x0: Any, count: int, shape: tuple[int, int] | None, *, flat: bool
+) -> tuple[Array, bool]:
+    """Points (count, 3), or (count, 2) of a flat image, that a user gave as a mesh or array.
+
+    With whether they are in the order of a grid, row by row, not of the vertices.
+
+    Raises
+    ------
+    MeshError
+        They are no finite numbers, or not as many as the vertices.
+    """
+    try:
+        points = np.asarray(getattr(x0, "vertices", x0), dtype=np.float64)
+    except (TypeError, ValueError):
+        raise MeshError("x0 must be a mesh or an array of numbers") from None
+    columns = (2, 3) if flat else (3,)
+    ordered = points.ndim == 3
+    fits = points.shape[:1] == (count,) if not ordered else points.shape[:2] == shape
+    if points.ndim not in (2, 3) or not fits or points.shape[-1] not in columns:
+        grid = "" if shape is None else f" or {(*shape, columns[0])}"
+        raise MeshError(f"x0 has shape {points.shape}; it must be {(count, columns[0])}{grid}")
+    points = points.reshape(count, -1)
+    if not np.isfinite(points).all():
+        raise MeshError("x0 has coordinates that are not finite")
+    return points, ordered

@@ -6,6 +6,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -13,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import flat_start, tasks
-from gso.constraints import TIGHT, Constraint
+from gso.components import several
+from gso.constraints import TIGHT, Constraint, compile_constraints
 from gso.fit import describe_spline
 from gso.mesh import Mesh
 from gso.pattern import Pattern
@@ -21,8 +23,9 @@ from gso.result import Result
 from gso.spelling import known_keywords
 from gso.status import ConvergenceWarning, OptionError, Status
 from gso.tasks.base import Options, Request
-from gso.tno import linear
+from gso.tno import components, linear
 from gso.tno.canonical import Canonical
+from gso.tno.job import Job
 from gso.tno.run import Outcome, Run
 from gso.tno.search import of_curvature, of_strain, reach, stay_within, strain_left
 from gso.tno.solver import Callback
@@ -46,6 +49,10 @@ def optimize(
     callback: Callback | None = None,
 ) -> Result:
     """Make a surface developable, flatten it, denoise it, bend it, or map it to the plane.
+
+    Of a mesh of several components each is solved by itself, as if it were alone: in its own
+    frame, with its own weights. Constraints that join components (glue, lengths, symmetry)
+    keep those in one solve, in which each has the weights of its own size.
 
     Parameters
     ----------
@@ -72,7 +79,8 @@ def optimize(
     target_curvature : float, optional
         `developable` by "curvature" only: the mean absolute curvature ``loss_gc_worst`` to
         reach within 5 %, in 1/size^2 as the metrics have it (size: the largest distance from
-        the centroid), with the smallest displacement that does.
+        the centroid), with the smallest displacement that does. Of several components each
+        reaches it by its own size.
     x0 : Mesh, array or Start, optional
         Where to start: vertices (n, 3) or a grid; (n, 2) or (H, W, 2) for a flat image.
         Proximity and lengths stay those of `mesh`. On grids what is wrong with a surface
@@ -80,7 +88,8 @@ def optimize(
         smoothed surface. A :class:`gso.tno.Start` says more about it.
     callback : callable, optional
         Called with a :class:`gso.Progress` after each iteration; returning False stops
-        the solve, and the best iterate so far is returned.
+        the solve, and the best iterate so far is returned. Large meshes of several components
+        are solved in processes: it is then called when a component is done.
 
     Returns
     -------
@@ -114,7 +123,6 @@ def optimize(
     module, formulation, settings = check(
         task, formulation, options, max_deviation, target_curvature, max_strain
     )
-    frame = Canonical(design)
     given = x0 if isinstance(x0, Start) else Start(x0)
     if given.iterations is not None:
         for name, value in (("target_curvature", target_curvature), ("max_strain", max_strain)):
@@ -124,11 +132,42 @@ def optimize(
                     "leave one of them out"
                 )
     flat = getattr(module, "BLOCK", "surface") == "flat"
+    whole = Job(design, compile_constraints(constraints, design, flat=flat), given)
+    wanted = {
+        "max_deviation": max_deviation,
+        "max_strain": max_strain,
+        "target_curvature": target_curvature,
+    }
+    one = partial(_solved, task, formulation, given_formulation, settings, wanted)
+    pieces = components.parts(design, whole.constraints)
+    if pieces:
+        result = components.solve(one, whole, pieces, callback)
+    else:
+        result = one(whole, callback)
+    result.seconds["total"] = time.perf_counter() - clock
+    if not result.converged and result.status is not Status.MAX_ITERATIONS:
+        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=3)
+    return result
+
+
+def _solved(
+    task: str,
+    formulation: str,
+    given_formulation: str | None,
+    settings: Options,
+    wanted: dict[str, float | None],
+    job: Job,
+    callback: Callback | None,
+) -> Result:
+    """Solve what nothing can be taken from: one component, or several that are joined."""
+    module, given = tasks.get(task), job.start
+    frame = Canonical(job.design, job.names)
+    flat = job.constraints.flat
     request = Request(
         frame.mesh,
         settings,
         formulation,
-        frame.constraints(constraints, flat=flat),
+        frame.constraints(job.constraints, flat=flat),
         start=frame.start(given.points, flat=flat),
     )
     run = Run(
@@ -138,24 +177,28 @@ def optimize(
         budget=given.iterations,
         tolerance=given.tolerance,
     )
-    bound = None if max_deviation is None else max_deviation / frame.frame.scale
-    outcome, request = _solved(
-        run, request, bound, max_strain, target_curvature, others=others(request, given_formulation)
+    bound = wanted["max_deviation"]
+    outcome, request = _searched(
+        run,
+        request,
+        None if bound is None else bound / frame.frame.scale,
+        wanted["max_strain"],
+        wanted["target_curvature"],
+        others=others(request, given_formulation),
     )
     formulation = request.formulation
     judge(request, frame, outcome)
-    result = packed(task, formulation, design, frame, outcome, run)
+    result = packed(task, formulation, job.design, frame, outcome, run)
+    if several(job.design):
+        result.notes += ("its components are joined by constraints and solved together",)
     if run.refused:
         result.notes += (f"the start ({given.source}) was not used: {run.refused}",)
     elif given.points is not None:
         result.warm_start = given.source
-    result.seconds["total"] = time.perf_counter() - clock
-    if not result.converged and result.status is not Status.MAX_ITERATIONS:
-        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=3)
     return result
 
 
-def _solved(
+def _searched(
     run: Run,
     request: Request,
     bound: float | None,
@@ -258,7 +301,7 @@ def judge(request: Request, frame: Canonical, outcome: Outcome) -> None:
     outcome.details = {**outcome.details, "constraints": lengths}
     broken = [k for k, miss in misses.items() if miss.hard and not miss.length <= TIGHT]
     for name in broken:
-        where = ", ".join(map(str, frame.order[misses[name].vertices]))
+        where = ", ".join(map(str, frame.names[misses[name].vertices]))
         outcome.notes += (f"{name} is missed by {lengths[name]:.3g} (vertices {where})",)
     if broken and outcome.status is not Status.CANCELLED:
         outcome.status = Status.CONSTRAINTS_MISSED

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 from gso.status import ConvergenceWarning, GSOError
@@ -22,7 +25,11 @@ class Done:
 
 
 def spread(
-    function: Callable[[Any], Any], pieces: Iterable[Any], *, workers: int | None = None
+    function: Callable[[Any], Any],
+    pieces: Iterable[Any],
+    *,
+    workers: int | None = None,
+    caller: bool = True,
 ) -> Generator[Done, None, None]:
     """Apply a function to many pieces of work in parallel processes, results as they finish.
 
@@ -34,6 +41,9 @@ def spread(
         Read as workers become free, so a generator of any length fits in memory.
     workers : int, optional
         Processes; :func:`processors` when not given, 0 for none (in this process).
+    caller : bool
+        Workers import the caller's script, as `function` may be in it. Without, a script
+        whose calls are not guarded by ``if __name__ == "__main__"`` can be run.
 
     Yields
     ------
@@ -52,7 +62,7 @@ def spread(
         for index, piece in numbered:
             yield _attempt(function, index, piece)
         return
-    pool = _Pool(workers, function)
+    pool = _Pool(workers, function, caller)
     try:
         more = True
         while more or pool.busy:
@@ -71,6 +81,17 @@ def processors() -> int:
     """Number of processors that this process may use: batch systems and taskset give it some."""
     allowed = getattr(os, "sched_getaffinity", None)
     return len(allowed(0)) if allowed else os.cpu_count() or 1
+
+
+@contextmanager
+def _nameless() -> Iterator[None]:
+    """Processes that start meanwhile find no script to import."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 def _attempt(function: Callable[[Any], Any], index: int, piece: Any) -> Done:
@@ -110,8 +131,8 @@ class _Pool:
     so that the one that kills its worker is found and the others get their results.
     """
 
-    def __init__(self, workers: int, function: Callable[[Any], Any]):
-        self.workers, self.function = workers, function
+    def __init__(self, workers: int, function: Callable[[Any], Any], caller: bool):
+        self.workers, self.function, self.caller = workers, function, caller
         self.running: dict[Future[Done], tuple[int, Any, bool]] = {}
         self.suspects: list[tuple[int, Any]] = []
         self._start()
@@ -134,7 +155,9 @@ class _Pool:
 
     def add(self, index: int, piece: Any, *, alone: bool = False) -> None:
         try:
-            future = self.executor.submit(_attempt, self.function, index, piece)
+            # A worker starts when there is something for it to do.
+            with nullcontext() if self.caller else _nameless():
+                future = self.executor.submit(_attempt, self.function, index, piece)
         except BrokenProcessPool:
             self._replace()
             self.suspects.append((index, piece))

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import flat_start, metrics
+from gso.components import average, several
+from gso.mesh import Mesh
 from gso.status import Status
 from gso.tasks.base import Request
 from gso.tno.strain import largest_strain, lay_out
@@ -78,9 +80,17 @@ def of_curvature(request: Request, target: float) -> Demand:
     """``loss_gc_worst`` of at most `target`, reached within 5 %."""
 
     def value(points: Array) -> float:
-        return metrics.loss_gc_worst(request.mesh.replaced(points), scale=1.0)
+        return curved(request.mesh, points)
 
     return Demand(value, target, 0.05)
+
+
+def curved(mesh: Mesh, points: Array) -> float:
+    """``loss_gc_worst`` of a surface (n, 3) in the unit ball; of components by their own sizes."""
+    after = mesh.replaced(points)
+    if not several(mesh):
+        return metrics.loss_gc_worst(after, scale=1.0)
+    return float(average(lambda a, b: metrics.loss_gc_worst(b, scale=metrics.unit(a)), mesh, after))
 
 
 def of_strain(request: Request, target: float) -> Demand:

@@ -42,6 +42,7 @@ class Session:
     task goes on from where it is: the pattern of its equations, their symbolic analysis and
     the shape are kept, so that a frame costs one or two iterations. Hard handles are at
     their positions after every :meth:`move`, to rounding; the surface catches up with them.
+    A mesh of several components is kept in one solve, with weights by each one's own size.
 
     Parameters
     ----------

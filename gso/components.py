@@ -1,0 +1,196 @@
+"""The components of a mesh as meshes of their own, and measures of all of them together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import metrics as measure
+from gso.mesh import Mesh
+from gso.metrics import INFO, Info
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+_JOINED: dict[str, Any] = {"sum": np.sum, "max": np.max, "min": np.min}
+
+
+@dataclass(frozen=True)
+class Component:
+    """A part of a mesh as a mesh of its own.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        Its vertices and faces, in their order; a grid where they are one.
+    vertices, faces : ndarray of int
+        Which of the whole mesh they are.
+    """
+
+    mesh: Mesh
+    vertices: Ints
+    faces: Ints
+
+    @property
+    def area(self) -> float:
+        """Area of the surface."""
+        return measure.area(self.mesh)
+
+    def of(self, other: Mesh) -> Mesh:
+        """The same part of a mesh with the same faces."""
+        return self.mesh.replaced(other.vertices[self.vertices])
+
+
+def labels(mesh: Mesh, links: Iterable[tuple[int, int]] | Ints = ()) -> Ints:
+    """Component of each vertex (n,), numbered by their smallest vertex; -1 where no face is.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    links : array_like of int, (k, 2)
+        Vertices whose components count as one.
+
+    Examples
+    --------
+    >>> mesh = Mesh(np.tile(np.eye(3), (2, 1)), [[0, 1, 2], [3, 4, 5]])
+    >>> labels(mesh).tolist(), labels(mesh, [(1, 5)]).tolist()
+    ([0, 0, 0, 1, 1, 1], [0, 0, 0, 0, 0, 0])
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    own = mesh.components
+    pairs = np.asarray(links, np.int64).reshape(-1, 2)
+    if len(pairs):
+        a, b = own[pairs.T]
+        count = int(own.max()) + 1
+        graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
+        own = connected_components(graph, directed=False)[1].astype(np.int64)[own]
+    out = np.full(len(own), -1)
+    used = mesh.used
+    found, first, number = np.unique(own[used], return_index=True, return_inverse=True)
+    rank = np.empty(len(found), np.int64)
+    rank[np.argsort(first)] = np.arange(len(found))
+    out[used] = rank[number]
+    return out
+
+
+def several(mesh: Mesh) -> bool:
+    """Whether a mesh has more than one component."""
+    return mesh.grid_index is None and bool(labels(mesh).max() > 0)
+
+
+def split(mesh: Mesh, label: Ints | None = None) -> list[Component]:
+    """The components of a mesh; vertices of no face belong to none.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    label : ndarray of int, (n,), optional
+        What is kept together, as :func:`labels` has it; every component for itself when not
+        given.
+
+    Examples
+    --------
+    >>> mesh = Mesh(np.tile(np.eye(3), (2, 1)), [[0, 1, 2], [5, 4, 3]])
+    >>> [part.mesh.faces.tolist() for part in split(mesh)]
+    [[[0, 1, 2]], [[2, 1, 0]]]
+    """
+    label = labels(mesh) if label is None else label
+    of_face = label[mesh.faces[:, 0]]
+    vertices, faces = _grouped(label), _grouped(of_face)
+    local = np.empty(len(label), np.int64)
+    out = []
+    for ids, which in zip(vertices, faces, strict=True):
+        local[ids] = np.arange(len(ids))
+        table = mesh.faces[which]
+        own = Mesh(mesh.vertices[ids], np.where(table < 0, -1, local[table]))
+        out.append(Component(own, ids, which))
+    return out
+
+
+def _grouped(label: Ints) -> list[Ints]:
+    """Indices of each label 0, 1 ..., in ascending order."""
+    order = np.argsort(label, kind="stable")
+    ends = np.searchsorted(label[order], np.arange(label.max() + 2))
+    return [order[a:b] for a, b in pairwise(ends)]
+
+
+def combined(
+    several: Sequence[Mapping[str, float]], areas: Sequence[float], info: Mapping[str, Info] = INFO
+) -> dict[str, float]:
+    """Metrics of a whole from those of its components.
+
+    Means are weighted by the components' areas; see :attr:`gso.metrics.Info.joined`. A metric
+    that some components do not have is that of the others.
+
+    Parameters
+    ----------
+    several : sequence of dict
+        Metrics by name, of each component.
+    areas : sequence of float
+        Their areas.
+
+    Examples
+    --------
+    >>> parts = [{"d_H": 1.0, "strain_max": 0.1}, {"d_H": 2.0, "strain_max": 0.3}]
+    >>> combined(parts, [3.0, 1.0])
+    {'d_H': 1.25, 'strain_max': 0.3}
+    """
+    names = dict.fromkeys(name for metrics in several for name in metrics)
+    out = {}
+    for name in names:
+        have = [k for k, metrics in enumerate(several) if name in metrics]
+        values = np.array([several[k][name] for k in have])
+        how = info[name].joined if name in info else "mean"
+        if how == "mean":
+            out[name] = mean(values, np.array([areas[k] for k in have]))
+        else:
+            out[name] = float(_JOINED[how](values))
+    return out
+
+
+def average(function: Callable[..., Any], mesh: Mesh, *others: Mesh) -> Any:
+    """Mean over the components of a mesh, weighted by area, of what a function says of each.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(mesh, *others)`` of one component returns a number or a tuple of them.
+    mesh : Mesh
+    *others : Mesh
+        Meshes with its faces, whose same parts the function is given.
+
+    Examples
+    --------
+    >>> mesh = Mesh(np.tile(np.eye(3), (2, 1)), [[0, 1, 2], [3, 4, 5]])
+    >>> float(average(lambda part: len(part.faces), mesh))
+    1.0
+    """
+    if not several(mesh):
+        return function(mesh, *others)
+    parts = split(mesh)
+    found = [function(part.mesh, *map(part.of, others)) for part in parts]
+    return np.average(found, axis=0, weights=[part.area for part in parts])
+
+
+def sizes(mesh: Mesh) -> Array:
+    """Size of the component of each vertex (n,): the largest distance from its centroid."""
+    out = np.full(len(mesh.vertices), mesh.frame.scale)
+    if several(mesh):
+        for part in split(mesh):
+            out[part.vertices] = part.mesh.frame.scale
+    return out
+
+
+def mean(values: Array, weights: Array) -> float:
+    """Weighted mean, to the last bit of values that are all the same."""
+    if (values == values[0]).all():
+        return float(values[0])
+    return float(np.average(values, weights=weights))

@@ -1,0 +1,47 @@
+"""Objectives of components that constraints join: each with the weights of its own size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.mesh import Mesh
+from gso.tasks.measured import parted
+from gso.terms import Weighted
+from gso.terms.placed import placed
+
+Array = NDArray[np.float64]
+
+
+def objective(mesh: Mesh, make: Callable[..., list[Weighted]], *positions: Array) -> list[Weighted]:
+    """Terms of a mesh, each component's made in its own unit ball.
+
+    Energies are means over the components, weighted by area: a small component that is joined
+    to a large one is worked on as if it were alone.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        In the solver's frame.
+    make : callable
+        ``make(mesh, *positions)`` returns the terms of one component.
+    *positions : ndarray, (n, 3)
+        More positions of the vertices, in the frame of `mesh`.
+    """
+    parts = parted(mesh)
+    if not parts:
+        return make(mesh, *positions)
+    total = sum(part.area for part in parts)
+    items = []
+    for part in parts:
+        frame = part.mesh.frame
+        own = part.mesh.replaced(frame.to_unit(part.mesh.vertices))
+        where: dict[str, Any] = {"vertices": part.vertices, "faces": part.faces}
+        where |= {"count": len(mesh.vertices), "share": part.area / total}
+        for item in make(own, *(frame.to_unit(p[part.vertices]) for p in positions)):
+            items.append(replace(item, term=placed(item.term, frame, **where)))
+    return items

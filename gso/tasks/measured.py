@@ -1,0 +1,54 @@
+"""The metrics of a task, component by component and of the whole."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import metrics as measure
+from gso import tasks
+from gso.components import Component, combined, several, split
+from gso.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+
+def parted(design: Mesh) -> list[Component]:
+    """The components of a mesh that has several; none of a mesh that is one."""
+    return split(design) if several(design) else []
+
+
+def measured(task: str, design: Mesh, after: Mesh, flat: Array | None) -> dict[str, float]:
+    """Metrics of a result: of several components each by its own size, then together.
+
+    Parameters
+    ----------
+    task : str
+        Whose metrics.
+    design, after : Mesh
+        Before and after. Where their faces differ, components cannot be told to belong
+        together, and the surfaces are measured as wholes.
+    flat : ndarray, (n, 2), or None
+        A flat image.
+
+    Examples
+    --------
+    >>> panel = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> lifted = Mesh.from_grid(panel + [0.0, 0.0, 0.1])
+    >>> round(measured("developable", Mesh.from_grid(panel), lifted, None)["d_H"], 6)
+    3.535534
+    """
+    module = tasks.get(task)
+    parts = parted(design) if np.array_equal(design.faces, after.faces) else []
+    if not parts:
+        return module.metrics(design, after, flat, measure.unit(design))
+    found = [
+        module.metrics(
+            part.mesh,
+            part.of(after),
+            None if flat is None else flat[part.vertices],
+            measure.unit(part.mesh),
+        )
+        for part in parts
+    ]
+    return combined(found, [part.area for part in parts])
