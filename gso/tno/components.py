@@ -136,7 +136,9 @@ def _moved(result: Result, here: Mesh, there: Mesh) -> Result:
         mesh = result.mesh
     elif result.mesh is result.design:
         mesh = there
-    elif result.flat is not None and np.array_equal(result.mesh.vertices[:, :2], result.flat):
+    elif result.pattern is not None and np.array_equal(
+        result.mesh.vertices[:, :2], result.pattern.flat
+    ):
         mesh = result.mesh
     else:
         unit = here.frame.to_unit(result.mesh.vertices)
