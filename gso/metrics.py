@@ -357,6 +357,18 @@ def principal_strains(surface: Any, flat: Any) -> Strains:
     return Strains(float(values.mean()), float(np.percentile(values, 99)), values)
 
 
+def strains(surface: Any, flat: Any) -> dict[str, float]:
+    """Largest, 99th percentile and mean of :func:`principal_strains`, by their names.
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> strains(grid, grid[..., :2] * 1.5)["strain_max"]
+    0.5
+    """
+    found = principal_strains(surface, flat)
+    largest = float(found.values.max())
+    return {"strain_max": largest, "strain_p99": found.p99, "strain_mean": found.mean}
+
+
 def corner_strains(surface: Any, flat: Any) -> Array:
     """Larger principal strain max |s - 1| (4 q + t,) of every corner triangle.
 

@@ -20,7 +20,6 @@ from gso.status import MeshError, Progress, Status
 Array = NDArray[np.float64]
 
 _FORMAT = 1
-_UNUSABLE = (Status.CANCELLED, Status.TARGET_MISSED, Status.CONSTRAINTS_MISSED)
 
 
 @dataclass
@@ -56,14 +55,21 @@ class Result:
     warm_start : str
         What started the solve: "cold", "x0", "session", "net" (:func:`gso.hybrid.solve`), or
         the source that a :class:`gso.tno.Start` names.
+    reasons : tuple of str
+        Why the result cannot be used as what was asked for, and where; see :mod:`gso.verdict`.
+        The notes have them too.
+    layout : ndarray, (n, 2), or None
+        Of `developable`: the pattern by which its strain is measured, in the input's unit; None
+        where the surface must be cut open first, or no verdict was asked for.
     notes : tuple of str
-        What was repaired in the input or restricted in the run.
+        What was repaired in the input or restricted in the run, and the reasons.
     details : dict
         Numbers of the task: weights chosen ... Of `denoise`: "sigma", the standard deviation
         that the noise is estimated to have, in the input's unit; "dof", degrees of freedom
         that the smoothing leaves to each coordinate; "order" and "weight". With constraints,
         "constraints": the largest length by which each is missed, in the input's unit. With
         a spline, "spline": its curvature and distances, see :func:`gso.fit.describe_spline`.
+        Of `developable`, "verdict": its largest strain and deviation, and what was asked.
     spline : BSplineSurface or None
         The surface that `mesh` has samples of, with the option ``variables="surface"``.
     """
@@ -85,6 +91,8 @@ class Result:
     details: dict[str, Any] = field(default_factory=dict)
     spline: BSplineSurface | None = None
     cell_scale: Array | None = None
+    reasons: tuple[str, ...] = ()
+    layout: Array | None = None
 
     @property
     def converged(self) -> bool:
@@ -93,10 +101,14 @@ class Result:
 
     @property
     def usable(self) -> bool:
-        """Whether it can be worked with: complete, as asked for, no cell turned over."""
+        """Whether it can be used as what was asked for: there are no :attr:`reasons` against it.
+
+        Without a verdict: whether it is complete, finite, and has no cell turned over.
+        """
         points = self.mesh.vertices if self.flat is None else self.flat
         return bool(
-            self.status not in _UNUSABLE
+            not self.reasons
+            and not (self.status.refuses or self.status is Status.UNUSABLE)
             and np.isfinite(points).all()
             and not self.metrics.get("flipped_cells", 0)
         )
@@ -119,7 +131,11 @@ class Result:
         from gso import metrics, tasks
 
         module = tasks.get(self.task)
-        return module.metrics(self.design, self.mesh, self.flat, metrics.unit(self.design))
+        known = module.metrics(self.design, self.mesh, self.flat, metrics.unit(self.design))
+        if self.layout is None:
+            return known
+        strains = metrics.strains(self.mesh, self.layout)
+        return strains | {k: v for k, v in known.items() if k not in strains}
 
     def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
         """Write the result.
@@ -165,6 +181,7 @@ class Result:
             "device": self.device,
             "warm_start": self.warm_start,
             "notes": list(self.notes),
+            "reasons": list(self.reasons),
             "details": self.details,
             "metrics": self.metrics,
             "history": [asdict(p) for p in self.history],
@@ -177,6 +194,8 @@ class Result:
         }
         if self.flat is not None:
             arrays["flat"] = self.flat
+        if self.layout is not None:
+            arrays["layout"] = self.layout
         if self.cell_scale is not None:
             arrays["cell_scale"] = self.cell_scale
         if self.spline is not None:
@@ -224,6 +243,9 @@ class Result:
                 record["details"],
                 spline=BSplineSurface.from_arrays(data),
                 cell_scale=_checked(data, "cell_scale", (len(design.faces),)),
+                # Files of earlier versions have neither.
+                reasons=tuple(record.get("reasons", ())),
+                layout=_checked(data, "layout", (len(design.vertices), 2)),
             )
             result.__dict__["metrics"] = record["metrics"]
         except (KeyError, TypeError, ValueError) as error:

@@ -4,7 +4,7 @@ Each function returns faces or edges in the numbering of the mesh, none where al
 """
 
 from gso.faults.crossings import crossings
-from gso.faults.folds import collapsed, folded
+from gso.faults.folds import SHORT, collapsed, folded
 from gso.faults.overlaps import overlaps
 
-__all__ = ["collapsed", "crossings", "folded", "overlaps"]
+__all__ = ["SHORT", "collapsed", "crossings", "folded", "overlaps"]

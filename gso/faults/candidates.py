@@ -34,24 +34,25 @@ def candidates(points: Array, faces: Ints) -> tuple[Ints, Array]:
     widths : ndarray, (p,)
         Longest side of the smaller bounding box of each pair.
     """
-    ids = four_corners(faces)
-    corners = points[ids]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    pairs = overlapping(low, high)
-    first, second = ids[pairs].transpose(1, 2, 0)
+    ids = np.ascontiguousarray(four_corners(faces).T)
+    corners = np.ascontiguousarray(points.T)[:, ids]
+    low, high = np.minimum.reduce(corners, axis=1), np.maximum.reduce(corners, axis=1)
+    pairs = overlapping(low.T, high.T)
+    first, second = pairs.T
     apart = np.ones(len(pairs), bool)
-    for k in range(4):
-        apart &= (first != second[k]).all(axis=0)
-    pairs = pairs[apart]
-    a, b = corners[pairs].transpose(1, 2, 0, 3)
-    width = (high - low).max(axis=1)[pairs].min(axis=1)
-    axis = b.mean(axis=0) - a.mean(axis=0)
-    length = np.linalg.norm(axis, axis=1)
-    here, there = (np.einsum("kpd,pd->kp", x, axis) for x in (a, b))
-    met = here.max(axis=0) - there.min(axis=0) > DEPTH * width * length
+    for i in ids:
+        for j in ids:
+            apart &= i[first] != j[second]
+    first, second = first[apart], second[apart]
+    width = np.minimum(*((high - low).max(axis=0)[k] for k in (first, second)))
+    centre = corners.mean(axis=1)
+    axis = centre[:, second] - centre[:, first]
+    length = np.sqrt((axis**2).sum(axis=0))
+    here, there = (np.einsum("dkp,dp->kp", corners[:, :, k], axis) for k in (first, second))
+    met = np.maximum.reduce(here) - np.minimum.reduce(there) > DEPTH * width * length
     # Faces about the same centre are never told apart.
     met |= length <= DEPTH * width
-    return pairs[met], width[met]
+    return np.stack([first, second], axis=1)[met], width[met]
 
 
 def split(faces: Ints, other: NDArray[np.bool_] | None = None) -> tuple[Ints, Ints]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.geometry import cross, dot, norm, norm2, sub
 from gso.mesh import Mesh
 from gso.topology import are_quads, four_corners
 
@@ -15,7 +16,7 @@ Ints = NDArray[np.int64]
 SHARP = -0.9
 #: Share of its length below which an edge has collapsed.
 SHORT = 0.02
-#: Share of a triangle's longest side, as its height, below which it has no direction.
+#: Share of a corner's longer side, as its height, below which it has no direction.
 _FLAT = 1e-6
 
 
@@ -48,59 +49,56 @@ def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
     >>> folded(Mesh(strip.reshape(-1, 3), faces))
     array([1, 2])
     """
-    he, points = mesh.half_edges, mesh.vertices - mesh.frame.centre
+    he, points = mesh.half_edges, tuple((mesh.vertices - mesh.frame.centre).T.copy())
     quad = are_quads(mesh.faces)
-    hinge, sound = _own_folds(points, mesh.faces, quad, below)
-    broken = hinge.all(axis=1) if mesh.grid_index is None else hinge.any(axis=1)
+    normals, fold = _corner_normals(points, mesh.faces, quad, below)
+    broken = fold.all(axis=0) if mesh.grid_index is None else fold.any(axis=0)
     bad = [np.flatnonzero(broken & quad)]
+    # Triangles of a split that folds are none of the surface's.
+    sound = ~fold
     h = np.flatnonzero(he.twin > np.arange(he.twin.size))
-    both = [_beside(points, mesh, side, sound) for side in (h, he.twin[h])]
-    for n in both[0]:
-        for m in both[1]:
-            # The edge runs the other way on the other side, and normals agree all the same.
-            fold = h[np.einsum("ed,ed->e", n, m) < below]
-            bad += [he.face[fold], he.face[he.twin[fold]]]
+    local = np.arange(he.face.size) - np.searchsorted(he.face, he.face)
+    size = np.where(quad, 4, 3)[he.face]
+    sides = (h, he.twin[h])
+    for k in range(2):
+        for j in range(2):
+            # The triangles of the edge's two ends, on either side.
+            here, there = (
+                (he.face[s], (local[s] + turn) % size[s])
+                for s, turn in zip(sides, (k, j), strict=True)
+            )
+            cosine = dot(*(tuple(n[c, f] for n in normals) for f, c in (here, there)))
+            both = sound[(here[1] + 1) % 2, here[0]] & sound[(there[1] + 1) % 2, there[0]]
+            found = h[(cosine < below) & both]
+            bad += [he.face[found], he.face[he.twin[found]]]
     return np.unique(np.concatenate(bad))
 
 
-def _own_folds(
-    points: Array, faces: Ints, quad: NDArray[np.bool_], below: float
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which quads fold along each diagonal (m, 2), and which splits are sound (m, 2)."""
-    ids = four_corners(faces)
-    fold = np.zeros((len(faces), 2), bool)
-    for k in range(2):
-        a, b, c, d = (points[ids[:, (k + j) % 4]] for j in range(4))
-        fold[:, k] = np.einsum("fd,fd->f", _normals(a, b, c), _normals(a, c, d)) < below
-    fold &= quad[:, None]
-    return fold, ~fold
+def _corner_normals(
+    points: tuple[Array, ...], faces: Ints, quad: NDArray[np.bool_], below: float
+) -> tuple[tuple[Array, ...], NDArray[np.bool_]]:
+    """Unit normals of the corner triangles (4, m), and quads that fold along a diagonal (2, m).
 
-
-def _beside(
-    points: Array, mesh: Mesh, side: Ints, sound: NDArray[np.bool_]
-) -> tuple[Array, Array]:
-    """Unit normals of the two triangles that may lie along half-edges; zero where none does."""
-    he = mesh.half_edges
-    a, b = points[he.origin[side]], points[he.dest[side]]
-    ahead, behind = he.dest[he.next[side]], he.origin[he.prev[side]]
-    # Corner of the face that the half-edge starts from.
-    first = np.searchsorted(he.face, he.face[side])
-    local = (side - first) % 2
-    good = sound[he.face[side]]
-    row = np.arange(len(side))
-    # The triangle with the next corner lies along the diagonal from this one.
-    with_next = _normals(a, b, points[ahead]) * good[row, local][:, None]
-    with_last = _normals(a, b, points[behind]) * good[row, 1 - local][:, None]
-    return with_next, with_last
-
-
-def _normals(a: Array, b: Array, c: Array) -> Array:
-    """Unit normals of triangles, zero where they are almost lines."""
-    normal = np.cross(b - a, c - a)
-    length = np.linalg.norm(normal, axis=1)
-    longest = np.max([((x - y) ** 2).sum(axis=1) for x, y in ((a, b), (b, c), (c, a))], axis=0)
-    thick = length > _FLAT * longest
-    return normal * np.divide(1.0, length, out=np.zeros_like(length), where=thick)[:, None]
+    Corner k is cut off by the diagonal of corners k - 1 and k + 1. The corners of a triangle
+    all have its normal.
+    """
+    ids = four_corners(faces).T
+    corners = [tuple(x[i] for x in points) for i in ids]
+    sides = [sub(corners[(k + 1) % 4], corners[k]) for k in range(4)]
+    out = []
+    for k in range(4):
+        normal = cross(sides[k], sides[k - 1])
+        area, longest = norm(normal), np.maximum(norm2(sides[k]), norm2(sides[k - 1]))
+        # A triangle that is almost a line has no direction.
+        scale = np.divide(-1.0, area, out=np.zeros_like(area), where=area > _FLAT * longest)
+        out.append([x * scale for x in normal])
+    normals = [np.stack(x) for x in zip(*out, strict=True)]
+    for x in normals:
+        x[:, ~quad] = x[1, ~quad]
+    # The diagonal of corners 0-2 cuts off 1 and 3.
+    pairs = ((1, 3), (0, 2))
+    fold = [dot(*(tuple(x[k] for x in normals) for k in pair)) < below for pair in pairs]
+    return tuple(normals), np.stack(fold) & quad
 
 
 def collapsed(before: Mesh, after: Array, *, share: float = SHORT) -> Ints:

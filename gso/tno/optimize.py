@@ -20,6 +20,7 @@ from gso.status import ConvergenceWarning, OptionError, Status
 from gso.tasks.base import Options, Request
 from gso.tno import linear
 from gso.tno.canonical import Canonical
+from gso.tno.judged import asked_of, judged, warning
 from gso.tno.run import Outcome, Run
 from gso.tno.search import reach_target, stay_within
 from gso.tno.solver import Callback
@@ -39,6 +40,7 @@ def optimize(
     target_curvature: float | None = None,
     x0: Any = None,
     callback: Callback | None = None,
+    verdict: bool = True,
 ) -> Result:
     """Make a surface developable, flatten it, denoise it, bend it, or map it to the plane.
 
@@ -72,6 +74,9 @@ def optimize(
     callback : callable, optional
         Called with a :class:`gso.Progress` after each iteration; returning False stops
         the solve, and the best iterate so far is returned.
+    verdict : bool
+        Judge the result (:mod:`gso.verdict`) and, where it is a developable surface, lay it out
+        to measure its strain. Without it neither is done, which saves their time.
 
     Returns
     -------
@@ -138,9 +143,12 @@ def optimize(
         result.notes += (f"the start ({given.source}) was not used: {run.refused}",)
     elif given.points is not None:
         result.warm_start = given.source
+    if verdict:
+        limits = {"max_deviation": max_deviation, "target_curvature": target_curvature}
+        result = judged(result, asked_of(request, frame.frame.scale, **limits))
     result.seconds["total"] = time.perf_counter() - clock
-    if not result.converged and result.status is not Status.MAX_ITERATIONS:
-        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=2)
+    if said := warning(result):
+        warnings.warn(said, ConvergenceWarning, stacklevel=2)
     return result
 
 
