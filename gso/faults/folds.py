@@ -12,8 +12,9 @@ from gso.topology import are_quads, four_corners
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Cosine of the angle between neighbouring normals below which a face lies folded on the next.
-SHARP = -0.9
+#: Cosine of the angle between neighbouring normals below which a face is folded onto the next:
+#: it turns back by more than 120 degrees. Sound results stay above 0 all but always.
+SHARP = -0.5
 #: Share of its length below which an edge has collapsed.
 SHORT = 0.02
 #: Share of a corner's longer side, as its height, below which it has no direction.
@@ -23,8 +24,8 @@ _FLAT = 1e-6
 def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
     """Faces that are folded onto a neighbour, or onto themselves, in both triangulations.
 
-    The normals of two triangles at an edge are then almost opposite: a face is turned over, or
-    the surface has a sharp crease. Quads count as the triangles along both diagonals. A quad
+    The normals of two triangles at an edge then differ by more than 120 degrees: a face is turned
+    over, or the surface has a sharp crease. Quads count as the triangles along both diagonals. A quad
     is folded onto itself when the two triangles along a diagonal are; where the mesh is no
     grid, along both diagonals, since an arrow-shaped one is not.
 
