@@ -391,6 +391,17 @@ def corner_strains(surface: Any, flat: Any) -> Array:
     return values
 
 
+def face_strains(surface: Any, flat: Any) -> Array:
+    """Largest of :func:`corner_strains` of every face (m,); NaN where none has an area."""
+    quad = topology.are_quads(_faces(surface))
+    values = corner_strains(surface, flat)
+    corners, triangles = np.split(values, [4 * np.count_nonzero(quad)])
+    out = np.empty(len(quad))
+    out[quad] = np.fmax.reduce(corners.reshape(4, -1), axis=0)
+    out[~quad] = triangles
+    return out
+
+
 def stretches(surface: Any, flat: Any) -> tuple[Array, Array]:
     """Largest and smallest ratio of lengths (m,) of every face, image over surface.
 

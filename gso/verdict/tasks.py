@@ -6,15 +6,19 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 
+import numpy as np
+
 from gso import metrics
 from gso.verdict.asked import DEVELOPABLE, TARGET, TIGHT, Asked, asked_curvature
-from gso.verdict.wording import length, percent, sentence
+from gso.verdict.wording import length, percent, places, sentence
 
 if TYPE_CHECKING:
     from gso.result import Result
 
 #: Share of the curvature that must be gone for something to have been done.
 _DONE = 0.01
+#: Strain of a triangle that is squeezed to a line or doubled: a face that has turned over.
+_WHOLE = 0.99
 #: Share of the diagonal beyond which a result is another surface than the design.
 _FAR = 0.5
 
@@ -31,7 +35,8 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
     strain = None
     found = {"deviation": deviation, **asked.limits}
     if result.layout is not None:
-        strain = found["strain_max"] = metrics.strains(mesh, result.layout)["strain_max"]
+        strains = np.nan_to_num(metrics.face_strains(mesh, result.layout))
+        strain = found["strain_max"] = float(strains.max())
     allowed = asked.max_strain
     if allowed is None and asked.max_deviation is not None:
         allowed = DEVELOPABLE
@@ -47,6 +52,12 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
                 "the largest strain is not known: the surface must be cut open before it can be "
                 "laid out"
             )
+    if strain is not None and strain >= _WHOLE:
+        bad = np.flatnonzero(strains >= _WHOLE)
+        yield (
+            f"no pattern fits the surface: its lengths would change by {percent(strain)} at "
+            f"{places('face', bad)}"
+        )
     target = asked.target_curvature
     if target is not None and not after <= target * (1.0 + TARGET):
         yield f"mean |K| is {after:.3g}, above the target of {target:.3g}"
@@ -66,7 +77,7 @@ def _limits(diagonal: float, deviation: float, asked: Asked) -> Iterator[str]:
     most = asked.max_deviation
     # Far from the origin of the coordinates a distance is known to their rounding only.
     if most is not None and deviation > most * (1.0 + TIGHT) + 1e-12 * diagonal:
-        yield f"the result is {length(deviation)} away from the input, more than {length(most)}"
+        yield f"the result is {length(deviation)} away from the input, more than {most:g}"
     elif deviation > _FAR * diagonal + asked.moved:
         share = percent(deviation / diagonal)
         yield f"the result is {length(deviation)} away from the input, {share} of its diagonal"

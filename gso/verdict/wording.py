@@ -25,28 +25,29 @@ def places(what: str, ids: Any) -> str:
 
 
 def length(value: float, unit: str = "") -> str:
-    """A length to three digits, with its unit where there is one.
+    """A measured length to three digits, with its unit where there is one.
 
-    >>> length(20.0, "mm"), length(0.5), length(1234.5)
-    ('20 mm', '0.5', '1230')
+    >>> length(20.0, "mm"), length(0.5), length(0.0123456), length(1234.5)
+    ('20.0 mm', '0.500', '0.0123', '1230')
     """
-    if not np.isfinite(value) or value == 0:
-        return f"{value:g}"
-    digits = max(2 - int(np.floor(np.log10(abs(value)))), 0)
-    text = f"{float(f'{value:.3g}'):.{min(digits, 9)}f}" if 1e-6 < abs(value) < 1e6 else f"{value:.3g}"
-    if "." in text and "e" not in text:
-        text = text.rstrip("0").rstrip(".")
+    if value == 0 or not np.isfinite(value):
+        text = f"{value:g}"
+    elif not 1e-4 <= abs(value) < 1e6:
+        text = f"{value:.2e}"
+    else:
+        rounded = float(f"{value:.3g}")
+        text = f"{rounded:.{max(2 - int(np.floor(np.log10(abs(rounded)))), 0)}f}"
     return f"{text} {unit}" if unit else text
 
 
 def percent(value: float) -> str:
-    """A share to three digits.
+    """A measured share to three digits.
 
-    >>> percent(0.01741), percent(0.58), percent(1e-7)
-    ('1.74 %', '58 %', '0 %')
+    >>> percent(0.01741), percent(0.58), percent(1e-8)
+    ('1.74 %', '58.0 %', '0 %')
     """
-    shown = round(100.0 * value, 4)
-    return f"{length(shown)} %"
+    shown = 100.0 * value
+    return f"{length(shown if shown >= 1e-4 else 0.0)} %"
 
 
 def headline(result: Result, unit: str = "") -> str:
@@ -66,7 +67,7 @@ def headline(result: Result, unit: str = "") -> str:
     >>> bowl = np.dstack([*np.meshgrid(10 * u, 10 * u), 2 * (u**2 + u[:, None] ** 2)])
     >>> from gso.tno import optimize
     >>> headline(optimize(bowl, max_deviation=0.5), "mm")
-    'largest strain 1... %, deviation 0.5 mm: not developable within 0.5 mm'
+    'largest strain 1... %, deviation 0.500 mm: not developable within 0.5 mm'
     """
     found = result.details.get("verdict")
     return sentence(found, unit) if found else ""
@@ -82,8 +83,8 @@ def sentence(found: dict[str, float], unit: str = "") -> str:
         return said
     within = []
     if "max_deviation" in found:
-        within.append(f"within {length(found['max_deviation'], unit)}")
+        within.append(f"within {found['max_deviation']:g} {unit}".rstrip())
     if "max_strain" in found:
-        within.append(f"at a strain of {percent(found['max_strain'])}")
+        within.append(f"to a strain of {100 * found['max_strain']:g} %")
     good = strain <= found["allowed"]
     return f"{said}: {'developable' if good else 'not developable'} {' and '.join(within)}"
