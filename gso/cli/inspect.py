@@ -46,12 +46,15 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
 
     from gso import metrics as measure
     from gso import tasks
+    from gso.tno.layout import lay_out
 
     size = measure.unit(before)
-    values = dict(tasks.get("developable").metrics(before, after, None, size))
+    flat = np.ptp(after.vertices[:, 2]) <= 1e-9 * after.diagonal
+    layout = None if flat else lay_out(after)
+    values = {} if layout is None else measure.strains(after, layout)
+    values |= tasks.get("developable").metrics(before, after, None, size)
     notes = []
     same = np.array_equal(before.faces, after.faces)
-    flat = np.ptp(after.vertices[:, 2]) <= 1e-9 * after.diagonal
     if same and not flat:
         values["theta"] = measure.normal_angle(before, after)
     if same and flat:

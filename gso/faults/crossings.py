@@ -26,7 +26,7 @@ def crossings(mesh: Mesh) -> Ints:
     Returns
     -------
     ndarray of int, (p, 2)
-        Faces, the smaller number first; none twice.
+        Faces, the smaller number first; in increasing order, none twice.
 
     Notes
     -----
@@ -45,7 +45,8 @@ def crossings(mesh: Mesh) -> Ints:
     which, first, second = by_triangles(pairs, *split(mesh.faces))
     crossed = np.zeros(len(pairs), bool)
     crossed[which[_cross(points[first], points[second], DEPTH * width[which])]] = True
-    return pairs[crossed]
+    found = pairs[crossed]
+    return found[np.lexsort(found.T[::-1])]
 
 
 def _cross(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:

@@ -15,8 +15,8 @@ from gso.verdict.wording import length, percent, places, sentence
 if TYPE_CHECKING:
     from gso.result import Result
 
-#: Share of the curvature that must be gone for something to have been done.
-_DONE = 0.01
+#: Share by which curvature or roughness must change to count as better or worse.
+_SAME = 0.01
 #: Strain of a triangle that is squeezed to a line or doubled: a face that has turned over.
 _WHOLE = 0.99
 #: Share of the diagonal beyond which a result is another surface than the design.
@@ -66,9 +66,9 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
 
     if asked.moved > 0 or after <= max(Options().developable_below, target or 0.0):
         return
-    if after > before * (1.0 + TIGHT):
+    if after > (1.0 + _SAME) * before:
         yield f"mean |K| is {after:.3g}, worse than the {before:.3g} of the input"
-    elif not (strain is not None and strain <= DEVELOPABLE) and after > (1.0 - _DONE) * before:
+    elif after > (1.0 - _SAME) * before and not (strain is not None and strain <= DEVELOPABLE):
         yield f"nothing was done: mean |K| is {after:.3g}, as in the input"
 
 
@@ -86,8 +86,8 @@ def _limits(diagonal: float, deviation: float, asked: Asked) -> Iterator[str]:
 def denoise(result: Result, asked: Asked) -> Iterator[str]:
     """No rougher than the input."""
     ratio = metrics.fairness_ratio(result.design, result.mesh)
-    if not asked.moved and ratio > 1.0 + TIGHT:
-        yield f"the result is rougher than the input, {ratio:.3g} times"
+    if not asked.moved and ratio > 1.0 + _SAME:
+        yield f"the result is {ratio:.3g} times as rough as the input"
 
 
 #: By task; one that is not named here is judged by its surface or pattern alone.
