@@ -159,9 +159,7 @@ def test_a_folded_strip(kind):
     flat = Mesh.from_grid(np.dstack([np.arange(7.0)[:, None] + 0 * x, 0 * x + np.arange(4), 0 * x]))
     strip = np.dstack([x, 0 * x + np.arange(4), height])
     mesh = kinds(flat)[kind]
-    order = np.argmin(
-        ((mesh.vertices[:, None] - flat.vertices[None]) ** 2).sum(axis=2), axis=1
-    )
+    order = np.argmin(((mesh.vertices[:, None] - flat.vertices[None]) ** 2).sum(axis=2), axis=1)
     folded = mesh.replaced(strip.reshape(-1, 3)[order])
     found = faults.folded(folded)
     where = {frozenset(f[f >= 0]) for f in mesh.faces[found]}
@@ -194,9 +192,7 @@ def test_the_pattern_of_a_cylinder_and_of_a_long_ring(kind):
     angle, radius = T, 1.5 + 0.5 * V
     plane = grid(T, V, 0 * T)
     mesh = kinds(plane)[kind]
-    order = np.argmin(
-        ((mesh.vertices[:, None] - plane.vertices[None]) ** 2).sum(axis=2), axis=1
-    )
+    order = np.argmin(((mesh.vertices[:, None] - plane.vertices[None]) ** 2).sum(axis=2), axis=1)
 
     def sector(full):
         out = np.stack([radius * np.cos(full * angle), radius * np.sin(full * angle)], axis=-1)
@@ -221,9 +217,9 @@ def test_parts_side_by_side_must_not_overlap():
     tile = Mesh.from_grid(np.dstack([*np.mgrid[:4.0, :4.0], np.zeros((4, 4))]))
     mesh = beside(tile, moved(tile, [9, 0, 0]))
     flat = tile.vertices[:, :2]
-    assert not faults.overlaps(mesh, np.r_[flat, flat + [3.0, 0.0]]).size
+    assert not faults.overlaps(mesh, np.r_[flat, flat + (3.0, 0.0)]).size
     np.testing.assert_array_equal(
-        faults.overlaps(mesh, np.r_[flat, flat + [2.5, 0.0]]), [6, 7, 8, 9, 10, 11]
+        faults.overlaps(mesh, np.r_[flat, flat + (2.5, 0.0)]), [6, 7, 8, 9, 10, 11]
     )
     # One part wholly inside a face of the other, and both in one place.
     np.testing.assert_array_equal(

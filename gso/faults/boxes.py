@@ -50,7 +50,7 @@ def overlapping(low: Array, high: Array) -> Ints:
     for k in np.unique(level):
         # Those of this size, then the smaller ones that may overlap them.
         order = np.r_[np.flatnonzero(level == k), np.flatnonzero(level > k)]
-        own = np.count_nonzero(level == k)
+        own = int(np.count_nonzero(level == k))
         found.append(_in_grid(low[order], high[order], own, origin, largest * _RATIO**-k, order))
     pairs = np.concatenate(found)
     return np.sort(pairs, axis=1)

@@ -53,15 +53,14 @@ def _cross(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:
     """Which pairs of triangles (t, 3, 3) pass through each other by more than a depth (t,)."""
     out = np.zeros(len(a), bool)
     at = np.arange(len(a))
+    for k in range(2):
+        # Most pairs end with the first plane: the second one is asked for the rest.
+        base, other = (a, b) if k == 0 else (b, a)
+        at = at[_both_sides(_heights(base[at], other[at])[1], depth[at])]
+    a, b, depth = a[at], b[at], depth[at]
     normal_a, height_b = _heights(a, b)
-    some = _both_sides(height_b, depth)
-    at, a, b, depth, normal_a, height_b = (
-        x[some] for x in (at, a, b, depth, normal_a, height_b)
-    )
     normal_b, height_a = _heights(b, a)
-    some = _both_sides(height_a, depth)
-    at, a, b, depth, height_a, height_b = (x[some] for x in (at, a, b, depth, height_a, height_b))
-    line = np.cross(normal_a[some], normal_b[some])
+    line = np.cross(normal_a, normal_b)
     line /= np.maximum(np.linalg.norm(line, axis=1, keepdims=True), 1e-300)
     low_a, high_a = _extent(a, height_a, line)
     low_b, high_b = _extent(b, height_b, line)

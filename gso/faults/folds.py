@@ -24,10 +24,10 @@ _FLAT = 1e-6
 def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
     """Faces that are folded onto a neighbour, or onto themselves, in both triangulations.
 
-    The normals of two triangles at an edge then differ by more than 120 degrees: a face is turned
-    over, or the surface has a sharp crease. Quads count as the triangles along both diagonals. A quad
-    is folded onto itself when the two triangles along a diagonal are; where the mesh is no
-    grid, along both diagonals, since an arrow-shaped one is not.
+    The normals of two triangles at an edge then differ by more than 120 degrees: a face is
+    turned over, or the surface has a sharp crease. Quads count as the triangles along both
+    diagonals. A quad is folded onto itself when the two triangles along a diagonal are; where
+    the mesh is no grid, along both diagonals, since an arrow-shaped one is not.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def collapsed(before: Mesh, after: Array, *, share: float = SHORT) -> Ints:
     Returns
     -------
     ndarray of int, (e, 2)
-        Ends of those edges.
+        Ends of those edges, the smaller number first.
 
     Examples
     --------
@@ -130,4 +130,4 @@ def collapsed(before: Mesh, after: Array, *, share: float = SHORT) -> Ints:
     a, b = before.edges.T
     was = np.linalg.norm(before.vertices[a] - before.vertices[b], axis=1)
     now = np.linalg.norm(after[a] - after[b], axis=1)
-    return before.edges[now < share * was]
+    return np.sort(before.edges[now < share * was], axis=1)

@@ -51,9 +51,7 @@ def lay_out(surface: Mesh, given: Array | None = None, *, options: str = "fast")
     if not _opens(surface):
         return given
     frame = Canonical(surface)
-    request = Request(
-        frame.mesh, flatten.Options.preset(options), "strain", Compiled(flat=True)
-    )
+    request = Request(frame.mesh, flatten.Options.preset(options), "strain", Compiled(flat=True))
     try:
         outcome = Run(flatten, None)(request)
     except MeshError:

@@ -43,10 +43,11 @@ def _reasons(result: Result, asked: Asked) -> Iterator[str]:
         yield str(result.status)
     flat = result.layout if result.flat is None else result.flat
     for points in (result.mesh.vertices, flat):
-        wrong = [] if points is None else np.flatnonzero(~np.isfinite(points).all(axis=1))
-        if len(wrong):
-            yield f"the coordinates of {places('vertex', wrong)} are not finite"
-            return
+        if points is None or np.isfinite(points).all():
+            continue
+        wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
+        yield f"the coordinates of {places('vertex', wrong)} are not finite"
+        return
     if getattr(tasks.get(result.task), "BLOCK", "surface") == "flat":
         surface = result.design
     else:

@@ -37,9 +37,7 @@ def against_pattern(surface: Mesh, flat: Array, *, lengths: bool = True) -> Iter
         yield f"the pattern is turned over at {places('face', bad)}"
     bad = np.setdiff1d(faults.overlaps(surface, flat), bad)
     if bad.size:
-        yield (
-            f"the pattern lies on itself at {places('face', bad)}: cut the surface into pieces"
-        )
+        yield (f"the pattern lies on itself at {places('face', bad)}: cut the surface into pieces")
     if lengths:
         yield from _collapsed(surface, flat, "the pattern")
 
@@ -65,4 +63,5 @@ def _known(design: Mesh, pairs: Ints) -> NDArray[np.bool_]:
         touched = np.zeros(len(design.vertices), bool)
         touched[he.origin[near[he.face]]] = True
         near[he.face[touched[he.origin]]] = True
-    return near[pairs].all(axis=1)
+    known: NDArray[np.bool_] = near[pairs].all(axis=1)
+    return known

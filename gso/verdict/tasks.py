@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-
 import numpy as np
 
 from gso import metrics
@@ -95,5 +94,3 @@ TASKS: dict[str, Callable[[Result, Asked], Iterator[str]]] = {
     "developable": developable,
     "denoise": denoise,
 }
-
-
