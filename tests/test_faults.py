@@ -217,9 +217,9 @@ def test_parts_side_by_side_must_not_overlap():
     tile = Mesh.from_grid(np.dstack([*np.mgrid[:4.0, :4.0], np.zeros((4, 4))]))
     mesh = beside(tile, moved(tile, [9, 0, 0]))
     flat = tile.vertices[:, :2]
-    assert not faults.overlaps(mesh, np.r_[flat, flat + (3.0, 0.0)]).size
+    assert not faults.overlaps(mesh, np.r_[flat, flat + np.array([3.0, 0.0])]).size
     np.testing.assert_array_equal(
-        faults.overlaps(mesh, np.r_[flat, flat + (2.5, 0.0)]), [6, 7, 8, 9, 10, 11]
+        faults.overlaps(mesh, np.r_[flat, flat + np.array([2.5, 0.0])]), [6, 7, 8, 9, 10, 11]
     )
     # One part wholly inside a face of the other, and both in one place.
     np.testing.assert_array_equal(

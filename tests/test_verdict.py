@@ -141,7 +141,7 @@ def test_strain_is_judged_as_it_was_asked_for(good):
 
 
 def test_a_distance_that_is_passed():
-    low = FLAT + (0, 0, 0.5)
+    low = FLAT + np.array([0, 0, 0.5])
     assert tried(FLAT, low, asked=Asked(max_deviation=0.5)).usable
     result = tried(FLAT, low, asked=Asked(max_deviation=0.49))
     assert result.status is Status.UNUSABLE
@@ -199,7 +199,7 @@ def test_a_surface_that_passes_through_itself():
     result = tried(flat, eight, "bend")
     assert not result.usable
     assert "passes through itself at faces" in result.reasons[0]
-    assert tried(eight, eight + (0, 0, 1e-3), "bend").usable
+    assert tried(eight, eight + np.array([0, 0, 1e-3]), "bend").usable
 
 
 def test_edges_that_collapse():

@@ -63,5 +63,4 @@ def _known(design: Mesh, pairs: Ints) -> NDArray[np.bool_]:
         touched = np.zeros(len(design.vertices), bool)
         touched[he.origin[near[he.face]]] = True
         near[he.face[touched[he.origin]]] = True
-    known: NDArray[np.bool_] = near[pairs].all(axis=1)
-    return known
+    return near[pairs[:, 0]] & near[pairs[:, 1]]
