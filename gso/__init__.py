@@ -51,6 +51,7 @@ _OPTIONS = {
 _MODULES = (
     "constraints",
     "tno",
+    "verdict",
     "metrics",
     "topology",
     "io",

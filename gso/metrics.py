@@ -543,6 +543,18 @@ def principal_strains(surface: Any, flat: Any) -> Strains:
     return Strains(float(values.mean()), float(np.percentile(values, 99)), values)
 
 
+def strains(surface: Any, flat: Any) -> dict[str, float]:
+    """Largest, 99th percentile and mean of :func:`principal_strains`, by their names.
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> strains(grid, grid[..., :2] * 1.5)["strain_max"]
+    0.5
+    """
+    found = principal_strains(surface, flat)
+    largest = float(found.values.max())
+    return {"strain_max": largest, "strain_p99": found.p99, "strain_mean": found.mean}
+
+
 def corner_strains(surface: Any, flat: Any) -> Array:
     """Larger principal strain max |s - 1| (4 q + t,) of every corner triangle.
 
@@ -563,6 +575,17 @@ def corner_strains(surface: Any, flat: Any) -> Array:
     values = np.full(len(tri), np.nan)
     values[keep] = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0))
     return values
+
+
+def face_strains(surface: Any, flat: Any) -> Array:
+    """Largest of :func:`corner_strains` of every face (m,); NaN where none has an area."""
+    quad = topology.are_quads(_faces(surface))
+    values = corner_strains(surface, flat)
+    corners, triangles = np.split(values, [4 * np.count_nonzero(quad)])
+    out = np.empty(len(quad))
+    out[quad] = np.fmax.reduce(corners.reshape(4, -1), axis=0)
+    out[~quad] = triangles
+    return out
 
 
 def stretches(surface: Any, flat: Any) -> tuple[Array, Array]:
@@ -617,28 +640,46 @@ def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None, *, surface:
     if faces is None and image.ndim != 3:
         raise MeshError("flipped_cells needs faces=... for an image that is no grid (H, W, 2)")
     points = image.reshape(-1, image.shape[-1])[:, :2]
-    grid = faces is None
-    quads, tris = topology.by_size(
-        topology.grid_faces(*image.shape[:2]) if faces is None else faces
-    )
+    table = topology.grid_faces(*image.shape[:2]) if faces is None else faces
+    space = None if surface is None else _points(surface)
+    return int(_flipped(points, table, space, grid=faces is None).sum())
+
+
+def _flipped(
+    points: Array, faces: NDArray[np.int64], space: Array | None, *, grid: bool
+) -> NDArray[np.bool_]:
+    """Which faces (m,) are turned over in an image (n, 2), quads first."""
+    quads, tris = topology.by_size(faces)
     # Corners 1 and 3 are the split along the diagonal 0-2, corners 0 and 2 the other one.
     bad = corner_areas(points, quads).reshape(4, -1) <= 0
     turned = bad.any(axis=0) if grid else (bad[0] | bad[2]) & (bad[1] | bad[3])
     flipped = np.r_[turned, corner_areas(points, tris) <= 0]
-    if surface is not None:
-        space = _points(surface)
+    if space is not None:
         area = _space_areas(space, quads).reshape(4, -1).min(axis=0, initial=np.inf)
         area = np.r_[area, _space_areas(space, tris)]
         flipped &= area > 1e-12 * np.max(area, initial=0.0)
-    return int(flipped.sum())
+    return flipped
+
+
+def flipped_faces(mesh: Mesh, flat: Array) -> NDArray[np.int64]:
+    """Faces of a mesh that are turned over in its flat image (n, 2), by number.
+
+    Those that :func:`flips` counts.
+
+    >>> from gso.mesh import Mesh
+    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> flipped_faces(Mesh(square, [[0, 1, 2, 3]]), square[:, 1::-1])
+    array([0])
+    """
+    quad = topology.are_quads(mesh.faces)
+    order = np.r_[np.flatnonzero(quad), np.flatnonzero(~quad)]
+    grid = mesh.grid_index is not None
+    return np.sort(order[_flipped(flat, mesh.faces, mesh.vertices, grid=grid)])
 
 
 def flips(mesh: Mesh, flat: Array) -> int:
     """:func:`flipped_cells` of a flat image (n, 2) of a mesh, grid or not."""
-    grid = mesh.grid_index
-    if grid is None:
-        return flipped_cells(flat, mesh.faces, surface=mesh)
-    return flipped_cells(flat[grid], surface=mesh.grid)
+    return len(flipped_faces(mesh, flat))
 
 
 def area(mesh: Mesh, points: Array | None = None) -> float:

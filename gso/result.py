@@ -23,7 +23,6 @@ Array = NDArray[np.float64]
 
 _FORMAT = 1
 _PATTERN = ("flat", "faces", "vertex", "seams")
-_UNUSABLE = (Status.CANCELLED, Status.TARGET_MISSED, Status.CONSTRAINTS_MISSED)
 
 
 @dataclass
@@ -63,14 +62,21 @@ class Result:
     warm_start : str
         What started the solve: "cold", "x0", "session", "net" (:func:`gso.hybrid.solve`), or
         the source that a :class:`gso.tno.Start` names.
+    reasons : tuple of str
+        Why the result cannot be used as what was asked for, and where; see :mod:`gso.verdict`.
+        The notes have them too.
+    layout : ndarray, (n, 2), or None
+        Of `developable`: the pattern by which its strain is measured, in the input's unit; None
+        where the surface must be cut open first, or no verdict was asked for.
     notes : tuple of str
-        What was repaired in the input or restricted in the run.
+        What was repaired in the input or restricted in the run, and the reasons.
     details : dict
         Numbers of the task: weights chosen ... Of `denoise`: "sigma", the standard deviation
         that the noise is estimated to have, in the input's unit; "dof", degrees of freedom
         that the smoothing leaves to each coordinate; "order" and "weight". With constraints,
         "constraints": the largest length by which each is missed, in the input's unit. With
         a spline, "spline": its curvature and distances, see :func:`gso.fit.describe_spline`.
+        Of `developable`, "verdict": its largest strain and deviation, and what was asked.
     spline : BSplineSurface or None
         The surface that `mesh` has samples of, with the option ``variables="surface"``; of
         several components, each has its own.
@@ -101,6 +107,8 @@ class Result:
     details: dict[str, Any] = field(default_factory=dict)
     spline: BSplineSurface | None = None
     cell_scale: Array | None = None
+    reasons: tuple[str, ...] = ()
+    layout: Array | None = None
     pattern: Pattern | None = None
     components: list[Result] = field(default_factory=list)
     names: NDArray[np.int64] | None = None
@@ -116,11 +124,15 @@ class Result:
 
     @property
     def usable(self) -> bool:
-        """Whether it can be worked with: complete, as asked for, no cell turned over."""
+        """Whether it can be used as what was asked for: there are no :attr:`reasons` against it.
+
+        Without a verdict: whether it is complete, finite, and has no cell turned over.
+        """
         points = self.mesh.vertices if self.pattern is None else self.pattern.flat
         return bool(
             all(part.usable for part in self.components)
-            and self.status not in _UNUSABLE
+            and not self.reasons
+            and not (self.status.refuses or self.status is Status.UNUSABLE)
             and np.isfinite(points).all()
             and not self.metrics.get("flipped_cells", 0)
         )
@@ -142,19 +154,27 @@ class Result:
         """Metrics of the task, computed at first access; see :data:`gso.metrics.INFO`."""
         from gso import tasks
         from gso.components import combined
-        from gso.metrics import area
+        from gso.metrics import area, strains
         from gso.tasks.measured import measured
 
         if self.components:
             areas = [area(part.design) for part in self.components]
             return combined([part.metrics for part in self.components], areas)
+        module = tasks.get(self.task)
         if self.pattern is None or not self.pattern.is_cut:
-            return measured(self.task, self.design, self.mesh, self.flat)
-        module, flat = tasks.get(self.task), self.pattern.flat
-        if getattr(module, "BLOCK", "surface") == "flat":
-            return measured(self.task, self.pattern.surface(self.design), self.pattern.mesh, flat)
-        own = measured(self.task, self.design, self.mesh, None)
-        return own | module.flat_metrics(self.pattern.surface(self.mesh), flat)
+            known = measured(self.task, self.design, self.mesh, self.flat)
+        elif getattr(module, "BLOCK", "surface") == "flat":
+            surface = self.pattern.surface(self.design)
+            known = measured(self.task, surface, self.pattern.mesh, self.pattern.flat)
+        else:
+            own = measured(self.task, self.design, self.mesh, None)
+            surface = self.pattern.surface(self.mesh)
+            known = own | module.flat_metrics(surface, self.pattern.flat)
+            return strains(surface, self.pattern.flat) | known
+        if self.layout is None:
+            return known
+        found = strains(self.mesh, self.layout)
+        return found | {k: v for k, v in known.items() if k not in found}
 
     def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
         """Write the result.
@@ -210,6 +230,7 @@ class Result:
             "device": self.device,
             "warm_start": self.warm_start,
             "notes": list(self.notes),
+            "reasons": list(self.reasons),
             "details": self.details,
             "metrics": self.metrics,
             "history": [asdict(p) for p in self.history],
@@ -228,6 +249,8 @@ class Result:
             arrays["flat"] = self.flat
         elif self.pattern is not None:
             arrays |= {f"pattern_{name}": getattr(self.pattern, name) for name in _PATTERN}
+        if self.layout is not None:
+            arrays["layout"] = self.layout
         if self.cell_scale is not None:
             arrays["cell_scale"] = self.cell_scale
         if self.spline is not None:
@@ -276,6 +299,7 @@ class Result:
                 pattern,
             )
             result.spline = BSplineSurface.from_arrays(data)
+            result.layout = _checked(data, "layout", (len(design.vertices), 2))
             label = _checked(data, "component", (len(design.vertices),))
             if label is not None:
                 result._divide(record.get("components", []), label.astype(np.int64))
@@ -314,6 +338,8 @@ class Result:
             record["details"],
             cell_scale=cell_scale,
             pattern=pattern,
+            # Files of earlier versions have none.
+            reasons=tuple(record.get("reasons", ())),
         )
         result.__dict__["metrics"] = record["metrics"]
         return result

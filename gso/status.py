@@ -49,11 +49,17 @@ class Status(enum.Enum):
     MAX_ITERATIONS = "done: all iterations that the options allow were used"
     STALLED = "stopped: no step lowers the energy any further"
     CANCELLED = "stopped by the callback; the best iterate so far is returned"
+    UNUSABLE = "not usable as what was asked for; the notes say why and where"
 
     @property
     def converged(self) -> bool:
         """Whether the result is as good as the options ask for."""
         return self in (Status.CONVERGED, Status.ALREADY_GOOD, Status.TARGET_REACHED)
+
+    @property
+    def refuses(self) -> bool:
+        """Whether it says by itself that the result is not what was asked for."""
+        return self in (Status.CANCELLED, Status.TARGET_MISSED, Status.CONSTRAINTS_MISSED)
 
     def __str__(self) -> str:
         return self.value

@@ -48,7 +48,7 @@ def many(
                 if item.result is None:
                     raise MeshError(item.error or "failed")
                 job.write(item.result, out, pictures[item.index])
-                done = report.record(file, out, item.result)
+                done = report.record(file, out, item.result, job.named)
                 if not job.quiet:
                     bar.write(report.line(done), file=sys.stdout)
             except GSOError as error:

@@ -48,11 +48,13 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
     from gso import metrics as measure
     from gso.components import average
     from gso.tasks.measured import measured
+    from gso.tno.layout import strains_of
 
-    values = dict(measured("developable", before, after, None))
+    flat = np.ptp(after.vertices[:, 2]) <= 1e-9 * after.diagonal
+    values = {} if flat else strains_of(after)
+    values |= measured("developable", before, after, None)
     notes = []
     same = np.array_equal(before.faces, after.faces)
-    flat = np.ptp(after.vertices[:, 2]) <= 1e-9 * after.diagonal
     if same and not flat:
         values["theta"] = float(average(measure.normal_angle, before, after))
     if same and flat:

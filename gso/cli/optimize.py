@@ -47,6 +47,8 @@ class Job:
         Outputs may replace inputs.
     inputs : tuple of str
         Files that are read besides the surfaces.
+    named : str
+        The unit where it was given: what is printed has none otherwise.
     """
 
     keywords: dict[str, Any] = field(default_factory=dict)
@@ -57,6 +59,7 @@ class Job:
     weld: float | None = None
     force: bool = False
     inputs: tuple[str, ...] = ()
+    named: str = ""
 
     def spare(self, files: Iterable[str], *outputs: str | None) -> None:
         """Refuse outputs that are inputs."""
@@ -224,7 +227,7 @@ class Job:
     type=click.Choice(UNITS),
     default="mm",
     show_default=True,
-    help="Unit of the coordinates, for .svg, .step, .iges and .3dm.",
+    help="Unit of the coordinates, for .svg, .step, .iges and .3dm, and for what is printed.",
 )
 @files.weld
 @files.force
@@ -233,8 +236,7 @@ def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
     """Optimise the surface IN and write it to OUT.
 
     Several inputs are worked on in parallel; OUT is then a folder. The exit code is 0 only
-    when every result is usable: it was computed, reached its target if it had one, and has
-    no cell turned over.
+    when every result can be used as what was asked for; where not, notes say why and where.
     """
     if given["net"] is not None and given["method"] in ("auto", "tno"):
         raise OptionError("--net goes with --method net or hybrid")
@@ -247,6 +249,7 @@ def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
         given["weld"],
         given["force"],
         tuple(name for name in (given["constraints"], given["net"]) if name is not None),
+        _named_unit(given["unit"]),
     )
     if given["table"] is not None:
         from gso.io import check_writable
@@ -269,6 +272,12 @@ def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
             raise OptionError("--suffix is for many inputs; name the format in -o")
         good = _single(job, names[0], out, given["plot"], given["table"])
     click.get_current_context().exit(0 if good else 1)
+
+
+def _named_unit(unit: str) -> str:
+    """The unit, where the user named it."""
+    source = click.get_current_context().get_parameter_source("unit")
+    return unit if source is click.core.ParameterSource.COMMANDLINE else ""
 
 
 def _is_cad(out: str) -> bool:
@@ -328,7 +337,7 @@ def _single(job: Job, file: str, out: str, plot: str | None, table: str | None) 
     with iterations() as callback, report.status_only():
         result = job.solve(mesh, callback=callback)
     job.write(result, out, plot)
-    record = report.record(file, out, result)
+    record = report.record(file, out, result, job.named)
     if table is not None:
         report.write_json(table, record)
     if not job.quiet:

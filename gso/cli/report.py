@@ -26,8 +26,10 @@ def status_only() -> Iterator[None]:
         yield
 
 
-def record(file: str, out: str, result: Result) -> dict[str, Any]:
-    """A result without its geometry."""
+def record(file: str, out: str, result: Result, unit: str = "") -> dict[str, Any]:
+    """A result without its geometry; `unit` is the name of that of its coordinates, if known."""
+    from gso.verdict import headline
+
     return {
         "input": file,
         "output": out,
@@ -36,6 +38,8 @@ def record(file: str, out: str, result: Result) -> dict[str, Any]:
         "status": result.status.name,
         "message": str(result.status),
         "usable": result.usable,
+        "headline": headline(result, unit),
+        "reasons": list(result.reasons),
         "iterations": result.iterations,
         "seconds": result.seconds.get("total", 0.0),
         "backend": result.backend,
@@ -47,8 +51,8 @@ def record(file: str, out: str, result: Result) -> dict[str, Any]:
 
 
 def text(record: Mapping[str, Any]) -> str:
-    """A record as a table of metrics, the status, and the notes."""
-    lines = [f"{record['input']} -> {record['output']}", ""]
+    """A record: what it amounts to, a table of metrics, the status, and the notes."""
+    lines = [*filter(None, [record["headline"]]), f"{record['input']} -> {record['output']}", ""]
     lines += table(record["metrics"])
     lines += ["", f"{record['task']}: {record['message']}"]
     spent = f"{record['iterations']} iterations, {record['seconds']:.2f} s"
@@ -75,13 +79,17 @@ def _spline(said: Mapping[str, Any]) -> str:
 def line(record: Mapping[str, Any]) -> str:
     """A record in one line."""
     values = record["metrics"]
-    shown = []
-    # A task's first metric says most about its results.
-    for name in [name.removesuffix("_before") for name in values][:1]:
+    shown = [record["headline"]] if record["headline"] else []
+    # A task's first metric says most about its results, where there is no better line.
+    for name in [name.removesuffix("_before") for name in values][: 1 - len(shown)]:
         was = f"{_short(values[f'{name}_before'])} -> " if f"{name}_before" in values else ""
         shown.append(f"{name} {was}{_short(values[name])}")
     shown += [] if record["usable"] else ["not usable"]
-    return "; ".join([f"{record['input']} -> {record['output']}", *shown, record["message"]])
+    # What stands in the first line need not be said again.
+    said = [r for r in record["reasons"] if not r.startswith("largest strain")]
+    return "; ".join(
+        [f"{record['input']} -> {record['output']}", *shown, *said[:1], record["message"]]
+    )
 
 
 def table(metrics: Mapping[str, Any]) -> list[str]:

@@ -83,7 +83,7 @@ def solve(
         curvature. Elsewhere the result is that of :func:`gso.tno.optimize`.
     **keywords
         Passed to :func:`gso.tno.optimize`: `formulation`, `options`, `constraints`,
-        `max_deviation`, `max_strain`, `target_curvature`, `callback`.
+        `max_deviation`, `max_strain`, `target_curvature`, `callback`, `verdict`.
 
     Returns
     -------

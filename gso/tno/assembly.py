@@ -35,6 +35,7 @@ _WORST_LAST = (
     Status.STALLED,
     Status.TARGET_MISSED,
     Status.CONSTRAINTS_MISSED,
+    Status.UNUSABLE,
 )
 
 
@@ -97,6 +98,7 @@ def together(
         details=_details(results, areas),
         components=list(results),
         pattern=pattern,
+        reasons=tuple(f"component {k}: {why}" for k, r in enumerate(results) for why in r.reasons),
     )
 
 

@@ -26,6 +26,7 @@ from gso.tasks.base import Options, Request
 from gso.tno import components, linear
 from gso.tno.canonical import Canonical
 from gso.tno.job import Job
+from gso.tno.judged import asked_of, judged, warning
 from gso.tno.run import Outcome, Run
 from gso.tno.search import of_curvature, of_strain, reach, stay_within, strain_left
 from gso.tno.solver import Callback
@@ -47,6 +48,7 @@ def optimize(
     target_curvature: float | None = None,
     x0: Any = None,
     callback: Callback | None = None,
+    verdict: bool = True,
 ) -> Result:
     """Make a surface developable, flatten it, denoise it, bend it, or map it to the plane.
 
@@ -90,6 +92,9 @@ def optimize(
         Called with a :class:`gso.Progress` after each iteration; returning False stops
         the solve, and the best iterate so far is returned. Large meshes of several components
         are solved in processes: it is then called when a component is done.
+    verdict : bool
+        Judge the result (:mod:`gso.verdict`) and, where it is a developable surface, lay it out
+        to measure its strain. Without it neither is done, which saves their time.
 
     Returns
     -------
@@ -138,15 +143,15 @@ def optimize(
         "max_strain": max_strain,
         "target_curvature": target_curvature,
     }
-    one = partial(_solved, task, formulation, given_formulation, settings, wanted)
+    one = partial(_solved, task, formulation, given_formulation, settings, wanted, verdict)
     pieces = components.parts(design, whole.constraints)
     if pieces:
         result = components.solve(one, whole, pieces, callback)
     else:
         result = one(whole, callback)
     result.seconds["total"] = time.perf_counter() - clock
-    if not result.converged and result.status is not Status.MAX_ITERATIONS:
-        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=3)
+    if said := warning(result):
+        warnings.warn(said, ConvergenceWarning, stacklevel=3)
     return result
 
 
@@ -156,6 +161,7 @@ def _solved(
     given_formulation: str | None,
     settings: Options,
     wanted: dict[str, float | None],
+    verdict: bool,
     job: Job,
     callback: Callback | None,
 ) -> Result:
@@ -195,6 +201,8 @@ def _solved(
         result.notes += (f"the start ({given.source}) was not used: {run.refused}",)
     elif given.points is not None:
         result.warm_start = given.source
+    if verdict:
+        result = judged(result, asked_of(request, frame.frame.scale, **wanted))
     return result
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,11 @@ from numpy.typing import NDArray
 from gso import flat_start, metrics
 from gso.components import average, several
 from gso.mesh import Mesh
-from gso.status import Status
+from gso.pattern import Pattern
+from gso.status import MeshError, Status
 from gso.tasks.base import Request
-from gso.tno.strain import largest_strain, lay_out
+from gso.tno.layout import largest_strain, lay_out
+from gso.verdict.asked import DEVELOPABLE
 
 Array = NDArray[np.float64]
 Solve = Callable[[Request], Any]
@@ -40,8 +43,6 @@ _ITERATIONS = 25
 _COARSE_ITERATIONS = 15
 #: No result of a search moves a vertex farther than this, in unit balls.
 FARTHEST = 0.25
-#: Largest strain of what is called developable where only a distance is asked for.
-DEVELOPABLE = 5e-3
 
 
 @dataclass
@@ -95,14 +96,29 @@ def curved(mesh: Mesh, points: Array) -> float:
 
 def of_strain(request: Request, target: float) -> Demand:
     """Largest strain of the flat pattern of at most `target`, reached within 10 %."""
-    return Demand(lambda points: largest_strain(request.mesh, points), target, 0.1)
+    return Demand(partial(_strain, request), target, 0.1)
+
+
+def _pattern(request: Request, points: Array) -> Pattern:
+    """Flat pattern of a surface (n, 3) on the faces of the design."""
+    found = lay_out(request.mesh.replaced(points))
+    if found is None:
+        raise MeshError(
+            "max_strain needs a surface that can be laid out, every component with a boundary and "
+            "without handles: cut it open along edges first"
+        )
+    return found
+
+
+def _strain(request: Request, points: Array) -> float:
+    return largest_strain(request.mesh.replaced(points), _pattern(request, points))
 
 
 def strain_left(request: Request, outcome: Any) -> float:
     """Largest strain of the flat pattern of an outcome; infinite where there is no pattern."""
     if not flat_start.flattens(request.mesh):
         return np.inf
-    return largest_strain(request.mesh, outcome.points)
+    return _strain(request, outcome.points)
 
 
 def stay_within(
@@ -268,7 +284,7 @@ class _Found:
             points = far + high * (near - far)
             blocks = {"surface": points}
             if "flat" in outcome.blocks:
-                blocks["flat"] = lay_out(self.request.mesh, points)[1]
+                blocks["flat"] = _pattern(self.request, points).flat
             outcome.move(blocks)
 
 

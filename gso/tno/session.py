@@ -22,6 +22,7 @@ from gso.tno import linear
 from gso.tno.canonical import Canonical
 from gso.tno.direction import DIRECTIONS
 from gso.tno.handles import moved, pinned
+from gso.tno.judged import asked_of, judged, warning
 from gso.tno.optimize import check, judge, packed
 from gso.tno.problem import Problem
 from gso.tno.run import Outcome, Run, objective
@@ -203,7 +204,7 @@ class Session:
                 self._pose()
         result = self.result()
         if not result.converged:
-            warnings.warn(str(result.status), ConvergenceWarning, stacklevel=2)
+            warnings.warn(warning(result) or str(result.status), ConvergenceWarning, stacklevel=2)
         return result
 
     def result(self) -> Result:
@@ -224,7 +225,7 @@ class Session:
             self._task, self._formulation, self._design, self._frame, outcome, self._run
         )
         result.warm_start = "session"
-        return result
+        return judged(result, asked_of(self._request, self._frame.frame.scale))
 
     @property
     def _surface(self) -> Array:

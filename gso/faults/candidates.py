@@ -1,0 +1,91 @@
+"""Pairs of faces that may cross: apart in the mesh, near each other in space."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.faults.boxes import overlapping
+from gso.topology import four_corners
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Share of a face's width by which two faces must reach into each other: what is less is touch.
+DEPTH = 1e-3
+
+
+def candidates(points: Array, faces: Ints) -> tuple[Ints, Array]:
+    """Pairs of faces without a common vertex that the simplest tests do not tell apart.
+
+    Those are their bounding boxes, and their extents along the line through their centres,
+    which separates most of the faces that are near each other within a smooth surface.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 2) or (n, 3)
+        Vertices.
+    faces : ndarray of int, (m, 3) or (m, 4)
+        A triangle among quads ends in -1.
+
+    Returns
+    -------
+    pairs : ndarray of int, (p, 2)
+    widths : ndarray, (p,)
+        Longest side of the smaller bounding box of each pair.
+    """
+    ids = np.ascontiguousarray(four_corners(faces).T)
+    corners = np.ascontiguousarray(points.T)[:, ids]
+    low, high = np.minimum.reduce(corners, axis=1), np.maximum.reduce(corners, axis=1)
+    pairs = overlapping(low.T, high.T)
+    first, second = pairs.T
+    apart = np.ones(len(pairs), bool)
+    for i in ids:
+        for j in ids:
+            apart &= i[first] != j[second]
+    first, second = first[apart], second[apart]
+    width = np.minimum(*((high - low).max(axis=0)[k] for k in (first, second)))
+    centre = corners.mean(axis=1)
+    axis = centre[:, second] - centre[:, first]
+    length = np.sqrt((axis**2).sum(axis=0))
+    here, there = (np.einsum("dkp,dp->kp", corners[:, :, k], axis) for k in (first, second))
+    met = np.maximum.reduce(here) - np.minimum.reduce(there) > DEPTH * width * length
+    # Faces about the same centre are never told apart.
+    met |= length <= DEPTH * width
+    return np.stack([first, second], axis=1)[met], width[met]
+
+
+def split(faces: Ints, other: NDArray[np.bool_] | None = None) -> tuple[Ints, Ints]:
+    """Two triangles for every face (m, 2, 3), and how many of them count (m,): 1 or 2.
+
+    Quads are split along corners 0-2, or 1-3 where `other` says so. A triangle comes first.
+    """
+    ids = four_corners(faces)
+    if other is not None:
+        ids = np.where(other[:, None], np.roll(ids, -1, axis=1), ids)
+    count = np.where(faces[:, 3] < 0, 1, 2) if faces.shape[1] == 4 else np.ones(len(faces), int)
+    triangles = np.stack([ids[:, [0, 1, 2]], ids[:, [0, 2, 3]]], axis=1)
+    # An `other` split is of quads only.
+    single = count == 1
+    triangles[single, 0] = faces[single, :3]
+    return triangles, count
+
+
+def by_triangles(pairs: Ints, triangles: Ints, count: Ints) -> tuple[Ints, Ints, Ints]:
+    """Pairs of faces as pairs of their triangles.
+
+    Returns
+    -------
+    which : ndarray of int, (t,)
+        The pair of faces that each pair of triangles is of.
+    first, second : ndarray of int, (t, 3)
+        Their corners.
+    """
+    which, first, second = [], [], []
+    for i in range(2):
+        for j in range(2):
+            there = np.flatnonzero((count[pairs[:, 0]] > i) & (count[pairs[:, 1]] > j))
+            which.append(there)
+            first.append(triangles[pairs[there, 0], i])
+            second.append(triangles[pairs[there, 1], j])
+    return np.concatenate(which), np.concatenate(first), np.concatenate(second)

@@ -1,0 +1,93 @@
+"""Where a surface passes through itself."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.faults.candidates import DEPTH, by_triangles, candidates, split
+from gso.mesh import Mesh
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def crossings(mesh: Mesh) -> Ints:
+    """Pairs of faces that share no vertex and pass through each other.
+
+    Quads count as the two triangles along their first diagonal. Faces that touch, lie on each
+    other, or reach into each other by less than a thousandth of their width do not cross; and
+    neither is a crossing seen that lies along edges of both parts, to that precision.
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    ndarray of int, (p, 2)
+        Faces, the smaller number first; in increasing order, none twice.
+
+    Notes
+    -----
+    Two triangles cross when each has corners on both sides of the other's plane and the parts
+    of the planes' common line that lie in them overlap (Moeller 1997).
+
+    Examples
+    --------
+    >>> wall = np.array([[-1.0, 0.1, -1], [1, 0.1, -1], [0.3, 0.1, 1]])
+    >>> floor = np.array([[-1.0, -1, 0], [1, -1, 0], [0, 1, 0]])
+    >>> crossings(Mesh(np.r_[wall, floor], [[0, 1, 2], [3, 4, 5]]))
+    array([[0, 1]])
+    """
+    points = mesh.vertices - mesh.frame.centre
+    pairs, width = candidates(points, mesh.faces)
+    which, first, second = by_triangles(pairs, *split(mesh.faces))
+    crossed = np.zeros(len(pairs), bool)
+    crossed[which[_cross(points[first], points[second], DEPTH * width[which])]] = True
+    found = pairs[crossed]
+    return found[np.lexsort(found.T[::-1])]
+
+
+def _cross(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:
+    """Which pairs of triangles (t, 3, 3) pass through each other by more than a depth (t,)."""
+    out = np.zeros(len(a), bool)
+    at = np.arange(len(a))
+    for k in range(2):
+        # Most pairs end with the first plane: the second one is asked for the rest.
+        base, other = (a, b) if k == 0 else (b, a)
+        at = at[_both_sides(_heights(base[at], other[at])[1], depth[at])]
+    a, b, depth = a[at], b[at], depth[at]
+    normal_a, height_b = _heights(a, b)
+    normal_b, height_a = _heights(b, a)
+    line = np.cross(normal_a, normal_b)
+    line /= np.maximum(np.linalg.norm(line, axis=1, keepdims=True), 1e-300)
+    low_a, high_a = _extent(a, height_a, line)
+    low_b, high_b = _extent(b, height_b, line)
+    out[at] = np.minimum(high_a, high_b) - np.maximum(low_a, low_b) > depth
+    return out
+
+
+def _heights(base: Array, other: Array) -> tuple[Array, Array]:
+    """Unit normals of triangles, and the corners of others above their planes (t, 3)."""
+    normal = np.cross(base[:, 1] - base[:, 0], base[:, 2] - base[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    return normal, np.einsum("tkd,td->tk", other - base[:, :1], normal)
+
+
+def _both_sides(height: Array, depth: Array) -> NDArray[np.bool_]:
+    return (height.min(axis=1) < -depth) & (height.max(axis=1) > depth)
+
+
+def _extent(triangle: Array, height: Array, line: Array) -> tuple[Array, Array]:
+    """Where a triangle that has corners on both sides of a plane meets it, along a line."""
+    above = height > 0
+    lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
+    row = np.arange(len(triangle))
+    along = np.einsum("tkd,td->tk", triangle, line)
+    ends = []
+    for k in (1, 2):
+        other = (lone + k) % 3
+        share = height[row, lone] / (height[row, lone] - height[row, other])
+        ends.append(along[row, lone] + share * (along[row, other] - along[row, lone]))
+    return np.minimum(*ends), np.maximum(*ends)

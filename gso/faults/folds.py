@@ -1,0 +1,133 @@
+"""Faces that are folded onto their neighbours, and edges that have collapsed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.geometry import cross, dot, norm, norm2, sub
+from gso.mesh import Mesh
+from gso.topology import are_quads, four_corners
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Cosine of the angle between neighbouring normals below which a face is folded onto the next:
+#: it turns back by more than 120 degrees. Sound results stay above 0 all but always.
+SHARP = -0.5
+#: Share of its length below which an edge has collapsed.
+SHORT = 0.02
+#: Share of a corner's longer side, as its height, below which it has no direction.
+_FLAT = 1e-6
+
+
+def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
+    """Faces that are folded onto a neighbour, or onto themselves, in both triangulations.
+
+    The normals of two triangles at an edge then differ by more than 120 degrees: a face is
+    turned over, or the surface has a sharp crease. Quads count as the triangles along both
+    diagonals. A quad is folded onto itself when the two triangles along a diagonal are; where
+    the mesh is no grid, along both diagonals, since an arrow-shaped one is not.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    below : float
+        Cosine of the angle between normals from which on it is a fold.
+
+    Returns
+    -------
+    ndarray of int, (f,)
+        Faces on both sides of the folds, in increasing order.
+
+    Examples
+    --------
+    A strip of three squares, the last of which lies on the one before:
+
+    >>> x = np.array([0.0, 1.0, 2.0, 1.0])
+    >>> strip = np.stack([np.stack([x, 0 * x + y, 0 * x], axis=1) for y in (0, 1)], axis=1)
+    >>> faces = [[0, 2, 3, 1], [2, 4, 5, 3], [4, 6, 7, 5]]
+    >>> folded(Mesh(strip.reshape(-1, 3), faces))
+    array([1, 2])
+    """
+    he, points = mesh.half_edges, tuple((mesh.vertices - mesh.frame.centre).T.copy())
+    quad = are_quads(mesh.faces)
+    normals, fold = _corner_normals(points, mesh.faces, quad, below)
+    broken = fold.all(axis=0) if mesh.grid_index is None else fold.any(axis=0)
+    bad = [np.flatnonzero(broken & quad)]
+    # Triangles of a split that folds are none of the surface's.
+    sound = ~fold
+    h = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    local = np.arange(he.face.size) - np.searchsorted(he.face, he.face)
+    size = np.where(quad, 4, 3)[he.face]
+    sides = (h, he.twin[h])
+    for k in range(2):
+        for j in range(2):
+            # The triangles of the edge's two ends, on either side.
+            here, there = (
+                (he.face[s], (local[s] + turn) % size[s])
+                for s, turn in zip(sides, (k, j), strict=True)
+            )
+            cosine = dot(*(tuple(n[c, f] for n in normals) for f, c in (here, there)))
+            both = sound[(here[1] + 1) % 2, here[0]] & sound[(there[1] + 1) % 2, there[0]]
+            found = h[(cosine < below) & both]
+            bad += [he.face[found], he.face[he.twin[found]]]
+    return np.unique(np.concatenate(bad))
+
+
+def _corner_normals(
+    points: tuple[Array, ...], faces: Ints, quad: NDArray[np.bool_], below: float
+) -> tuple[tuple[Array, ...], NDArray[np.bool_]]:
+    """Unit normals of the corner triangles (4, m), and quads that fold along a diagonal (2, m).
+
+    Corner k is cut off by the diagonal of corners k - 1 and k + 1. The corners of a triangle
+    all have its normal.
+    """
+    ids = four_corners(faces).T
+    corners = [tuple(x[i] for x in points) for i in ids]
+    sides = [sub(corners[(k + 1) % 4], corners[k]) for k in range(4)]
+    out = []
+    for k in range(4):
+        normal = cross(sides[k], sides[k - 1])
+        area, longest = norm(normal), np.maximum(norm2(sides[k]), norm2(sides[k - 1]))
+        # A triangle that is almost a line has no direction.
+        scale = np.divide(-1.0, area, out=np.zeros_like(area), where=area > _FLAT * longest)
+        out.append([x * scale for x in normal])
+    normals = [np.stack(x) for x in zip(*out, strict=True)]
+    for x in normals:
+        x[:, ~quad] = x[1, ~quad]
+    # The diagonal of corners 0-2 cuts off 1 and 3.
+    pairs = ((1, 3), (0, 2))
+    fold = [dot(*(tuple(x[k] for x in normals) for k in pair)) < below for pair in pairs]
+    return tuple(normals), np.stack(fold) & quad
+
+
+def collapsed(before: Mesh, after: Array, *, share: float = SHORT) -> Ints:
+    """Edges of a mesh that are a small share of what they were.
+
+    Parameters
+    ----------
+    before : Mesh
+        The design, or the surface of a pattern.
+    after : ndarray, (n, 2) or (n, 3)
+        Vertices of the result, or of the pattern.
+    share : float
+        Of an edge's length before, below which it has collapsed. At a fiftieth no face of
+        common shape is left, and what is measured on it means nothing; sound results seldom
+        fall below a third.
+
+    Returns
+    -------
+    ndarray of int, (e, 2)
+        Ends of those edges, the smaller number first.
+
+    Examples
+    --------
+    >>> mesh = Mesh(np.eye(3), [[0, 1, 2]])
+    >>> collapsed(mesh, np.array([[1.0, 0, 0], [0.99, 0, 0], [0, 0, 1]]))
+    array([[0, 1]])
+    """
+    a, b = before.edges.T
+    was = np.linalg.norm(before.vertices[a] - before.vertices[b], axis=1)
+    now = np.linalg.norm(after[a] - after[b], axis=1)
+    return np.sort(before.edges[now < share * was], axis=1)

@@ -1,0 +1,95 @@
+"""Where a flat pattern lies on itself."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import geometry
+from gso.faults.candidates import DEPTH, by_triangles, candidates, split
+from gso.mesh import Mesh
+from gso.topology import are_quads
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Angle around a vertex, beyond a full turn, from which its faces overlap.
+_TURN = 2.0 * np.pi + 1e-2
+
+
+def overlaps(mesh: Mesh, flat: Array) -> Ints:
+    """Faces that lie on each other in a flat image, components included.
+
+    Faces that share an edge or touch are not meant, nor are faces that reach over each other by
+    less than a thousandth of their width, nor, by themselves, faces turned over: see
+    :func:`gso.metrics.flipped_faces` for those.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The surface; its vertices do not matter here.
+    flat : ndarray, (n, 2)
+        Its image.
+
+    Returns
+    -------
+    ndarray of int, (f,)
+        Faces that lie on others, in increasing order.
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> tiles = Mesh(np.r_[square, square + 2.0], [[0, 1, 2, 3], [4, 5, 6, 7]])
+    >>> overlaps(tiles, np.r_[square, square + 0.5][:, :2])
+    array([0, 1])
+    >>> overlaps(tiles, np.r_[square, square + [1, 0, 0]][:, :2])
+    array([], dtype=int64)
+    """
+    points = flat - flat[mesh.used].mean(axis=0)
+    pairs, width = candidates(points, mesh.faces)
+    triangles, count = split(mesh.faces, _other_diagonal(points, mesh.faces))
+    which, first, second = by_triangles(pairs, triangles, count)
+    met = _meet(points[first], points[second], DEPTH * width[which])
+    wound = _wound(points, mesh.faces, triangles, count)
+    return np.unique(np.r_[pairs[which[met]].ravel(), wound])
+
+
+def _other_diagonal(points: Array, faces: Ints) -> NDArray[np.bool_]:
+    """Which quads only the diagonal of corners 1-3 splits into unflipped triangles."""
+    triangles, _ = split(faces)
+    return are_quads(faces) & (_areas(points, triangles).min(axis=1) <= 0)
+
+
+def _areas(points: Array, triangles: Ints) -> Array:
+    """Doubled signed areas of triangles (..., 3)."""
+    corners = (tuple(points[triangles[..., k]].T) for k in range(3))
+    return geometry.corner_area2(*corners).T
+
+
+def _meet(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:
+    """Which pairs of triangles (t, 3, 2) no line separates: one of their sides would."""
+    met = np.ones(len(a), bool)
+    for base in (a, b):
+        for k in range(3):
+            side = base[:, (k + 1) % 3] - base[:, k]
+            normal = np.stack([-side[:, 1], side[:, 0]], axis=1)
+            length = np.linalg.norm(side, axis=1)
+            here, there = (np.einsum("tkd,td->tk", x, normal) for x in (a, b))
+            reach = np.minimum(
+                here.max(axis=1) - there.min(axis=1), there.max(axis=1) - here.min(axis=1)
+            )
+            met &= reach > depth * length
+    return met
+
+
+def _wound(points: Array, faces: Ints, triangles: Ints, count: Ints) -> Ints:
+    """Faces at vertices around which they turn by more than a full turn."""
+    every = np.concatenate([triangles[:, 0], triangles[count == 2, 1]])
+    face = np.r_[np.arange(len(faces)), np.flatnonzero(count == 2)]
+    turn = np.zeros(len(points))
+    for k in range(3):
+        here, ahead, behind = (points[every[:, (k + j) % 3]] for j in range(3))
+        u, v = tuple((ahead - here).T), tuple((behind - here).T)
+        angle = np.arctan2(np.abs(u[0] * v[1] - u[1] * v[0]), u[0] * v[0] + u[1] * v[1])
+        turn += np.bincount(every[:, k], angle, minlength=len(points))
+    return face[(turn[every] > _TURN).any(axis=1)]

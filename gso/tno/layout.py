@@ -1,0 +1,77 @@
+"""The pattern of a surface: how much it must be strained to lie in the plane."""
+
+from __future__ import annotations
+
+from gso import flat_start, metrics
+from gso.constraints import Compiled
+from gso.mesh import Mesh
+from gso.pattern import Pattern
+from gso.status import MeshError
+from gso.tasks.base import Request
+from gso.tno.canonical import Canonical
+from gso.tno.run import Run
+
+
+def lay_out(
+    surface: Mesh, given: Pattern | None = None, *, options: str = "fast"
+) -> Pattern | None:
+    """Flat pattern of a surface with little strain, by the flatten task's ``strain``.
+
+    A surface that closes around itself is cut open.
+
+    Parameters
+    ----------
+    surface : Mesh
+        In any frame.
+    given : Pattern, optional
+        One of it that is there already: the better one by the largest strain is returned.
+    options : str
+        Preset of the flatten task.
+
+    Returns
+    -------
+    Pattern or None
+        In the unit of the surface, components side by side; None where a component is closed or
+        has handles, and would have to be cut open first.
+
+    Examples
+    --------
+    >>> t = np.linspace(0, 3, 20)
+    >>> arch = np.stack(np.broadcast_arrays(np.cos(t), np.sin(t), t[:, None]), axis=-1)
+    >>> mesh = Mesh.from_grid(arch)
+    >>> largest_strain(mesh, lay_out(mesh)) < 1e-3
+    True
+    """
+    # Scipy comes with it.
+    from gso.tasks import flatten
+
+    if not flat_start.flattens(surface):
+        return given
+    frame = Canonical(surface)
+    request = Request(frame.mesh, flatten.Options.preset(options), "strain", Compiled(flat=True))
+    try:
+        outcome = Run(flatten, None)(request)
+    except MeshError:
+        return given
+    flat = outcome.points * frame.frame.scale
+    if outcome.cut is None:
+        found = Pattern.whole(surface, frame.back("flat", flat))
+    elif surface.grid_index is None:
+        found = Pattern(flat, outcome.cut.mesh.faces, outcome.cut.vertex, outcome.cut.seams)
+    else:
+        return given
+    if given is not None and largest_strain(surface, given) <= largest_strain(surface, found):
+        return given
+    return found
+
+
+def largest_strain(surface: Mesh, pattern: Pattern) -> float:
+    """Largest principal strain max |s - 1| of a surface in its pattern."""
+    values = metrics.principal_strains(pattern.surface(surface), pattern.flat).values
+    return float(values.max())
+
+
+def strains_of(surface: Mesh) -> dict[str, float]:
+    """Mean, 99th percentile and largest strain of a surface's pattern; empty without one."""
+    pattern = lay_out(surface)
+    return {} if pattern is None else metrics.strains(pattern.surface(surface), pattern.flat)

@@ -1,0 +1,60 @@
+"""The verdict: one place that says whether a result can be used as what was asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gso import tasks
+from gso.status import Status
+from gso.verdict.asked import Asked
+from gso.verdict.shape import against_pattern, against_surface
+from gso.verdict.tasks import TASKS
+from gso.verdict.wording import places
+
+if TYPE_CHECKING:
+    from gso.result import Result
+
+#: Tasks whose pattern is not meant to keep lengths.
+_STRETCHED = ("conformal",)
+
+
+def judge(result: Result, asked: Asked) -> tuple[str, ...]:
+    """Reasons against a result, each with its place; none where it can be used.
+
+    Parameters
+    ----------
+    result : Result
+        As the solver left it, with its `layout` where it has one.
+    asked : Asked
+        What it must keep to.
+
+    Returns
+    -------
+    tuple of str
+    """
+    return tuple(_reasons(result, asked))
+
+
+def _reasons(result: Result, asked: Asked) -> Iterator[str]:
+    if result.status.refuses:
+        yield str(result.status)
+    flat = result.layout if result.flat is None else result.flat
+    for points in (result.mesh.vertices, flat):
+        if points is None or np.isfinite(points).all():
+            continue
+        wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
+        yield f"the coordinates of {places('vertex', wrong)} are not finite"
+        return
+    if getattr(tasks.get(result.task), "BLOCK", "surface") == "flat":
+        surface = result.design
+    else:
+        surface = result.mesh
+        if result.status is not Status.ALREADY_GOOD:
+            yield from against_surface(result.design, surface)
+    if flat is not None:
+        yield from against_pattern(surface, flat, lengths=result.task not in _STRETCHED)
+    if result.task in TASKS:
+        yield from TASKS[result.task](result, asked)

@@ -1,0 +1,66 @@
+"""What is asked of every surface and every pattern: no folds, crossings, overlaps, collapse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso import faults, metrics
+from gso.mesh import Mesh
+from gso.verdict.wording import places
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def against_surface(design: Mesh, surface: Mesh) -> Iterator[str]:
+    """Reasons against a surface; what the design has already is none."""
+    bad = faults.folded(surface)
+    if bad.size:
+        bad = np.setdiff1d(bad, faults.folded(design))
+    if bad.size:
+        yield f"the surface is folded onto itself at {places('face', bad)}"
+    pairs = faults.crossings(surface)
+    if pairs.size:
+        pairs = pairs[~_known(design, pairs)]
+    if pairs.size:
+        yield f"the surface passes through itself at {places('face', np.unique(pairs))}"
+    yield from _collapsed(design, surface.vertices, "the surface")
+
+
+def against_pattern(surface: Mesh, flat: Array, *, lengths: bool = True) -> Iterator[str]:
+    """Reasons against the flat image (n, 2) of a surface; `lengths`: it should keep them."""
+    bad = metrics.flipped_faces(surface, flat)
+    if bad.size:
+        yield f"the pattern is turned over at {places('face', bad)}"
+    bad = np.setdiff1d(faults.overlaps(surface, flat), bad)
+    if bad.size:
+        yield (f"the pattern lies on itself at {places('face', bad)}: cut the surface into pieces")
+    if lengths:
+        yield from _collapsed(surface, flat, "the pattern")
+
+
+def _collapsed(before: Mesh, after: Array, what: str) -> Iterator[str]:
+    edges = faults.collapsed(before, after)
+    if len(edges):
+        share = f"{100 * faults.SHORT:.0f} %"
+        named = [f"{a}-{b}" for a, b in edges]
+        yield f"{what} has edges of less than {share} of their length: {places('edge', named)}"
+
+
+def _known(design: Mesh, pairs: Ints) -> NDArray[np.bool_]:
+    """Which pairs of faces lie where the design passes through itself already."""
+    before = faults.crossings(design)
+    if not before.size:
+        return np.zeros(len(pairs), bool)
+    # A crossing may have moved on by a face or two.
+    near = np.zeros(len(design.faces), bool)
+    near[before.ravel()] = True
+    he = design.half_edges
+    for _ in range(2):
+        touched = np.zeros(len(design.vertices), bool)
+        touched[he.origin[near[he.face]]] = True
+        near[he.face[touched[he.origin]]] = True
+    return near[pairs[:, 0]] & near[pairs[:, 1]]

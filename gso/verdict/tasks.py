@@ -1,0 +1,101 @@
+"""What each task was asked for: the reasons against a result that belong to its task alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gso import metrics
+from gso.verdict.asked import DEVELOPABLE, TARGET, TIGHT, Asked, asked_curvature
+from gso.verdict.wording import length, percent, places, sentence
+
+if TYPE_CHECKING:
+    from gso.result import Result
+
+#: Share by which curvature or roughness must change to count as better or worse.
+_SAME = 0.01
+#: Strain of a triangle that is squeezed to a line or doubled: a face that has turned over.
+_WHOLE = 0.99
+#: Share of the diagonal beyond which a result is another surface than the design.
+_FAR = 0.5
+
+
+def developable(result: Result, asked: Asked) -> Iterator[str]:
+    """Less curvature than the design has, near it, and a pattern with little strain.
+
+    What was measured goes into the result's details, under "verdict".
+    """
+    design, mesh = result.design, result.mesh
+    scale = metrics.unit(design)
+    far = metrics.surface_distance(design, mesh)
+    deviation = max(far.there_max, far.back_max)
+    before, after = (asked_curvature(m, scale=scale) for m in (design, mesh))
+    strain = None
+    found = {"deviation": deviation, **asked.limits}
+    if result.layout is not None:
+        strains = np.nan_to_num(metrics.face_strains(mesh, result.layout))
+    elif result.pattern is not None:
+        surface = result.pattern.surface(mesh)
+        strains = np.nan_to_num(metrics.face_strains(surface, result.pattern.flat))
+    if result.layout is not None or result.pattern is not None:
+        strain = found["strain_max"] = float(strains.max())
+    allowed = asked.max_strain
+    if allowed is None and asked.max_deviation is not None:
+        allowed = DEVELOPABLE
+    if allowed is not None:
+        found["allowed"] = allowed * (1.0 + TIGHT)
+    result.details = {**result.details, "verdict": found}
+    yield from _limits(design.diagonal, deviation, asked)
+    if "allowed" in found:
+        if strain is not None and not strain <= found["allowed"]:
+            yield sentence(found)
+        elif strain is None and asked.max_strain is not None:
+            yield (
+                "the largest strain is not known: the surface must be cut open before it can be "
+                "laid out"
+            )
+    if strain is not None and strain >= _WHOLE:
+        bad = np.flatnonzero(strains >= _WHOLE)
+        yield (
+            f"no pattern fits the surface: its lengths would change by {percent(strain)} at "
+            f"{places('face', bad)}"
+        )
+    target = asked.target_curvature
+    if target is not None and not after <= target * (1.0 + TARGET):
+        yield f"mean |K| is {after:.3g}, above the target of {target:.3g}"
+    # Scipy comes with it.
+    from gso.tasks.developable import Options
+
+    if asked.moved > 0 or after <= max(Options().developable_below, target or 0.0):
+        return
+    if after > (1.0 + _SAME) * before:
+        yield f"mean |K| is {after:.3g}, worse than the {before:.3g} of the input"
+    elif after > (1.0 - _SAME) * before and not (strain is not None and strain <= DEVELOPABLE):
+        yield f"nothing was done: mean |K| is {after:.3g}, as in the input"
+
+
+def _limits(diagonal: float, deviation: float, asked: Asked) -> Iterator[str]:
+    """Reasons from the distance to the design."""
+    most = asked.max_deviation
+    # Far from the origin of the coordinates a distance is known to their rounding only.
+    if most is not None and deviation > most * (1.0 + TIGHT) + 1e-12 * diagonal:
+        yield f"the result is {length(deviation)} away from the input, more than {most:g}"
+    elif deviation > _FAR * diagonal + asked.moved:
+        share = percent(deviation / diagonal)
+        yield f"the result is {length(deviation)} away from the input, {share} of its diagonal"
+
+
+def denoise(result: Result, asked: Asked) -> Iterator[str]:
+    """No rougher than the input."""
+    ratio = metrics.fairness_ratio(result.design, result.mesh)
+    if not asked.moved and ratio > 1.0 + _SAME:
+        yield f"the result is {ratio:.3g} times as rough as the input"
+
+
+#: By task; one that is not named here is judged by its surface or pattern alone.
+TASKS: dict[str, Callable[[Result, Asked], Iterator[str]]] = {
+    "developable": developable,
+    "denoise": denoise,
+}

@@ -1,0 +1,90 @@
+"""How reasons are put: places, lengths with their unit, the sentence that comes first."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from gso.result import Result
+
+#: Places that a reason names.
+_NAMED = 6
+
+
+def places(what: str, ids: Any) -> str:
+    """Elements by number, the first few of many.
+
+    >>> places("face", [3]), places("face", range(8))
+    ('face 3', 'faces 0, 1, 2, 3, 4, 5 and 2 more')
+    """
+    named = [str(k) for k in list(ids)[:_NAMED]]
+    more = f" and {len(ids) - _NAMED} more" if len(ids) > _NAMED else ""
+    return f"{what}{'s' if len(ids) > 1 else ''} {', '.join(named)}{more}"
+
+
+def length(value: float, unit: str = "") -> str:
+    """A measured length to three digits, with its unit where there is one.
+
+    >>> length(20.0, "mm"), length(0.5), length(0.0123456), length(1234.5)
+    ('20.0 mm', '0.500', '0.0123', '1230')
+    """
+    if value == 0 or not np.isfinite(value):
+        text = f"{value:g}"
+    elif not 1e-4 <= abs(value) < 1e6:
+        text = f"{value:.2e}"
+    else:
+        rounded = float(f"{value:.3g}")
+        text = f"{rounded:.{max(2 - int(np.floor(np.log10(abs(rounded)))), 0)}f}"
+    return f"{text} {unit}" if unit else text
+
+
+def percent(value: float) -> str:
+    """A measured share to three digits.
+
+    >>> percent(0.01741), percent(0.58), percent(1e-8)
+    ('1.74 %', '58.0 %', '0 %')
+    """
+    shown = 100.0 * value
+    return f"{length(shown if shown >= 1e-4 else 0.0)} %"
+
+
+def headline(result: Result, unit: str = "") -> str:
+    """What a developable result amounts to, in one line: strain, deviation, and the verdict.
+
+    Empty for other tasks, and where nothing was measured.
+
+    Parameters
+    ----------
+    result : Result
+    unit : str
+        Name of the unit of the coordinates.
+
+    Examples
+    --------
+    >>> u = np.linspace(-1, 1, 17)
+    >>> bowl = np.dstack([*np.meshgrid(10 * u, 10 * u), 2 * (u**2 + u[:, None] ** 2)])
+    >>> from gso.tno import optimize
+    >>> headline(optimize(bowl, max_deviation=0.5), "mm")
+    'largest strain 1... %, deviation 0.500 mm: not developable within 0.5 mm'
+    """
+    found = result.details.get("verdict")
+    return sentence(found, unit) if found else ""
+
+
+def sentence(found: dict[str, float], unit: str = "") -> str:
+    """:func:`headline` of what the verdict measured and what was asked for."""
+    strain, deviation = found.get("strain_max"), found["deviation"]
+    parts = [] if strain is None else [f"largest strain {percent(strain)}"]
+    parts.append(f"deviation {length(deviation, unit)}")
+    said = ", ".join(parts)
+    if found.get("allowed") is None or strain is None:
+        return said
+    within = []
+    if "max_deviation" in found:
+        within.append(f"within {found['max_deviation']:g} {unit}".rstrip())
+    if "max_strain" in found:
+        within.append(f"to a strain of {100 * found['max_strain']:g} %")
+    good = strain <= found["allowed"]
+    return f"{said}: {'developable' if good else 'not developable'} {' and '.join(within)}"

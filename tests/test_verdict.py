@@ -1,0 +1,352 @@
+"""Results are usable when they are what was asked for; otherwise there is a reason."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import gso
+from gso import metrics
+from gso.cli import main
+from gso.dataset import bezier
+from gso.mesh import Mesh
+from gso.status import Status
+from gso.tno.judged import judged
+from gso.tno.layout import lay_out
+from gso.verdict import Asked, headline, judge
+from tests.conftest import cylinder, saddle, shuffled
+
+pytestmark = pytest.mark.filterwarnings("ignore::gso.ConvergenceWarning")
+
+FLAT = np.dstack([*np.mgrid[:9.0, :9.0], np.zeros((9, 9))])
+
+
+def result_of(design, after, task="developable", **more):
+    """A result as a solver would leave it that says all is well."""
+    design = design if isinstance(design, Mesh) else Mesh.from_grid(design)
+    mesh = design.replaced(np.asarray(after).reshape(-1, 3))
+    more = {"flat": None, "status": Status.CONVERGED} | more
+    return gso.Result(task, "", design, mesh, **more)
+
+
+def tried(design, after, task="developable", asked=None, **more):
+    with np.errstate(all="raise", under="ignore"):
+        return judged(result_of(design, after, task, **more), asked or Asked())
+
+
+@pytest.fixture(scope="module")
+def good():
+    return gso.tno.optimize(saddle(17, strength=0.1))
+
+
+def test_a_good_result_has_no_reasons(good):
+    assert good.usable and good.reasons == ()
+    assert good.status is not Status.UNUSABLE
+    assert {"pattern", "verdict"} <= set(good.seconds)
+    assert good.layout.shape == (289, 2)
+
+
+def test_strain_is_that_of_the_pattern_and_comes_first(good):
+    assert next(iter(good.metrics)) == "strain_max"
+    values = metrics.principal_strains(good.mesh, good.layout).values
+    assert good.metrics["strain_max"] == values.max()
+    assert 0 < good.metrics["strain_mean"] < good.metrics["strain_p99"] < values.max() < 0.01
+    assert good.details["verdict"]["strain_max"] == pytest.approx(values.max())
+
+
+def test_without_a_verdict_nothing_is_judged_or_laid_out(good):
+    plain = gso.tno.optimize(saddle(17, strength=0.1), verdict=False)
+    assert plain.layout is None and plain.reasons == () and "strain_max" not in plain.metrics
+    assert not {"pattern", "verdict"} & set(plain.seconds)
+    np.testing.assert_array_equal(plain.mesh.vertices, good.mesh.vertices)
+
+
+def test_reasons_and_pattern_are_saved(tmp_path):
+    result = gso.tno.optimize(saddle(9), max_deviation=0.01)
+    assert result.status is Status.UNUSABLE and not result.converged
+    assert set(result.reasons) <= set(result.notes)
+    result.save(tmp_path / "a.npz")
+    again = gso.Result.load(tmp_path / "a.npz")
+    assert (again.reasons, again.status, again.usable) == (result.reasons, result.status, False)
+    np.testing.assert_array_equal(again.layout, result.layout)
+    assert headline(again, "mm") == headline(result, "mm")
+
+
+def test_files_of_earlier_versions_load(tmp_path, good):
+    good.save(tmp_path / "a.npz")
+    data = dict(np.load(tmp_path / "a.npz"))
+    record = json.loads(data["record"].tobytes())
+    del record["reasons"], data["layout"]
+    data["record"] = np.frombuffer(json.dumps(record).encode(), np.uint8)
+    np.savez(tmp_path / "b.npz", **data)
+    again = gso.Result.load(tmp_path / "b.npz")
+    assert again.usable and again.layout is None and again.reasons == ()
+
+
+def test_the_pattern_of_what_unrolls_has_no_strain():
+    for mesh in (Mesh.from_grid(cylinder(17)), shuffled(Mesh.from_grid(cylinder(17)))):
+        moved = mesh.replaced(1e3 * mesh.vertices + 5e4)
+        flat = lay_out(moved)
+        assert metrics.strains(moved, flat)["strain_max"] < 2e-3
+        assert not metrics.flips(moved, flat)
+
+
+def test_what_must_be_cut_has_no_pattern():
+    angle = 2 * np.pi * np.arange(24) / 24
+    rings = np.stack([np.stack([np.cos(angle), np.sin(angle), 0 * angle + z], -1) for z in (0, 1)])
+    k = np.arange(24)
+    tube = Mesh(rings.reshape(-1, 3), np.stack([k, np.roll(k, -1), np.roll(k, -1) + 24, k + 24], 1))
+    assert lay_out(tube) is None
+    ball = Mesh(np.r_[np.eye(3), -np.eye(3)], [
+        [0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5],
+    ])  # fmt: skip
+    assert lay_out(ball) is None
+
+
+def test_a_hole_does_not_hinder_the_pattern():
+    grid = Mesh.from_grid(cylinder(17))
+    holed = Mesh(grid.vertices, np.delete(grid.faces, [120, 121, 136, 137], axis=0))
+    flat = lay_out(holed)
+    assert metrics.strains(holed, flat)["strain_max"] < 2e-3
+
+
+@pytest.mark.parametrize("bound", [0.05, 1.0])
+def test_a_bound_asks_for_half_a_percent_of_strain(bound):
+    mesh = Mesh.from_grid(10.0 * saddle(17, strength=0.1))
+    result = gso.tno.optimize(mesh, max_deviation=bound)
+    strain = metrics.principal_strains(result.mesh, result.layout).values.max()
+    assert result.usable == (strain <= 5e-3) == (bound == 1.0)
+    verdict = "developable within 1 mm" if bound == 1.0 else "not developable within 0.05 mm"
+    assert headline(result, "mm").endswith(f": {verdict}")
+    if bound == 0.05:
+        assert any(headline(result) == reason for reason in result.reasons)
+        assert headline(result).endswith("deviation 0.0500: not developable within 0.05")
+
+
+def test_strain_is_judged_as_it_was_asked_for(good):
+    strain = good.metrics["strain_max"]
+    for factor, fine in ((1.1, True), (1.0, True), (0.99, False)):
+        asked = Asked(max_strain=factor * strain)
+        reasons = judge(result_of(good.design, good.mesh.vertices, layout=good.layout), asked)
+        assert (not reasons) is fine
+        assert fine or "not developable to a strain of" in reasons[0]
+    # A distance beside it does not bring its own limit of half a percent.
+    asked = Asked(max_strain=0.5, max_deviation=1.0)
+    curved = result_of(saddle(9), 0.9 * saddle(9), layout=lay_out(Mesh.from_grid(saddle(9))))
+    assert not any("largest strain" in r for r in judge(curved, asked))
+
+
+def test_a_distance_that_is_passed():
+    low = FLAT + np.array([0, 0, 0.5])
+    assert tried(FLAT, low, asked=Asked(max_deviation=0.5)).usable
+    result = tried(FLAT, low, asked=Asked(max_deviation=0.49))
+    assert result.status is Status.UNUSABLE
+    assert "0.500 away from the input, more than 0.49" in result.reasons[0]
+
+
+def test_a_result_that_has_left_its_design():
+    far = tried(saddle(9), FLAT + 40.0)
+    assert "of its diagonal" in far.reasons[0]
+    # A handle that took it there asked for it.
+    assert tried(saddle(9), FLAT + 40.0, asked=Asked(moved=100.0)).usable
+
+
+def test_a_target_that_is_missed():
+    result = tried(saddle(9), 0.9 * saddle(9), asked=Asked(target_curvature=0.01))
+    assert any("above the target of 0.01" in r for r in result.reasons)
+
+
+def test_more_curvature_than_before():
+    assert "worse than" in tried(saddle(9, strength=0.3), saddle(9, strength=0.4)).reasons[0]
+    # That of a handle is no fault.
+    asked = Asked(moved=0.1)
+    assert tried(saddle(9, strength=0.3), saddle(9, strength=0.4), asked=asked).usable
+
+
+def test_nothing_was_done():
+    result = tried(saddle(9), saddle(9))
+    assert result.status is Status.UNUSABLE and result.reasons[0].startswith("nothing was done")
+    for status in (Status.CONVERGED, Status.ALREADY_GOOD):
+        assert tried(cylinder(17), cylinder(17), status=status).usable
+
+
+def test_a_status_that_refuses_stays():
+    for status in (Status.CANCELLED, Status.TARGET_MISSED, Status.CONSTRAINTS_MISSED):
+        result = tried(cylinder(17), cylinder(17), status=status)
+        assert result.status is status and not result.usable and result.reasons == (str(status),)
+        assert result.notes == ()
+
+
+def test_a_face_turned_over_in_the_surface():
+    after = FLAT.copy()
+    after[4, 4] = [2.2, 2.2, 0.0]
+    for task in ("developable", "bend", "denoise"):
+        result = tried(FLAT, after, task)
+        assert not result.usable and "folded onto itself at face" in result.reasons[0]
+        # What the design has already is none of the solver's.
+        assert not any("folded" in r for r in tried(after, after, task).reasons)
+
+
+def test_a_surface_that_passes_through_itself():
+    angle = np.linspace(0, 1, 24)[:, None] + np.zeros((24, 9))
+    across = np.arange(9.0) / 4 + np.zeros((24, 9))
+    flat = np.stack([7 * angle, across, 0 * angle], axis=-1)
+    eight = np.stack([np.sin(6.28 * angle + 0.1), across, 0.5 * np.sin(12.57 * angle + 0.2)], -1)
+    result = tried(flat, eight, "bend")
+    assert not result.usable
+    assert "passes through itself at faces" in result.reasons[0]
+    assert tried(eight, eight + np.array([0, 0, 1e-3]), "bend").usable
+
+
+def test_edges_that_collapse():
+    after = FLAT.copy()
+    after[4, 4] = [3.001, 4, 0]
+    result = tried(FLAT, after, "denoise")
+    assert any("less than 2 % of their length: edge 31-40" in r for r in result.reasons)
+
+
+def flattened(design, flat, task="flatten"):
+    design = design if isinstance(design, Mesh) else Mesh.from_grid(design)
+    return tried(design, np.c_[flat, np.zeros(len(flat))], task, flat=flat)
+
+
+@pytest.mark.parametrize("task", ["flatten", "conformal"])
+def test_patterns(task):
+    flat = FLAT.reshape(-1, 3)[:, :2].copy()
+    assert flattened(FLAT, flat, task).usable
+    turned = flat * [1.0, -1.0]
+    assert (
+        "turned over at faces 0, 1, 2, 3, 4, 5 and 58 more"
+        in flattened(FLAT, turned, task).reasons[0]
+    )
+    angle, radius = np.meshgrid(np.linspace(0, 7, 9), np.linspace(1, 2, 9), indexing="ij")
+    wound = np.stack([radius * np.sin(angle), radius * np.cos(angle)], -1).reshape(-1, 2)
+    assert any("lies on itself" in r for r in flattened(FLAT, wound, task).reasons)
+
+
+def test_a_ring_beyond_a_full_turn_is_told_to_be_cut():
+    """A developable ramp of more than a turn: the surface is sound, its pattern is not."""
+    turn, width = np.meshgrid(np.linspace(0, 8.5, 80), np.linspace(1, 1.6, 9), indexing="ij")
+    ramp = np.stack([width * np.cos(turn), width * np.sin(turn), 0.1 * turn], axis=-1)
+    result = gso.tno.optimize(ramp, task="flatten")
+    assert result.status is Status.UNUSABLE
+    assert any("the pattern lies on itself" in r for r in result.reasons)
+
+
+def test_coordinates_that_are_not_finite():
+    flat = FLAT.reshape(-1, 3)[:, :2].copy()
+    result = result_of(FLAT, FLAT, "flatten", flat=flat)
+    result.flat[3] = np.nan
+    assert judge(result, Asked()) == ("the coordinates of vertex 3 are not finite",)
+
+
+def test_a_rougher_surface_is_not_denoised():
+    rough = FLAT + 0.1 * np.random.default_rng(0).standard_normal(FLAT.shape)
+    assert "as rough as the input" in tried(FLAT + 0.01 * saddle(9), rough, "denoise").reasons[0]
+    assert gso.tno.optimize(rough, task="denoise").usable
+
+
+def test_the_verdict_is_fast():
+    result = gso.tno.optimize(saddle(64), options="fast")
+    assert min(judged(result, Asked()).seconds["verdict"] for _ in range(5)) < 0.1
+
+
+# Results that were called usable before there was a verdict.
+
+
+@pytest.mark.parametrize(("size", "target"), [(7, 0.02), (9, 0.005)])
+def test_target_curvature_on_coarse_grids(size, target):
+    result = gso.tno.optimize(saddle(size, strength=0.6), target_curvature=target)
+    curved = metrics.loss_gc(result.mesh, scale=metrics.unit(result.design))
+    assert result.usable or result.reasons
+    if curved <= 0.1 * target or result.metrics["strain_max"] > 0.99:
+        # It reached its target by crumpling.
+        assert not result.usable and any("face" in reason for reason in result.reasons)
+
+
+def test_jiang_on_a_strongly_curved_surface():
+    u = np.linspace(-1, 1, 9)
+    steep = np.dstack([*np.meshgrid(u, u), np.sin(9 * u)[:, None] * np.sin(9 * u)])
+    result = gso.tno.optimize(steep, options="jiang2020")
+    before, after = (metrics.loss_gc(m) for m in (result.design, result.mesh))
+    assert after < 0.99 * before or not result.usable
+
+
+def test_isometry_with_a_fixed_boundary():
+    design = bezier.generate(1, seed=5)[0].sample(17)
+    held = [gso.FixedBoundary()]
+    result = gso.tno.optimize(design, formulation="isometry", constraints=held)
+    if result.metrics["loss_gc"] > result.metrics["loss_gc_before"]:
+        assert result.status is Status.UNUSABLE
+        assert any("worse than" in reason for reason in result.reasons)
+    else:
+        assert result.usable
+
+
+def test_bend_with_a_sharp_fold():
+    sheet = np.dstack([*np.mgrid[:17.0, :17.0], np.zeros((17, 17))])
+    pushed = [gso.Fixed(np.arange(17)), gso.Handle([280], [[2.0, 8.0, 1.0]])]
+    result = gso.tno.optimize(sheet, task="bend", constraints=pushed)
+    assert not result.usable and "folded onto itself at faces" in result.reasons[0]
+    lifted = [gso.Fixed(np.arange(17)), gso.Handle([280], [[12.0, 8.0, 4.0]])]
+    assert gso.tno.optimize(sheet, task="bend", constraints=lifted).usable
+
+
+def test_sessions_are_judged():
+    sheet = np.dstack([*np.mgrid[:9.0, :9.0], np.zeros((9, 9))])
+    fixed, hand = gso.Fixed(np.arange(18)), gso.Handle([76], [[8.0, 4.0, 0.0]])
+    session = gso.tno.Session(sheet, constraints=[fixed, hand])
+    session.move([76], [[7.0, 4.0, 2.0]])
+    assert session.settle().usable
+    session.move([76], [[1.0, 4.0, 0.5]])
+    result = session.settle()
+    assert result.reasons and result.status is Status.UNUSABLE
+    assert "verdict" in result.seconds
+
+
+def test_hybrid_results_are_judged():
+    result = gso.hybrid.solve(saddle(17), polish=2, max_deviation=0.01)
+    assert any("not developable within 0.01" in reason for reason in result.reasons)
+
+
+def test_batches_may_leave_it_out():
+    for verdict in (True, False):
+        (item,) = gso.tno.optimize_many([saddle(9)], workers=0, options="fast", verdict=verdict)
+        assert (item.result.layout is not None) is verdict
+
+
+@pytest.mark.parametrize(("unit", "said"), [(["--unit", "cm"], " cm"), ([], "")])
+def test_the_command_line_says_it_first(tmp_path, monkeypatch, unit, said):
+    monkeypatch.chdir(tmp_path)
+    gso.save(Mesh.from_grid(saddle(9)), "in.obj")
+    asked = [
+        "optimize",
+        "in.obj",
+        "-o",
+        "out.obj",
+        "--max-deviation",
+        "0.01",
+        "--metrics",
+        "m.json",
+    ]
+    done = CliRunner().invoke(main, asked + unit)
+    first = done.stdout.splitlines()[0]
+    assert first.startswith("largest strain ")
+    assert f"deviation 0.00998{said}: not developable within 0.01{said}" in first
+    assert done.exit_code == 1
+    record = json.loads((tmp_path / "m.json").read_text())
+    assert record["headline"] == first and record["reasons"] and not record["usable"]
+    done = CliRunner().invoke(main, ["optimize", "in.obj", "-o", "out.obj", *unit])
+    assert done.exit_code == 0
+    first = done.stdout.splitlines()[0]
+    assert first.startswith("largest strain ") and "developable" not in first
+
+
+def test_unjudged_results_are_usable_as_before(good):
+    plain = replace(good, reasons=(), status=Status.CONVERGED)
+    assert plain.usable
+    assert not replace(plain, status=Status.CANCELLED).usable
