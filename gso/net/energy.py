@@ -99,11 +99,12 @@ class Developable:
         }
 
     def _elongation(self, x: Planes) -> Tensor:
-        squared, total, count = Squared(), torch.zeros_like(self.curved), 0
+        squared: Any = Squared()
+        total, count = torch.zeros_like(self.curved), 0
         for d, inverse, band in zip(_edges(x), self.lengths, self.bands, strict=True):
             origin = tuple(torch.zeros_like(c) for c in d)
             (r,) = elongation.residual([origin, d], [inverse, *band])
-            total = total + squared.value(r).sum(dim=(1, 2))  # type: ignore[arg-type]
+            total = total + squared.value(r).sum(dim=(1, 2))
             count += r[0].numel()
         return total / count
 

@@ -79,12 +79,18 @@ def curvatures(meshes: Sequence[Mesh]) -> list[Heat]:
 
 
 def distance(before: Mesh, after: Mesh) -> Heat:
-    """Distance of a surface to the one before, percent of that one's diagonal."""
-    percent = 100.0 / before.diagonal * metrics.point_to_surface(after.vertices, before)
+    """Distance of a surface to the one before, percent of that one's diagonal.
+
+    The faces show the way there; the summary has the largest distance of the way back too,
+    which is larger where a border has shrunk.
+    """
+    scale = 100.0 / before.diagonal
+    percent = scale * metrics.point_to_surface(after.vertices, before)
+    back = scale * metrics.point_to_surface(before.vertices[before.used], after).max()
     values = per_face(after, percent)
-    summary = f"mean {percent.mean():.2g} %, largest {percent.max():.2g} %"
-    scale = _rising([values], "distance (% of the diagonal)", "GnBu", top=100.0)
-    return Heat(values, scale, summary)
+    summary = f"mean {percent.mean():.2g} %, largest {percent.max():.2g} %, back {back:.2g} %"
+    rising = _rising([values], "distance (% of the diagonal)", "GnBu", top=100.0)
+    return Heat(values, rising, summary)
 
 
 def strain(design: Mesh, flat: Array) -> Heat:
