@@ -297,13 +297,14 @@ def questions() -> dict[str, Any]:
     surfaces, _ = reference()
     rows, out = [], {}
     for share in (0.0025, 0.005, 0.01):
-        curvature, reach, seconds = [], [], []
+        curvature, reach, both, seconds = [], [], [], []
         for points in progress(surfaces, f"within {share:.2%}"):
             mesh = gso.Mesh.from_grid(points)
             bound = share * mesh.diagonal
             result, spent = timed(lambda m=mesh, b=bound: gso.tno.optimize(m, max_deviation=b))
             curvature.append(result.metrics["loss_gc"])
             reach.append(metrics.point_to_surface(result.mesh.vertices, mesh).max() / bound)
+            both.append(0.01 * result.metrics["distance_max"] / share)
             seconds.append(spent)
         kept = sum(r <= 1 + 1e-6 for r in reach)
         rows.append(
@@ -312,13 +313,14 @@ def questions() -> dict[str, Any]:
                 f"kept on {kept}",
                 np.mean(curvature),
                 np.max(reach),
+                np.max(both),
                 np.median(seconds),
             ]
         )
         out[f"within {share}"] = [kept, float(np.mean(curvature))]
     table(
         "max_deviation, share of the diagonal",
-        ["bound", "", "loss_gc", "largest / bound", "median s"],
+        ["bound", "", "loss_gc", "largest / bound", "both ways", "median s"],
         rows,
     )
     rows = []
@@ -416,13 +418,14 @@ def general() -> dict[str, Any]:
                     m["K_A_r"],
                     m["d_H"],
                     m["deviation_max"],
+                    m["distance_max"],
                     spent,
                 ]
             )
-            out[f"developable {label}"] = [m["K_A_r"], m["deviation_max"]]
+            out[f"developable {label}"] = [m["K_A_r"], m["deviation_max"], m["distance_max"]]
     table(
         "Developable, irregular quad meshes",
-        ["mesh", "before", "loss_gc", "K_A-r", "d_H %", "farthest %", "s"],
+        ["mesh", "before", "loss_gc", "K_A-r", "d_H %", "farthest %", "both ways %", "s"],
         rows,
     )
     return out

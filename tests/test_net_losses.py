@@ -63,6 +63,17 @@ def test_developable_energy_is_the_solvers(pair):
             )
 
 
+def test_elongation_energy_is_the_solvers_where_it_is_large(pair):
+    designs, _ = pair
+    results = designs * [0.4, 1.0, 1.6]
+    parts = energy.Developable(batch(*designs), developable.Options()).parts(batch(*results))
+    for k, (design, result) in enumerate(zip(designs, results, strict=True)):
+        last = tasks.get("developable").plan(request(design)).stages[-1]
+        value = total(last.items, result.reshape(-1, 3))["elongation"]
+        assert value > 1e-4
+        assert float(parts["elongation"][k]) == pytest.approx(value, rel=1e-9)
+
+
 def test_strain_energy_is_the_solvers(pair):
     designs, _ = pair
     rng = np.random.default_rng(1)

@@ -238,7 +238,7 @@ def test_distance_of_parallel_planes():
     mesh = plane()
     heat = distance(mesh, mesh.replaced(mesh.vertices + np.array([0, 0, 0.1])))
     assert np.allclose(heat.values, 10.0 / np.sqrt(2))
-    assert heat.summary == "mean 7.1 %, largest 7.1 %"
+    assert heat.summary == "mean 7.1 %, largest 7.1 %, back 7.1 %"
 
 
 def test_strain_of_magnified_patterns():

@@ -86,24 +86,29 @@ def curvatures(meshes: Sequence[Mesh]) -> list[Heat]:
 def distance(before: Mesh, after: Mesh) -> Heat:
     """Distance of a surface to the one before, percent of that one's diagonal.
 
-    Of several components, each by its own, where the faces are the same.
+    Of several components, each by its own, where the faces are the same. The faces show the way
+    there; the summary has the largest distance of the way back too, which is larger where a border
+    has shrunk.
     """
     if several(before) and np.array_equal(before.faces, after.faces):
         percent = np.zeros(len(after.vertices))
+        far = 0.0
         for part in split(before):
             percent[part.vertices] = _percent(part.mesh, part.of(after))
+            far = max(far, _percent(part.of(after), part.mesh, by=part.mesh).max())
         mean = average(lambda one, other: _percent(one, other).mean(), before, after)
     else:
-        percent = _percent(before, after)
+        percent, far = _percent(before, after), _percent(after, before, by=before).max()
         mean = percent.mean()
     values = per_face(after, percent)
-    summary = f"mean {mean:.2g} %, largest {percent.max():.2g} %"
+    summary = f"mean {mean:.2g} %, largest {percent.max():.2g} %, back {far:.2g} %"
     scale = _rising([values], "distance (% of the diagonal)", "GnBu", top=100.0)
     return Heat(values, scale, summary)
 
 
-def _percent(before: Mesh, after: Mesh) -> Array:
-    return 100.0 / before.diagonal * metrics.point_to_surface(after.vertices, before)
+def _percent(to: Mesh, of: Mesh, *, by: Mesh | None = None) -> Array:
+    """Distance of the vertices of one surface to another, percent of a diagonal."""
+    return 100.0 / (by or to).diagonal * metrics.point_to_surface(of.vertices, to)
 
 
 def strain(design: Mesh, flat: Array) -> Heat:

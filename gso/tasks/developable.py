@@ -97,23 +97,29 @@ class Options(BaseOptions):
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
         "fast": {
             "iterations": 4,
-            "coarse_iterations": 6,
-            "w_curvature": 1.8e-3,
-            "w_fairness": 1.4e-5,
+            "coarse_iterations": 8,
+            "w_curvature": 1.15e-3,
+            "w_fairness": 8.2e-6,
         },
         "balanced": {},
-        "accurate": {"iterations": 36, "coarse_iterations": 15, "variables": "free"},
+        "accurate": {
+            "iterations": 14,
+            "coarse_iterations": 12,
+            "variables": "free",
+            "w_curvature": 8.9e-4,
+            "w_fairness": 9.0e-6,
+        },
     }
 
     iterations: int = 12
     method: str = "levenberg-marquardt"
-    w_curvature: float = 1.3e-3
-    w_fairness: float = 1.1e-5
+    w_curvature: float = 9.0e-4
+    w_fairness: float = 7.8e-6
     w_proximity: float = 1.0
     w_elongation: float = 0.1
-    near: float = 0.01
-    tangential: float = 0.7
-    eps: float = 0.01
+    near: float = 0.006
+    tangential: float = 0.5
+    eps: float = 0.007
     variables: str = "normal"
     controls: int = 16
     coarse_iterations: int = 12
