@@ -185,7 +185,7 @@ class BSplineSurface:
         """Mean of |K|, the absolute Gaussian curvature, over the area, 1 / length^2.
 
         By Gauss quadrature with so many points in every interval between knots. Compare
-        it with ``K_A_meyer`` of a mesh, which is the same for a fine one.
+        it with ``mean_abs_K`` of a mesh, which is the same for a fine one.
 
         Raises
         ------

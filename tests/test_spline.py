@@ -212,7 +212,7 @@ def test_the_result_is_its_spline(solved, surfaces):
     assert 0 < said["fitted"]["vertices_mean"] <= said["fitted"]["vertices_max"] < 0.1
     exact = metrics.surface_distance(surfaces[0], solved.grid)
     assert said["design"]["between_mean"] == pytest.approx(exact.there_mean, rel=0.1)
-    assert said["curvature"] == pytest.approx(solved.metrics["K_A_meyer"], rel=0.5)
+    assert said["curvature"] == pytest.approx(solved.metrics["mean_abs_K"], rel=0.5)
 
 
 def test_the_spline_is_in_the_users_frame(solved, surfaces):
