@@ -139,6 +139,9 @@ class Options(BaseOptions):
             raise OptionError("eps and near must be positive")
 
 
+#: Factor on the weight of curvature on meshes that are no grids: more of it stays there, around
+#: irregular vertices and for want of coarser grids to begin with.
+GENERAL = 2.0
 #: Curvature at which half of the design's own bending counts as wanted.
 FLAT_CURVATURE = 0.02
 #: A design is a developable surface with noise on it when smoothing leaves at most this
@@ -321,7 +324,7 @@ def _objective(
     """Terms on the design or on a coarser copy of it."""
     o = request.options
     w_curvature, w_fairness = adapted_weights(o, max(curved, 1e-3), bending)
-    w_curvature *= request.demand
+    w_curvature *= request.demand if mesh.grid_index is not None else GENERAL * request.demand
     w_proximity = o.w_proximity
     if request.max_deviation is not None:
         # The bound keeps the result close; the terms may ask for more.

@@ -6,11 +6,16 @@ import time
 
 import numpy as np
 
+from gso.metrics import nonplanarity
 from gso.result import Result
 from gso.status import Status
 from gso.tasks.base import Request
 from gso.tno.layout import lay_out
 from gso.verdict import Asked, judge
+
+#: Gap of the diagonals over the mean edge up to which quads are planar, and above which they
+#: visibly are not.
+_PLANAR, _BENT = 1e-6, 1e-3
 
 
 def asked_of(request: Request, scale: float, **limits: float | None) -> Asked:
@@ -38,6 +43,7 @@ def judged(result: Result, asked: Asked) -> Result:
         elif pattern is not None:
             result.layout = pattern.flat
         result.seconds["pattern"] = time.perf_counter() - clock
+        result.notes += _planarity(result)
     clock = time.perf_counter()
     result.reasons = judge(result, asked)
     said = str(result.status)
@@ -46,6 +52,19 @@ def judged(result: Result, asked: Asked) -> Result:
         result.status = Status.UNUSABLE
     result.seconds["verdict"] = time.perf_counter() - clock
     return result
+
+
+def _planarity(result: Result) -> tuple[str, ...]:
+    """That planar quads are planar no more."""
+    if result.design.is_triangles:
+        return ()
+    before, after = (float(nonplanarity(m).max()) for m in (result.design, result.mesh))
+    if before > _PLANAR or after <= _BENT:
+        return ()
+    return (
+        f"the input's quads are planar, those of the result are not: their diagonals are up to "
+        f"{after:.2g} of the mean edge apart; the constraint PlanarFaces keeps them planar",
+    )
 
 
 def warning(result: Result) -> str:
