@@ -540,6 +540,8 @@ def principal_strains(surface: Any, flat: Any) -> Strains:
     """
     values = corner_strains(surface, flat)
     values = values[~np.isnan(values)]
+    if not values.size:
+        values = np.full(1, np.nan)
     return Strains(float(values.mean()), float(np.percentile(values, 99)), values)
 
 

@@ -218,7 +218,7 @@ def test_given_lengths_are_reached():
 
 def test_hard_constraints_are_no_part_of_the_energy():
     result = gso.tno.optimize(GRID, constraints=[gso.FixedLengths(GRID.edges[::5])])
-    assert set(result.energy) == {"curvature", "proximity", "fairness"}
+    assert set(result.energy) == {"curvature", "proximity", "fairness", "elongation"}
     soft = gso.tno.optimize(GRID, constraints=[gso.FixedLengths(GRID.edges[::5], weight=1.0)])
     assert soft.energy["length"] > 0
 

@@ -170,7 +170,7 @@ def test_a_flat_start_that_turns_over_is_dropped():
         {"task": "flatten"},
         {"task": "flatten", "formulation": "lengths"},
         {"task": "flatten", "formulation": "isometry"},
-        {"max_deviation": 0.1},
+        {"max_deviation": 0.1, "formulation": "curvature"},
         {"constraints": [gso.Handle([0, 16, 272], saddle(17).reshape(-1, 3)[[0, 16, 272]] * 1.1)]},
     ],
     ids=lambda k: "-".join(map(str, k.values()))[:20] or "curvature",
@@ -181,7 +181,11 @@ def test_a_good_start_stays_good(keywords):
     points = cold.flat if keywords.get("task") == "flatten" else cold.mesh
     result = optimize(design, x0=Start(points, source="guess", guarded=True), **keywords)
     assert result.warm_start == "guess"
-    assert energy(result) <= 1.02 * energy(cold)
+    if "max_deviation" in keywords:
+        # A search takes what has the least strain, whatever weights it took.
+        assert result.metrics["strain_max"] <= 1.02 * cold.metrics["strain_max"]
+    else:
+        assert energy(result) <= 1.02 * energy(cold)
 
 
 @pytest.mark.parametrize("task", ["flatten", "conformal"])

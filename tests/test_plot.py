@@ -62,8 +62,8 @@ def test_results_are_drawn(tmp_path, task):
         assert len(titles) == 3
         assert "distance (% of the diagonal)" in labels
     if task == "developable":
-        assert titles[0] == f"input: mean |K| {result.metrics['loss_gc_before']:.2g}"
-        assert titles[1] == f"result: mean |K| {result.metrics['loss_gc']:.2g}"
+        assert titles[0] == f"input: mean |K| {result.metrics['mean_abs_K_before']:.2g}"
+        assert titles[1] == f"result: mean |K| {result.metrics['mean_abs_K']:.2g}"
         assert len(labels) == 2
 
 

@@ -99,7 +99,7 @@ def solve(task: str, method: str, model: str, points: np.ndarray) -> Any:
         from gso import hybrid
 
         return hybrid.solve(points, task=task, net=model)
-    return gso.tno.optimize(points, task=task)
+    return gso.tno.optimize(points, task=task, verdict=False)
 
 
 def shares(run: Callable[[], Any]) -> dict[str, Any]:

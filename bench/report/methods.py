@@ -30,7 +30,7 @@ def _solved(result: gso.Result) -> Solved:
 
 
 def _tno(task: str, case: Case, **options: Any) -> Solved:
-    return _solved(gso.tno.optimize(case.given, task=task, **options))
+    return _solved(gso.tno.optimize(case.given, task=task, verdict=False, **options))
 
 
 def _net(task: str, case: Case, model: str) -> Solved:

@@ -113,6 +113,7 @@ def solve(
     clock = time.perf_counter()
     polish = _checked(task, polish, keywords)
     design = as_mesh(mesh)
+    design.check_joined()
     pieces = _pieces(design, task, sparing, keywords)
     if pieces:
         result = _each(design, pieces, task, keywords | {"net": net, "polish": polish})

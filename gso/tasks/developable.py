@@ -328,7 +328,8 @@ def _objective(
     w_proximity = o.w_proximity
     if request.max_deviation is not None:
         # The bound keeps the result close; the terms may ask for more.
-        w_curvature, w_fairness, w_proximity = 3 * w_curvature, 2 * w_fairness, 0.3 * w_proximity
+        w_curvature, w_fairness = 4.5 * w_curvature, 3.0 * w_fairness
+        w_proximity = 0.3 * w_proximity
     normals = vertex_normals(mesh)
     near = proximity.build(mesh, normals, tangential=o.tangential)
     items = [Weighted(t, w_curvature, Absolute(o.eps)) for t in curvature.build(mesh)]
@@ -541,11 +542,13 @@ def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict
         "distance_max": percent * max(true.there_max, true.back_max),
         "deviation_max": percent * true.there_max,
         "fairness_ratio": measure.fairness_ratio(before, after),
-        "edge_ratio_min": float(np.nanmin(measure.edge_ratios(before, after))),
         "fold_max_before": float(measure.folds(before).max(initial=0.0)),
         "fold_max": float(measure.folds(after).max(initial=0.0)),
     }
-    if before.boundary_loops:
+    same = np.array_equal(before.faces, after.faces)
+    if same:
+        out["edge_ratio_min"] = float(np.nanmin(measure.edge_ratios(before, after)))
+    if same and before.boundary_loops:
         loops = measure.loop_ratios(before, after)
         out |= {"loop_ratio_min": float(loops.min()), "loop_ratio_max": float(loops.max())}
     return out if flat is None else out | flat_metrics(after, flat)

@@ -38,7 +38,10 @@ class GaussNewton:
             Gradient of the objective.
         """
         damping = self.damping
-        typical = max(float(values[diagonal].mean()), 1e-300)
+        # Unknowns of vertices that belong to no face count in nothing.
+        own = values[diagonal]
+        own = own[own > 0]
+        typical = max(float(own.mean()), 1e-300) if own.size else 1e-300
         added = 0.0
         while True:
             values[diagonal] += (damping - added) * typical

@@ -36,6 +36,7 @@ def lay_out(
 
     Examples
     --------
+    >>> import numpy as np
     >>> t = np.linspace(0, 3, 20)
     >>> arch = np.stack(np.broadcast_arrays(np.cos(t), np.sin(t), t[:, None]), axis=-1)
     >>> mesh = Mesh.from_grid(arch)

@@ -67,7 +67,7 @@ def headline(result: Result, unit: str = "") -> str:
     >>> bowl = np.dstack([*np.meshgrid(10 * u, 10 * u), 2 * (u**2 + u[:, None] ** 2)])
     >>> from gso.tno import optimize
     >>> headline(optimize(bowl, max_deviation=0.5), "mm")
-    'largest strain 1... %, deviation 0.500 mm: not developable within 0.5 mm'
+    'largest strain 0... %, deviation 0... mm: developable within 0.5 mm'
     """
     found = result.details.get("verdict")
     return sentence(found, unit) if found else ""
