@@ -123,7 +123,12 @@ def _facts(mesh: Mesh) -> list[tuple[str, str]]:
     if mesh.stars:
         positive, negative, absolute = average(measure.curvature_features, mesh)
         rows += [
-            ("loss_gc", f"{absolute:.4g} 1/size^2 (mean |K|)"),
+            (
+                "mean |K|",
+                f"{average(measure.mean_abs_K, mesh):.4g} 1/size^2 (1 on a unit sphere)",
+            ),
+            ("loss_gc_worst", f"{average(measure.loss_gc_worst, mesh):.4g} 1/size^2"),
+            ("loss_gc", f"{absolute:.4g} 1/size^2 (published: one triangulation)"),
             ("K_P, K_N", f"{positive:.4g}, {negative:.4g} 1/size^2 (mean K > 0, mean K < 0)"),
         ]
     else:

@@ -74,11 +74,12 @@ def _rising(values: Sequence[Array], label: str, colours: str, top: float = _TOP
 def curvatures(meshes: Sequence[Mesh]) -> list[Heat]:
     """Absolute Gaussian curvature times the squared size of the first mesh, in one scale.
 
-    Where all have its faces, that is the size of each of its components.
+    In the triangulation of the quads where it is larger. Where all have the first mesh's faces,
+    that is the size of each of its components.
     """
     alike = all(np.array_equal(m.faces, meshes[0].faces) for m in meshes)
     size = sizes(meshes[0]) if alike else metrics.unit(meshes[0])
-    values = [per_face(m, np.abs(metrics.curvature(m)) * size**2) for m in meshes]
+    values = [per_face(m, np.abs(metrics.worst_curvature(m)) * size**2) for m in meshes]
     scale = _rising(values, "|K| · size²", "OrRd")
     return [Heat(v, scale) for v in values]
 
