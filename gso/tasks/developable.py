@@ -141,7 +141,7 @@ class Options(BaseOptions):
 
 #: Factor on the weight of curvature on meshes that are no grids: more of it stays there, around
 #: irregular vertices and for want of coarser grids to begin with.
-GENERAL = 2.0
+GENERAL = 1.8
 #: Curvature at which half of the design's own bending counts as wanted.
 FLAT_CURVATURE = 0.02
 #: A design is a developable surface with noise on it when smoothing leaves at most this
