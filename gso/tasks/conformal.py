@@ -157,6 +157,9 @@ def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[s
     """Metrics of a conformal image (n, 2) of `mesh`; units: :data:`gso.metrics.INFO`."""
     distortion = measure.quasi_conformal(mesh, flat) - 1.0
     distortion = distortion[~np.isnan(distortion)]
+    if not distortion.size:
+        # No face has an area to speak of.
+        return {"flipped_cells": float(measure.flips(mesh, flat))}
     lengths = np.sqrt(np.prod(measure.stretches(mesh, flat), axis=0))
     return {
         "angle_distortion_mean": float(distortion.mean()),
