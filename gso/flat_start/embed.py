@@ -53,8 +53,7 @@ def embeddings(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
     for ids in parts(mesh):
         local = np.full(len(mesh.vertices), -1)
         local[ids] = np.arange(len(ids))
-        faces = mesh.faces[local[mesh.faces[:, 0]] >= 0]
-        part = Mesh(mesh.vertices[ids], np.where(faces < 0, -1, local[faces]))
+        part = _part(mesh, ids)
         _check(part, int(ids[0]))
         own = (local[t[local[t[:, 0]] >= 0]] for t in (triangles, upward))
         found.append((ids, _embed(part, *own)))

@@ -151,8 +151,8 @@ def stay_within(
     free = run(request)
     if free.status is Status.CANCELLED:
         return _cancelled(best, free), True
-    if _distance(request, free) <= bound and limit.value(free.points) < least:
-        return free, limit.met(limit.value(free.points))
+    if _distance(request, free) <= bound and (value := limit.value(free.points)) < least:
+        return free, limit.met(value)
     return best, limit.met(least)
 
 
