@@ -29,7 +29,11 @@ FAILED = "FAILED"
 _DEVELOPABLE = (
     "loss_gc_before",
     "loss_gc",
+    "loss_gc_worst_before",
+    "loss_gc_worst",
+    "loss_gc_half",
     "K_A_r",
+    "K_A_r_worst",
     "d_H",
     "distance_mean",
     "distance_max",
