@@ -106,7 +106,7 @@ def _results(
                 for name in figures.CURVES
                 if ("developable", 0.0, name) in records
             }
-            for metric in ("K_A_r", "d_H")
+            for metric in ("K_A_r_worst", "d_H")
         },
         "timing": [asdict(t) for t in times],
         "exponents": pages.exponents(times),

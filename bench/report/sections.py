@@ -17,8 +17,11 @@ from report.quality import Record, Records
 
 #: Headings of columns, and formats of their numbers.
 HEADINGS = {
-    "loss_gc": "loss_gc",
-    "K_A_r": "K_A-r",
+    "loss_gc": "loss_gc, published",
+    "loss_gc_worst": "loss_gc, worse split",
+    "loss_gc_half": "every 2nd vertex",
+    "K_A_r": "K_A-r, published",
+    "K_A_r_worst": "K_A-r, worse split",
     "d_H": "d_H %",
     "distance_mean": "true distance %",
     "fairness_ratio": "fairness out/in",
@@ -34,6 +37,8 @@ HEADINGS = {
     "off": "off the clean %",
     "objective_ratio": "objective out/in",
 }
+#: Columns that describe the input.
+GIVEN = ("theta_noisy",)
 #: Metrics that are no part of the package's, or have another name there: is lower better?
 _LOWER = {"unflipped": False, "rate": False, "off": True, "objective_ratio": True}
 
@@ -102,6 +107,12 @@ class Section:
     default: str = ""
 
     @property
+    def main(self) -> str:
+        """The metric that the task is about; never one that a method can lower unseen."""
+        first = next(m for m in self.columns if m not in GIVEN)
+        return "loss_gc_worst" if first == "loss_gc" else first
+
+    @property
     def methods(self) -> list[Method]:
         """The methods that it has rows of."""
         every = [m for m in methods().values() if m.task == self.task]
@@ -114,7 +125,16 @@ class Section:
         return records.get((self.task, self.sigma, method.name), [])
 
 
-_DEVELOPABLE = ("loss_gc", "K_A_r", "d_H", "fairness_ratio")
+#: The published figures see one triangulation of the quads; the others are honest.
+_DEVELOPABLE = (
+    "loss_gc",
+    "loss_gc_worst",
+    "loss_gc_half",
+    "K_A_r",
+    "K_A_r_worst",
+    "d_H",
+    "fairness_ratio",
+)
 
 SECTIONS = (
     Section(

@@ -22,7 +22,7 @@ from report.surfaces import Case, Surfaces
 
 #: What the parameters are chosen by; lower is better.
 _SCORE: dict[str, Callable[[Case, Array], float]] = {
-    "developable": lambda case, points: metrics.loss_gc(points),
+    "developable": lambda case, points: metrics.loss_gc_worst(points),
     "denoise": lambda case, points: metrics.normal_angle(case.surface, points),
 }
 #: Share of the input's score that a result must be below, not to count as nothing done.

@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from report.quality import Record, Records
-from report.sections import HEADINGS, SECTIONS, Section, lower_is_better
+from report.sections import GIVEN, HEADINGS, SECTIONS, Section, lower_is_better
 from report.timing import Timing
 
 #: What is compared beside the metrics of a table.
 TIME = "seconds"
-_GIVEN = ("theta_noisy",)
 #: Rows that are no results but what results begin with.
 _STARTS = ("Init",)
 
@@ -91,7 +90,7 @@ def losses(records: Records) -> list[Loss]:
     found = [
         Loss(section.name, metric, section.default, winners)
         for section in SECTIONS
-        for metric in [m for m in section.columns if m not in _GIVEN] + [TIME]
+        for metric in [m for m in section.columns if m not in GIVEN] + [TIME]
         if (winners := list(_winners(section, metric, records)))
     ]
     return sorted(found, key=lambda loss: not loss.lost)
@@ -100,7 +99,6 @@ def losses(records: Records) -> list[Loss]:
 def _winners(section: Section, metric: str, records: Records) -> Iterator[Winner]:
     own = {m.name: section.of(records, m) for m in section.methods if not m.peer}
     default = own[section.default]
-    main = next(m for m in section.columns if m not in _GIVEN)
     for name, figures in section.published.items():
         if metric in figures and name not in _STARTS:
             yield from _against(section, metric, f"the paper's {name}", figures[metric], own)
@@ -113,9 +111,9 @@ def _winners(section: Section, metric: str, records: Records) -> Iterator[Winner
         theirs = _mean(given, where, metric)
         if theirs is None:
             continue
-        central, ours = _mean(given, where, main), _mean(default, where, main)
-        worse = central is not None and ours is not None and _better(main, ours, central)
-        but = f"{HEADINGS[main]} {central:.3g} against {ours:.3g}" if worse else ""
+        central, ours = _mean(given, where, section.main), _mean(default, where, section.main)
+        worse = central is not None and ours is not None and _better(section.main, ours, central)
+        but = f"{HEADINGS[section.main]} {central:.3g} against {ours:.3g}" if worse else ""
         for winner in _against(section, metric, method.name, theirs, own, where):
             yield replace(winner, but=but)
 

@@ -20,8 +20,9 @@ SCORE = {"developable": "score", "flatten": "strain_mean", "denoise": "theta"}
 def figures(task: str, before: Array, result: Array) -> dict[str, float]:
     """Metrics of one result; for "denoise" `before` is the surface without noise.
 
-    "score" weighs what is left of the curvature against the distance as the published
-    figures of Net-CF do: each counts as much as a tenth of its own figure.
+    "score" weighs what is left of the curvature, by the worse triangulation, against the
+    distance as the published figures of Net-CF do: each counts as much as a tenth of its own
+    figure.
     """
     if task == "denoise":
         return {"theta": metrics.normal_angle(before, result)}
@@ -37,12 +38,15 @@ def figures(task: str, before: Array, result: Array) -> dict[str, float]:
         }
     found = {
         "loss_gc": metrics.loss_gc(result, scale=1.0),
+        "loss_gc_worst": metrics.loss_gc_worst(result, scale=1.0),
+        "loss_gc_half": metrics.loss_gc_half(result, scale=1.0),
         "K_A_r": metrics.K_A_r(before, result),
+        "K_A_r_worst": metrics.K_A_r_worst(before, result),
         "d_H": metrics.d_H(before, result),
         "fairness_ratio": metrics.fairness_ratio(before, result),
     }
-    left = 1.0 - found["K_A_r"]
-    return found | {"score": left / 0.1232 + found["d_H"] / 0.517 + found["loss_gc"] / 0.0291}
+    left, curved = 1.0 - found["K_A_r_worst"], found["loss_gc_worst"]
+    return found | {"score": left / 0.1232 + found["d_H"] / 0.517 + curved / 0.0291}
 
 
 def mean_figures(task: str, befores: Array, results: Array) -> dict[str, float]:
