@@ -64,6 +64,26 @@ def test_a_settled_session_is_a_solve_at_once(weight):
     assert result.warm_start == "session" and result.backend == at_once.backend
 
 
+def test_a_settled_session_never_has_more_energy_than_a_solve_at_once():
+    mesh = Mesh.from_grid(np.dstack([*np.mgrid[:21.0, :21.0], np.zeros((21, 21))]))
+    v, (fixed, hand) = (
+        mesh.vertices,
+        (mesh.grid_index[rows].ravel() for rows in (slice(2), [-2, -1])),
+    )
+    goal = v[hand] - [6, 0, 0]
+    session = gso.tno.Session(mesh, constraints=[gso.Fixed(fixed), gso.Handle(hand, v[hand])])
+    for share in np.linspace(0.1, 1.0, 10):
+        session.move(hand, v[hand] + share * (goal - v[hand]))  # pushed together, in its plane
+        session.step()
+    result = session.settle()
+    constraints = [gso.Fixed(fixed), gso.Handle(hand, goal)]
+    at_once = gso.tno.optimize(mesh, task="bend", constraints=constraints)
+    assert sum(result.energy.values()) <= (1 + 1e-3) * sum(at_once.energy.values())
+    assert result.usable and at_once.usable
+    assert any("solve from the design" in note for note in result.notes)
+    np.testing.assert_allclose(session.vertices, result.mesh.vertices, atol=1e-12)
+
+
 def test_a_surface_lags_less_than_a_frame_behind():
     session = bending()
     for angle in np.linspace(0.05, 1.0, 20):

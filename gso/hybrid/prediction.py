@@ -94,7 +94,7 @@ def predictions(
         try:
             grid, patch = _seen(design, task)
             if not alone:
-                _check_curvature(grid)
+                _check_curvature(design, grid)
             sizes.setdefault(grid.shape, []).append((k, grid, patch))
         except MeshError as error:
             found[k] = Prediction(None, time.perf_counter() - clock, name, str(error))
@@ -151,14 +151,20 @@ def _seen(design: Mesh, task: str) -> tuple[Array, Patch | None]:
     return patch.grid, patch
 
 
-def _check_curvature(grid: Array) -> None:
+def _check_curvature(design: Mesh, grid: Array) -> None:
     """Refuse surfaces far from all that nets are taught: what they make of those is a lottery."""
     curved = metrics.loss_gc(grid)
-    if curved > CURVED:
-        raise MeshError(
-            f"mean |K| in the unit ball is {curved:.3g}, and above {CURVED:.2g} is too far from "
-            "what nets are taught"
+    if curved <= CURVED:
+        return
+    what = "mean |K| in the unit ball"
+    if design.grid is None:
+        own = metrics.loss_gc_worst(design)
+        what += (
+            f" is {own:.3g} on the mesh; on the grid of {len(grid)} x {len(grid)} for the net it"
         )
+    raise MeshError(
+        f"{what} is {curved:.3g}, and above {CURVED:.2g} is too far from what nets are taught"
+    )
 
 
 def _predicted(grids: Array, task: str, net: Any, passes: int | None) -> Sequence[Any]:

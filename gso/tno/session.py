@@ -34,6 +34,8 @@ Ints = NDArray[np.int64]
 
 #: Most iterations of :meth:`Session.settle`.
 _SETTLED = 100
+#: Energies this close, as a share, are those of one minimum.
+_SAME = 1e-3
 
 
 class Session:
@@ -107,7 +109,8 @@ class Session:
         self._solver: Any = None
         self._problem: Problem | None = None
         self._direction = DIRECTIONS[self._options.method]()
-        self._plan = self._planned(constraints, self._frame.start(x0, flat=False))
+        self._x0 = self._frame.start(x0, flat=False)
+        self._plan = self._planned(constraints, self._x0)
         self._status = self._plan.status or Status.CONVERGED
         self._coordinates = self._solved(self._plan)
         self._pose()
@@ -188,11 +191,36 @@ class Session:
     def settle(self) -> Result:
         """Iterate until the task's tolerance is met and all constraints hold.
 
+        An energy has many minima, and the one that handles were dragged into may be a bad one.
+        So the solve of :func:`gso.tno.optimize`, from the design, is made as well. Its result
+        is taken where only that one is usable, or where it has less energy.
+
         Returns
         -------
         Result
-            The :meth:`result`; with a `ConvergenceWarning` where that was not reached.
+            The :meth:`result`; with a `ConvergenceWarning` where the tolerance was not reached.
+            A note says that the solve from the design was taken, and how far from the dragged
+            surface it is.
         """
+        result = self._settled()
+        if self._stage is not None:
+            dragged, kept = result, (self._plan, self._coordinates, self._status)
+            self._plan = self._planned(self._constraints, self._x0)
+            self._coordinates = self._solved(self._plan)
+            self._pose()
+            result = self.result()
+            if _better(result, dragged):
+                result.notes += (_jumped(dragged, result),)
+            else:
+                result = dragged
+                self._plan, self._coordinates, self._status = kept
+                self._pose()
+        if not result.converged:
+            warnings.warn(warning(result) or str(result.status), ConvergenceWarning, stacklevel=2)
+        return result
+
+    def _settled(self) -> Result:
+        """The result of iterating from where the surface is."""
         stage = self._stage
         if stage is not None:
             solution = self._iterate(stage, _SETTLED, stage.tolerance)
@@ -202,10 +230,7 @@ class Session:
             self._coordinates, _ = tighten(aimed, before, solution, solve)
             if self._coordinates is not before:
                 self._pose()
-        result = self.result()
-        if not result.converged:
-            warnings.warn(warning(result) or str(result.status), ConvergenceWarning, stacklevel=2)
-        return result
+        return self.result()
 
     def result(self) -> Result:
         """The surface as it is, as a result of :func:`gso.tno.optimize`."""
@@ -320,3 +345,25 @@ class Session:
         self._run.iterations += solution.iterations
         self._run.history += solution.history
         return solution
+
+
+def _better(one: Result, other: Result) -> bool:
+    """Whether a result is usable where the other is not, or has less energy."""
+    if one.usable != other.usable:
+        return one.usable
+    return sum(one.energy.values()) < (1.0 - _SAME) * sum(other.energy.values())
+
+
+def _jumped(dragged: Result, taken: Result) -> str:
+    """How the result taken differs from the dragged one."""
+    apart = np.linalg.norm(taken.mesh.vertices - dragged.mesh.vertices, axis=1)
+    k = int(apart.argmax())
+    why = (
+        "has less energy than the dragged surface"
+        if taken.usable == dragged.usable
+        else "is usable and the dragged surface is not"
+    )
+    return (
+        f"the solve from the design {why}, and was taken; the two are up to {apart[k]:.4g} apart, "
+        f"at vertex {k}"
+    )
