@@ -21,7 +21,7 @@ def orientation(triangles: Ints, layout: Layout) -> Limit:
     Along a step the signed area of a triangle is a parabola in the step length; the step
     ends at :data:`SAFETY` of its smallest positive root over all triangles (Smith and
     Schaefer 2015, Bijective parameterization with free boundaries, section 3.3).
-    Triangles that are turned over already are let go.
+    Triangles that are inverted already are ignored.
 
     Parameters
     ----------

@@ -72,9 +72,7 @@ INFO: dict[str, Info] = {
     "strain_p99": Info("", True, "99th percentile of the larger principal strain"),
     "strain_max": Info("", True, "largest principal strain", "max"),
     "area_error": Info("", True, "mean |A'/A - 1| over corner triangles"),
-    "flipped_cells": Info(
-        "", True, "cells turned over (of grids: with a corner turned over)", "sum"
-    ),
+    "flipped_cells": Info("", True, "inverted cells (of grids: with an inverted corner)", "sum"),
     "angle_distortion_mean": Info("", True, "mean over faces of s1/s2 - 1, principal stretches"),
     "angle_distortion_p99": Info("", True, "99th percentile of s1/s2 - 1"),
     "scale_min": Info("", False, "smallest ratio of lengths, flat over surface", "min"),
@@ -630,7 +628,7 @@ def area_error(surface: Any, flat: Any) -> float:
 
 
 def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None, *, surface: Any = None) -> int:
-    """Number of cells that are turned over in a flat image.
+    """Number of inverted cells in a flat image.
 
     A grid cell (`flat` is (H, W, 2)) counts when any of its four corner triangles has
     signed area <= 0; another quad (`flat` is (n, 2), `faces` given), which may be an arrow,
@@ -650,7 +648,7 @@ def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None, *, surface:
 def _flipped(
     points: Array, faces: NDArray[np.int64], space: Array | None, *, grid: bool
 ) -> NDArray[np.bool_]:
-    """Which faces (m,) are turned over in an image (n, 2), quads first."""
+    """Which faces (m,) are inverted in an image (n, 2), quads first."""
     quads, tris = topology.by_size(faces)
     # Corners 1 and 3 are the split along the diagonal 0-2, corners 0 and 2 the other one.
     bad = corner_areas(points, quads).reshape(4, -1) <= 0
@@ -664,7 +662,7 @@ def _flipped(
 
 
 def flipped_faces(mesh: Mesh, flat: Array) -> NDArray[np.int64]:
-    """Faces of a mesh that are turned over in its flat image (n, 2), by number.
+    """Faces of a mesh that are inverted in its flat image (n, 2), by number.
 
     Those that :func:`flips` counts.
 

@@ -39,11 +39,13 @@ class Result:
         The optimised surface, vertices in the input's order and unit; for `flatten` the
         pattern at z = 0.
     flat : ndarray, (n, 2), or None
-        The flat image, where the task makes one, in the input's unit of length; None where the
+        The flat image, where the solve has one, in the input's unit of length; None where the
         surface was cut open for it.
     pattern : Pattern or None
         The flat pattern as a mesh of its own, with the surface's vertex that each of its vertices
-        is: of the surface as it is, or cut open.
+        is: of the surface as it is, or cut open. Of `developable`: the one with the least strain
+        that was found, by which the strain in the metrics is measured; None where the surface
+        must be cut open first, or no verdict was asked for.
     cell_scale : ndarray, (m,), or None
         Of `conformal`: the length of a face's diagonals (sides, of a triangle) in the flat
         image over that on the surface, in the order of the input's faces.
@@ -65,9 +67,6 @@ class Result:
     reasons : tuple of str
         Why the result cannot be used as what was asked for, and where; see :mod:`gso.verdict`.
         The notes have them too.
-    layout : ndarray, (n, 2), or None
-        Of `developable`: the pattern by which its strain is measured, in the input's unit; None
-        where the surface must be cut open first, or no verdict was asked for.
     notes : tuple of str
         What was repaired in the input or restricted in the run, and the reasons.
     details : dict
@@ -108,7 +107,6 @@ class Result:
     spline: BSplineSurface | None = None
     cell_scale: Array | None = None
     reasons: tuple[str, ...] = ()
-    layout: Array | None = None
     pattern: Pattern | None = None
     components: list[Result] = field(default_factory=list)
     names: NDArray[np.int64] | None = None
@@ -126,7 +124,7 @@ class Result:
     def usable(self) -> bool:
         """Whether it can be used as what was asked for: there are no :attr:`reasons` against it.
 
-        Without a verdict: whether it is complete, finite, and has no cell turned over.
+        Without a verdict: whether it is complete, finite, and has no inverted cell.
         """
         points = self.mesh.vertices if self.pattern is None else self.pattern.flat
         return bool(
@@ -160,20 +158,19 @@ class Result:
         if self.components:
             areas = [area(part.design) for part in self.components]
             return combined([part.metrics for part in self.components], areas)
-        module = tasks.get(self.task)
-        if self.pattern is None or not self.pattern.is_cut:
-            known = measured(self.task, self.design, self.mesh, self.flat)
-        elif getattr(module, "BLOCK", "surface") == "flat":
-            surface = self.pattern.surface(self.design)
-            known = measured(self.task, surface, self.pattern.mesh, self.pattern.flat)
-        else:
-            own = measured(self.task, self.design, self.mesh, None)
-            surface = self.pattern.surface(self.mesh)
-            known = own | module.flat_metrics(surface, self.pattern.flat)
-            return strains(surface, self.pattern.flat) | known
-        if self.layout is None:
+        module, pattern = tasks.get(self.task), self.pattern
+        if pattern is not None and getattr(module, "BLOCK", "surface") == "flat":
+            if pattern.is_cut:
+                surface = pattern.surface(self.design)
+                return measured(self.task, surface, pattern.mesh, pattern.flat)
+            return measured(self.task, self.design, self.mesh, self.flat)
+        known = measured(self.task, self.design, self.mesh, self.flat)
+        if pattern is None or self.task != "developable":
             return known
-        found = strains(self.mesh, self.layout)
+        surface = pattern.surface(self.mesh)
+        if pattern.is_cut:
+            known |= module.flat_metrics(surface, pattern.flat)
+        found = strains(surface, pattern.flat)
         return found | {k: v for k, v in known.items() if k not in found}
 
     def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
@@ -247,10 +244,8 @@ class Result:
         }
         if self.flat is not None:
             arrays["flat"] = self.flat
-        elif self.pattern is not None:
+        if self.pattern is not None and self.pattern.flat is not self.flat:
             arrays |= {f"pattern_{name}": getattr(self.pattern, name) for name in _PATTERN}
-        if self.layout is not None:
-            arrays["layout"] = self.layout
         if self.cell_scale is not None:
             arrays["cell_scale"] = self.cell_scale
         if self.spline is not None:
@@ -299,7 +294,6 @@ class Result:
                 pattern,
             )
             result.spline = BSplineSurface.from_arrays(data)
-            result.layout = _checked(data, "layout", (len(design.vertices), 2))
             label = _checked(data, "component", (len(design.vertices),))
             if label is not None:
                 result._divide(record.get("components", []), label.astype(np.int64))
@@ -361,7 +355,7 @@ class Result:
 
 
 def _pattern(data: Mapping[str, Any], design: Mesh) -> Pattern | None:
-    """The pattern of a design that was cut open, from a file's arrays; None where there is none."""
+    """The pattern that a file has beside the flat image, or None."""
     if "pattern_flat" not in data:
         return None
     flat, faces, vertex, seams = (data[f"pattern_{name}"] for name in _PATTERN)

@@ -25,7 +25,7 @@ def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
     """Faces that are folded onto a neighbour, or onto themselves, in both triangulations.
 
     The normals of two triangles at an edge then differ by more than 120 degrees: a face is
-    turned over, or the surface has a sharp crease. Quads count as the triangles along both
+    inverted, or the surface has a sharp crease. Quads count as the triangles along both
     diagonals. A quad is folded onto itself when the two triangles along a diagonal are; where
     the mesh is no grid, along both diagonals, since an arrow-shaped one is not.
 

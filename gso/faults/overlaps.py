@@ -21,7 +21,7 @@ def overlaps(mesh: Mesh, flat: Array) -> Ints:
     """Faces that lie on each other in a flat image, components included.
 
     Faces that share an edge or touch are not meant, nor are faces that reach over each other by
-    less than a thousandth of their width, nor, by themselves, faces turned over: see
+    less than a thousandth of their width, nor, by themselves, inverted faces: see
     :func:`gso.metrics.flipped_faces` for those.
 
     Parameters

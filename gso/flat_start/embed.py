@@ -1,4 +1,4 @@
-"""Plane images of disk-like meshes in which no face is turned over."""
+"""Plane images of disk-like meshes in which no face is inverted."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def embeddings(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
     triangles : ndarray of int, (t, 3)
         Triangles that carry strain.
     upward : ndarray of int, (u, 3)
-        Triangles that must not be turned over.
+        Triangles that must not be inverted.
 
     Returns
     -------

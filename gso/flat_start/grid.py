@@ -19,7 +19,7 @@ def rectangle(grid: Array) -> Array:
     -------
     ndarray, (H, W, 2)
         Rows run along x, columns along y; vertex (0, 0) is at the origin. No cell is
-        turned over.
+        inverted.
 
     Examples
     --------

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gso import geometry
 from gso.cutting import Cut, cut, joining
+from gso.faults import overlaps
 from gso.flat_start.begin import DOUBTFUL, begin
 from gso.flat_start.embed import parts
 from gso.mesh import Mesh
@@ -77,8 +78,8 @@ def opened(mesh: Mesh, *, iterations: int = 100) -> Opened:
 
     A disk with holes lies flat with its holes; a tube does not. Both have several boundary
     loops, so both ways are tried: without a cut, and cut along a tree of shortest lines that
-    joins the loops. The cut stays where the strain without it is large and that with it
-    is much less. Holes in the side of a tube, round which the surface turns as round a hole
+    joins the loops. The cut stays where the strain without it is large, that with it is much less,
+    and the sheet that it makes does not lie on itself. Holes in the side of a tube, round which the surface turns as round a hole
     in the plane, stay closed where that strains it no more.
 
     Parameters
@@ -122,14 +123,15 @@ def by_rows(mesh: Mesh) -> tuple[Mesh, Ints]:
 
 def _best(mesh: Mesh, ids: Ints, loops: list[Ints], iterations: int) -> tuple[Ints, str] | None:
     """Edges to cut one component along, and what to say about it; None to leave it whole."""
-    uncut = _level(mesh, ids, np.empty((0, 2), np.int64), iterations)
+    uncut, lies_on_itself = _tried(mesh, ids, np.empty((0, 2), np.int64), iterations)
     if uncut <= _SMALL:
         return None
     turned = [abs(turning(mesh, loop) + 2.0 * np.pi) > _TURN for loop in loops]
     tube = [loop for loop, turns in zip(loops, turned, strict=True) if turns]
     choices = [tube, loops] if 2 <= len(tube) < len(loops) else [loops]
     trees = [joining(mesh, some) for some in choices]
-    levels = [_level(mesh, ids, tree, iterations) for tree in trees]
+    tried = [_tried(mesh, ids, tree, iterations) for tree in trees]
+    levels = [level if lies_on_itself or not bad else np.inf for level, bad in tried]
     enough = max(_ALIKE * min(levels), _SMALL)
     which = next(k for k, level in enumerate(levels) if level <= enough)
     if levels[which] > (_BETTER if uncut > _BAD else _MUCH_BETTER) * uncut:
@@ -143,14 +145,18 @@ def _best(mesh: Mesh, ids: Ints, loops: list[Ints], iterations: int) -> tuple[In
     )
 
 
-def _level(mesh: Mesh, ids: Ints, edges: Ints, iterations: int) -> float:
-    """Root-mean-square strain of one component, cut along edges, at the start of its layout."""
+def _tried(mesh: Mesh, ids: Ints, edges: Ints, iterations: int) -> tuple[float, bool]:
+    """How one component lies flat, cut along edges, at the start of its layout.
+
+    Its root-mean-square strain, and whether it lies on itself.
+    """
     local = np.full(len(mesh.vertices), -1)
     local[ids] = np.arange(len(ids))
     faces = mesh.faces[local[mesh.faces[:, 0]] >= 0]
     part = Mesh(mesh.vertices[ids], np.where(faces < 0, -1, local[faces]))
     ready, _ = by_rows(cut(part, local[edges]).mesh)
-    return begin(ready, iterations=iterations, doubtful=_SMALL).level
+    start = begin(ready, iterations=iterations, doubtful=_SMALL)
+    return start.level, bool(overlaps(ready, start.flat).size)
 
 
 def turning(mesh: Mesh, loop: Ints) -> float:

@@ -62,7 +62,8 @@ def together(
         result.names = piece.vertices
     areas = [piece.area for piece in pieces]
     flat = _laid_out(len(design.vertices), pieces, jobs, results)
-    pattern = _side_by_side(design, pieces, results) if flat is None else None
+    own = all(r.pattern is None or r.pattern.flat is r.flat for r in results)
+    pattern = None if own and flat is not None else _side_by_side(design, pieces, results)
     if whole.constraints.flat and flat is not None:
         mesh = design.replaced(np.c_[flat, np.zeros(len(flat))])
     elif whole.constraints.flat and pattern is not None:
@@ -105,7 +106,7 @@ def together(
 def _side_by_side(
     design: Mesh, pieces: Sequence[Component], results: Sequence[Result]
 ) -> Pattern | None:
-    """Patterns of the components beside each other, where some are cut open."""
+    """Patterns of the components beside each other; None where one has none."""
     patterns = [r.pattern for r in results if r.pattern is not None]
     if len(patterns) < len(results):
         return None

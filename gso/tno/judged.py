@@ -37,11 +37,7 @@ def judged(result: Result, asked: Asked) -> Result:
     """
     if result.task == "developable" and np.isfinite(result.mesh.vertices).all():
         clock = time.perf_counter()
-        pattern = lay_out(result.mesh, result.pattern)
-        if pattern is not None and pattern.is_cut:
-            result.pattern = pattern
-        elif pattern is not None:
-            result.layout = pattern.flat
+        result.pattern = lay_out(result.mesh, result.pattern)
         result.seconds["pattern"] = time.perf_counter() - clock
         result.notes += _planarity(result)
     clock = time.perf_counter()

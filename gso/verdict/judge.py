@@ -27,7 +27,7 @@ def judge(result: Result, asked: Asked) -> tuple[str, ...]:
     Parameters
     ----------
     result : Result
-        As the solver left it, with its `layout` where it has one.
+        As the solver left it, with its `pattern` where it has one.
     asked : Asked
         What it must keep to.
 
@@ -41,8 +41,8 @@ def judge(result: Result, asked: Asked) -> tuple[str, ...]:
 def _reasons(result: Result, asked: Asked) -> Iterator[str]:
     if result.status.refuses:
         yield str(result.status)
-    flat = result.layout if result.flat is None else result.flat
-    for points in (result.mesh.vertices, flat):
+    pattern = result.pattern
+    for points in (result.mesh.vertices, None if pattern is None else pattern.flat):
         if points is None or np.isfinite(points).all():
             continue
         wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
@@ -54,7 +54,7 @@ def _reasons(result: Result, asked: Asked) -> Iterator[str]:
         surface = result.mesh
         if result.status is not Status.ALREADY_GOOD:
             yield from against_surface(result.design, surface)
-    if flat is not None:
-        yield from against_pattern(surface, flat, lengths=result.task not in _STRETCHED)
+    if pattern is not None:
+        yield from against_pattern(surface, pattern, lengths=result.task not in _STRETCHED)
     if result.task in TASKS:
         yield from TASKS[result.task](result, asked)

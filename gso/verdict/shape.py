@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gso import faults, metrics
 from gso.mesh import Mesh
+from gso.pattern import Pattern
 from gso.verdict.wording import places
 
 Array = NDArray[np.float64]
@@ -30,20 +31,24 @@ def against_surface(design: Mesh, surface: Mesh) -> Iterator[str]:
     yield from _collapsed(design, surface.vertices, "the surface")
 
 
-def against_pattern(surface: Mesh, flat: Array, *, lengths: bool = True) -> Iterator[str]:
-    """Reasons against the flat image (n, 2) of a surface; `lengths`: it should keep them."""
+def against_pattern(surface: Mesh, pattern: Pattern, *, lengths: bool = True) -> Iterator[str]:
+    """Reasons against the pattern of a surface; `lengths`: it should keep them."""
+    surface, flat = pattern.surface(surface), pattern.flat
     bad = metrics.flipped_faces(surface, flat)
     if bad.size:
-        yield f"the pattern is turned over at {places('face', bad)}"
+        yield f"the pattern is inverted at {places('face', bad)}"
     bad = np.setdiff1d(faults.overlaps(surface, flat), bad)
     if bad.size:
         yield (f"the pattern lies on itself at {places('face', bad)}: cut the surface into pieces")
     if lengths:
-        yield from _collapsed(surface, flat, "the pattern")
+        yield from _collapsed(surface, flat, "the pattern", pattern.vertex)
 
 
-def _collapsed(before: Mesh, after: Array, what: str) -> Iterator[str]:
+def _collapsed(before: Mesh, after: Array, what: str, names: Ints | None = None) -> Iterator[str]:
+    """Reasons from short edges; `names` are the numbers of the vertices for the user."""
     edges = faults.collapsed(before, after)
+    if names is not None:
+        edges = names[edges]
     if len(edges):
         share = f"{100 * faults.SHORT:.0f} %"
         named = [f"{a}-{b}" for a, b in edges]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 #: Share by which curvature or roughness must change to count as better or worse.
 _SAME = 0.01
-#: Strain of a triangle that is squeezed to a line or doubled: a face that has turned over.
+#: Strain of a triangle that is squeezed to a line or doubled: an inverted face.
 _WHOLE = 0.99
 #: Share of the diagonal beyond which a result is another surface than the design.
 _FAR = 0.5
@@ -34,12 +34,9 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
     before, after = (asked_curvature(m, scale=scale) for m in (design, mesh))
     strain = None
     found = {"deviation": deviation, **asked.limits}
-    if result.layout is not None:
-        strains = np.nan_to_num(metrics.face_strains(mesh, result.layout))
-    elif result.pattern is not None:
+    if result.pattern is not None:
         surface = result.pattern.surface(mesh)
         strains = np.nan_to_num(metrics.face_strains(surface, result.pattern.flat))
-    if result.layout is not None or result.pattern is not None:
         strain = found["strain_max"] = float(strains.max())
     allowed = asked.max_strain
     if allowed is None and asked.max_deviation is not None:
