@@ -1,4 +1,4 @@
-"""Write the tables of README.rst and docs: ``python docs/tables.py`` from the repository's root.
+"""Write the tables of docs: ``python docs/tables.py`` from the repository's root.
 
 They are made from the docstrings and values in the code, and from the figures that
 ``python bench/run_all.py --store`` measured. Each stands in one place, between the comments
@@ -24,7 +24,7 @@ from gso.net import catalogue
 
 ROOT = Path(__file__).resolve().parents[1]
 #: Files with tables.
-PAGES = (ROOT / "README.rst", ROOT / "docs" / "benchmarks.rst", ROOT / "docs" / "net.rst")
+PAGES = tuple(ROOT / "docs" / f"{name}.rst" for name in ("reference", "benchmarks", "net"))
 #: What was measured; without it there are no tables of it.
 RESULTS = ROOT / "bench" / "data" / "results.json"
 
@@ -205,7 +205,7 @@ def descriptions(options: type) -> dict[str, str]:
 
 
 def prose(text: str) -> str:
-    """Text of a docstring for a README: bars are no substitutions, names are literals."""
+    """Text of a docstring in reStructuredText: bars are no substitutions, names are literals."""
     literal = re.sub(r"(?<!`)`([^`]+)`(?!`)", r"``\1``", text)
     return "".join(
         part if part.startswith("``") else part.replace("|", r"\|")

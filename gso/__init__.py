@@ -9,7 +9,96 @@
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    # The same names for type checkers and editors; they are imported at first use.
+    from gso import constraints, dataset, hybrid, io, metrics, net, plot, rulings, tno, topology
+    from gso import verdict as verdict
+    from gso.constraints import (
+        Fixed,
+        FixedBoundary,
+        FixedLengths,
+        Glue,
+        Handle,
+        OnCurve,
+        PlanarFaces,
+        SlidingBoundary,
+        SymmetryPlane,
+    )
+    from gso.fit import fit_spline
+    from gso.io import as_mesh, load, save, save_spline
+    from gso.mesh import Mesh
+    from gso.result import Result
+    from gso.spline import BSplineSurface
+    from gso.status import (
+        BackendError,
+        ConvergenceWarning,
+        DatasetError,
+        GSOError,
+        MeshError,
+        OptionError,
+        Progress,
+        Status,
+        WeightsError,
+    )
+    from gso.tasks.bend import Options as BendOptions
+    from gso.tasks.conformal import Options as ConformalOptions
+    from gso.tasks.denoise import Options as DenoiseOptions
+    from gso.tasks.developable import Options as DevelopableOptions
+    from gso.tasks.flatten import Options as FlattenOptions
+    from gso.tasks.joint import Options as IsometryOptions
+    from gso.tasks.options import Options
+
+    __version__: str
+
+__all__ = [
+    "BSplineSurface",
+    "BackendError",
+    "BendOptions",
+    "ConformalOptions",
+    "ConvergenceWarning",
+    "DatasetError",
+    "DenoiseOptions",
+    "DevelopableOptions",
+    "Fixed",
+    "FixedBoundary",
+    "FixedLengths",
+    "FlattenOptions",
+    "GSOError",
+    "Glue",
+    "Handle",
+    "IsometryOptions",
+    "Mesh",
+    "MeshError",
+    "OnCurve",
+    "OptionError",
+    "Options",
+    "PlanarFaces",
+    "Progress",
+    "Result",
+    "SlidingBoundary",
+    "Status",
+    "SymmetryPlane",
+    "WeightsError",
+    "__version__",
+    "as_mesh",
+    "constraints",
+    "dataset",
+    "fit_spline",
+    "hybrid",
+    "io",
+    "load",
+    "metrics",
+    "net",
+    "plot",
+    "rulings",
+    "save",
+    "save_spline",
+    "tno",
+    "topology",
+    "verdict",
+]
 
 _NAMES = {
     "Mesh": "gso.mesh",
@@ -61,8 +150,6 @@ _MODULES = (
     "plot",
     "rulings",
 )
-
-__all__ = [*_NAMES, *_OPTIONS, *_MODULES, "__version__"]
 
 
 def __getattr__(name: str) -> Any:

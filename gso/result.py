@@ -25,7 +25,7 @@ _FORMAT = 1
 _PATTERN = ("flat", "faces", "vertex", "seams")
 
 
-@dataclass
+@dataclass(repr=False)
 class Result:
     """Outcome of :func:`gso.tno.optimize`.
 
@@ -114,6 +114,11 @@ class Result:
     def __post_init__(self) -> None:
         if self.pattern is None and self.flat is not None:
             self.pattern = Pattern.whole(self.design, self.flat)
+
+    def __repr__(self) -> str:
+        from gso.verdict.wording import summary
+
+        return summary(self)
 
     @property
     def converged(self) -> bool:

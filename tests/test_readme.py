@@ -20,6 +20,7 @@ from gso.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.rst"
+GUIDE, REFERENCE = (ROOT / "docs" / f"{name}.rst" for name in ("guide", "reference"))
 PAGES = [README, *sorted((ROOT / "docs").glob("*.rst"))]
 
 
@@ -63,14 +64,16 @@ def test_python_blocks_run(page, workshop):
         assert Path("panel_developable.obj").exists()
         assert Path("panel_pattern.svg").exists()
         assert scope["held"].metrics["deviation_max"] <= 10.0 / scope["mesh"].diagonal * (1 + 1e-6)
-        assert scope["aimed"].metrics["loss_gc"] <= 0.02
+        assert scope["aimed"].metrics["loss_gc_worst"] <= 0.02 * (1 + 0.05)
+        assert scope["strained"].metrics["strain_max"] <= 0.002 * (1 + 1e-6)
+    if page.stem == "extending":
         before = scope["problem"].by_term(scope["noisy"].vertices.ravel())["planarity"]
         assert scope["problem"].by_term(scope["solution"].x)["planarity"] < 0.1 * before
 
 
 def test_commands_run(workshop):
-    lines = [line for line in commands(README) if line.startswith("gso ")]
-    assert len(lines) > 5
+    lines = [line for line in commands(README) + commands(GUIDE) if line.startswith("gso ")]
+    assert len(lines) > 10
     pytest.importorskip("matplotlib")
     pytest.importorskip("OCP", exc_type=ImportError)
     for line in lines:
@@ -84,7 +87,7 @@ def test_commands_run(workshop):
 
 
 def test_every_option_of_a_command_in_the_readme_exists():
-    ours = [line for line in commands(README) if line.startswith("gso ")]
+    ours = [line for line in commands(README) + commands(GUIDE) if line.startswith("gso ")]
     named = set(re.findall(r"--[a-z][a-z-]+", "\n".join(ours)))
     known = {name for c in main.commands.values() for p in c.params for name in p.opts}
     assert named <= known
@@ -113,7 +116,7 @@ def test_tables_are_up_to_date(monkeypatch):
 
 
 def test_tables_name_every_metric_and_setting():
-    text = README.read_text()
+    text = REFERENCE.read_text()
     for name in gso.metrics.INFO:
         assert f"* - ``{name}``\n" in text
     for options in (gso.DevelopableOptions, gso.FlattenOptions, gso.DenoiseOptions):
@@ -124,7 +127,7 @@ def test_tables_name_every_metric_and_setting():
 def test_formulations_are_named():
     from gso import tasks
 
-    text = README.read_text()
+    text = REFERENCE.read_text()
     for task in tasks.names():
         names = ", ".join(f"``{name}``" for name in tasks.get(task).FORMULATIONS)
         assert f"   * - ``{task}``\n     - {names}\n" in text

@@ -78,9 +78,10 @@ def opened(mesh: Mesh, *, iterations: int = 100) -> Opened:
 
     A disk with holes lies flat with its holes; a tube does not. Both have several boundary
     loops, so both ways are tried: without a cut, and cut along a tree of shortest lines that
-    joins the loops. The cut stays where the strain without it is large, that with it is much less,
-    and the sheet that it makes does not lie on itself. Holes in the side of a tube, round which the surface turns as round a hole
-    in the plane, stay closed where that strains it no more.
+    joins the loops. The surface is cut where the strain without it is large, the strain with it
+    is much less, and the pattern does not overlap itself. Holes in the side of a tube, around
+    which the surface turns as around a hole in the plane, are left closed where that does not
+    add strain.
 
     Parameters
     ----------

@@ -73,6 +73,43 @@ def headline(result: Result, unit: str = "") -> str:
     return sentence(found, unit) if found else ""
 
 
+def summary(result: Result) -> str:
+    """What happened in a solve, in five lines at most; lengths are in the mesh's own unit.
+
+    Examples
+    --------
+    >>> from gso.tno import optimize
+    >>> u = np.linspace(-1, 1, 17)
+    >>> print(optimize(np.dstack([*np.meshgrid(u, u), 0.1 * np.outer(u, u)])))
+    Result of developable (curvature): usable, converged: ...
+      largest strain 0... %, deviation 0...
+      mean |K| 0.0... -> 0.00... in the unit ball
+      Mesh(289 vertices, 256 faces, grid 17 x 17)
+      ... iterations, ... s, banded, cold start
+    """
+    usable = "usable" if result.usable else "not usable"
+    why = result.reasons[0] if result.reasons else str(result.status)
+    found = result.metrics
+    lines = [headline(result)]
+    if lines[0] == why:
+        del lines[0]
+    if "mean_abs_K_before" in found:
+        change = f"{found['mean_abs_K_before']:.3g} -> {found['mean_abs_K']:.3g}"
+        lines.append(f"mean |K| {change} in the unit ball")
+    elif "strain_max" in found:
+        lines.append(
+            f"strain: mean {percent(found['strain_mean'])}, largest {percent(found['strain_max'])}"
+        )
+    elif "roughness_ratio" in found:
+        lines.append(f"roughness {found['roughness_ratio']:.3g} times the input's")
+    start = "cold start" if result.warm_start == "cold" else f"warm start: {result.warm_start}"
+    seconds = f"{sum(result.seconds.values()):.2g} s"
+    parts = [f"{result.iterations} iterations", seconds, result.backend, start]
+    lines += [repr(result.mesh), ", ".join(part for part in parts if part)]
+    first = f"Result of {result.task} ({result.formulation}): {usable}, {why}"
+    return "\n  ".join([first, *(line for line in lines if line)])
+
+
 def sentence(found: dict[str, float], unit: str = "") -> str:
     """:func:`headline` of what the verdict measured and what was asked for."""
     strain, deviation = found.get("strain_max"), found["deviation"]
