@@ -35,6 +35,7 @@ from tqdm import tqdm
 import gso
 from gso import metrics
 from gso.dataset import bezier
+from gso.tno.layout import strains_of
 
 ROOT = Path(__file__).resolve().parent.parent
 PRESETS = ("fast", "balanced", "accurate")
@@ -125,18 +126,20 @@ def developable() -> dict[str, Any]:
     rows, out = [], {}
     for preset in (*PRESETS, PURE):
         options = "balanced" if preset == PURE else preset
-        figures, seconds, backend = [], [], ""
+        figures, strains, seconds, backend = [], [], [], ""
         with without_extras() if preset == PURE else tempfile.TemporaryDirectory():
             gso.tno.optimize(surfaces[0], options=options)
             for points in progress(surfaces, preset):
                 result = gso.tno.optimize(points, options=options)
                 judged = result.seconds["pattern"] + result.seconds["verdict"]
                 figures.append(honest(points, result.grid))
+                strains.append(100.0 * result.metrics["strain_max"])
                 seconds.append(result.seconds["total"] - judged)
                 backend = result.backend
         name = f"balanced, {PURE}" if preset == PURE else preset
         mean = np.mean(figures, axis=0)
-        rows.append([name, *mean, np.median(seconds), np.max(seconds), backend])
+        strain = [np.median(strains), np.percentile(strains, 90)]
+        rows.append([name, *mean, *strain, np.median(seconds), np.max(seconds), backend])
         out[name] = [*map(float, mean), float(np.median(seconds))]
     table(
         "Developable, 24 surfaces, mean input loss_gc "
@@ -150,13 +153,24 @@ def developable() -> dict[str, Any]:
             "K_A-r worse",
             "d_H %",
             "fairness",
+            "strain %",
+            "90th",
             "median s",
             "max s",
             "backend",
         ],
         rows,
     )
+    print(
+        "  strain: the largest of each result's pattern, median and 90th percentile; of the input "
+        f"{100.0 * np.median([_strained(s) for s in surfaces]):.3g} %"
+    )
     return out
+
+
+def _strained(points: np.ndarray) -> float:
+    """Largest strain of a surface's pattern."""
+    return strains_of(gso.Mesh.from_grid(points))["strain_max"]
 
 
 def flat_figures(surface: Any, flat: np.ndarray) -> tuple[float, ...]:

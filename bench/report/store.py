@@ -98,7 +98,7 @@ def digest(key: Any) -> str:
 @lru_cache(maxsize=1)
 def solver() -> str:
     """Digest of the code that the optimiser's results and all measures depend on."""
-    aside = {PACKAGE / name for name in _ASIDE}
+    aside = set(_present(_ASIDE))
     return _content(
         path
         for path in PACKAGE.rglob("*.py")
@@ -109,22 +109,32 @@ def solver() -> str:
 @lru_cache(maxsize=1)
 def measures() -> str:
     """Digest of the code that all measures depend on."""
-    places = [PACKAGE / name for name in _MEASURES]
     return _content(
-        path for place in places for path in ([place] if place.is_file() else place.glob("*.py"))
+        path
+        for place in _present(_MEASURES)
+        for path in ([place] if place.is_file() else place.rglob("*.py"))
     )
 
 
 @lru_cache(maxsize=1)
 def nets() -> str:
     """Digest of the code that nets and warm starts depend on, beside the optimiser's."""
-    return _content(path for name in ("net", "hybrid") for path in (PACKAGE / name).glob("*.py"))
+    return _content(path for place in _present(("net", "hybrid")) for path in place.rglob("*.py"))
 
 
 @lru_cache(maxsize=32)
 def source(*paths: Path) -> str:
     """Digest of some files."""
     return _content(paths)
+
+
+def _present(names: Iterable[str]) -> list[Path]:
+    """Files and folders of the package; one that was renamed must not drop out of a digest."""
+    places = [PACKAGE / name for name in names]
+    for place in places:
+        if not place.exists():
+            raise FileNotFoundError(f"{place}: gone; name in {__file__} what it became")
+    return places
 
 
 def _content(paths: Iterable[Path]) -> str:
