@@ -141,6 +141,16 @@ class TestPattern:
             assert not result.pattern.is_cut
             assert result.flat is result.pattern.flat
 
+    def test_no_cut_makes_the_pattern_overlap_itself(self):
+        u = np.linspace(-1, 1, 9)
+        saddle = Mesh.from_grid(np.dstack([*np.meshgrid(u, u), 0.6 * np.outer(u, u)]))
+        kept = saddle.faces[np.setdiff1d(np.arange(64), [27, 28, 35, 36])]
+        ids = np.unique(kept)
+        mesh = Mesh(saddle.vertices[ids], np.searchsorted(ids, kept))
+        result = gso.tno.optimize(mesh)  # a cut to the hole would close with an overlap
+        assert not any("lies on itself" in reason for reason in result.reasons)
+        assert not result.pattern.is_cut
+
     def test_sphere_with_three_holes_is_cut_along_a_tree(self):
         import trimesh
 
@@ -240,6 +250,8 @@ class TestFiles:
         assert gso.load(tmp_path / "p.obj").grid_shape == (25, 9)
         result.save(tmp_path / "p.svg")
         assert "outline" in (tmp_path / "p.svg").read_text()
+        gso.tno.optimize(saddle(9)).save(tmp_path / "d.svg")  # of any developable result
+        assert "outline" in (tmp_path / "d.svg").read_text()
 
     def test_pictures(self, result, tmp_path):
         pytest.importorskip("matplotlib")
