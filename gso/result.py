@@ -197,7 +197,8 @@ class Result:
         elif suffix == "svg":
             if self.pattern is None:
                 raise MeshError(
-                    f"{path}: this result has no flat image to write as SVG; use task='flatten'"
+                    f"{path}: this result has no flat pattern to write as SVG; a closed surface "
+                    "or one with handles must be cut open first, other tasks have none"
                 )
             surface = self.mesh if self.task == "developable" else self.design
             outline = self.pattern.surface(surface)

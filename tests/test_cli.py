@@ -188,7 +188,6 @@ def test_denoises(run):
     [
         (["-o", "no/such/out.obj"], ["no/such", "create it"]),
         (["-o", "out.doc"], [".doc", ".obj"]),
-        (["-o", "out.svg"], ["--task flatten"]),
         (["-o", "out.svg", "--task", "bend"], ["--task flatten"]),
         (["-o", "out.obj", "--plot", "out.jpg"], [".jpg", ".png"]),
         (["-o", "out.obj", "--metrics", "no/such/out.json"], ["no/such"]),

@@ -95,12 +95,11 @@ class Job:
         from gso import io
 
         if out.lower().endswith(".svg"):
-            task, formulation = self.keywords["task"], self.keywords["formulation"]
-            block = getattr(tasks.get(task), "BLOCK", "surface")
-            if block != "flat" and (task, formulation) != ("developable", "isometry"):
+            task = self.keywords["task"]
+            if task != "developable" and getattr(tasks.get(task), "BLOCK", "surface") != "flat":
                 raise OptionError(
-                    f"{out}: only a flat pattern is drawn as SVG; use --task flatten, or "
-                    "--task developable --formulation isometry"
+                    f"{out}: only a flat pattern is drawn as SVG; use --task flatten or "
+                    "--task developable"
                 )
             io.check_writable(out)
         elif _is_cad(out):
