@@ -37,7 +37,7 @@ def resample(values: Array, height: int, width: int) -> Array:
 
 
 def carry(coarse: Mesh, fine: Mesh, points: Array) -> Array:
-    """Interpolate the displacement of a coarse grid to points (m, 3), and add it to a finer grid."""
+    """Move a finer grid by the interpolated displacement of a coarse one to points (m, 3)."""
     shift = (points - coarse.vertices)[coarse.grid_index]
     return fine.vertices + resample(shift, *fine.grid_shape).reshape(-1, 3)  # type: ignore[misc]
 
