@@ -84,7 +84,7 @@ class Result:
         constraints count as one. Empty for a mesh of one component. In the result of the
         whole mesh, `metrics` are means weighted by area (or maxima, minima, sums:
         :data:`gso.metrics.INFO`) and `energy` is such a mean; `status` is the worst one;
-        `iterations` and `seconds` are sums over the solves, and identical components are
+        `iterations` and `seconds` are sums over the solves, where copies of a component are
         solved once.
     names : ndarray of int, (n,), or None
         In the result of a component: indices of its vertices in the whole mesh.

@@ -1,4 +1,4 @@
-"""Quantities of one quad cell with corners v0 v1 v2 v3 in cyclic order."""
+"""Quantities of one face: quads with corners v0 v1 v2 v3 in cyclic order, and triangles."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def diagonal_distance(v0: Vec, v1: Vec, v2: Vec, v3: Vec) -> Any:
 
 
 def face_products(*corners: Vec) -> tuple[Any, Any, Any]:
-    """What isometric faces have in common (Jiang et al. 2020).
+    """Invariants of a face under isometries (Jiang et al. 2020).
 
-    The squared diagonals and their inner product of a quad: its midpoints' parallelogram.
-    The squared sides 01, 12, 20 of a triangle.
+    For a quad the squared diagonals and their inner product, which determine the parallelogram
+    of edge midpoints. For a triangle the squared sides 01, 12, 20.
     """
     if len(corners) == 4:
         a, b = diagonals(*corners)
@@ -38,11 +38,11 @@ def face_products(*corners: Vec) -> tuple[Any, Any, Any]:
 
 
 def isometry_defect(a: Vec, b: Vec, a2: Vec, b2: Vec) -> tuple[Any, Any, Any]:
-    """What two cells with diagonals (a, b) and (a2, b2) lack to be isometric.
+    """Isometry defect of two quad cells with diagonals (a, b) and (a2, b2).
 
     The differences of the diagonals' *lengths* and of their dot product, as in the
-    metric ``loss_iso-cell`` of Wang et al. 2024. All zero: the parallelograms of edge
-    midpoints are congruent.
+    metric ``loss_iso-cell`` of Wang et al. 2024. When all are zero, the parallelograms of
+    edge midpoints are congruent.
     """
     return norm(a) - norm(a2), norm(b) - norm(b2), dot(a, b) - dot(a2, b2)
 

@@ -29,7 +29,7 @@ def _star(centre: Vec, ring: Sequence[Vec]) -> tuple[Any, Any]:
 
 
 def _curvature(angles: Any, area2: Any) -> Any:
-    """Gaussian curvature of a star with that sum of angles and of doubled areas."""
+    """Gaussian curvature of a star from its sums of angles and of doubled areas."""
     return (2.0 * math.pi - angles) / (0.5 * area2)
 
 
@@ -43,8 +43,9 @@ def star_area(centre: Vec, ring: Sequence[Vec]) -> Any:
     return 0.5 * _star(centre, ring)[1]
 
 
-#: Steps (i, j) from a grid vertex to its ring of six, in both triangulations of the cells: split
-#: along (i, j)-(i+1, j+1) as in the published metric, and along the other diagonals.
+#: Index offsets (i, j) from a grid vertex to its ring of six neighbours, for both triangulations
+#: of the cells: split along (i, j)-(i+1, j+1) as in the published metric, and along the other
+#: diagonals.
 GRID_RINGS = (
     ((-1, 0), (-1, -1), (0, -1), (1, 0), (1, 1), (0, 1)),
     ((-1, 0), (-1, 1), (0, 1), (1, 0), (1, -1), (0, -1)),
@@ -52,14 +53,14 @@ GRID_RINGS = (
 
 
 def grid_star(points: Vec, split: int = 0) -> tuple[Vec, list[Vec]]:
-    """Interior vertices of grids and their rings of six, of components (..., H, W).
+    """Interior vertices of grids and their rings of six neighbours, as component tuples.
 
     Parameters
     ----------
     points : tuple of 3 arrays, (..., H, W)
-        NumPy's or torch's.
+        Components of the vertices, NumPy arrays or torch tensors.
     split : {0, 1}
-        Which triangulation: an index of :data:`GRID_RINGS`.
+        Triangulation of the cells: an index of :data:`GRID_RINGS`.
 
     Examples
     --------
@@ -79,9 +80,9 @@ def grid_star(points: Vec, split: int = 0) -> tuple[Vec, list[Vec]]:
 def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
     """Gaussian curvature of a vertex star, 1 / length^2.
 
-    ``K = (2 pi - sum of angles) / (sum of full triangle areas)``, the definition with
-    which the published figures of GSO-Net (Wang et al. 2024, Eq. 1) were computed. With
-    the barycentric area of Meyer et al. 2003 it is three times as large.
+    ``K = (2 pi - sum of angles) / (sum of full triangle areas)``, the definition behind the
+    published figures of GSO-Net (Wang et al. 2024, Eq. 1). With the barycentric area of
+    Meyer et al. 2003 it is three times as large.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
         The vertex.
     ring : sequence of tuples of 3 numbers
         Its neighbours in cyclic order, three or more. A neighbour listed twice in a row
-        adds nothing, so rings of different length can share one padded layout.
+        adds nothing, so rings of different lengths can be padded to one length.
 
     Examples
     --------
@@ -105,15 +106,15 @@ def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
 def grid_curvature(points: Vec, split: int = 0) -> Any:
     """:func:`gaussian_curvature` of the interior vertices of grids, 1 / length^2.
 
-    The six triangles of all stars are computed at once, where small grids take the time of
-    single steps.
+    The six triangles of all stars are computed in one batch, because on small grids the time
+    goes into the number of array operations.
 
     Parameters
     ----------
     points : tuple of 3 arrays, (..., H, W)
-        NumPy's or torch's.
+        Components of the vertices, NumPy arrays or torch tensors.
     split : {0, 1}
-        Which triangulation of the cells: an index of :data:`GRID_RINGS`.
+        Triangulation of the cells: an index of :data:`GRID_RINGS`.
 
     Returns
     -------

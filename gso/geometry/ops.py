@@ -1,7 +1,7 @@
-"""Square root, atan2, minimum and stacks for whatever numbers come in.
+"""Square root, atan2, minimum and stack for NumPy, torch and CasADi numbers.
 
-The kind of number is asked of the argument itself, so that neither torch nor casadi
-is imported here: whoever holds such a number has imported its package already.
+The module is found from the type of the argument, so neither torch nor casadi is imported
+here: a caller with such a number has imported its package already.
 """
 
 from __future__ import annotations
@@ -51,6 +51,6 @@ def minimum(x: Any, y: Any) -> Any:
 
 
 def stack(arrays: Sequence[Any]) -> Any:
-    """Arrays of one shape, NumPy's or torch's, along a new first axis."""
+    """Stack NumPy arrays or torch tensors of one shape along a new first axis."""
     mod = _module_of(arrays[0])
     return np.stack(arrays) if mod is None else mod.stack(tuple(arrays))

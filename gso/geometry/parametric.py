@@ -17,7 +17,7 @@ def smooth_gaussian_curvature(su: Vec, sv: Vec, suu: Vec, suv: Vec, svv: Vec) ->
     Parameters
     ----------
     su, sv, suu, suv, svv : tuple of 3 numbers
-        First and second derivatives of the surface by its parameters.
+        First and second derivatives of the surface with respect to its parameters.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The shape operator of a face, from tangents and how the normal turns along them."""
+"""The shape operator of a face, from two tangents and the changes of the normal along them."""
 
 from __future__ import annotations
 
@@ -65,10 +65,10 @@ def half_trace(s: Matrix) -> Any:
 
 
 def eigen(p: Any, q: Any, r: Any) -> tuple[Any, Any, Any]:
-    """Eigenvalues of the symmetric matrix ``((p, q), (q, r))``, and where the first one lies.
+    """Eigenvalues of the symmetric matrix ``((p, q), (q, r))``, and the first eigenvector's angle.
 
     Returns ``(high, low, angle)``: `high` >= `low`, and the eigenvector of `high` is
-    (cos, sin) of `angle`, radians. Equal eigenvalues have the angle 0.
+    (cos, sin) of `angle`, radians. For equal eigenvalues the angle is 0.
 
     >>> [float(x) for x in eigen(0.0, 1.0, 0.0)]
     [1.0, -1.0, 0.785]

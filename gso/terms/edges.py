@@ -11,7 +11,7 @@ from gso import geometry
 from gso.mesh import Mesh
 from gso.terms.base import Term, mean_weights
 
-#: Turning or moving the flat image changes no length.
+#: Rigid motions of the flat image change no length.
 INVARIANT = ("translation", "rotation")
 
 
@@ -21,12 +21,12 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """The edge in units of its length in space."""
+    """The edge vector divided by its length in space."""
     return (tuple(x * constants[0] for x in geometry.sub(points[1], points[0])),)
 
 
 def build(mesh: Mesh) -> Term:
-    """Change of every edge of the faces that has a length, averaged over them."""
+    """Build the relative change of all edges of non-zero length, averaged over them."""
     length = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
     measured = length > 1e-9 * length.mean()
     length = length[measured]
