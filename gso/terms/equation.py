@@ -1,4 +1,4 @@
-"""Linear equations between coordinates, as something to come closer to."""
+"""Linear equations between coordinates as soft constraints."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gso.geometry import dot
 from gso.mesh import Mesh
 from gso.terms.base import Array, Ints, Term
 
-#: What is wanted does not move with the surface.
+#: The equations do not move with the surface.
 INVARIANT = ()
 
 
@@ -26,7 +26,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def build(part: OnPlane | Relations, *, block: str = "surface") -> Term:
-    """Vertices near a plane, or near the images of others."""
+    """Build the soft constraint of vertices to a plane, or to affine images of other vertices."""
     if isinstance(part, OnPlane):
         count = len(part.ids)
         rows = np.tile(np.r_[part.normal, part.normal @ part.anchor], (count, 1))

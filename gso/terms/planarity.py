@@ -11,7 +11,7 @@ from gso import geometry, topology
 from gso.mesh import Mesh
 from gso.terms.base import Ints, Term
 
-#: Turning or moving a quad leaves it as planar as it was.
+#: Rigid motions do not change planarity.
 INVARIANT = ("translation", "rotation")
 
 
@@ -21,7 +21,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def build(quads: Ints, *, weight: float = 1.0) -> Term:
-    """Planarity of quads (k, 4), each with a weight."""
+    """Build the planarity of quads (k, 4), each with the same weight."""
     return Term(
         "planarity",
         residual,

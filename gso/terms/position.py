@@ -1,4 +1,4 @@
-"""Soft position handles."""
+"""Soft position constraints."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ INVARIANT = ()
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Displacement from the wanted position."""
+    """Displacement from the target position."""
     return sub(points[0], tuple(constants))
 
 
 def build(ids: Ints, positions: Array, weights: Array, *, block: str = "surface") -> Term:
-    """Pull vertices `ids` (k,) of a block to `positions` (k, dim) with `weights` (k,)."""
+    """Build soft targets `positions` (k, dim) of vertices `ids` (k,), with `weights` (k,)."""
     return Term(
         "position",
         residual,

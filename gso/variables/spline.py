@@ -57,17 +57,18 @@ def spline_offsets(
 def spline_surface(layout: Layout, shape: tuple[int, int], controls: tuple[int, int]) -> Variables:
     """The block "surface" is a bicubic B-spline; all other blocks are free.
 
-    Three unknowns per control point, numbered row by row, in the place of the block: with
-    ("surface", "flat") first the control net, then the plane coordinates, which makes a
-    spline that is isometric to a plane (the second algorithm of Jiang et al. 2020).
-    `project` fits a given surface; the misfit is the caller's to report.
+    There are three unknowns per control point, numbered row by row, in the place of the block.
+    With the blocks ("surface", "flat") the unknowns are the control net and then the plane
+    coordinates; this gives a spline that is isometric to a plane (the second algorithm of
+    Jiang et al. 2020). :meth:`Variables.project` fits a given surface; the caller has to
+    report the misfit.
 
     Parameters
     ----------
     layout : Layout
-        The block "surface" has the points of the grid, row by row.
+        Its block "surface" has the points of the grid, row by row.
     shape, controls : (int, int)
-        Points of the grid, and control points, along both sides.
+        Numbers of grid points and of control points along both sides.
 
     Examples
     --------
