@@ -40,7 +40,7 @@ def orientation(triangles: Ints, layout: Layout) -> Limit:
         c = _cross(e, f)
         b = _cross(e, df) + _cross(de, f)
         a = _cross(de, df)
-        # 2c / (sqrt(b^2 - 4ac) - b) is the smallest positive root, or there is none.
+        # 2c / (sqrt(b^2 - 4ac) - b) is the smallest positive root, if there is one.
         with np.errstate(invalid="ignore"):
             steepness = np.sqrt(b * b - 4.0 * a * c) - b
         falling = (steepness > 0) & (c > 0)

@@ -304,7 +304,7 @@ class Mesh:
 
 @lru_cache(maxsize=32)
 def _grid_template(height: int, width: int) -> Mesh:
-    """Flat grid with precomputed connectivity, shared by all grids of this size."""
+    """Build a flat grid with precomputed connectivity, shared by all grids of this size."""
     rows, columns = np.mgrid[:height, :width]
     flat = np.stack([rows, columns, np.zeros_like(rows)], axis=-1).reshape(-1, 3)
     mesh = Mesh(flat, topology.grid_faces(height, width))
@@ -321,7 +321,7 @@ _HEAP = 0.4
 
 
 def _unjoined(mesh: Mesh) -> tuple[str, ...]:
-    """Note on coincident edges that are not joined; empty where there are none."""
+    """Write the note on coincident edges that are not joined; empty where there are none."""
     count = int(mesh.seams.sum())
     if not count:
         return ()

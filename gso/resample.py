@@ -19,7 +19,7 @@ SMALLEST = 20
 
 @lru_cache(maxsize=64)
 def _matrix(source: int, target: int) -> Array:
-    """Matrix of not-a-knot cubic spline interpolation from `source` to `target` samples."""
+    """Return the not-a-knot cubic spline interpolation matrix of `source` to `target` samples."""
     from scipy.interpolate import make_interp_spline
 
     spline = make_interp_spline(np.linspace(0, 1, source), np.eye(source), k=min(3, source - 1))

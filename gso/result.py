@@ -45,7 +45,7 @@ class Result:
         The flat pattern as a separate mesh, with the correspondence of its vertices to the
         surface, which may be cut open. For `developable`: the pattern with the least strain that
         was found, from which the strain metrics are computed; None if the surface must be cut
-        open first, or no verdict was asked for.
+        open first, or no verdict was made.
     cell_scale : ndarray, (m,), or None
         For `conformal`: length of a face's diagonals (of a triangle's sides) in the flat image
         over that on the surface, in the order of the input's faces.
@@ -65,8 +65,8 @@ class Result:
         Initial guess of the solve: "cold" for a cold start, "x0", "session", "net"
         (:func:`gso.hybrid.solve`), or the source named by a :class:`gso.tno.Start`.
     reasons : tuple of str
-        Why the result cannot be used as what was asked for, and where; see :mod:`gso.verdict`.
-        They are also part of `notes`.
+        Why the result is not usable for its task, and where; see :mod:`gso.verdict`. They are
+        also part of `notes`.
     notes : tuple of str
         What was repaired in the input or restricted in the run, and the reasons.
     details : dict
@@ -75,7 +75,7 @@ class Result:
         degrees of freedom of each coordinate after smoothing; "order" and "weight". With
         constraints, "constraints": the largest violation of each, in the input's unit. With a
         spline, "spline": its curvature and distances, see :func:`gso.fit.describe_spline`.
-        For `developable`, "verdict": largest strain and deviation, and the limits asked for.
+        For `developable`, "verdict": largest strain and deviation, and the given limits.
     spline : BSplineSurface or None
         The spline that `mesh` samples, with the option ``variables="surface"``; with several
         components, each has its own.
@@ -128,10 +128,10 @@ class Result:
 
     @property
     def usable(self) -> bool:
-        """Whether the result can be used as what was asked for: there are no :attr:`reasons`.
+        """Whether the result is usable for its task: there are no :attr:`reasons` against it.
 
-        The status must not refuse the result either, coordinates must be finite, no cell of a
-        flat image inverted, and all components usable. Without a verdict only these count.
+        In addition, the status must not refuse the result, coordinates must be finite, no cell
+        of a flat image inverted, and all components usable. Without a verdict only these count.
         """
         points = self.mesh.vertices if self.pattern is None else self.pattern.flat
         return bool(
@@ -221,7 +221,7 @@ class Result:
         self.notes += tuple(n for n in io.left_out(self.mesh, path) if n not in self.notes)
 
     def _record(self) -> dict[str, Any]:
-        """Everything but the arrays, as JSON-compatible values."""
+        """Collect everything but the arrays, as JSON-compatible values."""
         return {
             "format": _FORMAT,
             "task": self.task,

@@ -170,7 +170,7 @@ class BSplineSurface:
         return self._lattice(np.linspace(u[0], u[-1], height), np.linspace(v[0], v[-1], width))
 
     def normals(self, u: ArrayLike, v: ArrayLike) -> Array:
-        """Unit normals (..., 3), in the direction of the cross product of the u and v derivatives.
+        """Return unit normals (..., 3) along the cross product of the u and v derivatives.
 
         Zero where the parametrisation degenerates.
         """
@@ -179,11 +179,11 @@ class BSplineSurface:
         return np.divide(n, length, out=np.zeros_like(n), where=length > 0)
 
     def gaussian_curvature(self, u: ArrayLike, v: ArrayLike) -> Array:
-        """Gaussian curvature of the smooth surface at parameters, 1 / length^2."""
+        """Return the Gaussian curvature of the smooth surface at parameters, 1 / length^2."""
         return _curvature([self.evaluate(u, v, du=i, dv=j) for i, j in _ORDERS])
 
     def mean_gaussian_curvature(self, per_span: int = 4) -> float:
-        """Mean of |K|, the absolute Gaussian curvature, over the area, 1 / length^2.
+        """Return the mean of |K|, the absolute Gaussian curvature, over the area, 1 / length^2.
 
         It is integrated by Gauss quadrature with `per_span` points in every knot interval and
         direction. The metric ``mean_abs_K`` of a mesh approximates it under refinement.
@@ -233,7 +233,7 @@ def _curvature(derivatives: list[Array]) -> Array:
 
 
 def _quadrature(knots: Array, per_span: int) -> tuple[Array, Array]:
-    """Gauss points and weights of all knot intervals."""
+    """Return the Gauss points and weights of all knot intervals."""
     ends = np.unique(knots)
     points, weights = np.polynomial.legendre.leggauss(per_span)
     half = 0.5 * np.diff(ends)[:, None]

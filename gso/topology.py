@@ -69,7 +69,7 @@ class HalfEdges:
 
 
 def _half_edge_table(faces: Ints) -> tuple[Ints, Ints, Ints, Ints]:
-    """Origin, dest, face and next of every half-edge, grouped by face."""
+    """Return origin, dest, face and next of every half-edge, grouped by face."""
     m, k = faces.shape
     size = np.full(m, k) if k == 3 else np.where(faces[:, 3] < 0, 3, 4)
     face = np.repeat(np.arange(m), size)
@@ -81,7 +81,7 @@ def _half_edge_table(faces: Ints) -> tuple[Ints, Ints, Ints, Ints]:
 
 
 def edge_keys(origin: Ints, dest: Ints, vertex_count: int) -> Ints:
-    """One integer per undirected edge."""
+    """Encode undirected edges as integers."""
     return np.minimum(origin, dest) * np.int64(vertex_count) + np.maximum(origin, dest)
 
 
@@ -264,7 +264,7 @@ def check_vertices(he: HalfEdges) -> None:
 
 
 def are_quads(faces: Ints) -> NDArray[np.bool_]:
-    """Mask (m,) of the faces (m, 3) or (m, 4) that have four corners."""
+    """Mark the faces (m, 3) or (m, 4) that have four corners, (m,)."""
     return faces[:, 3] >= 0 if faces.shape[1] == 4 else np.zeros(len(faces), bool)
 
 
@@ -339,13 +339,13 @@ def quad_splits(faces: Ints, he: HalfEdges) -> NDArray[np.bool_]:
 
 
 def _place_in_face(he: HalfEdges, quad: NDArray[np.bool_]) -> Ints:
-    """Index within its face, 0 to 3, of the corner where each half-edge starts."""
+    """Return the index within its face, 0 to 3, of the corner where each half-edge starts."""
     first = np.concatenate([[0], np.cumsum(np.where(quad, 4, 3))[:-1]])
     return np.arange(he.face.size) - first[he.face]
 
 
 def _clashing_splits(quads: Ints, turn: NDArray[np.bool_], he: HalfEdges) -> NDArray[np.bool_]:
-    """Mask of the quads whose diagonal is also an edge or the diagonal of another quad."""
+    """Mark the quads whose diagonal is also an edge or the diagonal of another quad."""
     ends = np.where(turn[:, None], quads[:, [1, 3]], quads[:, [0, 2]])
     split = edge_keys(ends[:, 0], ends[:, 1], he.vertex_count)
     _, which, often = np.unique(split, return_inverse=True, return_counts=True)
@@ -370,7 +370,7 @@ Stars = list[tuple[Ints, Ints]]
 
 
 def grid_stars(ids: Ints, ring: Sequence[tuple[int, int]]) -> Stars:
-    """Stars of the interior vertices of a grid (H, W), with rings given by index offsets (i, j)."""
+    """List the stars of a grid's interior vertices (H, W), with rings as index offsets (i, j)."""
     h, w = ids.shape
     if min(h, w) < 3:
         return []
@@ -379,7 +379,7 @@ def grid_stars(ids: Ints, ring: Sequence[tuple[int, int]]) -> Stars:
 
 
 def vertex_stars(faces: Ints, he: HalfEdges, turned: NDArray[np.bool_]) -> tuple[Stars, Stars]:
-    """Closed stars of the interior vertices in two triangulations of the quads around them.
+    """Build closed stars of the interior vertices in two triangulations of the quads around them.
 
     Around a vertex the quads are split alternately: along the diagonal through the vertex, and
     along the other one. The second star swaps the two. Together they use both diagonals of
@@ -428,7 +428,7 @@ def vertex_stars(faces: Ints, he: HalfEdges, turned: NDArray[np.bool_]) -> tuple
 
 
 def _rings(he: HalfEdges, centre: Ints, spokes: Ints, through: NDArray[np.bool_]) -> Stars:
-    """Stars of vertices with the same number of faces, padded to :data:`RING_SIZES`.
+    """Build the stars of vertices with equal face counts, padded to :data:`RING_SIZES`.
 
     A quad that is split through the centre adds its opposite corner to the ring.
     """
@@ -464,7 +464,7 @@ def _merged(stars: Stars) -> Stars:
 
 
 def polyline_triples(he: HalfEdges, faces: Ints) -> Ints:
-    """Consecutive triples (a, b, c) along the polylines of a quad mesh, (t, 3).
+    """List consecutive triples (a, b, c) along the polylines of a quad mesh, (t, 3).
 
     Lines run straight through regular vertices (four faces inside, two on the boundary)
     and end at irregular ones.
@@ -473,7 +473,7 @@ def polyline_triples(he: HalfEdges, faces: Ints) -> Ints:
 
 
 def polyline_crosses(he: HalfEdges, faces: Ints) -> Ints:
-    """Triples of :func:`polyline_triples` with the crossing line, (a, b, c, p, q), (t, 5).
+    """List :func:`polyline_triples` with the crossing line, (a, b, c, p, q), (t, 5).
 
     p and q are the neighbours of b on both sides of the polyline; on the boundary q is b.
     """
@@ -496,7 +496,7 @@ def polyline_crosses(he: HalfEdges, faces: Ints) -> Ints:
 
 
 def hinges(he: HalfEdges) -> Ints:
-    """The four vertices (a, b, left, right) around every interior edge of a triangulation."""
+    """List the four vertices (a, b, left, right) around every interior edge of a triangulation."""
     h = np.flatnonzero(he.twin > np.arange(he.twin.size))
     return np.stack(
         [he.origin[h], he.dest[h], he.dest[he.next[h]], he.dest[he.next[he.twin[h]]]], axis=1
@@ -504,13 +504,13 @@ def hinges(he: HalfEdges) -> Ints:
 
 
 def edges(he: HalfEdges) -> Ints:
-    """Each undirected edge once, (e, 2)."""
+    """List each undirected edge once, (e, 2)."""
     once = _once(he)
     return np.stack([he.origin[once], he.dest[once]], axis=1)
 
 
 def rim(he: HalfEdges) -> NDArray[np.bool_]:
-    """Mask over :func:`edges` of the boundary edges, (e,)."""
+    """Mark the boundary edges among :func:`edges`, (e,)."""
     return he.twin[_once(he)] < 0
 
 
@@ -519,7 +519,7 @@ def _once(he: HalfEdges) -> NDArray[np.bool_]:
 
 
 def boundary_loops(he: HalfEdges) -> list[Ints]:
-    """Vertex ids of each boundary loop, anticlockwise round the surface, longest first."""
+    """List the vertex ids of the boundary loops, anticlockwise round the surface, longest first."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components, depth_first_order
 

@@ -141,7 +141,7 @@ def collapse(faces: Ints, target: Ints) -> Collapsed:
 
 
 def seams(points: Array, origin: Ints, dest: Ints) -> NDArray[np.bool_]:
-    """Mask of the edges (from vertex `origin` to `dest`) that coincide with another of them."""
+    """Mark the edges (from vertex `origin` to `dest`) that coincide with another of them."""
     ends, index = np.unique(np.r_[origin, dest], return_inverse=True)
     place = equal(points[ends])[index.ravel()]
     a, b = place[: len(origin)], place[len(origin) :]

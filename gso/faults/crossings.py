@@ -50,7 +50,7 @@ def crossings(mesh: Mesh) -> Ints:
 
 
 def _cross(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:
-    """Mask of the pairs of triangles (t, 3, 3) that penetrate by more than a depth (t,)."""
+    """Mark the pairs of triangles (t, 3, 3) that penetrate by more than a depth (t,)."""
     out = np.zeros(len(a), bool)
     at = np.arange(len(a))
     for k in range(2):
@@ -69,7 +69,7 @@ def _cross(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:
 
 
 def _heights(base: Array, other: Array) -> tuple[Array, Array]:
-    """Unit normals of triangles, and heights of others' corners above their planes (t, 3)."""
+    """Return unit normals of triangles, and heights (t, 3) of others' corners above them."""
     normal = np.cross(base[:, 1] - base[:, 0], base[:, 2] - base[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     return normal, np.einsum("tkd,td->tk", other - base[:, :1], normal)
@@ -80,7 +80,7 @@ def _both_sides(height: Array, depth: Array) -> NDArray[np.bool_]:
 
 
 def _extent(triangle: Array, height: Array, line: Array) -> tuple[Array, Array]:
-    """Interval along a line in which a triangle with corners on both sides meets a plane."""
+    """Return the interval along a line in which a triangle meets a plane that it crosses."""
     above = height > 0
     lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
     row = np.arange(len(triangle))

@@ -78,7 +78,7 @@ def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
 def _corner_normals(
     points: tuple[Array, ...], faces: Ints, quad: NDArray[np.bool_], below: float
 ) -> tuple[tuple[Array, ...], NDArray[np.bool_]]:
-    """Unit normals of the corner triangles (4, m), and quads that fold along a diagonal (2, m).
+    """Return corner triangles' unit normals (4, m), and quads that fold along a diagonal (2, m).
 
     Corner triangle k is cut off by the diagonal between corners k - 1 and k + 1. For a
     triangular face all four have its normal.

@@ -55,19 +55,19 @@ def overlaps(mesh: Mesh, flat: Array) -> Ints:
 
 
 def _other_diagonal(points: Array, faces: Ints) -> NDArray[np.bool_]:
-    """Mask of the quads that have an inverted triangle when split along the diagonal 0-2."""
+    """Mark the quads that have an inverted triangle when split along the diagonal 0-2."""
     triangles, _ = split(faces)
     return are_quads(faces) & (_areas(points, triangles).min(axis=1) <= 0)
 
 
 def _areas(points: Array, triangles: Ints) -> Array:
-    """Doubled signed areas of triangles (..., 3)."""
+    """Return the doubled signed areas of triangles (..., 3)."""
     corners = (tuple(points[triangles[..., k]].T) for k in range(3))
     return geometry.corner_area2(*corners).T
 
 
 def _meet(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:
-    """Mask of the pairs of triangles (t, 3, 2) that overlap by more than a depth (t,).
+    """Mark the pairs of triangles (t, 3, 2) that overlap by more than a depth (t,).
 
     By the separating-axis test: if a line separates two triangles, one of their sides does.
     """

@@ -11,13 +11,13 @@ from gso.geometry.vector import Vec, cross, dot, norm2, sub
 
 
 def _wedge(a: Vec, b: Vec) -> tuple[Any, Any]:
-    """Angle between two edges of a triangle, and its doubled area."""
+    """Return the angle between two edges of a triangle, and its doubled area."""
     twice = ops.sqrt(norm2(cross(a, b)))
     return ops.atan2(twice, dot(a, b)), twice
 
 
 def _star(centre: Vec, ring: Sequence[Vec]) -> tuple[Any, Any]:
-    """Sum of angles and sum of doubled triangle areas of a closed star."""
+    """Sum the angles and the doubled triangle areas of a closed star."""
     edges = [sub(p, centre) for p in ring]
     angles: Any = 0.0
     area2: Any = 0.0
@@ -29,17 +29,17 @@ def _star(centre: Vec, ring: Sequence[Vec]) -> tuple[Any, Any]:
 
 
 def _curvature(angles: Any, area2: Any) -> Any:
-    """Gaussian curvature of a star from its sums of angles and of doubled areas."""
+    """Return the Gaussian curvature of a star from its sums of angles and of doubled areas."""
     return (2.0 * math.pi - angles) / (0.5 * area2)
 
 
 def star_defect(centre: Vec, ring: Sequence[Vec]) -> Any:
-    """Angle defect ``2 pi - sum of angles`` of an interior vertex, radians."""
+    """Return the angle defect ``2 pi - sum of angles`` of an interior vertex, radians."""
     return 2.0 * math.pi - _star(centre, ring)[0]
 
 
 def star_area(centre: Vec, ring: Sequence[Vec]) -> Any:
-    """Sum of the full areas of the triangles of a star (three times the barycentric area)."""
+    """Sum the full areas of the triangles of a star (three times the barycentric area)."""
     return 0.5 * _star(centre, ring)[1]
 
 
@@ -53,7 +53,7 @@ GRID_RINGS = (
 
 
 def grid_star(points: Vec, split: int = 0) -> tuple[Vec, list[Vec]]:
-    """Interior vertices of grids and their rings of six neighbours, as component tuples.
+    """Return the interior vertices of grids and their rings of six, as component tuples.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def grid_star(points: Vec, split: int = 0) -> tuple[Vec, list[Vec]]:
 
 
 def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
-    """Gaussian curvature of a vertex star, 1 / length^2.
+    """Return the Gaussian curvature of a vertex star, 1 / length^2.
 
     ``K = (2 pi - sum of angles) / (sum of full triangle areas)``, the definition behind the
     published figures of GSO-Net (Wang et al. 2024, Eq. 1). With the barycentric area of
@@ -104,7 +104,7 @@ def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
 
 
 def grid_curvature(points: Vec, split: int = 0) -> Any:
-    """:func:`gaussian_curvature` of the interior vertices of grids, 1 / length^2.
+    """Return :func:`gaussian_curvature` of the interior vertices of grids, 1 / length^2.
 
     The six triangles of all stars are computed in one batch, because on small grids the time
     goes into the number of array operations.

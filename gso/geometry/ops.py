@@ -25,7 +25,7 @@ def _module_of(x: Any) -> Any:
 
 
 def sqrt(x: Any) -> Any:
-    """Square root of ``max(x, tiny)``: finite, with a finite derivative, at zero."""
+    """Return the square root of ``max(x, tiny)``: finite, with a finite derivative, at zero."""
     mod = _module_of(x)
     if mod is None:
         return np.sqrt(np.maximum(x, TINY))
@@ -35,13 +35,13 @@ def sqrt(x: Any) -> Any:
 
 
 def atan2(y: Any, x: Any) -> Any:
-    """Angle of the vector (x, y), radians."""
+    """Return the angle of the vector (x, y), radians."""
     mod = _module_of(y)
     return np.arctan2(y, x) if mod is None else mod.atan2(y, x)
 
 
 def minimum(x: Any, y: Any) -> Any:
-    """Smaller of two numbers."""
+    """Return the smaller of two numbers."""
     mod = _module_of(x)
     if mod is None:
         return np.minimum(x, y)

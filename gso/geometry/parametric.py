@@ -8,7 +8,7 @@ from gso.geometry.vector import Vec, cross, dot, norm
 
 
 def smooth_gaussian_curvature(su: Vec, sv: Vec, suu: Vec, suv: Vec, svv: Vec) -> Any:
-    """Gaussian curvature of a parametrised surface, 1 / length^2.
+    """Return the Gaussian curvature of a parametrised surface, 1 / length^2.
 
     The determinant of the second fundamental form over that of the first,
     ``((suu.n)(svv.n) - (suv.n)^2) / |su x sv|^2`` with the unit normal n. Zero where the

@@ -9,11 +9,11 @@ Array = NDArray[np.float64]
 
 
 def box_diagonal(points: Array) -> float:
-    """Length of the diagonal of the bounding box of points (n, d)."""
+    """Return the length of the diagonal of the bounding box of points (n, d)."""
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def ball(points: Array) -> tuple[Array, float]:
-    """Centroid (d,) of points (n, d), and the largest distance from it."""
+    """Return the centroid (d,) of points (n, d), and the largest distance from it."""
     centre = points.mean(axis=0)
     return centre, float(np.sqrt(((points - centre) ** 2).sum(axis=1).max()))

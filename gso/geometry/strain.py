@@ -15,7 +15,7 @@ from gso.geometry.vector import Vec, cross, dot, norm, norm2, sub
 
 
 def rest_frame(p: Vec, q: Vec, r: Vec) -> tuple[Any, Any, Any]:
-    """Upper triangle ``(m11, m12, m22)`` of the inverse rest matrix of a triangle in space.
+    """Return the inverse rest matrix of a triangle in space, upper triangle ``(m11, m12, m22)``.
 
     In the frame of the triangle's plane the edges ``q - p`` and ``r - p`` are the columns of
     ``[[l, u], [0, h]]``; this is the inverse of that matrix. It grows without bound as
@@ -28,7 +28,7 @@ def rest_frame(p: Vec, q: Vec, r: Vec) -> tuple[Any, Any, Any]:
 
 
 def stretch(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
-    """Residuals of the membrane strain of the plane triangle p q r.
+    """Return the residuals of the membrane strain of the plane triangle p q r.
 
     Returns ``(Q - 1, c, d)``, where ``R^2 = c^2 + d^2``; twice the sum of their squares
     is ``(s1 - 1)^2 + (s2 - 1)^2``, the as-rigid-as-possible energy (Sorkine and Alexa
@@ -39,14 +39,14 @@ def stretch(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, An
 
 
 def singular_values(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, Any]:
-    """Principal stretches ``(s1, s2)`` of a triangle; ``s2 < 0`` when it is inverted."""
+    """Return the principal stretches ``(s1, s2)`` of a triangle; ``s2 < 0`` when it is inverted."""
     q_part, c, d = turn_and_shear(p, q, r, rest)
     big, small = norm(q_part), ops.sqrt(norm2((c, d)))
     return big + small, big - small
 
 
 def turn_and_shear(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Vec, Any, Any]:
-    """Parts ``((q1, q2), c, d)`` of a triangle's map, all linear in the unknowns.
+    """Return the parts ``((q1, q2), c, d)`` of a triangle's map, all linear in the unknowns.
 
     ``Q = |(q1, q2)|`` is the conformal part (rotation and scale), ``R = |(c, d)|`` the shear.
     """

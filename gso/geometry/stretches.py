@@ -10,7 +10,7 @@ from gso.geometry.vector import Vec, dot, norm2, sub
 
 
 def first_form(*corners: Vec) -> tuple[Any, Any, Any]:
-    """``(E, F, G)`` of a face: squared lengths and inner product of two vectors that span it.
+    """Return ``(E, F, G)`` of a face: inner products of two vectors that span it.
 
     These are the diagonals of a quad, which span its parallelogram of edge midpoints (Jiang et
     al. 2020), and the sides at the first corner of a triangle.
@@ -23,7 +23,7 @@ def first_form(*corners: Vec) -> tuple[Any, Any, Any]:
 
 
 def principal_stretches(rest: tuple[Any, Any, Any], image: tuple[Any, Any, Any]) -> tuple[Any, Any]:
-    """Largest and smallest ratio ``(s1, s2)`` of lengths, image over rest.
+    """Return the largest and smallest ratio ``(s1, s2)`` of lengths, image over rest.
 
     Takes the :func:`first_form` of the face on both surfaces, which may lie in space; `rest`
     must have an area. The product of the stretches is the ratio of areas; their quotient is

@@ -90,7 +90,7 @@ class Term:
 
 
 def mean_weights(count: int) -> Array:
-    """Equal weights that sum to one."""
+    """Return equal weights that sum to one."""
     return np.full(count, 1.0 / max(count, 1))
 
 

@@ -20,7 +20,7 @@ _SHORTEST = 0.2
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Curvature of a polyline at a vertex, minus its target value.
+    """Return the curvature of a polyline at a vertex, minus its target value.
 
     Let d be the second difference of the points a, b, c, and e, f the chords along the
     polyline and across it, with unit normal n. The residuals compare d.e and d.f (the
@@ -34,7 +34,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def hinge_residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Bending across the common edge a b of two triangles with opposite vertices c and d.
+    """Return the bending across the common edge a b of two triangles a b c and b a d.
 
     As :func:`residual`, with the linear combination of the four points that vanishes on affine
     functions as the second difference, and the chords b - a and d - c.
@@ -102,11 +102,11 @@ def build(mesh: Mesh, *, tangential: float = 1.0) -> list[Term]:
 
 
 def _lengths(*vectors: Array) -> Array:
-    """Mean length of vectors (e, 3) by element, bounded below by a share of the overall mean."""
+    """Average the lengths of vectors (e, 3) by element, with a lower bound."""
     length = np.mean([np.linalg.norm(x, axis=1) for x in vectors], axis=0)
     return np.maximum(length, _SHORTEST * length.mean() if len(length) else 0.0)
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return build(mesh, tangential=0.5)

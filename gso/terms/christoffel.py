@@ -20,7 +20,7 @@ _SHORTEST = 1.0
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Differences of d.(c - a), d.(p - b) and d.(q - b) between a mesh and its counterpart.
+    """Return differences of d.(c - a), d.(p - b) and d.(q - b) of a mesh and its counterpart.
 
     Here d is the second difference of the points a, b, c of a polyline, and p, q are the
     neighbours of b across it. These inner products of second differences with edges are
@@ -86,11 +86,11 @@ def build(mesh: Mesh, block: str, *, counterpart: str | None = None) -> list[Ter
 
 
 def _lengths(chords: Array) -> Array:
-    """Lengths (t,) of chords (t, 3), bounded below by :data:`_SHORTEST` times their mean."""
+    """Measure chords (t, 3), bounded below by :data:`_SHORTEST` times their mean length."""
     length = np.linalg.norm(chords, axis=1)
     return np.maximum(length, _SHORTEST * length.mean())
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return [*build(mesh, "surface", counterpart="flat"), *build(mesh, "flat")]

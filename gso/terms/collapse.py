@@ -24,7 +24,7 @@ SQUEEZED = 0.2
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``max(0, a / A - 1)`` of each corner triangle with doubled area A.
+    """Return ``max(0, a / A - 1)`` of each corner triangle with doubled area A.
 
     The residual is zero where A is larger than `a`, and unbounded as A goes to zero. A step
     limit alone keeps A positive, but then an energy that decreases by folding stalls at the
@@ -45,7 +45,7 @@ def build(mesh: Mesh) -> list[Term]:
 
 
 def _squeezed_areas(vertices: Array, faces: Ints) -> Array:
-    """Doubled areas below which the barrier of each corner triangle is active, (4 or 1, e)."""
+    """Return the doubled areas (4 or 1, e) below which corner barriers are active."""
     out = []
     for corner in corners_of(faces.shape[1]):
         p, q, r = (tuple(vertices[faces[:, k]].T) for k in corner)
@@ -54,5 +54,5 @@ def _squeezed_areas(vertices: Array, faces: Ints) -> Array:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return build(mesh)

@@ -17,7 +17,7 @@ INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Differences of |a|^2, |b|^2 and a.b of a face and its counterpart, times a constant.
+    """Return differences of |a|^2, |b|^2 and a.b of a face and its counterpart, times a constant.
 
     For quads a and b are the diagonals: all zero when the parallelograms of the edge
     midpoints are congruent (Jiang et al. 2020, Eq. 1 and 2). For triangles they are the
@@ -83,7 +83,7 @@ def build(
 
 
 def edge_residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Difference of the squared length of an edge and its target, times a constant.
+    """Return the difference of an edge's squared length and its target, times a constant.
 
     Constants: one over the mean squared length of the edges; the target squared length.
     """
@@ -110,7 +110,7 @@ def _products(vertices: Array, faces: Ints) -> Array:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return [
         *build(mesh, "surface"),
         *build(mesh, "flat"),

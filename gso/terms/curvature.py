@@ -16,7 +16,7 @@ INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Gaussian curvature at the first point; the others are its ring."""
+    """Return the Gaussian curvature at the first point; the others are its ring."""
     return (gaussian_curvature(points[0], points[1:]),)
 
 
@@ -56,7 +56,7 @@ def _weights(mesh: Mesh, centre: Ints, ring: Ints) -> Array:
 
 
 def star_areas(vertices: Array, centre: Ints, ring: Ints) -> Array:
-    """Areas (n,) of vertex stars."""
+    """Return the areas (n,) of vertex stars."""
     from gso.geometry import star_area
 
     return star_area(
@@ -65,5 +65,5 @@ def star_areas(vertices: Array, centre: Ints, ring: Ints) -> Array:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return build(mesh)

@@ -19,7 +19,7 @@ INVARIANT = ()
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Vector from a target to the point, without its component along a unit direction.
+    """Return the vector from a target to the point, without its part along a unit direction.
 
     Constants: the target; then the direction, or zero where the vertex cannot slide.
     """
@@ -63,7 +63,7 @@ class _Sliding:
         self.shift = np.zeros(self.rows.shape)
 
     def constants(self, coordinates: Array) -> Array:
-        """Targets and directions from the current nearest points."""
+        """Return the targets and directions from the current nearest points."""
         target, tangent = self._targets(coordinates)
         shift = self.shift - (self.shift * tangent).sum(axis=1, keepdims=True) * tangent
         return np.concatenate([(target - shift).T, tangent.T])
@@ -82,7 +82,7 @@ class _Sliding:
         self.shift = factor * self.shift
 
     def _targets(self, coordinates: Array) -> tuple[Array, Array]:
-        """Nearest points, and the directions in which vertices can slide there, (k, dim) each."""
+        """Find the nearest points, and the directions of free sliding there, (k, dim) each."""
         points, lines = coordinates[self.rows], self.lines
         target, segment, along = lines.nearest(points)
         way = lines.way[segment]
@@ -98,7 +98,7 @@ class _Sliding:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     ids = np.arange(4)
     out = []
     for block, dim in (("surface", 3), ("flat", 2)):

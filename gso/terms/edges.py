@@ -16,12 +16,12 @@ INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``l' / l - 1``. Constants: 1 / l."""
+    """Return ``l' / l - 1``. Constants: 1 / l."""
     return (geometry.norm(vectors(points, constants)[0]) - 1.0,)
 
 
 def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """The edge vector divided by its length in space."""
+    """Return the edge vector divided by its length in space."""
     return (tuple(x * constants[0] for x in geometry.sub(points[1], points[0])),)
 
 
@@ -41,5 +41,5 @@ def build(mesh: Mesh) -> Term:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return [build(mesh)]

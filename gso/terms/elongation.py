@@ -24,7 +24,7 @@ BOUNDARY = (0.92, 1.08)
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``max(0, low / s - 1) + max(0, s / high - 1)`` of the ratio s of lengths, result over design.
+    """Return ``max(0, low / s - 1) + max(0, s / high - 1)`` of the length ratio s, result / design.
 
     It is zero between both ratios, so that moderate changes cost nothing, and unbounded as the
     edge collapses. Constants: 1 / length in the design, low, high.
@@ -55,5 +55,5 @@ def build(mesh: Mesh) -> Term:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return [build(mesh)]

@@ -17,7 +17,7 @@ INVARIANT = ()
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``sum of a_k . p_k - b``. Constants: the components of every a_k, then b."""
+    """Return ``sum of a_k . p_k - b``. Constants: the components of every a_k, then b."""
     dim = len(points[0])
     total = -constants[-1]
     for k, point in enumerate(points):
@@ -50,7 +50,7 @@ def _term(index: Ints, rows: Array, block: str) -> Term:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     ids, out = np.arange(4), []
     for block, dim in (("surface", 3), ("flat", 2)):
         normal, anchor = np.full(dim, dim**-0.5), np.full(dim, 0.1)

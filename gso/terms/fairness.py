@@ -17,7 +17,7 @@ INVARIANT = ("translation",)
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Linear combination of the points minus a target vector.
+    """Return the linear combination of the points minus a target vector.
 
     Constants: one coefficient per point (they sum to zero), then the target's components.
     """
@@ -30,7 +30,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def differences(mesh: Mesh) -> tuple[Ints, Array]:
-    """Stencils (e, k) and coefficients (k, e) of the second differences of a mesh.
+    """Return stencils (e, k) and coefficients (k, e) of the second differences of a mesh.
 
     On quad meshes: ``(1, -2, 1) / h^2`` along polylines. On a grid h is the length of a side
     over its number of cells. If the sides differ by less than a factor of two, both are
@@ -61,13 +61,13 @@ def differences(mesh: Mesh) -> tuple[Ints, Array]:
 
 
 def _spacing(grid: Array) -> tuple[float, float]:
-    """Spacing of the samples along both directions of a grid."""
+    """Return the spacing of the samples along both directions of a grid."""
     side = [np.linalg.norm(np.diff(grid, axis=a), axis=-1).sum(axis=a).mean() for a in (0, 1)]
     return spacing(side[0], side[1], grid.shape)
 
 
 def spacing(along: Any, across: Any, shape: Sequence[int]) -> tuple[Any, Any]:
-    """Spacing of a grid's samples from the mean lengths of its sides; arrays or tensors.
+    """Return a grid's spacing from the mean lengths of its sides; for arrays or tensors.
 
     Sides whose lengths differ by less than a factor of two count as equally long.
     """
@@ -140,5 +140,5 @@ def build(
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return [build(mesh), build(mesh, block="flat")]

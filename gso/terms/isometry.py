@@ -16,7 +16,7 @@ INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Differences of the diagonals' lengths and of their dot product (Wang et al. 2024).
+    """Return differences of the diagonals' lengths and of their dot product (Wang et al. 2024).
 
     For a triangle they are the differences of its sides' lengths. Constants: |a|, |b| and
     a.b of the cell in space, or the three lengths.
@@ -29,7 +29,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """The vectors whose lengths the first residuals compare."""
+    """Return the vectors whose lengths the first residuals compare."""
     return tuple(_vectors(points))
 
 
@@ -40,7 +40,7 @@ def _vectors(points: Sequence[tuple[Any, ...]]) -> list[Any]:
 
 
 def typical_length(mesh: Mesh) -> float:
-    """Root mean square of the compared lengths: diagonals of quads and sides of triangles."""
+    """Return the root mean square of the compared lengths: diagonals, and sides of triangles."""
     quads, triangles = topology.by_size(mesh.faces)
     ends = [quads[:, c] for c in ((0, 2), (1, 3))]
     ends += [triangles[:, c] for c in ((0, 1), (1, 2), (2, 0))]
@@ -78,5 +78,5 @@ def _rest(vertices: Array, faces: Ints) -> Array:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return build(mesh)

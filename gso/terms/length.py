@@ -16,7 +16,7 @@ INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``(l'^2 - l^2) / 2l``, about ``l' - l`` where that is small, and smooth at ``l' = 0``.
+    """Return ``(l'^2 - l^2) / 2l``: about ``l' - l`` near zero, and smooth at ``l' = 0``.
 
     Constants: the target length l, and a shift, 0 for a soft term.
     """
@@ -37,6 +37,6 @@ def build(pairs: Ints, lengths: Array, *, block: str = "surface", weight: float 
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     lengths = np.full(len(mesh.edges), 0.3)
     return [build(mesh.edges, lengths), build(mesh.edges, lengths, block="flat")]

@@ -20,10 +20,10 @@ class Loss(Protocol):
     """Loss of the residuals (r, e) of elements; acts on each residual unless stated otherwise."""
 
     def value(self, r: Array) -> Array:
-        """Loss (., e); its sum over the first axis is the total of each element."""
+        """Return the loss (., e); its sum over the first axis is the total of each element."""
 
     def weights(self, r: Array) -> tuple[Array, Array]:
-        """First derivative, and a curvature >= 0 for the Gauss-Newton matrix, (r, e) each."""
+        """Return the derivative, and a curvature >= 0 for the Gauss-Newton matrix, (r, e) each."""
 
 
 @dataclass(frozen=True)

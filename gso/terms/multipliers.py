@@ -35,7 +35,7 @@ class Shifts:
         self._rows = [[dim * ids + d for d in range(dim)] for ids in index.T]
 
     def constants(self, coordinates: Array) -> Array:
-        """Constants with the current shifts; the coordinates are ignored."""
+        """Return the constants with the current shifts; the coordinates are ignored."""
         return self._constants
 
     def push(self, coordinates: Array) -> float:

@@ -16,7 +16,7 @@ INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Distance between the lines of the diagonals. Constants: a shift, 0 for a soft term."""
+    """Return the distance between the diagonals' lines. Constants: a shift, 0 for a soft term."""
     return (geometry.diagonal_distance(*points) + constants[0],)
 
 
@@ -32,6 +32,6 @@ def build(quads: Ints, *, weight: float = 1.0) -> Term:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     quads = topology.by_size(mesh.faces)[0]
     return [build(quads)] if len(quads) else []

@@ -16,7 +16,7 @@ INVARIANT = ()
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Displacement from the target position."""
+    """Return the displacement from the target position."""
     return sub(points[0], tuple(constants))
 
 
@@ -33,6 +33,6 @@ def build(ids: Ints, positions: Array, weights: Array, *, block: str = "surface"
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     ids = np.arange(3)
     return [build(ids, mesh.vertices[ids] + 0.1, np.ones(3))]

@@ -18,7 +18,7 @@ INVARIANT = ()
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``t u + (1 - t) (u.n) n`` of the displacement u from the reference point.
+    """Return ``t u + (1 - t) (u.n) n`` of the displacement u from the reference point.
 
     Constants: reference point (3), unit normal n (3), factor t on the tangential part.
     """
@@ -80,7 +80,7 @@ def closest(mesh: Mesh, normals: Array, *, tangential: float = 0.0) -> Term:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     from gso.variables.normal import vertex_normals
 
     return [build(mesh, vertex_normals(mesh), tangential=0.5)]

@@ -15,7 +15,7 @@ INVARIANT = ()
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``s - 1``, which selects one of the conformal maps (Jiang et al. 2020)."""
+    """Return ``s - 1``, which selects one of the conformal maps (Jiang et al. 2020)."""
     return (points[0][0] - 1.0,)
 
 
@@ -28,5 +28,5 @@ def build(mesh: Mesh) -> Term:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return [build(mesh)]

@@ -15,7 +15,7 @@ INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """(c, d) of each corner triangle of a face, see :mod:`gso.geometry.strain`.
+    """Return (c, d) of each corner triangle of a face, see :mod:`gso.geometry.strain`.
 
     Constants: the three numbers of :func:`gso.geometry.rest_frame` per corner triangle.
     """
@@ -36,5 +36,5 @@ def build(mesh: Mesh) -> list[Term]:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return build(mesh)

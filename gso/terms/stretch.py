@@ -26,7 +26,7 @@ _STEEPEST = 1.3
 
 
 def corners_of(size: int) -> tuple[tuple[int, int, int], ...]:
-    """Corner triangles (corner, next, previous) of a face with 3 or 4 corners."""
+    """Return the corner triangles (corner, next, previous) of a face with 3 or 4 corners."""
     return _CORNERS if size == 4 else ((0, 1, 2),)
 
 
@@ -40,7 +40,7 @@ def _maps(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> list[A
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``sqrt(2) (Q - 1)`` of each corner triangle of a face, then all sqrt(2) c, all sqrt(2) d.
+    """Return ``sqrt(2) (Q - 1)`` of each corner triangle, then all sqrt(2) c, all sqrt(2) d.
 
     Half the sum of squares of a corner's three numbers is
     ``((s1 - 1)^2 + (s2 - 1)^2) / 2``. Constants: the three numbers of
@@ -55,7 +55,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """The plane vectors whose lengths are ``sqrt(2) Q``."""
+    """Return the plane vectors whose lengths are ``sqrt(2) Q``."""
     return tuple((_ROOT2 * q[0], _ROOT2 * q[1]) for q, _, _ in _maps(points, constants))
 
 
@@ -96,7 +96,7 @@ class Spread:
         return parts, 0.5 / self.level**2 * (parts * parts).sum(axis=0)
 
     def value(self, r: Array) -> Array:
-        """Loss of each corner."""
+        """Return the loss of each corner."""
         y = self._squares(r)[1]
         e = self.eps**2
         low = 2.0 / self.p * ((y + e) ** (0.5 * self.p) - e ** (0.5 * self.p))
@@ -105,7 +105,7 @@ class Spread:
         return self.level**2 * (low + rise * (2.0 / self.q * held + y - held))
 
     def weights(self, r: Array) -> tuple[Array, Array]:
-        """First derivative, and the curvature without its negative part and its cross terms."""
+        """Return the derivative, and the curvature without negative part and cross terms."""
         parts, y = self._squares(r)
         held = np.minimum(y, (_STEEPEST * self.knee) ** 2)
         low = (y + self.eps**2) ** (0.5 * self.p - 1.0)
@@ -145,13 +145,13 @@ def pieces(mesh: Mesh) -> list[Ints]:
 
 
 def _corner(vertices: Array, faces: Ints, corner: tuple[int, int, int]) -> tuple[Array, Array]:
-    """Doubled area vectors (e, 3) of a corner, and the sums (e,) of its squared sides."""
+    """Return doubled area vectors (e, 3) of a corner, and the sums (e,) of its squared sides."""
     p, q, r = (vertices[faces[:, k]] for k in corner)
     return np.cross(q - p, r - p), ((q - p) ** 2).sum(axis=1) + ((r - p) ** 2).sum(axis=1)
 
 
 def corner_shares(vertices: Array, quads: Ints) -> Array:
-    """Doubled signed area of each corner of quads (4, e), over the sum of its squared sides.
+    """Return the doubled signed corner areas (4, e) of quads over the sums of squared sides.
 
     The sign is relative to the normal of the face.
     """
@@ -163,7 +163,7 @@ def corner_shares(vertices: Array, quads: Ints) -> Array:
 
 
 def rest_constants(vertices: Array, faces: Ints) -> Array:
-    """Rest frames of the corner triangles of faces, (12 or 3, e)."""
+    """Return the rest frames of the corner triangles of faces, (12 or 3, e)."""
     points = [tuple(np.ascontiguousarray(vertices[faces[:, k]].T)) for k in range(faces.shape[1])]
     rows = [
         geometry.rest_frame(*(points[k] for k in corner)) for corner in corners_of(faces.shape[1])
@@ -214,5 +214,5 @@ def build(mesh: Mesh) -> list[Term]:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return build(mesh)

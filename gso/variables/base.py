@@ -31,7 +31,7 @@ class Layout:
         return sum(count * dim for _, count, dim in self.blocks)
 
     def where(self, name: str) -> tuple[int, int, int]:
-        """(start, count, dim) of a block."""
+        """Return (start, count, dim) of a block."""
         start = 0
         for block, count, dim in self.blocks:
             if block == name:
@@ -41,11 +41,11 @@ class Layout:
 
     @classmethod
     def of(cls, count: int, *names: str) -> Layout:
-        """Layout of the blocks named, each with `count` rows."""
+        """Make the layout of the blocks named, each with `count` rows."""
         return cls(tuple((name, count, DIMENSIONS[name]) for name in names))
 
     def split(self, coordinates: Array) -> dict[str, Array]:
-        """Arrays (count, dim) by block."""
+        """Split the coordinate vector into arrays (count, dim) by block."""
         out, start = {}, 0
         for block, count, dim in self.blocks:
             out[block] = coordinates[start : start + count * dim].reshape(count, dim)
@@ -53,12 +53,12 @@ class Layout:
         return out
 
     def columns(self, name: str, rows: Ints) -> Ints:
-        """Positions (..., dim) in the coordinate vector of rows (...) of a block."""
+        """Return the positions (..., dim) in the coordinate vector of rows (...) of a block."""
         start, _, dim = self.where(name)
         return start + np.asarray(rows)[..., None] * dim + np.arange(dim)
 
     def pack(self, blocks: dict[str, Array]) -> Array:
-        """Coordinate vector from arrays (count, dim) by block."""
+        """Concatenate arrays (count, dim) by block into the coordinate vector."""
         return np.concatenate([np.asarray(blocks[b], float).ravel() for b, _, _ in self.blocks])
 
 

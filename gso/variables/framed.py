@@ -13,7 +13,7 @@ ALONG = (1.0 - 2.0 * _TANGENTIAL**2) ** 0.5
 
 
 def framed_displacements(layout: Layout, points: Array, normals: Array) -> Variables:
-    """Vertex = point + (unknowns along the normal and two tangents), on the block "surface".
+    """Make "surface" vertices = points + (unknowns along the normal and two tangents).
 
     Coordinates of other blocks are unknowns themselves, after those of the surface. With
     these unknowns, simple bounds keep a vertex in a ball around its point and still allow
@@ -40,7 +40,7 @@ def framed_displacements(layout: Layout, points: Array, normals: Array) -> Varia
 
 
 def ball_bounds(layout: Layout, count: int, reach: float) -> tuple[Array, Array]:
-    """Bounds on :func:`framed_displacements` of `count` vertices: a box within balls.
+    """Bound :func:`framed_displacements` of `count` vertices by a box within balls.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from gso.variables.base import Array, Layout, Variables
 
 
 def vertex_normals(mesh: Mesh) -> Array:
-    """Area-weighted unit normals (n, 3) at the vertices of a mesh.
+    """Return area-weighted unit normals (n, 3) at the vertices of a mesh.
 
     Mean over both triangulations of the quads: a quad that is split through the vertex
     contributes both triangles, otherwise only the corner triangle at the vertex. So a
@@ -32,7 +32,7 @@ def vertex_normals(mesh: Mesh) -> Array:
 
 
 def normal_offsets(layout: Layout, points: Array, normals: Array) -> Variables:
-    """Vertex = point + unknown * normal, on the block "surface".
+    """Make vertices = points + unknowns * normals, on the block "surface".
 
     Parameters
     ----------

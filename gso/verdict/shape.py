@@ -62,7 +62,7 @@ def _collapsed(before: Mesh, after: Array, what: str, names: Ints | None = None)
 
 
 def _known(design: Mesh, pairs: Ints) -> NDArray[np.bool_]:
-    """Mask of the pairs of faces where the design intersects itself already."""
+    """Mark the pairs of faces where the design intersects itself already."""
     before = faults.crossings(design)
     if not before.size:
         return np.zeros(len(pairs), bool)
