@@ -238,7 +238,8 @@ class Mesh:
         Raises
         ------
         MeshError
-            The number of components that touch others is 0.4 of the number of faces or more.
+            At least two components touch others, and their number is at least 0.4 of that of
+            the faces.
         """
         touching = np.unique(self.components[self.half_edges.origin[self.seams]]).size
         if touching >= max(2, _HEAP * len(self.faces)):
