@@ -1,4 +1,7 @@
-"""What a file says of a mesh beyond its geometry, kept to be written with it again."""
+"""Face names and texture coordinates that a file stores beside the geometry of a mesh.
+
+They are kept so that they can be written again with the result.
+"""
 
 from __future__ import annotations
 
@@ -13,20 +16,20 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Keywords of OBJ that name the faces after them, and what they name.
+#: OBJ keywords that label the faces listed after them, and the kind of each label.
 LABELS = {"o": "objects", "g": "groups", "s": "smoothing groups", "usemtl": "materials"}
 
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """Names that stand before runs of faces.
+    """Labels of one kind (one OBJ keyword), each for a run of consecutive faces.
 
     Attributes
     ----------
     names : tuple of str
-        As the file has them, one for each time that a name is said.
+        In the order of the file, one entry per occurrence of the keyword.
     of_face : ndarray of int, (m,)
-        Place in `names` of each face's name; -1 before the first.
+        Index in `names` of each face's label; -1 for faces before the first label.
     """
 
     names: tuple[str, ...]
@@ -35,17 +38,17 @@ class Labels:
 
 @dataclass(frozen=True, eq=False)
 class Attributes:
-    """Names of faces and texture coordinates of their corners.
+    """Labels of faces and texture coordinates of face corners.
 
-    They belong to faces and corners, not to vertices: they stay valid while vertices move,
-    are merged or doubled.
+    They belong to faces and corners, not to vertices, so they stay valid when vertices are
+    moved, merged or duplicated.
 
     Attributes
     ----------
     libraries : tuple of str
-        Files of materials (``mtllib``), as written in the file.
+        Material files (``mtllib``), as written in the file.
     labels : dict of str to Labels
-        By the keywords of OBJ: "o", "g", "s", "usemtl".
+        Labels by OBJ keyword: "o", "g", "s", "usemtl".
     texture : ndarray, (t, 1 to 3), or None
         Texture coordinates (``vt``).
     texture_corners : ndarray of int, shaped like the faces, or None
@@ -59,18 +62,19 @@ class Attributes:
 
     @property
     def empty(self) -> bool:
-        """Whether nothing is said."""
+        """Whether there are no material files, labels or texture coordinates."""
         return not (self.libraries or self.labels or self.texture_corners is not None)
 
     def taken(self, faces: Ints, turns: Ints | None = None) -> Attributes:
-        """Those of some of the faces.
+        """Select the attributes of some of the faces.
 
         Parameters
         ----------
         faces : ndarray of int, (p,)
-            Which faces, in the new order.
+            Indices of the selected faces, in the new order.
         turns : ndarray of int, (p, k), optional
-            For each new corner the column of the old one; -1 where there is no corner.
+            Permutation of the corners within each face: for each new corner the column of
+            the old one; -1 where there is no corner.
         """
         corners = self.texture_corners
         if corners is not None:
@@ -91,7 +95,7 @@ class Attributes:
         return ", ".join(parts) or "nothing"
 
     def arrays(self) -> dict[str, Array | Ints]:
-        """Plain arrays, for a .npz file."""
+        """Convert to plain arrays for a .npz file."""
         words = {
             "libraries": self.libraries,
             "labels": {k: v.names for k, v in self.labels.items()},
@@ -104,7 +108,7 @@ class Attributes:
 
     @classmethod
     def from_arrays(cls, data: Mapping[str, Any], faces: Ints) -> Attributes | None:
-        """What :meth:`arrays` made, for a mesh with these faces; None where there is nothing.
+        """Restore from the output of :meth:`arrays`; None where `data` has no attributes.
 
         Raises
         ------
@@ -137,7 +141,7 @@ class Attributes:
 
 
 def _checked(index: Any, shape: tuple[int, ...], count: int) -> Ints:
-    """Indices of this shape below a count, -1 for none."""
+    """Convert to integers; check the shape and the range -1 ... count - 1."""
     table = np.array(index, np.int64)
     if table.shape != shape or (table >= count).any() or (table < -1).any():
         raise ValueError(f"attributes are an array {table.shape} that does not fit the faces")

@@ -1,4 +1,4 @@
-"""The components of a mesh as meshes of their own, and measures of all of them together."""
+"""Splitting a mesh into its connected components, and combining their metrics."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _JOINED: dict[str, Any] = {"sum": np.sum, "max": np.max, "min": np.min}
 
 @dataclass(frozen=True)
 class Component:
-    """A part of a mesh as a mesh of its own.
+    """One component of a mesh, as a separate mesh.
 
     Attributes
     ----------
     mesh : Mesh
-        Its vertices and faces, in their order; a grid where they are one.
+        The component; vertices and faces keep their order. A grid where it is one.
     vertices, faces : ndarray of int
-        Which of the whole mesh they are.
+        Indices of its vertices and faces in the whole mesh.
     """
 
     mesh: Mesh
@@ -43,18 +43,21 @@ class Component:
         return measure.area(self.mesh)
 
     def of(self, other: Mesh) -> Mesh:
-        """The same part of a mesh with the same faces."""
+        """Extract the same component from another mesh with the same faces."""
         return self.mesh.replaced(other.vertices[self.vertices])
 
 
 def labels(mesh: Mesh, links: Iterable[tuple[int, int]] | Ints = ()) -> Ints:
-    """Component of each vertex (n,), numbered by their smallest vertex; -1 where no face is.
+    """Number the component of each vertex (n,).
+
+    Components are numbered in the order of their smallest vertex. Vertices that belong to no
+    face get -1.
 
     Parameters
     ----------
     mesh : Mesh
     links : array_like of int, (k, 2)
-        Vertices whose components count as one.
+        Pairs of vertices whose components are merged into one.
 
     Examples
     --------
@@ -82,19 +85,19 @@ def labels(mesh: Mesh, links: Iterable[tuple[int, int]] | Ints = ()) -> Ints:
 
 
 def several(mesh: Mesh) -> bool:
-    """Whether a mesh has more than one component."""
+    """Tell whether a mesh has more than one component."""
     return mesh.grid_index is None and bool(labels(mesh).max() > 0)
 
 
 def split(mesh: Mesh, label: Ints | None = None) -> list[Component]:
-    """The components of a mesh; vertices of no face belong to none.
+    """Split a mesh into its components; vertices of no face are dropped.
 
     Parameters
     ----------
     mesh : Mesh
     label : ndarray of int, (n,), optional
-        What is kept together, as :func:`labels` has it; every component for itself when not
-        given.
+        Part of each vertex, numbered as by :func:`labels`; every connected component is a part
+        of its own when not given.
 
     Examples
     --------
@@ -116,7 +119,7 @@ def split(mesh: Mesh, label: Ints | None = None) -> list[Component]:
 
 
 def _grouped(label: Ints) -> list[Ints]:
-    """Indices of each label 0, 1 ..., in ascending order."""
+    """Group the indices by label 0, 1 ..., in ascending order."""
     order = np.argsort(label, kind="stable")
     ends = np.searchsorted(label[order], np.arange(label.max() + 2))
     return [order[a:b] for a, b in pairwise(ends)]
@@ -125,10 +128,10 @@ def _grouped(label: Ints) -> list[Ints]:
 def combined(
     several: Sequence[Mapping[str, float]], areas: Sequence[float], info: Mapping[str, Info] = INFO
 ) -> dict[str, float]:
-    """Metrics of a whole from those of its components.
+    """Combine the metrics of the components into those of the whole mesh.
 
-    Means are weighted by the components' areas; see :attr:`gso.metrics.Info.joined`. A metric
-    that some components do not have is that of the others.
+    Means are weighted by the components' areas; see :attr:`gso.metrics.Info.joined`. Components
+    that lack a metric are left out of its mean, maximum, minimum or sum.
 
     Parameters
     ----------
@@ -157,15 +160,15 @@ def combined(
 
 
 def average(function: Callable[..., Any], mesh: Mesh, *others: Mesh) -> Any:
-    """Mean over the components of a mesh, weighted by area, of what a function says of each.
+    """Average a function over the components of a mesh, weighted by area.
 
     Parameters
     ----------
     function : callable
-        ``function(mesh, *others)`` of one component returns a number or a tuple of them.
+        ``function(mesh, *others)`` for one component returns a number or a tuple of numbers.
     mesh : Mesh
     *others : Mesh
-        Meshes with its faces, whose same parts the function is given.
+        Meshes with the same faces; the function gets the same component of each.
 
     Examples
     --------
@@ -181,7 +184,7 @@ def average(function: Callable[..., Any], mesh: Mesh, *others: Mesh) -> Any:
 
 
 def sizes(mesh: Mesh) -> Array:
-    """Size of the component of each vertex (n,): the largest distance from its centroid."""
+    """Return the size of each vertex's component (n,): its largest distance from the centroid."""
     out = np.full(len(mesh.vertices), mesh.frame.scale)
     if several(mesh):
         for part in split(mesh):
@@ -190,7 +193,7 @@ def sizes(mesh: Mesh) -> Array:
 
 
 def mean(values: Array, weights: Array) -> float:
-    """Weighted mean, to the last bit of values that are all the same."""
+    """Return the weighted mean; exact, without rounding, when all values are equal."""
     if (values == values[0]).all():
         return float(values[0])
     return float(np.average(values, weights=weights))

@@ -1,8 +1,8 @@
-"""Cut a mesh open along edges, and find the lines along which it should be.
+"""Cutting a mesh open along edges, and choosing the edges to cut.
 
-A vertex of the cut mesh is a fan of corners of the mesh: corners that follow each other round
-a vertex without a cut edge between them. The first fan of a vertex keeps its number, the
-others get numbers after the last one.
+Each vertex of the cut mesh corresponds to a fan of the original: a run of consecutive face
+corners around a vertex with no cut edge between them. The first fan keeps the index of the
+vertex; the others get new indices after the last one.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from gso.topology import edge_keys
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Relative difference of lengths below which two lines are equally long.
+#: Relative difference below which two path lengths count as equal.
 _EVEN = 1e-9
 
 
 @dataclass(frozen=True)
 class Cut:
-    """A mesh that was cut open.
+    """A mesh that was cut open along edges.
 
     Attributes
     ----------
     mesh : Mesh
-        The cut mesh: p vertices, the faces in their order and from the same corner on.
+        The cut mesh: p vertices; the faces keep their order and their first corners.
     vertex : ndarray of int, (p,)
-        Vertex of the mesh before that each vertex was; the first n are 0 ... n - 1.
+        Index in the original mesh of each vertex; the first n are 0 ... n - 1.
     seams : ndarray of int, (s, 2, 2)
-        The two copies of each cut edge, as vertices of the cut mesh; their first ends were one
-        vertex, and so were their second ends.
+        The two copies of each cut edge, as vertices of the cut mesh. The first ends of both
+        copies were one vertex, and so were the second ends.
     """
 
     mesh: Mesh
@@ -47,15 +47,16 @@ class Cut:
 def cut(mesh: Mesh, edges: ArrayLike) -> Cut:
     """Cut a mesh open along edges.
 
-    A vertex becomes as many as the cut edges and the boundary part its faces into: one at the
-    end of a line inside the surface, two along a line, three where three lines meet.
+    The cut edges and the boundary divide the faces around a vertex into fans; each fan gets
+    its own copy of the vertex. So there is one copy at the end of a cut line inside the
+    surface, two along a line, three where three lines meet.
 
     Parameters
     ----------
     mesh : Mesh
         The surface.
     edges : array_like of int, (e, 2)
-        Edges of its faces, in any order and direction. Those on the boundary change nothing.
+        Edges of its faces, in any order and direction. Boundary edges are ignored.
 
     Returns
     -------
@@ -114,11 +115,12 @@ def cut(mesh: Mesh, edges: ArrayLike) -> Cut:
 
 
 def joining(mesh: Mesh, loops: Sequence[Ints]) -> Ints:
-    """Edges (e, 2) of a tree of shortest lines that joins boundary loops of one component.
+    """Find a tree of shortest edge paths (e, 2) that joins boundary loops of one component.
 
-    From the first loop on, the nearest of the loops that are left is joined to what is joined
-    already, by a shortest line along edges. It keeps away from boundary loops that are not
-    given. Cut along it, a surface without handles whose loops are all given is a disk.
+    The tree starts at the first loop. In each step the nearest remaining loop is joined to it
+    by a shortest path along edges. Paths avoid boundary loops that are not given, where
+    possible. A surface of genus zero whose loops are all given becomes a disk when it is cut
+    along the tree.
 
     Parameters
     ----------
@@ -144,7 +146,7 @@ def joining(mesh: Mesh, loops: Sequence[Ints]) -> Ints:
     length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
     others = mesh.half_edges.boundary_vertex.copy()
     others[np.concatenate(loops)] = False
-    # A way round is shorter, if there is one.
+    # Penalty on edges that touch other loops: any path that avoids them is shorter.
     length[others[mesh.edges].any(axis=1)] += length.sum()
     graph = coo_matrix((length, (a, b)), shape=(n, n)).tocsr()
     reached, left = np.unique(loops[0]), list(loops[1:])

@@ -1,4 +1,4 @@
-"""B-splines fitted to grids, and how far they are from them."""
+"""Least-squares B-spline fits to grids, and their distance from the grids."""
 
 from __future__ import annotations
 
@@ -16,37 +16,39 @@ from gso.status import MeshError, OptionError
 
 Array = NDArray[np.float64]
 
-#: Points of a spline per edge of a mesh that it is compared with.
+#: Samples of the spline per grid edge when the two are compared. Grids with _LARGE coordinates
+#: or more get two.
 _REFINED = 4
 _LARGE = 100_000
 
 
 @known_keywords()
 def fit_spline(surface: Any, controls: int | tuple[int, int] = 16) -> BSplineSurface:
-    """Bicubic B-spline closest to a grid at uniform parameters, by least squares.
+    """Fit a bicubic B-spline to a grid at uniform parameters, by least squares.
 
-    Vertex (i, j) of an (H, W) grid belongs to the parameters (i / (H - 1), j / (W - 1)), as
-    in the optimiser's spline unknowns: fitted to what they made, it is the spline itself.
+    Vertex (i, j) of an (H, W) grid has the parameters (i / (H - 1), j / (W - 1)). The
+    optimiser's spline unknowns use the same parameters, so the fit to a surface that was
+    optimised as a spline reproduces that spline.
 
     Parameters
     ----------
     surface : Mesh, array (H, W, 3), path ...
-        A grid, or anything of which :func:`gso.as_mesh` makes one; for a result, its `mesh`.
+        A grid, or anything that :func:`gso.as_mesh` converts to one; for a result, its `mesh`.
     controls : int or (int, int)
-        Control points along both sides, 4 or more; see :func:`fitting_controls` for small
-        grids, which carry fewer.
+        Control points along both sides, 4 or more. Small grids get fewer; see
+        :func:`fitting_controls`.
 
     Returns
     -------
     BSplineSurface
-        In the unit and place of the grid; its `gap` is the distance between the two.
+        In the grid's own coordinates; its `gap` is the distance between spline and grid.
 
     Raises
     ------
     MeshError
-        The surface is no grid.
+        The surface is not a grid.
     OptionError
-        `controls` is no such number.
+        `controls` is not one or two integers of at least 4.
 
     Examples
     --------
@@ -65,12 +67,12 @@ def fit_spline(surface: Any, controls: int | tuple[int, int] = 16) -> BSplineSur
 
 
 def grid_of(mesh: Mesh) -> Array:
-    """Grid (H, W, 3) of a mesh.
+    """Return the grid (H, W, 3) of a mesh.
 
     Raises
     ------
     MeshError
-        It is none.
+        The mesh is not a grid.
     """
     if mesh.grid is None:
         raise MeshError(
@@ -81,10 +83,10 @@ def grid_of(mesh: Mesh) -> Array:
 
 
 def fitting_controls(controls: int | tuple[int, int], shape: tuple[int, ...]) -> tuple[int, int]:
-    """Control points along both sides of a grid.
+    """Limit the numbers of control points to what the two sides of a grid support.
 
-    At most two for three vertices, so that the vertices say what the spline does between
-    them, but four (or all, if there are fewer) always.
+    A side gets at most two control points per three vertices, so that the vertices determine
+    the spline between them; but at least four, or as many as it has vertices.
 
     >>> fitting_controls(16, (64, 9))
     (16, 6)
@@ -98,9 +100,10 @@ def fitting_controls(controls: int | tuple[int, int], shape: tuple[int, ...]) ->
 
 
 def interpolated(points: Array, controls: tuple[int, int]) -> BSplineSurface:
-    """Least-squares spline of a grid (H, W, 3), with so many control points."""
+    """Fit a spline with the given numbers of control points to a grid (H, W, 3)."""
     shape = points.shape[:2]
-    # Far from the origin digits would be lost; the basis sums to one, so moving is exact.
+    # Centring avoids cancellation far from the origin. The basis sums to one, so the spline
+    # moves with its control points.
     centre = points.reshape(-1, 3).mean(axis=0)
     knots = [clamped_knots(c) for c in controls]
     bases = [
@@ -117,26 +120,26 @@ def interpolated(points: Array, controls: tuple[int, int]) -> BSplineSurface:
 def describe_spline(
     mesh: Mesh, controls: tuple[int, int], design: Mesh, fitted: Array | None = None
 ) -> tuple[BSplineSurface, dict[str, Any]]:
-    """The spline that a mesh consists of samples of, and what a user should know of it.
+    """Recover the spline that a mesh samples, with its curvature and distances.
 
     Parameters
     ----------
     mesh : Mesh
         Samples of a spline at uniform parameters.
     controls : (int, int)
-        Its control points along both sides.
+        The spline's control points along both sides.
     design : Mesh
-        What it should be close to.
+        The surface that the spline should stay close to.
     fitted : ndarray, (n, 3), optional
-        Vertices that it was fitted to when its own solve began.
+        Vertices that the first spline of the solve was fitted to.
 
     Returns
     -------
     BSplineSurface
     dict
-        "controls"; "curvature", the mean |K| of the smooth surface in 1/size^2, size being
-        the design's; and distances (:class:`gso.spline.Gap`) to the "mesh" between its
-        vertices, to the "design", and of the first fit to what was "fitted".
+        "controls"; "curvature", the mean |K| of the smooth surface in 1/size^2, with the
+        design's size; and distances (:class:`gso.spline.Gap`): "mesh" and "design" from the
+        spline to these two, "fitted" from the first fit to its data.
     """
     spline = interpolated(grid_of(mesh), controls)
     spline = replace(spline, gap=gap(spline, mesh))
@@ -153,10 +156,10 @@ def describe_spline(
 
 
 def gap(spline: BSplineSurface, mesh: Mesh) -> Gap:
-    """Distances between a spline and a grid of about the same size.
+    """Measure the distances between a spline and a grid of about the same size.
 
-    The spline is replaced by triangles of a quarter of the grid's spacing (of half of it, on
-    large grids), whose corners are on it.
+    The spline is sampled at a quarter of the grid's spacing (at half of it for large grids)
+    and replaced by the triangles between the samples.
     """
     shape = grid_of(mesh).shape[:2]
     finer = _REFINED if mesh.vertices.size < _LARGE else 2

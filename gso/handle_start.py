@@ -1,4 +1,4 @@
-"""A surface that follows its handles: where solves with moved handles start from."""
+"""Deformation of a surface that follows its handles: the start of solves with moved handles."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from gso.variables import vertex_normals
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Weight of a field's slope, relative to its bending, and of its size, which counts only where
-#: no handle is.
+#: Weights of a field's slope and of its size, relative to its bending. They only select a
+#: solution where the handles leave the thin plate free.
 _SLOPE, _SIZE = 1e-6, 1e-12
-#: Height of a bulge, relative to that of an arc as long as the surface was.
+#: Height of the bulge, as a factor on size * sqrt(relative shortening).
 _BULGE = 0.5
-#: Mean shortening of the edges from which on a surface bulges.
+#: Relative shortening of the edges above which the surface is made to bulge.
 _SHORTER = 1e-9
-#: Share by which a bulge to the other side has to be better.
+#: Relative improvement that is required to bulge against the normals instead of along them.
 _EVEN = 1e-3
-#: Singular value, relative to the largest, that is no direction.
+#: Singular value, relative to the largest, that counts as zero.
 _THIN = 1e-9
 
 
 class Spread:
-    """Displacement of some vertices, spread over a surface with the least bending.
+    """Interpolation of handle displacements over a surface with the least bending.
 
-    The field with the smallest squared second differences (a thin plate with free ends):
-    affine where the handles allow it.
+    The field minimises the squared second differences (a thin plate with free ends), so it is
+    affine where the handles allow it. The matrix is factorised once.
 
     Parameters
     ----------
     mesh : Mesh
         The surface.
     ids : ndarray of int, (k,)
-        Vertices whose displacement is given, each once.
+        The handles: vertices with given displacements, each once.
 
     Examples
     --------
@@ -55,7 +55,7 @@ class Spread:
 
         n = len(mesh.vertices)
         self.mesh, self.ids = mesh, ids
-        #: Components, which of the handles they have, and their own fields.
+        #: Per component: the component, a mask of its handles, and its own field.
         self.parts: list[tuple[Component, NDArray[np.bool_], Spread]] = []
         if several(mesh):
             for part in split(mesh):
@@ -91,7 +91,7 @@ class Spread:
             )
 
     def __call__(self, displacement: Array) -> Array:
-        """Field (n, 3) from the displacement (k, 3) of the handles."""
+        """Interpolate the displacements (k, 3) of the handles, (n, 3)."""
         field = np.zeros((len(self.mesh.vertices), displacement.shape[1]))
         field[self.ids] = displacement
         if self.parts:
@@ -103,7 +103,7 @@ class Spread:
         return field
 
     def deflection(self) -> Array:
-        """Shape (n,) under an even load, largest value one; zero at the handles."""
+        """Return the deflection (n,) under a uniform load: zero at the handles, largest value 1."""
         out = np.zeros(len(self.mesh.vertices))
         if self.parts:
             for part, _, own in self.parts:
@@ -116,20 +116,20 @@ class Spread:
 
 
 def follow(mesh: Mesh, spread: Spread, targets: Array) -> Array:
-    """Vertices (n, 3) of a surface whose handles are at their targets.
+    """Deform a surface so that its handles reach their targets, (n, 3).
 
-    The surface moves rigidly with its handles as far as it can, part by part; what is left of
-    their motion is spread. Where that makes the surface shorter it bulges along its normals:
-    a sheet that is pressed together in its plane would not know which way to go.
+    Each component follows the best rigid motion of its handles. The remaining displacement of
+    the handles is interpolated. If that shortens the surface, a bulge along the normals is
+    added: without it, a sheet compressed in its plane has no preferred side to buckle to.
 
     Parameters
     ----------
     mesh : Mesh
         The surface.
     spread : Spread
-        Of its handles.
+        Interpolation from its handles.
     targets : ndarray, (k, 3)
-        Where they go.
+        Positions that the handles move to.
     """
     points = mesh.vertices.copy()
     if spread.parts:
@@ -152,16 +152,17 @@ def follow(mesh: Mesh, spread: Spread, targets: Array) -> Array:
 
 
 def _lost(mesh: Mesh, points: Array) -> float:
-    """Share of its edges' length that a surface loses; what edges gain does not count."""
+    """Return the relative shortening of the edges in total; edges that grow are ignored."""
     a, b = mesh.edges.T
     before, after = (np.linalg.norm(p[a] - p[b], axis=1) for p in (mesh.vertices, points))
     return float(np.maximum(before - after, 0.0).sum() / before.sum())
 
 
 def _motion(points: Array, targets: Array) -> tuple[Array, Array]:
-    """Rotation (3, 3) and shift (3,) that bring points (k, 3) closest to targets.
+    """Find the rotation (3, 3) and shift (3,) that bring points (k, 3) closest to targets.
 
-    Where the points do not say how to turn, as little as possible.
+    Where the points do not determine the rotation (one point, or collinear points), it is the
+    smallest possible.
     """
     from scipy.spatial.transform import Rotation
 

@@ -1,4 +1,4 @@
-"""How far a step may go: bounds that no iterate crosses."""
+"""Step limits of the line search that keep iterates away from inverted triangles."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from gso.variables import Layout
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Share of the way to a bound that a step may go.
+#: Largest step, as a fraction of the step at which a triangle degenerates.
 SAFETY = 0.9
 
 
 def orientation(triangles: Ints, layout: Layout) -> Limit:
-    """Keep triangles of the block "flat" from collapsing or turning over.
+    """Limit steps so that no triangle of the block "flat" collapses or inverts.
 
-    Along a step the signed area of a triangle is a parabola in the step length; the step
-    ends at :data:`SAFETY` of its smallest positive root over all triangles (Smith and
+    Along a step the signed area of a triangle is quadratic in the step length. The step is
+    limited to :data:`SAFETY` times the smallest positive root over all triangles (Smith and
     Schaefer 2015, Bijective parameterization with free boundaries, section 3.3).
     Triangles that are inverted already are ignored.
 
     Parameters
     ----------
     triangles : ndarray of int, (t, 3)
-        Corners, anticlockwise where the image is the right way up.
+        Corners, anticlockwise where the triangle is not inverted.
     layout : Layout
-        The coordinates.
+        Layout of the coordinate vector.
     """
     start, count, _ = layout.where("flat")
     part = slice(start, start + 2 * count)
@@ -40,7 +40,7 @@ def orientation(triangles: Ints, layout: Layout) -> Limit:
         c = _cross(e, f)
         b = _cross(e, df) + _cross(de, f)
         a = _cross(de, df)
-        # 2c / (sqrt(b^2 - 4ac) - b) is the smallest positive root, or there is none.
+        # 2c / (sqrt(b^2 - 4ac) - b) is the smallest positive root, if there is one.
         with np.errstate(invalid="ignore"):
             steepness = np.sqrt(b * b - 4.0 * a * c) - b
         falling = (steepness > 0) & (c > 0)

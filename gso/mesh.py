@@ -1,4 +1,4 @@
-"""The mesh that everything works on: vertices, faces, and the grid it may be."""
+"""The mesh class of the package: vertices, faces, connectivity, and the grid where it is one."""
 
 from __future__ import annotations
 
@@ -20,25 +20,26 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Frame:
-    """The user's frame: ``user = centre + scale * internal``.
+    """Similarity transform between the unit ball and the user's coordinates.
 
-    Inside, a mesh has its centroid at the origin and its farthest vertex at distance 1.
+    ``user = centre + scale * internal``: internally a mesh has its centroid at the origin and
+    its farthest vertex at distance 1.
     """
 
     centre: Array
     scale: float
 
     def to_unit(self, points: Array) -> Array:
-        """From the user's frame to the unit ball."""
+        """Transform points from the user's coordinates to the unit ball."""
         return (points - self.centre) / self.scale
 
     def to_user(self, points: Array) -> Array:
-        """From the unit ball to the user's frame."""
+        """Transform points from the unit ball to the user's coordinates."""
         return self.centre + self.scale * points
 
 
 class Mesh:
-    """A surface of quads, triangles or both, checked on entry.
+    """A surface mesh of quads, triangles or both, checked on construction.
 
     Parameters
     ----------
@@ -48,28 +49,28 @@ class Mesh:
         Vertex indices in cyclic order. In a mixed mesh the rows have four columns and a
         triangle ends in -1.
     notes : sequence of str
-        What was changed on the way in, for the user to read.
+        Messages for the user about changes that were made before construction.
     attributes : Attributes, optional
-        Names and texture coordinates of these faces.
+        Labels and texture coordinates of these faces.
 
     Attributes
     ----------
     vertices, faces : ndarray
         Read-only arrays; faces are consistently oriented.
     grid_index : ndarray of int, (H, W), or None
-        Vertex ids by row and column when the mesh is a grid, whatever its numbering.
+        Vertex ids by row and column when the mesh is a grid, in any numbering.
     notes : tuple of str
-        What was repaired: orientation, welded poles, unused vertices; edges that lie on
-        each other without being joined.
+        What was repaired or found: reversed faces, welded poles, unused vertices, several
+        components, coincident edges that are not joined.
     attributes : Attributes or None
-        What a file said of the faces, to be written with them again.
+        Labels and texture coordinates from a file, to be written again with the faces.
 
     Raises
     ------
     MeshError
         Non-finite coordinates, faces out of range, repeated vertices in a face,
-        duplicate faces, edges with three faces, one-sided surfaces, vertices in which
-        two parts merely touch, faces without area. The message names the place.
+        duplicate faces, edges with three faces, non-orientable surfaces, non-manifold
+        vertices, faces without area. The message names the face, edge or vertex.
 
     Examples
     --------
@@ -99,9 +100,9 @@ class Mesh:
 
     @classmethod
     def from_grid(cls, points: ArrayLike, *, weld: bool = True) -> Mesh:
-        """Mesh of a grid of points (H, W, 3), at least 3 x 3.
+        """Make the mesh of a grid of points (H, W, 3), at least 3 x 3.
 
-        A side collapsed to one point (a pole) is welded: the result is then a general
+        A side that is collapsed to one point (a pole) is welded: the result is then a general
         mesh with triangles at the pole, and `notes` says so. With ``weld=False`` it stays
         a grid.
         """
@@ -125,7 +126,7 @@ class Mesh:
         return template.replaced(points)
 
     def replaced(self, vertices: Array, *, notes: tuple[str, ...] = ()) -> Mesh:
-        """The same faces with other vertices (n, 3), connectivity not checked again."""
+        """Copy the mesh with other vertices (n, 3); the connectivity is shared, not rechecked."""
         points = _checked_vertices(vertices)
         if points.shape != self.vertices.shape:
             raise MeshError(f"{points.shape[0]} vertices given for {len(self.vertices)}")
@@ -161,7 +162,7 @@ class Mesh:
 
     @cached_property
     def triangles(self) -> Ints:
-        """The surface as triangles: quads split alike all over (t, 3)."""
+        """Triangulation (t, 3); quads are split as by :func:`gso.topology.quad_splits`."""
         if self.grid_index is not None:
             ids = self.grid_index.ravel()
             quads = ids[topology.grid_faces(*self.grid_index.shape)]
@@ -179,10 +180,10 @@ class Mesh:
 
     @cached_property
     def splits(self) -> tuple[topology.Stars, ...]:
-        """Interior vertices and their rings in each triangulation of the quads, by ring length.
+        """Vertex stars of both triangulations of the quads, grouped by ring length.
 
-        The own one first, then that of the other diagonals (see
-        :func:`gso.topology.vertex_stars`); a mesh of triangles has one.
+        First the mesh's own triangulation, then that along the other diagonals (see
+        :func:`gso.topology.vertex_stars`). A mesh of triangles has one.
         """
         if self.grid_index is not None:
             return tuple(topology.grid_stars(self.grid_index, r) for r in geometry.GRID_RINGS)
@@ -191,7 +192,7 @@ class Mesh:
 
     @property
     def stars(self) -> topology.Stars:
-        """Interior vertices and their rings in the own triangulation, grouped by length."""
+        """Interior vertices and their rings in the mesh's own triangulation, by ring length."""
         return self.splits[0]
 
     @cached_property
@@ -201,7 +202,7 @@ class Mesh:
 
     @cached_property
     def rim(self) -> NDArray[np.bool_]:
-        """Mask over :attr:`edges`: on the boundary."""
+        """Mask over :attr:`edges`: boundary edges."""
         return topology.rim(self.half_edges)
 
     @cached_property
@@ -222,22 +223,23 @@ class Mesh:
 
     @property
     def seams(self) -> NDArray[np.bool_]:
-        """Mask over half-edges: on the boundary, and on top of another such edge."""
+        """Mask over half-edges: boundary edges that coincide with another boundary edge."""
         he = self.half_edges
         mask = he.twin < 0
-        # Programs round what they write: so far apart is still on top of each other.
+        # Files have rounded coordinates, so vertices coincide up to a tolerance.
         step = _JOINED * np.ptp(self.vertices[self.used], axis=0).max()
         origin, dest = he.origin[mask], he.dest[mask]
         mask[mask] = seams(np.round((self.vertices - self.frame.centre) / step), origin, dest)
         return mask
 
     def check_joined(self) -> None:
-        """Refuse a heap of faces that touch and share no vertices: nothing holds it together.
+        """Refuse a polygon soup: faces that touch but share no vertices.
 
         Raises
         ------
         MeshError
-            Most faces have vertices of their own, where those of their neighbours are.
+            At least two components touch others, and their number is at least 0.4 of that of
+            the faces.
         """
         touching = np.unique(self.components[self.half_edges.origin[self.seams]]).size
         if touching >= max(2, _HEAP * len(self.faces)):
@@ -248,12 +250,12 @@ class Mesh:
 
     @property
     def euler_characteristic(self) -> int:
-        """Vertices - edges + faces, unused vertices not counted."""
+        """Number of vertices - edges + faces; unused vertices are not counted."""
         return int(self.used.sum()) - len(self.edges) + len(self.faces)
 
     @property
     def is_disk(self) -> bool:
-        """One component with one boundary loop and no handle."""
+        """Whether it is one component of genus zero with one boundary loop."""
         return (
             len(self.boundary_loops) == 1
             and self.euler_characteristic == 1
@@ -262,12 +264,12 @@ class Mesh:
 
     @property
     def has_triangles(self) -> bool:
-        """Some faces are triangles."""
+        """Whether some faces are triangles."""
         return self.is_triangles or bool((self.faces < 0).any())
 
     @property
     def is_triangles(self) -> bool:
-        """All faces are triangles."""
+        """Whether all faces are triangles."""
         return self.faces.shape[1] == 3
 
     @property
@@ -284,26 +286,26 @@ class Mesh:
 
     @property
     def diagonal(self) -> float:
-        """Length of the bounding box's diagonal, unused vertices not counted."""
+        """Length of the bounding box's diagonal; unused vertices are not counted."""
         return geometry.box_diagonal(self.vertices[self.used])
 
     @cached_property
     def frame(self) -> Frame:
-        """Centroid and largest distance from it: where the unit ball lies.
+        """Transform from the unit ball: the centroid, and the largest distance from it.
 
-        A vertex of no face may lie anywhere and does not count.
+        Unused vertices are not counted.
         """
         return Frame(*geometry.ball(self.vertices[self.used]))
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """Mask over vertices: belongs to a face."""
+        """Mask over vertices: those that belong to a face."""
         return self.half_edges.face_count > 0
 
 
 @lru_cache(maxsize=32)
 def _grid_template(height: int, width: int) -> Mesh:
-    """A flat grid with its connectivity worked out, to be shared by grids of that size."""
+    """Build a flat grid with precomputed connectivity, shared by all grids of this size."""
     rows, columns = np.mgrid[:height, :width]
     flat = np.stack([rows, columns, np.zeros_like(rows)], axis=-1).reshape(-1, 3)
     mesh = Mesh(flat, topology.grid_faces(height, width))
@@ -313,14 +315,14 @@ def _grid_template(height: int, width: int) -> Mesh:
     return mesh
 
 
-#: Vertices closer than this share of the size are taken to be at one place.
+#: Tolerance for coincident vertices, relative to the longest side of the bounding box.
 _JOINED = 1e-7
-#: Pieces that touch, by face, from which on a mesh is a heap of them.
+#: Number of touching components per face from which on a mesh counts as a polygon soup.
 _HEAP = 0.4
 
 
 def _unjoined(mesh: Mesh) -> tuple[str, ...]:
-    """What is to be said of edges that lie on each other without being joined."""
+    """Write the note on coincident edges that are not joined; empty where there are none."""
     count = int(mesh.seams.sum())
     if not count:
         return ()
@@ -333,7 +335,7 @@ def _advice(mesh: Mesh) -> str:
 
 
 def _turned(attributes: Attributes, table: Ints, flipped: NDArray[np.bool_]) -> Attributes:
-    """Attributes of faces some of which were reversed."""
+    """Reorder the corners of the attributes for faces that were reversed or lost a column."""
     corners = np.broadcast_to(np.arange(table.shape[1]), table.shape).copy()
     corners[table < 0] = -1
     corners[flipped] = topology.reverse(corners[flipped])
@@ -355,7 +357,7 @@ _CONNECTIVITY = (
 
 
 def _numbers(values: ArrayLike, expected: str) -> Array:
-    """A copy as an array of double precision."""
+    """Copy to an array of double precision."""
     try:
         given = np.asarray(values)
         if given.dtype.kind not in "c":
@@ -380,7 +382,7 @@ def _checked_vertices(vertices: ArrayLike) -> Array:
 
 
 def _checked_faces(faces: Any, points: Array) -> tuple[Ints, NDArray[np.bool_], tuple[str, ...]]:
-    """The faces as integers, consistently oriented; which were reversed; what was found."""
+    """Check and orient faces; return them, a mask of the reversed ones, and notes."""
     try:
         given = np.asarray(faces)
     except ValueError:
@@ -444,7 +446,7 @@ def _check_area(table: Ints, points: Array) -> None:
     mask = np.zeros(len(points), bool)
     mask[table[table >= 0]] = True
     used = points[mask]
-    # Squares and products of lengths must stay within double precision everywhere.
+    # Squares and products of lengths must stay in the range of double precision.
     farthest = np.abs(used).max()
     size = np.ptp(used, axis=0).max() if farthest < 1e100 else np.inf
     if not 1e-100 < size < np.inf:
@@ -470,7 +472,7 @@ def _check_area(table: Ints, points: Array) -> None:
 
 
 def _weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]] | None:
-    """Vertices and faces with the sides that are one point welded, or None if none is."""
+    """Weld the sides of a grid that are one point; None if there are none."""
     points = grid.reshape(-1, 3)
     ids = np.arange(len(points)).reshape(grid.shape[:2])
     sides = {
@@ -485,7 +487,7 @@ def _weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]]
         return None
     target = np.arange(len(points))
     for name in poles:
-        # A corner may have been welded to another side already: take that side along.
+        # A corner may already be welded to another side: merge that side as well.
         target[np.isin(target, target[sides[name]])] = target[sides[name]].min()
     kept, new = np.unique(target, return_inverse=True)
     table = collapse(faces, new).faces

@@ -1,12 +1,11 @@
-"""The published metrics, exactly as their figures were computed, and the corrected ones.
+"""Published metrics, exactly as their figures were computed, and corrected ones.
 
-Each function takes surfaces as a :class:`gso.Mesh` or a grid array (H, W, 3), and flat
-images as (H, W, 2) or (n, 2); those that compare lengths also take another surface, as a
-:class:`gso.Mesh`, for the image. Quantities that change with the unit of length
-(``loss_gc``, ``loss_iso_cell``, ``fairness``) are measured on the surface normalised to
-the unit ball; pass `scale`, the length that counts as one, to measure in another frame:
-``scale=1`` takes the coordinates as they are. Meaning, unit and direction of every
-metric stand in :data:`INFO`.
+Surfaces are given as a :class:`gso.Mesh` or a grid array (H, W, 3), flat images as (H, W, 2)
+or (n, 2). Functions that compare lengths also accept another surface, a :class:`gso.Mesh`,
+as the image. Quantities that depend on the unit of length (``loss_gc``, ``loss_iso_cell``,
+``fairness``) are measured on the surface normalised to the unit ball; pass `scale`, the
+length that counts as one, to normalise differently: ``scale=1`` takes the coordinates as
+they are. :data:`INFO` lists the meaning, unit and direction of every metric.
 """
 
 from __future__ import annotations
@@ -27,10 +26,10 @@ Array = NDArray[np.float64]
 
 
 class Info(NamedTuple):
-    """What a metric means: its unit, whether lower is better (None: neither is), a line of text.
+    """Description of a metric: unit, whether lower is better (None: neither), a line of text.
 
-    `joined` says how those of several components become one: "mean" (weighted by area), "max",
-    "min" or "sum".
+    `joined` says how the values of several components are combined: "mean" (weighted by
+    area), "max", "min" or "sum".
     """
 
     unit: str
@@ -92,7 +91,7 @@ class Strains(NamedTuple):
 
 
 class Distances(NamedTuple):
-    """Distances between two surfaces, in the unit of their coordinates."""
+    """Distances between two surfaces in both directions, in the unit of their coordinates."""
 
     there_mean: float
     there_max: float
@@ -101,23 +100,23 @@ class Distances(NamedTuple):
 
 
 def components(points: Array) -> tuple[Array, ...]:
-    """Component tuple of an array (..., d)."""
+    """Split an array (..., d) into a tuple of its d components."""
     return tuple(points[..., k] for k in range(points.shape[-1]))
 
 
 def _points(surface: Any) -> Array:
-    """Vertices of a mesh or grid as (n, 3)."""
+    """Return the vertices of a mesh or grid as (n, 3)."""
     points = surface.vertices if hasattr(surface, "vertices") else np.asarray(surface, float)
     return points.reshape(-1, points.shape[-1])
 
 
 def _used_points(surface: Any) -> Array:
-    """Vertices that belong to a face, (n, 3)."""
+    """Return the vertices that belong to a face, (n, 3)."""
     return surface.vertices[surface.used] if hasattr(surface, "used") else _points(surface)
 
 
 def _grid(surface: Any) -> Array | None:
-    """Grid array of a mesh or grid, or None."""
+    """Return the grid array of a mesh or grid, or None."""
     if hasattr(surface, "grid"):
         return surface.grid
     points = np.asarray(surface, float)
@@ -133,29 +132,28 @@ def _mesh(surface: Any) -> Mesh:
 
 
 def unit(surface: Any) -> float:
-    """Largest distance of a vertex from the centroid: the length that counts as one."""
+    """Return the largest distance of a vertex from the centroid: the default unit of length."""
     if hasattr(surface, "frame"):
         return surface.frame.scale
     return geometry.ball(_points(surface))[1]
 
 
 def curvature_grid(points: Array) -> Array:
-    """Discrete Gaussian curvature (H-2, W-2) of the interior vertices of a grid, 1/length^2."""
+    """Return the discrete Gaussian curvature (H-2, W-2) at interior grid vertices, 1/length^2."""
     return geometry.grid_curvature(components(np.asarray(points, float)))
 
 
 def curvature(surface: Any, split: int = 0) -> Array:
-    """Discrete Gaussian curvature of every vertex (n,); NaN on the boundary, 1/length^2.
+    """Return the discrete Gaussian curvature of every vertex (n,); NaN on the boundary, 1/length^2.
 
-    Closed stars of the triangulation, of any valence; vertices of a grid in the order of
-    the mesh.
+    Interior vertices may have any valence. Those of a grid come in the order of the mesh.
 
     Parameters
     ----------
     surface : Mesh or array (H, W, 3)
     split : {0, 1}
-        Which triangulation of the quads: the own one, or that of the other diagonals, which
-        on a mesh of triangles is the same.
+        Triangulation of the quads: the mesh's own one, or that along the other diagonals. On a
+        mesh of triangles both are the same.
     """
     mesh = _mesh(surface)
     out = np.full(len(mesh.vertices), np.nan)
@@ -168,9 +166,9 @@ def curvature(surface: Any, split: int = 0) -> Array:
 
 
 def worst_curvature(surface: Any) -> Array:
-    """Gaussian curvature of every vertex in the triangulation where it is larger, (n,).
+    """Return the Gaussian curvature of every vertex, from the triangulation with larger |K|, (n,).
 
-    By absolute value; NaN on the boundary, 1/length^2, with Meyer's area: 1 on a unit sphere.
+    NaN on the boundary, 1/length^2, with Meyer's area: 1 on a unit sphere.
 
     >>> u, v = np.mgrid[-0.2:0.2:9j, -0.2:0.2:9j]
     >>> ball = np.dstack([u, v, np.sqrt(1.0 - u**2 - v**2)])
@@ -196,12 +194,13 @@ def _mean_abs(surface: Any, split: int) -> float:
 
 
 def loss_gc(surface: Any, *, scale: float | None = None, split: int = 0) -> float:
-    """Mean absolute Gaussian curvature K_A over interior vertices (Wang et al. 2024, Eq. 1).
+    """Return the mean absolute Gaussian curvature K_A of interior vertices (Wang et al. 2024).
 
-    Times `scale` squared: of the surface in the unit ball when `scale` is not given.
+    This is Eq. 1 of the paper, multiplied by `scale` squared. Without `scale` it is that of
+    the surface in the unit ball.
 
-    It sees one triangulation of the quads, the own one, and is blind to what happens along
-    the other diagonals: see :func:`loss_gc_worst`.
+    Only one triangulation of the quads is used, so curvature along the other diagonals is not
+    seen: see :func:`loss_gc_worst`.
 
     Parameters
     ----------
@@ -209,7 +208,7 @@ def loss_gc(surface: Any, *, scale: float | None = None, split: int = 0) -> floa
     scale : float, optional
         Length that counts as one.
     split : {0, 1}
-        Which triangulation; 0 is the published figure.
+        Triangulation of the quads; 0 is the published figure.
 
     Examples
     --------
@@ -222,9 +221,9 @@ def loss_gc(surface: Any, *, scale: float | None = None, split: int = 0) -> floa
 
 
 def loss_gc_worst(surface: Any, *, scale: float | None = None) -> float:
-    """:func:`loss_gc` in that triangulation of the quads in which it is larger.
+    """Return :func:`loss_gc` in the triangulation of the quads where it is larger.
 
-    On meshes of triangles it is ``loss_gc``.
+    On meshes of triangles it equals ``loss_gc``.
 
     >>> crumpled = np.dstack([*np.mgrid[:6.0, :6.0], np.indices((6, 6)).sum(axis=0) % 2])
     >>> loss_gc_worst(crumpled) >= loss_gc(crumpled)
@@ -235,9 +234,9 @@ def loss_gc_worst(surface: Any, *, scale: float | None = None) -> float:
 
 
 def loss_gc_both(surface: Any, *, scale: float | None = None) -> float:
-    """:func:`loss_gc`, the mean over both triangulations of the quads: what the energy sees.
+    """Return the mean of :func:`loss_gc` over both triangulations of the quads, as in the energy.
 
-    It does not depend on how a mesh is numbered.
+    It does not depend on the numbering of the mesh.
 
     >>> saddle = np.dstack([*np.mgrid[:4.0, :4.0], np.outer(np.arange(4.0), np.arange(4.0))])
     >>> loss_gc_both(saddle) <= loss_gc_worst(saddle)
@@ -248,10 +247,10 @@ def loss_gc_both(surface: Any, *, scale: float | None = None) -> float:
 
 
 def loss_gc_half(surface: Any, *, scale: float | None = None) -> float:
-    """:func:`loss_gc` seen at half the resolution: a second opinion, which nothing minimises.
+    """Return :func:`loss_gc` at half the resolution, an independent check that no energy minimises.
 
-    Mean over the four grids of every second vertex, and over both triangulations of each. NaN
-    for meshes that are no grids, and for grids smaller than 6 x 6.
+    It is the mean over the four sub-grids of every second vertex, and over both triangulations
+    of each. NaN for meshes that are not grids, and for grids smaller than 6 x 6.
 
     >>> u, v = np.mgrid[-1:1:16j, -1:1:16j]
     >>> saddle = np.dstack([u, v, 0.3 * u * v])
@@ -267,18 +266,18 @@ def loss_gc_half(surface: Any, *, scale: float | None = None) -> float:
 
 
 def mean_abs_K(surface: Any, *, scale: float | None = None) -> float:
-    """Mean absolute Gaussian curvature with the area of Meyer et al. 2003: 1 on a unit sphere.
+    """Return the mean absolute Gaussian curvature with the area of Meyer et al. 2003.
 
-    Of the triangulation of the quads in which it is larger; three times
-    :func:`loss_gc_worst`, whose areas are those of whole stars.
+    It is 1 on a unit sphere, and taken from the triangulation of the quads where it is larger:
+    three times :func:`loss_gc_worst`, which divides by the areas of whole stars.
     """
     return 3.0 * loss_gc_worst(surface, scale=scale)
 
 
 def nonplanarity(surface: Any) -> Array:
-    """Gap between the diagonals of every quad over the mean length of the edges, (q,).
+    """Return the distance between the diagonals of every quad over the mean edge length, (q,).
 
-    Zero for planar quads; those of a mesh that has triangles too come in their order.
+    Zero for planar quads. In a mixed mesh, triangles are skipped.
 
     >>> nonplanarity(np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])).max()
     np.float64(0.0)
@@ -294,19 +293,19 @@ def nonplanarity(surface: Any) -> Array:
 
 
 def curvature_features(surface: Any, *, scale: float | None = None) -> tuple[float, float, float]:
-    """(K_P, K_N, K_A): means of the positive, negative and absolute curvature (Eq. 1)."""
+    """Return (K_P, K_N, K_A): means of the positive, negative and absolute curvature (Eq. 1)."""
     scale = unit(surface) if scale is None else scale
     k = _interior_curvature(surface) * scale**2
     return float(np.maximum(k, 0).mean()), float(np.minimum(k, 0).mean()), float(np.abs(k).mean())
 
 
 def K_A_r(before: Any, after: Any) -> float:
-    """Share of mean |K| removed, (K_A(before) - K_A(after)) / K_A(before); 0 for a flat input."""
+    """Return the share of mean |K| removed, 1 - K_A(after) / K_A(before); 0 for a flat input."""
     return _removed(loss_gc(before, scale=1.0), loss_gc(after, scale=1.0))
 
 
 def K_A_r_worst(before: Any, after: Any) -> float:
-    """Share of :func:`loss_gc_worst` removed; 0 for a flat input."""
+    """Return the share of :func:`loss_gc_worst` removed; 0 for a flat input."""
     return _removed(loss_gc_worst(before, scale=1.0), loss_gc_worst(after, scale=1.0))
 
 
@@ -315,10 +314,10 @@ def _removed(was: float, left: float) -> float:
 
 
 def d_H(before: Any, after: Any) -> float:
-    """Published proximity, percent of the input's bounding-box diagonal.
+    """Return the published proximity, percent of the input's bounding-box diagonal.
 
-    Mean over *output* vertices of the distance to the nearest *input* vertex: one-sided,
-    and it counts tangential sliding. See :func:`surface_distance` for the true distance.
+    Mean over *output* vertices of the distance to the nearest *input* vertex. It is one-sided
+    and includes tangential sliding; see :func:`surface_distance` for the true distance.
     """
     from scipy.spatial import cKDTree
 
@@ -328,12 +327,12 @@ def d_H(before: Any, after: Any) -> float:
 
 
 def point_to_surface(points: Array, mesh: Mesh) -> Array:
-    """Distance of each point (n, 3) to the triangulated surface, in its unit."""
+    """Return the distance (n,) of points (n, 3) to the triangulated surface, in its unit."""
     return Nearest(mesh).distances(points)
 
 
 def surface_distance(before: Any, after: Any) -> Distances:
-    """True point-to-surface distances, output to input ("there") and back."""
+    """Measure true point-to-surface distances: output to input ("there"), and back."""
     a, b = _mesh(before), _mesh(after)
     there = point_to_surface(_used_points(b), a)
     back = point_to_surface(_used_points(a), b)
@@ -341,7 +340,7 @@ def surface_distance(before: Any, after: Any) -> Distances:
 
 
 def displacement(before: Any, after: Any) -> tuple[float, float]:
-    """Root mean square and largest displacement of the vertices, percent of the diagonal.
+    """Return the root mean square and largest vertex displacement, percent of the diagonal.
 
     >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
     >>> displacement(grid, grid + [0.0, 0.0, 0.1 * np.sqrt(0.08)])
@@ -354,11 +353,11 @@ def displacement(before: Any, after: Any) -> tuple[float, float]:
 
 
 def fairness(surface: Any, *, scale: float | None = None) -> float:
-    """Sum of squared second differences along the polylines (Jiang et al. 2020).
+    """Return the sum of squared second differences along the polylines (Jiang et al. 2020).
 
-    Divided by `scale` squared, the unit ball's radius when not given. On a mesh with
-    triangles, which lacks polylines: over the pairs of triangles at the interior edges of
-    its triangulation, the difference of the two diagonals' midpoints, doubled.
+    Divided by `scale` squared, the unit ball's radius when not given. A mesh with triangles
+    has no polylines: there the sum runs over the interior edges of its triangulation, with
+    twice the vector between the midpoints of the edge and of its two opposite vertices.
     """
     scale = unit(surface) if scale is None else scale
     p = _grid(surface)
@@ -381,7 +380,7 @@ def fairness(surface: Any, *, scale: float | None = None) -> float:
 
 
 def fairness_ratio(before: Any, after: Any) -> float:
-    """:func:`fairness` of a result over that of its input; 1 for a flat input.
+    """Return :func:`fairness` of a result over that of its input; 1 for a flat input.
 
     >>> bowl = np.dstack([u := np.mgrid[:3.0, :3.0][0], u.T, u**2 + u.T**2])
     >>> fairness_ratio(bowl, bowl * [1.0, 1.0, 0.5])
@@ -392,7 +391,7 @@ def fairness_ratio(before: Any, after: Any) -> float:
 
 
 def edge_ratios(before: Any, after: Any) -> Array:
-    """Length of every edge (e,) in the result over that in the input; NaN where it had none.
+    """Return the length ratio result / input of every edge (e,); NaN where the input's is zero.
 
     >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
     >>> edge_ratios(grid, 2.0 * grid).min()
@@ -405,7 +404,7 @@ def edge_ratios(before: Any, after: Any) -> Array:
 
 
 def loop_ratios(before: Any, after: Any) -> Array:
-    """Length of every boundary loop in the result over that in the input, longest loop first.
+    """Return the length ratio result / input of every boundary loop, longest loop first.
 
     >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
     >>> loop_ratios(grid, 0.5 * grid)
@@ -418,12 +417,12 @@ def loop_ratios(before: Any, after: Any) -> Array:
 
 
 def _around(points: Array) -> float:
-    """Length of a closed polygon (n, 3)."""
+    """Return the length of a closed polygon (n, 3)."""
     return float(np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1).sum())
 
 
 def folds(surface: Any) -> Array:
-    """Angle between the normals of the two faces at every interior edge, degrees, (e,).
+    """Return the angle between the normals of the two faces at every interior edge, degrees, (e,).
 
     >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
     >>> folds(grid).max()
@@ -437,7 +436,7 @@ def folds(surface: Any) -> Array:
 
 
 def _flat(surface: Any, flat: Any) -> Array:
-    """Flat image as (n, 2), or another surface as (n, 3), in the order of the mesh's vertices."""
+    """Return an image as (n, 2), or another surface as (n, 3), in the order of the vertices."""
     if hasattr(flat, "vertices"):
         out = flat.vertices
     else:
@@ -455,7 +454,7 @@ def _flat(surface: Any, flat: Any) -> Array:
 
 
 def _cells(surface: Any) -> NDArray[np.int64]:
-    """Quad faces of a mesh or grid."""
+    """Return the quad faces of a mesh or grid."""
     if not hasattr(surface, "faces"):
         return topology.grid_faces(*np.asarray(surface).shape[:2])
     return topology.by_size(surface.faces)[0]
@@ -466,7 +465,7 @@ def _faces(surface: Any) -> NDArray[np.int64]:
 
 
 def isometry_defect(surface: Any, flat: Any, *, scale: float | None = None) -> Array:
-    """Per-cell isometry defect ``||a|-|a'|| + ||b|-|b'|| + |a.b - a'.b'|`` (c,)."""
+    """Return the defect ``||a|-|a'|| + ||b|-|b'|| + |a.b - a'.b'|`` of every quad cell (c,)."""
     scale = unit(surface) if scale is None else scale
     cells = _cells(surface)
     p = _points(surface) / scale
@@ -477,21 +476,21 @@ def isometry_defect(surface: Any, flat: Any, *, scale: float | None = None) -> A
 
 
 def loss_iso_cell(surface: Any, flat: Any, *, scale: float | None = None) -> float:
-    """Mean isometry defect of the quad cells, in the unit ball (published, Table 2).
+    """Return the mean isometry defect of the quad cells, in the unit ball (published, Table 2).
 
-    Blind to a slide of the two checkerboard sub-lattices against each other and to
-    folding: read it together with strain and flips. NaN on a mesh without quads.
+    It does not detect folding, nor a shift of the two checkerboard sub-lattices against each
+    other: read it together with strain and inverted cells. NaN on a mesh without quads.
     """
     defect = isometry_defect(surface, flat, scale=scale)
     return float(defect.mean()) if defect.size else float("nan")
 
 
 def isometry_energy(surface: Any, flat: Any) -> float:
-    """Mean over the faces of E_iso (Jiang et al. 2020), dimensionless.
+    """Return the mean over the faces of E_iso (Jiang et al. 2020), dimensionless.
 
-    The squared differences of the squared diagonals and of their product (of the squared
-    sides of triangles), divided by the squared mean of the surface's squared lengths. Its
-    square root is about twice the strain.
+    E_iso sums the squared differences of the squared diagonals and of their inner product (for
+    triangles: of the squared sides). The mean is divided by the squared mean of the surface's
+    squared lengths. Its square root is about twice the strain.
 
     >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
     >>> isometry_energy(grid, grid[..., :2])
@@ -512,16 +511,16 @@ def isometry_energy(surface: Any, flat: Any) -> float:
 
 
 def parallelogram_strain(surface: Any, flat: Any) -> Array:
-    """Larger principal strain max |s - 1| (m,) of every face's parallelogram of midpoints.
+    """Return the larger principal strain max |s - 1| of every face's midpoint parallelogram (m,).
 
-    Triangles count whole; zero where a face has no area.
+    For triangles it is that of the triangle; zero where a face has no area.
     """
     large, small = stretches(surface, flat)
     return np.nan_to_num(np.maximum(np.abs(large - 1.0), np.abs(small - 1.0)))
 
 
 def edge_length_error(surface: Any, flat: Any) -> float:
-    """Mean of |l'/l - 1| over the mesh edges."""
+    """Return the mean of |l'/l - 1| over the mesh edges."""
     mesh = _mesh(surface)
     a, b = mesh.edges.T
     q = _flat(surface, flat)
@@ -532,9 +531,10 @@ def edge_length_error(surface: Any, flat: Any) -> float:
 
 
 def principal_strains(surface: Any, flat: Any) -> Strains:
-    """Larger principal strain max |s - 1| of every corner triangle, pooled.
+    """Return the larger principal strain max |s - 1| of every corner triangle, pooled.
 
-    Four corner triangles per quad, one per triangle; those without area are left out.
+    There are four corner triangles per quad and one per triangle; those without area are
+    left out.
     """
     values = corner_strains(surface, flat)
     values = values[~np.isnan(values)]
@@ -544,7 +544,7 @@ def principal_strains(surface: Any, flat: Any) -> Strains:
 
 
 def strains(surface: Any, flat: Any) -> dict[str, float]:
-    """Largest, 99th percentile and mean of :func:`principal_strains`, by their names.
+    """Return maximum, 99th percentile and mean of :func:`principal_strains`, by metric name.
 
     >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
     >>> strains(grid, grid[..., :2] * 1.5)["strain_max"]
@@ -556,9 +556,9 @@ def strains(surface: Any, flat: Any) -> dict[str, float]:
 
 
 def corner_strains(surface: Any, flat: Any) -> Array:
-    """Larger principal strain max |s - 1| (4 q + t,) of every corner triangle.
+    """Return the larger principal strain max |s - 1| (4 q + t,) of every corner triangle.
 
-    In the order of :func:`gso.topology.corner_triangles`; NaN where one has no area.
+    In the order of :func:`gso.topology.corner_triangles`; NaN for triangles without area.
     """
     tri = topology.corner_triangles(_faces(surface))
     p, q = _in_range(_points(surface), _flat(surface, flat))
@@ -578,7 +578,7 @@ def corner_strains(surface: Any, flat: Any) -> Array:
 
 
 def face_strains(surface: Any, flat: Any) -> Array:
-    """Largest of :func:`corner_strains` of every face (m,); NaN where none has an area."""
+    """Return the largest of :func:`corner_strains` of every face (m,); NaN without any area."""
     quad = topology.are_quads(_faces(surface))
     values = corner_strains(surface, flat)
     corners, triangles = np.split(values, [4 * np.count_nonzero(quad)])
@@ -589,10 +589,11 @@ def face_strains(surface: Any, flat: Any) -> Array:
 
 
 def stretches(surface: Any, flat: Any) -> tuple[Array, Array]:
-    """Largest and smallest ratio of lengths (m,) of every face, image over surface.
+    """Return the largest and the smallest principal stretch of every face, (m,) each.
 
-    Of the parallelograms of a quad's edge midpoints, and of triangles: their product is the
-    ratio of areas, their quotient the quasi-conformal ratio. NaN where a face has no area.
+    They are ratios of lengths, image over surface, for the edge-midpoint parallelograms of
+    quads, and for triangles. Their product is the ratio of areas, their quotient the
+    quasi-conformal ratio. NaN where a face has no area.
     """
     faces, (p, q) = _faces(surface), _in_range(_points(surface), _flat(surface, flat))
     out = np.full((2, len(faces)), np.nan)
@@ -606,7 +607,7 @@ def stretches(surface: Any, flat: Any) -> tuple[Array, Array]:
 
 
 def quasi_conformal(surface: Any, flat: Any) -> Array:
-    """Quasi-conformal ratio (m,) of every face: largest stretch over smallest, 1 at best.
+    """Return the largest over the smallest stretch of every face (m,); 1 is best.
 
     Second-order accurate on quads, first-order on triangles; NaN where a face has no area.
 
@@ -619,7 +620,7 @@ def quasi_conformal(surface: Any, flat: Any) -> Array:
 
 
 def area_error(surface: Any, flat: Any) -> float:
-    """Mean of |A'/A - 1| over the corner triangles, those without area left out."""
+    """Return the mean of |A'/A - 1| over the corner triangles that have an area."""
     tri = topology.corner_triangles(_faces(surface))
     p, q = _in_range(_points(surface), _flat(surface, flat))
     before, after = _space_areas(p, tri), corner_areas(q, tri)
@@ -628,13 +629,13 @@ def area_error(surface: Any, flat: Any) -> float:
 
 
 def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None, *, surface: Any = None) -> int:
-    """Number of inverted cells in a flat image.
+    """Count the inverted cells in a flat image.
 
-    A grid cell (`flat` is (H, W, 2)) counts when any of its four corner triangles has
-    signed area <= 0; another quad (`flat` is (n, 2), `faces` given), which may be an arrow,
-    when neither diagonal splits it into two triangles of positive area; a triangle when
-    it is itself. With `surface`, cells with a corner that has no area in space either are
-    not counted.
+    A grid cell (`flat` is (H, W, 2)) is inverted when any of its four corner triangles has
+    signed area <= 0. Any other quad (`flat` is (n, 2), `faces` given) may be concave; it is
+    inverted when neither diagonal splits it into two triangles of positive area. A triangle
+    is inverted when its signed area is <= 0. With `surface`, cells that have a corner without
+    area in space are not counted.
     """
     image = np.asarray(flat, float)
     if faces is None and image.ndim != 3:
@@ -648,7 +649,7 @@ def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None, *, surface:
 def _flipped(
     points: Array, faces: NDArray[np.int64], space: Array | None, *, grid: bool
 ) -> NDArray[np.bool_]:
-    """Which faces (m,) are inverted in an image (n, 2), quads first."""
+    """Mark the faces (m,) that are inverted in an image (n, 2), quads first."""
     quads, tris = topology.by_size(faces)
     # Corners 1 and 3 are the split along the diagonal 0-2, corners 0 and 2 the other one.
     bad = corner_areas(points, quads).reshape(4, -1) <= 0
@@ -662,9 +663,9 @@ def _flipped(
 
 
 def flipped_faces(mesh: Mesh, flat: Array) -> NDArray[np.int64]:
-    """Faces of a mesh that are inverted in its flat image (n, 2), by number.
+    """Find the faces of a mesh that are inverted in its flat image (n, 2).
 
-    Those that :func:`flips` counts.
+    These are the faces that :func:`flips` counts.
 
     >>> from gso.mesh import Mesh
     >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -678,12 +679,12 @@ def flipped_faces(mesh: Mesh, flat: Array) -> NDArray[np.int64]:
 
 
 def flips(mesh: Mesh, flat: Array) -> int:
-    """:func:`flipped_cells` of a flat image (n, 2) of a mesh, grid or not."""
+    """Count the inverted faces in a flat image (n, 2) of a mesh; see :func:`flipped_cells`."""
     return len(flipped_faces(mesh, flat))
 
 
 def area(mesh: Mesh, points: Array | None = None) -> float:
-    """Area of a surface, or of an image (n, 2) or (n, 3) of it that is given.
+    """Return the area of a surface, or of its image (n, 2) or (n, 3) if `points` is given.
 
     >>> from gso.mesh import Mesh
     >>> area(Mesh.from_grid(np.dstack([*np.mgrid[:3.0, :4.0], np.zeros((3, 4))])))
@@ -695,28 +696,28 @@ def area(mesh: Mesh, points: Array | None = None) -> float:
 
 
 def _in_range(p: Array, q: Array) -> tuple[Array, Array]:
-    """A surface and its image in a unit of length whose fourth power is still a number.
+    """Rescale a surface and its image so that fourth powers of lengths do not overflow.
 
-    The unit is a power of two, which changes no digit of their ratios.
+    The unit is a power of two, so the ratios are exact.
     """
     unit = 2.0 ** np.floor(np.log2(np.ptp(p, axis=0).max() or 1.0))
     return p / unit, q / unit
 
 
 def _space_areas(points: Array, faces: NDArray[np.int64]) -> Array:
-    """Doubled areas of the corner triangles of faces in space."""
+    """Return the doubled areas of the corner triangles of faces in space."""
     p, q, r = (points[k] for k in topology.corner_triangles(faces).T)
     return np.linalg.norm(np.cross(q - p, r - p), axis=1)
 
 
 def corner_areas(flat: Array, faces: NDArray[np.int64]) -> Array:
-    """Doubled signed areas of the corner triangles of faces in a flat image (n, 2)."""
+    """Return the doubled signed areas of the faces' corner triangles in a flat image (n, 2)."""
     tri = topology.corner_triangles(faces)
     return geometry.corner_area2(*(components(flat[tri[:, k]]) for k in range(3)))
 
 
 def face_normals(surface: Any) -> Array:
-    """Unit normals (m, 3): diagonals' cross product for quads, zero where there is no area."""
+    """Return unit normals (m, 3): for quads, of the diagonals' cross product; zero without area."""
     faces, p = _faces(surface), _points(surface)
     a, b = geometry.diagonals(*(components(p[c]) for c in topology.four_corners(faces).T))
     normal = np.stack(geometry.cross(a, b), axis=1)
@@ -725,6 +726,6 @@ def face_normals(surface: Any) -> Array:
 
 
 def normal_angle(clean: Any, denoised: Any) -> float:
-    """Mean angle theta between the cell normals of two surfaces, degrees (Table 3)."""
+    """Return the mean angle theta between the cell normals of two surfaces, degrees (Table 3)."""
     n1, n2 = face_normals(clean), face_normals(denoised)
     return float(np.degrees(geometry.angle(components(n1), components(n2))).mean())

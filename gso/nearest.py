@@ -1,4 +1,4 @@
-"""The point of a surface that is nearest to a given one."""
+"""Closest-point queries on a triangulated surface."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ Array = NDArray[np.float64]
 
 
 class Feet(NamedTuple):
-    """Nearest points of a surface.
+    """Closest points of a surface to given points.
 
     Attributes
     ----------
     points : ndarray, (k, 3)
-        Where they are.
+        Closest points.
     normals : ndarray, (k, 3)
         Unit normals of the surface there, interpolated from its vertices.
     distances : ndarray, (k,)
-        How far they are away.
+        Distances to the given points.
     """
 
     points: Array
@@ -31,12 +31,12 @@ class Feet(NamedTuple):
 
 
 class Nearest:
-    """Nearest points of a triangulated surface, by a tree of boxes that is built once.
+    """Closest points of a triangulated surface, by a bounding-box tree that is built once.
 
     Parameters
     ----------
     mesh : Mesh
-        The surface; cells are split as everywhere in the package.
+        The surface, triangulated by :attr:`gso.Mesh.triangles`.
     normals : ndarray, (n, 3), optional
         Unit normals at its vertices, for :meth:`feet`; zero when not given.
     """
@@ -51,17 +51,17 @@ class Nearest:
         self._tree.init(self._vertices, self._triangles)
 
     def distances(self, points: Array) -> Array:
-        """Distance of every point (k, 3) from the surface, (k,)."""
+        """Return the distance of every point (k, 3) from the surface, (k,)."""
         return np.sqrt(self._query(points)[0])
 
     def feet(self, points: Array) -> Feet:
-        """Nearest points, and the surface's normals there."""
+        """Find the closest points to points (k, 3), and the surface's normals there."""
         squared, triangle, foot = self._query(points)
         corner = self._triangles[triangle]
         a, b, c = (self._vertices[corner[:, k]] for k in range(3))
         opposite = [np.cross(c - b, foot - b), np.cross(a - c, foot - c), np.cross(b - a, foot - a)]
         face = np.cross(b - a, c - a)
-        # Areas opposite to the corners, signed by the triangle's own normal.
+        # Barycentric coordinates up to a factor, signed by the triangle's own normal.
         share = np.stack([np.einsum("kd,kd->k", x, face) for x in opposite])
         share = np.maximum(share, 0.0)
         normals = np.einsum("jk,jkd->kd", share, self._normals[corner.T])

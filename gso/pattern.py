@@ -1,4 +1,4 @@
-"""The flat pattern of a surface: a mesh of its own, cut open where that was needed."""
+"""The flat pattern of a surface: a planar mesh, cut open where necessary."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ def _no_seams() -> Ints:
 
 @dataclass(frozen=True)
 class Pattern:
-    """A flat pattern, and where its vertices are on the surface.
+    """A flat pattern, and the correspondence of its vertices to the surface.
 
     Attributes
     ----------
     flat : ndarray, (p, 2)
-        Where its vertices lie in the plane, in the surface's unit of length.
+        Positions of its vertices in the plane, in the surface's unit of length.
     faces : ndarray of int, (m, 3) or (m, 4)
-        The surface's faces, in their order, in numbers of the pattern's vertices.
+        The surface's faces, in their order, as indices of the pattern's vertices.
     vertex : ndarray of int, (p,)
-        The surface's vertex that each of them is; 0 ... n - 1 where nothing is cut.
+        Index of the corresponding vertex of the surface; 0 ... n - 1 where nothing is cut.
     seams : ndarray of int, (s, 2, 2)
-        Edges that are one on the surface, in pairs; their first ends belong together, and so do
-        their second ends.
+        Pairs of pattern edges that are one edge of the surface. The first ends of a pair are
+        the same vertex of the surface, and so are the second ends.
 
     Examples
     --------
@@ -50,12 +50,12 @@ class Pattern:
 
     @classmethod
     def whole(cls, surface: Mesh, flat: Array) -> Pattern:
-        """Pattern of a surface that is not cut, from its flat image (n, 2)."""
+        """Make the pattern of a surface that is not cut from its flat image (n, 2)."""
         return cls(flat, surface.faces, np.arange(len(surface.vertices)))
 
     @property
     def is_cut(self) -> bool:
-        """Whether a vertex of the surface is there more than once."""
+        """Whether some vertex of the surface has several copies in the pattern."""
         return np.unique(self.vertex).size < len(self.vertex)
 
     @cached_property
@@ -64,11 +64,11 @@ class Pattern:
         return Mesh(np.pad(self.flat, ((0, 0), (0, 1))), self.faces)
 
     def surface(self, mesh: Mesh) -> Mesh:
-        """The surface with the pattern's vertices and faces: cut open, where it is in space.
+        """Return the surface in space with the pattern's connectivity: cut open along its seams.
 
         Parameters
         ----------
         mesh : Mesh
-            The surface that the pattern is of.
+            The surface that the pattern belongs to.
         """
         return Mesh(mesh.vertices[self.vertex], self.faces) if self.is_cut else mesh

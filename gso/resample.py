@@ -1,4 +1,4 @@
-"""Grids at another resolution, by cubic interpolation."""
+"""Resampling of grids at other resolutions by cubic interpolation."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from gso.status import MeshError
 
 Array = NDArray[np.float64]
 
-#: No side of a coarser grid has fewer vertices.
+#: Smallest number of vertices along a side of a coarser grid.
 SMALLEST = 20
 
 
 @lru_cache(maxsize=64)
 def _matrix(source: int, target: int) -> Array:
-    """Not-a-knot cubic spline interpolation from `source` to `target` samples."""
+    """Return the not-a-knot cubic spline interpolation matrix of `source` to `target` samples."""
     from scipy.interpolate import make_interp_spline
 
     spline = make_interp_spline(np.linspace(0, 1, source), np.eye(source), k=min(3, source - 1))
@@ -27,7 +27,7 @@ def _matrix(source: int, target: int) -> Array:
 
 
 def resample(values: Array, height: int, width: int) -> Array:
-    """Values (H, W, d) on a grid, interpolated to (height, width, d).
+    """Interpolate values (H, W, d) on a grid to (height, width, d).
 
     >>> resample(np.arange(16.0).reshape(4, 4, 1), 7, 4).shape
     (7, 4, 1)
@@ -37,16 +37,17 @@ def resample(values: Array, height: int, width: int) -> Array:
 
 
 def carry(coarse: Mesh, fine: Mesh, points: Array) -> Array:
-    """Points (m, 3) of a coarse grid, their displacement carried over to a finer one, (n, 3)."""
+    """Move a finer grid by the interpolated displacement of a coarse one to points (m, 3)."""
     shift = (points - coarse.vertices)[coarse.grid_index]
     return fine.vertices + resample(shift, *fine.grid_shape).reshape(-1, 3)  # type: ignore[misc]
 
 
 def coarser(mesh: Mesh, largest: int) -> list[Mesh]:
-    """Copies of a grid of half the resolution, a quarter ..., coarsest first.
+    """Resample a grid at a half, a quarter ... of its resolution, coarsest first.
 
-    Sides are halved until the longer one is at most `largest`, but once at least, and
-    never below :data:`SMALLEST`; empty for a grid that is as small as that.
+    Sides are halved until the longer one has at most `largest` vertices: at least once, and
+    never below :data:`SMALLEST`. The list is empty if no side is longer than `SMALLEST`. It
+    ends early where a coarser grid would have faces without area.
     """
     shape, grid = mesh.grid_shape, mesh.grid
     levels: list[Mesh] = []
@@ -64,7 +65,7 @@ def coarser(mesh: Mesh, largest: int) -> list[Mesh]:
 
 
 def alike(levels: list[Mesh], mesh: Mesh) -> list[Mesh]:
-    """Another surface on the vertices of a grid, at the resolution of coarser copies of it.
+    """Resample another surface with the same grid at the resolutions of coarser levels.
 
     >>> fine = Mesh.from_grid(np.dstack([*np.mgrid[:39.0, :39.0], np.zeros((39, 39))]))
     >>> [m.grid_shape for m in alike(coarser(fine, 32), fine)]

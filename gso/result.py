@@ -1,4 +1,4 @@
-"""What a solve returns."""
+"""The result of a solve: surface, flat image, metrics, verdict, and how the solve went."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ class Result:
     Attributes
     ----------
     task, formulation : str
-        What was asked for.
+        The task that was solved, and its formulation.
     design : Mesh
         The input.
     mesh : Mesh
         The optimised surface, vertices in the input's order and unit; for `flatten` the
         pattern at z = 0.
     flat : ndarray, (n, 2), or None
-        The flat image, where the solve has one, in the input's unit of length; None where the
+        The flat image, if the solve has one, in the input's unit of length; None if the
         surface was cut open for it.
     pattern : Pattern or None
-        The flat pattern as a mesh of its own, with the surface's vertex that each of its vertices
-        is: of the surface as it is, or cut open. Of `developable`: the one with the least strain
-        that was found, by which the strain in the metrics is measured; None where the surface
-        must be cut open first, or no verdict was asked for.
+        The flat pattern as a separate mesh, with the correspondence of its vertices to the
+        surface, which may be cut open. For `developable`: the pattern with the least strain that
+        was found, from which the strain metrics are computed; None if the surface must be cut
+        open first, or no verdict was made.
     cell_scale : ndarray, (m,), or None
-        Of `conformal`: the length of a face's diagonals (sides, of a triangle) in the flat
-        image over that on the surface, in the order of the input's faces.
+        For `conformal`: length of a face's diagonals (of a triangle's sides) in the flat image
+        over that on the surface, in the order of the input's faces.
     status : Status
         Why the solve ended; its value is a message.
     iterations : int
@@ -62,31 +62,32 @@ class Result:
     backend, device : str
         Linear solver of the last stage, and where it ran.
     warm_start : str
-        What started the solve: "cold", "x0", "session", "net" (:func:`gso.hybrid.solve`), or
-        the source that a :class:`gso.tno.Start` names.
+        Initial guess of the solve: "cold" for a cold start, "x0", "session", "net"
+        (:func:`gso.hybrid.solve`), or the source named by a :class:`gso.tno.Start`.
     reasons : tuple of str
-        Why the result cannot be used as what was asked for, and where; see :mod:`gso.verdict`.
-        The notes have them too.
+        Why the result is not usable for its task, and where; see :mod:`gso.verdict`. They are
+        also part of `notes`.
     notes : tuple of str
         What was repaired in the input or restricted in the run, and the reasons.
     details : dict
-        Numbers of the task: weights chosen ... Of `denoise`: "sigma", the standard deviation
-        that the noise is estimated to have, in the input's unit; "dof", degrees of freedom
-        that the smoothing leaves to each coordinate; "order" and "weight". With constraints,
-        "constraints": the largest length by which each is missed, in the input's unit. With
-        a spline, "spline": its curvature and distances, see :func:`gso.fit.describe_spline`.
-        Of `developable`, "verdict": its largest strain and deviation, and what was asked.
+        Numbers specific to the task, such as chosen weights. For `denoise`: "sigma", the
+        estimated standard deviation of the noise, in the input's unit; "dof", the effective
+        degrees of freedom of each coordinate after smoothing; "order" and "weight". With
+        constraints, "constraints": the largest violation of each, in the input's unit. With a
+        spline, "spline": its curvature and distances, see :func:`gso.fit.describe_spline`.
+        For `developable`, "verdict": largest strain and deviation, and the given limits.
     spline : BSplineSurface or None
-        The surface that `mesh` has samples of, with the option ``variables="surface"``; of
-        several components, each has its own.
+        The spline that `mesh` samples, with the option ``variables="surface"``; with several
+        components, each has its own.
     components : list of Result
-        Of a mesh of several components, that of each one (those that constraints join are
-        one), by their smallest vertices; empty for a mesh of one. In the result of the whole,
-        `metrics` are means weighted by area (or maxima, sums: :data:`gso.metrics.INFO`), and
-        so is `energy`; `status` is the worst one; `iterations` and `seconds` are sums over
-        what was solved: copies are solved once.
+        The results of the components, ordered by their smallest vertex; components joined by
+        constraints count as one. Empty for a mesh of one component. In the result of the
+        whole mesh, `metrics` are means weighted by area (or maxima, minima, sums:
+        :data:`gso.metrics.INFO`) and `energy` is such a mean; `status` is the worst one;
+        `iterations` and `seconds` are sums over the solves, where copies of a component are
+        solved once.
     names : ndarray of int, (n,), or None
-        Of one of those: which vertices of the whole mesh it has.
+        In the result of a component: indices of its vertices in the whole mesh.
     """
 
     task: str
@@ -127,9 +128,10 @@ class Result:
 
     @property
     def usable(self) -> bool:
-        """Whether it can be used as what was asked for: there are no :attr:`reasons` against it.
+        """Whether the result is usable for its task: there are no :attr:`reasons` against it.
 
-        Without a verdict: whether it is complete, finite, and has no inverted cell.
+        In addition, the status must not refuse the result, coordinates must be finite, no cell
+        of a flat image inverted, and all components usable. Without a verdict only these count.
         """
         points = self.mesh.vertices if self.pattern is None else self.pattern.flat
         return bool(
@@ -147,7 +149,7 @@ class Result:
 
     @property
     def flat_grid(self) -> Array | None:
-        """The flat image as (H, W, 2) when the input is a grid."""
+        """The flat image as (H, W, 2) when there is one and the input is a grid."""
         if self.flat is None or self.design.grid_index is None:
             return None
         return self.flat[self.design.grid_index]
@@ -179,14 +181,14 @@ class Result:
         return found | {k: v for k, v in known.items() if k not in found}
 
     def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
-        """Write the result.
+        """Write the result to a file; the suffix selects the format.
 
-        ``.npz`` keeps everything and is read back by :meth:`load`; ``.svg`` is the flat
-        image at 1:1, `unit` the unit of the mesh's coordinates; ``.step``, ``.iges`` and
-        ``.3dm`` are the spline, in that unit (see :func:`gso.save_spline`); any other suffix
-        of :func:`gso.save` is the surface (the pattern at z = 0 for `flatten`). What a
-        format does not hold of an OBJ file's names, materials and texture coordinates is
-        added to the notes.
+        ``.npz`` stores the whole result, to be read by :meth:`load`. ``.svg`` is the flat
+        pattern at scale 1:1, where `unit` is the unit of the mesh's coordinates. ``.step``,
+        ``.iges`` and ``.3dm`` are the spline in that unit (see :func:`gso.save_spline`). Any
+        other suffix of :func:`gso.save` is the surface (for `flatten` the pattern at z = 0).
+        Labels, materials and texture coordinates that the format cannot store are listed in
+        the notes.
         """
         from gso import io
 
@@ -220,7 +222,7 @@ class Result:
         self.notes += tuple(n for n in io.left_out(self.mesh, path) if n not in self.notes)
 
     def _record(self) -> dict[str, Any]:
-        """What is no array."""
+        """Collect everything but the arrays, as JSON-compatible values."""
         return {
             "format": _FORMAT,
             "task": self.task,
@@ -272,7 +274,7 @@ class Result:
         Raises
         ------
         MeshError
-            The file is missing, damaged, or no result.
+            The file is missing or damaged, is not a result, or has another format version.
         """
         from gso.io.arrays import read_arrays
         from gso.io.source import read_bytes
@@ -319,7 +321,7 @@ class Result:
         cell_scale: Array | None,
         pattern: Pattern | None = None,
     ) -> Result:
-        """A result of its record and arrays."""
+        """Build a result from its record and arrays."""
         result = cls(
             record["task"],
             record["formulation"],
@@ -345,7 +347,7 @@ class Result:
         return result
 
     def _divide(self, records: list[Mapping[str, Any]], label: NDArray[np.int64]) -> None:
-        """Give the components of a result that was read theirs; a flat image is the whole's."""
+        """Restore the component results from the arrays of the whole mesh."""
         from gso.components import split
 
         for record, piece in zip(records, split(self.design, label), strict=True):
@@ -361,7 +363,7 @@ class Result:
 
 
 def _pattern(data: Mapping[str, Any], design: Mesh) -> Pattern | None:
-    """The pattern that a file has beside the flat image, or None."""
+    """Read and check the pattern that a file stores besides the flat image; None without one."""
     if "pattern_flat" not in data:
         return None
     flat, faces, vertex, seams = (data[f"pattern_{name}"] for name in _PATTERN)
@@ -383,7 +385,7 @@ def _pattern(data: Mapping[str, Any], design: Mesh) -> Pattern | None:
 
 
 def _checked(data: Mapping[str, Array], name: str, shape: tuple[int, ...]) -> Array | None:
-    """An array of a file, None where there is none."""
+    """Return an array of a file after checking its shape; None if the file has none."""
     array = data.get(name)
     if array is not None and array.shape != shape:
         raise ValueError(f"{name} is an array {array.shape}, not {shape}")

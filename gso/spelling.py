@@ -1,4 +1,4 @@
-"""Misspelt options: every message names the nearest option that there is."""
+"""Checks of option names: the error for a misspelt one suggests the closest known name."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONL
 
 
 def nearest(name: Any, known: Iterable[str]) -> str | None:
-    """The known name that is most like a given one, whatever its case; None if none is.
+    """Find the known name most similar to a given one, ignoring case; None if none is close.
 
     >>> nearest("Flaten", ["bend", "denoise", "flatten"])
     'flatten'
@@ -28,7 +28,7 @@ def nearest(name: Any, known: Iterable[str]) -> str | None:
 
 
 def choices(name: Any, known: Iterable[str]) -> str:
-    """The part of a message that says what there is instead of an unknown name.
+    """Format the part of a message that lists the known names, after an unknown one.
 
     >>> choices("blanced", ["fast", "balanced"])
     "did you mean 'balanced'? There are fast, balanced"
@@ -42,12 +42,13 @@ def choices(name: Any, known: Iterable[str]) -> str:
 
 
 def check_keywords(where: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Refuse keywords that a call does not take.
+    """Refuse keywords that a call does not accept.
 
     Raises
     ------
     OptionError
-        Names the first such keyword, and the nearest one that there is.
+        A keyword is unknown. The message names the first such keyword and the closest known
+        one.
 
     Examples
     --------
@@ -63,15 +64,16 @@ def check_keywords(where: str, given: Iterable[str], known: Iterable[str]) -> No
 
 
 def known_keywords(*others: Callable[..., Any]) -> Callable[[F], F]:
-    """Decorator: a misspelt keyword is an :class:`gso.OptionError` that names the nearest one.
+    """Decorate a function so that unknown keywords raise :class:`gso.OptionError`.
 
-    The check is made before the call, by the signature, which stays as it is for ``help()``
-    and type checkers.
+    Keywords are checked against the signature before the call; the message suggests the
+    closest one. ``help()`` and type checkers still see the original signature.
 
     Parameters
     ----------
     *others : callable
-        Functions that the decorated one hands its ``**keywords`` to: theirs are known too.
+        Functions that the decorated one passes its ``**keywords`` to; their keywords are
+        accepted too.
 
     Examples
     --------
@@ -99,7 +101,7 @@ def known_keywords(*others: Callable[..., Any]) -> Callable[[F], F]:
 
 
 class _Signature:
-    """That of the dataclass's own ``__init__``, which ``__new__`` would hide from ``help()``."""
+    """Signature of the dataclass's ``__init__``, which ``__new__`` would hide from ``help()``."""
 
     def __get__(self, instance: object, owner: type) -> inspect.Signature:
         whole = inspect.signature(owner.__init__)  # type: ignore[misc]
@@ -107,7 +109,7 @@ class _Signature:
 
 
 class KnownFields:
-    """Base of dataclasses: a misspelt field is an :class:`gso.OptionError`.
+    """Base class of dataclasses in which an unknown field name raises :class:`gso.OptionError`.
 
     Examples
     --------
@@ -123,13 +125,13 @@ class KnownFields:
     __signature__ = _Signature()
 
     def __new__(cls, *positional: Any, **given: Any) -> Any:
-        """Check the names of the fields; values are checked by the class itself."""
+        """Check the field names; values are checked by the class itself."""
         if given:
             check_keywords(cls.__qualname__, given, _names(cls.__init__)[1:])
         return super().__new__(cls)
 
 
 def _names(function: Callable[..., Any]) -> list[str]:
-    """Parameters that can be given by name."""
+    """List the parameters that can be passed by keyword."""
     parameters = inspect.signature(function).parameters.values()
     return [p.name for p in parameters if p.kind in _NAMED]

@@ -1,4 +1,4 @@
-"""A surface as CAD systems keep it: a tensor-product B-spline."""
+"""Tensor-product B-spline surfaces, as CAD systems represent them."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from gso.status import MeshError, OptionError
 
 Array = NDArray[np.float64]
 
-#: Degree of the splines made here, in both directions.
+#: Default degree of the splines, in both directions.
 DEGREE = 3
 
-#: Derivatives that curvature is made of: by u, by v, and the second ones.
+#: Orders (du, dv) of the derivatives that Gaussian curvature needs.
 _ORDERS = ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 
 
 class Gap(NamedTuple):
     """Distances between a spline and a mesh, in the unit of their coordinates.
 
-    `vertices`: from the mesh's vertices to the spline. `between`: from points all over the
-    spline to the mesh's triangles.
+    `vertices`: from the mesh's vertices to the spline. `between`: from samples of the spline to
+    the mesh's triangles.
     """
 
     vertices_mean: float
@@ -35,9 +35,9 @@ class Gap(NamedTuple):
 
 
 def clamped_knots(controls: int) -> Array:
-    """Uniform knots on [0, 1] that make a spline begin and end in its control points.
+    """Make uniform clamped knots on [0, 1]: the spline interpolates its end control points.
 
-    The degree is three, or one less than the number of control points.
+    The degree is three, or one less than the number of control points if that is smaller.
 
     >>> clamped_knots(6)
     array([0.  , 0.  , 0.  , 0.  , 0.33, 0.67, 1.  , 1.  , 1.  , 1.  ])
@@ -48,7 +48,7 @@ def clamped_knots(controls: int) -> Array:
 
 
 def basis(knots: Array, controls: int, t: Array, order: int = 0) -> Array:
-    """Basis functions at parameters t, or their derivatives: (len(t), controls)."""
+    """Evaluate the basis functions at parameters t, or their derivatives: (len(t), controls)."""
     from scipy.interpolate import BSpline
 
     degree = len(knots) - controls - 1
@@ -66,15 +66,16 @@ class BSplineSurface:
     net : array_like, (n, m, 3)
         Control points, in any unit of length.
     knots_u, knots_v : array_like, (n + p + 1,), (m + q + 1,)
-        Knots along the first and the second index of the net, clamped: the first p + 1 are
-        equal, and the last p + 1. Their number says the degrees p and q.
+        Knots along the first and the second index of the net, clamped: the first p + 1 of
+        `knots_u` are equal, and so are the last p + 1; the same holds for `knots_v` and q. The
+        degrees p and q follow from the numbers of knots.
     gap : Gap, optional
         Distance from the mesh that it was fitted to.
 
     Raises
     ------
     MeshError
-        Arrays of the wrong shape, numbers that are not finite, knots that fall or are not
+        Arrays of the wrong shape, numbers that are not finite, knots that decrease or are not
         clamped.
 
     Examples
@@ -118,18 +119,18 @@ class BSplineSurface:
 
     @property
     def size(self) -> float:
-        """Diagonal of the control net's bounding box, in which the surface lies."""
+        """Diagonal of the control net's bounding box, which contains the surface."""
         return geometry.box_diagonal(self.net.reshape(-1, 3))
 
     def evaluate(self, u: ArrayLike, v: ArrayLike, *, du: int = 0, dv: int = 0) -> Array:
-        """Points of the surface, or derivatives.
+        """Evaluate points of the surface, or derivatives.
 
         Parameters
         ----------
         u, v : array_like
             Parameters between the first and the last knot; they broadcast.
         du, dv : int
-            Order of the derivative by u and by v.
+            Orders of the derivative with respect to u and v.
 
         Returns
         -------
@@ -138,8 +139,8 @@ class BSplineSurface:
         Raises
         ------
         OptionError
-            A parameter is outside the knots, `u` and `v` do not broadcast, or an order is no
-            integer, 0 or more.
+            A parameter is outside the knots, `u` and `v` do not broadcast, or an order is not
+            an integer of at least 0.
         """
         _check_count("du", du, 0)
         _check_count("dv", dv, 0)
@@ -156,12 +157,12 @@ class BSplineSurface:
         return points.reshape(*a.shape, 3)
 
     def sample(self, height: int, width: int) -> Array:
-        """Points at uniform parameters, both ends included, (height, width, 3).
+        """Sample points at uniform parameters, both ends included, (height, width, 3).
 
         Raises
         ------
         OptionError
-            A number of points is no integer, 1 or more.
+            A number of points is not an integer of at least 1.
         """
         _check_count("height", height, 1)
         _check_count("width", width, 1)
@@ -169,7 +170,7 @@ class BSplineSurface:
         return self._lattice(np.linspace(u[0], u[-1], height), np.linspace(v[0], v[-1], width))
 
     def normals(self, u: ArrayLike, v: ArrayLike) -> Array:
-        """Unit normals (..., 3), along the derivative by u x that by v.
+        """Return unit normals (..., 3) along the cross product of the u and v derivatives.
 
         Zero where the parametrisation degenerates.
         """
@@ -178,19 +179,19 @@ class BSplineSurface:
         return np.divide(n, length, out=np.zeros_like(n), where=length > 0)
 
     def gaussian_curvature(self, u: ArrayLike, v: ArrayLike) -> Array:
-        """Gaussian curvature of the smooth surface at parameters, 1 / length^2."""
+        """Return the Gaussian curvature of the smooth surface at parameters, 1 / length^2."""
         return _curvature([self.evaluate(u, v, du=i, dv=j) for i, j in _ORDERS])
 
     def mean_gaussian_curvature(self, per_span: int = 4) -> float:
-        """Mean of |K|, the absolute Gaussian curvature, over the area, 1 / length^2.
+        """Return the mean of |K|, the absolute Gaussian curvature, over the area, 1 / length^2.
 
-        By Gauss quadrature with so many points in every interval between knots. Compare
-        it with ``mean_abs_K`` of a mesh, which is the same for a fine one.
+        It is integrated by Gauss quadrature with `per_span` points in every knot interval and
+        direction. The metric ``mean_abs_K`` of a mesh approximates it under refinement.
 
         Raises
         ------
         OptionError
-            `per_span` is no integer, 1 or more.
+            `per_span` is not an integer of at least 1.
         """
         _check_count("per_span", per_span, 1)
         (u, wu), (v, wv) = (_quadrature(k, per_span) for k in (self.knots_u, self.knots_v))
@@ -200,13 +201,13 @@ class BSplineSurface:
         return float((np.abs(_curvature(d)) * area).sum()) / total if total > 0 else 0.0
 
     def arrays(self) -> dict[str, Array]:
-        """Arrays that :meth:`from_arrays` makes the surface of again."""
+        """Convert to arrays, from which :meth:`from_arrays` restores the surface."""
         out = {"spline_net": self.net, "knots_u": self.knots_u, "knots_v": self.knots_v}
         return out if self.gap is None else {**out, "spline_gap": np.array(self.gap)}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Array]) -> BSplineSurface | None:
-        """Surface from the arrays of :meth:`arrays`; None where there is none among them."""
+        """Restore a surface from the output of :meth:`arrays`; None if `arrays` has none."""
         if "spline_net" not in arrays:
             return None
         found = arrays.get("spline_gap")
@@ -214,13 +215,13 @@ class BSplineSurface:
         return cls(arrays["spline_net"], arrays["knots_u"], arrays["knots_v"], gap)
 
     def moved(self, scale: float, shift: ArrayLike = 0.0) -> BSplineSurface:
-        """The same surface with every point multiplied by `scale`, then moved by `shift`."""
+        """Copy the surface with every point multiplied by `scale`, then moved by `shift`."""
         gap = None if self.gap is None else Gap(*(scale * g for g in self.gap))
         net = self.net * scale + np.asarray(shift, dtype=np.float64)
         return BSplineSurface(net, self.knots_u, self.knots_v, gap)
 
     def _lattice(self, u: Array, v: Array, du: int = 0, dv: int = 0) -> Array:
-        """Points or derivatives at all pairs of parameters, (len(u), len(v), 3)."""
+        """Evaluate points or derivatives at all pairs of parameters, (len(u), len(v), 3)."""
         n, m = self.net.shape[:2]
         a, b = basis(self.knots_u, n, u, du), basis(self.knots_v, m, v, dv)
         return np.einsum("ia,jb,abk->ijk", a, b, self.net, optimize=True)
@@ -232,7 +233,7 @@ def _curvature(derivatives: list[Array]) -> Array:
 
 
 def _quadrature(knots: Array, per_span: int) -> tuple[Array, Array]:
-    """Gauss points and weights in every interval between knots."""
+    """Return the Gauss points and weights of all knot intervals."""
     ends = np.unique(knots)
     points, weights = np.polynomial.legendre.leggauss(per_span)
     half = 0.5 * np.diff(ends)[:, None]

@@ -1,4 +1,4 @@
-"""How a run ended, how it is going, and what can go wrong.
+"""Status of a solve, progress reports, and the package's exceptions.
 
 Every exception that the package raises on purpose is a :class:`GSOError`; its
 message names the vertex, face, file or option and says what to do about it.
@@ -35,7 +35,7 @@ class DatasetError(GSOError, ValueError):
 
 
 class ConvergenceWarning(UserWarning):
-    """A result was returned, but neither did the solver converge nor make all its iterations."""
+    """A result was returned with a status other than converged or all iterations used."""
 
 
 class Status(enum.Enum):
@@ -53,12 +53,12 @@ class Status(enum.Enum):
 
     @property
     def converged(self) -> bool:
-        """Whether the result is as good as the options ask for."""
+        """Whether the solve converged, reached its target, or had nothing to do."""
         return self in (Status.CONVERGED, Status.ALREADY_GOOD, Status.TARGET_REACHED)
 
     @property
     def refuses(self) -> bool:
-        """Whether it says by itself that the result is not what was asked for."""
+        """Whether the status alone makes the result unusable."""
         return self in (Status.CANCELLED, Status.TARGET_MISSED, Status.CONSTRAINTS_MISSED)
 
     def __str__(self) -> str:
@@ -67,7 +67,7 @@ class Status(enum.Enum):
 
 @dataclass(frozen=True)
 class Progress:
-    """What the solver tells a callback after each iteration, iterate 0 included.
+    """State of the solve that a callback gets after each iteration, iterate 0 included.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Progress:
     by_term : dict of str to float
         The objective by term; the values sum to `energy`.
     step : float
-        Length of the step that was accepted, as a fraction of the full step.
+        Accepted step length, as a fraction of the full step.
     name : str
         Name of the stage: its grid, or its unknowns.
     """

@@ -1,7 +1,7 @@
 """Connectivity of face arrays: half-edges, grids, stars, polylines, boundary loops.
 
 Faces are integer arrays (m, 3) or (m, 4). In a mixed mesh the rows have four columns
-and a triangle ends in -1. Everything here is vectorised; loops run over the valence of
+and a triangle ends in -1. Everything is vectorised: Python loops run over the valence of
 a vertex or the side of a grid, never over elements.
 """
 
@@ -23,10 +23,10 @@ RING_SIZES = (3, 4, 5, 6, 7, 8, 10, 12, 16, 24, 32, 64, 128, 256, 512, 1024, 409
 
 
 def grid_faces(height: int, width: int) -> Ints:
-    """Quads of a grid whose vertices are numbered row by row.
+    """List the quads of a grid whose vertices are numbered row by row.
 
-    Face (i, j) is (i, j), (i+1, j), (i+1, j+1), (i, j+1), so that its first diagonal is
-    the one along which cells are split into triangles everywhere in the package.
+    Face (i, j) is (i, j), (i+1, j), (i+1, j+1), (i, j+1). Its first diagonal, between corners
+    0 and 2, is the one along which the package splits grid cells into triangles.
     """
     v = np.arange(height * width).reshape(height, width)
     corners = (v[:-1, :-1], v[1:, :-1], v[1:, 1:], v[:-1, 1:])
@@ -35,13 +35,13 @@ def grid_faces(height: int, width: int) -> Ints:
 
 @dataclass(frozen=True)
 class HalfEdges:
-    """Half-edges of an oriented manifold; arrays over half-edges unless said otherwise.
+    """Half-edges of an oriented manifold; arrays over half-edges unless stated otherwise.
 
     Attributes
     ----------
     origin, dest : vertex at the start and at the end
     face : face on the left
-    next, prev : neighbours within the face
+    next, prev : next and previous half-edge of the face
     twin : the opposite half-edge, or -1 on the boundary
     """
 
@@ -55,7 +55,7 @@ class HalfEdges:
 
     @cached_property
     def boundary_vertex(self) -> NDArray[np.bool_]:
-        """Mask over vertices: on the boundary."""
+        """Mask over vertices: boundary vertices."""
         mask = np.zeros(self.vertex_count, bool)
         open_edges = self.twin < 0
         mask[self.origin[open_edges]] = True
@@ -69,7 +69,7 @@ class HalfEdges:
 
 
 def _half_edge_table(faces: Ints) -> tuple[Ints, Ints, Ints, Ints]:
-    """Origin, dest, face and next of every half-edge, grouped by face."""
+    """Return origin, dest, face and next of every half-edge, grouped by face."""
     m, k = faces.shape
     size = np.full(m, k) if k == 3 else np.where(faces[:, 3] < 0, 3, 4)
     face = np.repeat(np.arange(m), size)
@@ -81,7 +81,7 @@ def _half_edge_table(faces: Ints) -> tuple[Ints, Ints, Ints, Ints]:
 
 
 def edge_keys(origin: Ints, dest: Ints, vertex_count: int) -> Ints:
-    """One integer per undirected edge."""
+    """Encode undirected edges as integers."""
     return np.minimum(origin, dest) * np.int64(vertex_count) + np.maximum(origin, dest)
 
 
@@ -102,9 +102,9 @@ def half_edges(faces: Ints, vertex_count: int) -> HalfEdges:
 def _tree_parity(
     count: int, a: Ints, b: Ints, odd: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], Ints]:
-    """Parity of each node along a spanning forest with edges a-b that flip where `odd`.
+    """Propagate a parity along a spanning forest; edges a-b with `odd` change it.
 
-    Returns the parity and the component label of each node. Pointer jumping makes it
+    Returns the parity and the component label of each node. Pointer jumping takes
     log2(depth) vectorised passes.
     """
     from scipy.sparse import coo_matrix
@@ -117,7 +117,7 @@ def _tree_parity(
     )
     roots = np.zeros(parts, np.int64)
     roots[label[::-1]] = np.arange(count)[::-1]
-    # One more node, joined to a root of every component, makes the forest a tree.
+    # An extra node, joined to a root of every component, turns the forest into a tree.
     top = np.full(parts, count)
     graph = coo_matrix(
         (np.r_[odd + 1, np.ones(parts, int)], (np.r_[a, top], np.r_[b, roots])),
@@ -141,14 +141,14 @@ def orient(faces: Ints, vertex_count: int) -> tuple[Ints, int, int]:
     faces : ndarray
         The faces, some of them reversed.
     flipped : int
-        How many were reversed: the smaller side of each component.
+        Number of reversed faces; in each component these are the minority.
     components : int
         Number of edge-connected components.
 
     Raises
     ------
     MeshError
-        An edge has three faces or more, or the surface is one-sided.
+        An edge has three faces or more, or the surface is not orientable.
     """
     origin, dest, face, _ = _half_edge_table(faces)
     key = edge_keys(origin, dest, vertex_count)
@@ -185,7 +185,7 @@ def orient(faces: Ints, vertex_count: int) -> tuple[Ints, int, int]:
 
 
 def reverse(faces: Ints) -> Ints:
-    """Faces with the opposite orientation; the first corner stays first."""
+    """Reverse the orientation of faces; the first corner stays first."""
     out = faces.copy()
     if faces.shape[1] == 3:
         out[:, 1:] = faces[:, :0:-1]
@@ -197,10 +197,11 @@ def reverse(faces: Ints) -> Ints:
 
 
 def recognise_grid(he: HalfEdges, faces: Ints) -> Ints | None:
-    """Vertex ids (H, W) of a quad mesh that is a grid, 3 x 3 or more, in any numbering, or None.
+    """Find the vertex ids (H, W) of a quad mesh that is a grid; None if it is not.
 
-    Corner (0, 0) is the grid corner with the smallest id; the first axis runs along the
-    face's own direction there, so a grid written row by row is found row by row.
+    The grid has at least 3 x 3 vertices, in any numbering. Corner (0, 0) is the grid corner
+    with the smallest id. The first axis follows the half-edge of the face that starts there, so
+    a grid that was written row by row is found row by row.
     """
     if faces.shape[1] != 4 or (faces[:, 3] < 0).any():
         return None
@@ -236,12 +237,12 @@ def recognise_grid(he: HalfEdges, faces: Ints) -> Ints | None:
 
 
 def check_vertices(he: HalfEdges) -> None:
-    """Refuse a vertex in which fans of faces touch that share no edge there.
+    """Refuse non-manifold vertices, where fans of faces meet that share no edge there.
 
     Raises
     ------
     MeshError
-        Naming the first such vertex.
+        There is such a vertex; the message names the first one.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -263,12 +264,12 @@ def check_vertices(he: HalfEdges) -> None:
 
 
 def are_quads(faces: Ints) -> NDArray[np.bool_]:
-    """Which faces (m, 3) or (m, 4) have four corners, (m,)."""
+    """Mark the faces (m, 3) or (m, 4) that have four corners, (m,)."""
     return faces[:, 3] >= 0 if faces.shape[1] == 4 else np.zeros(len(faces), bool)
 
 
 def by_size(faces: Ints) -> tuple[Ints, Ints]:
-    """The quads (q, 4) and the triangles (t, 3) among faces."""
+    """Split faces into quads (q, 4) and triangles (t, 3)."""
     if faces.shape[1] == 3:
         return np.empty((0, 4), np.int64), faces
     quad = are_quads(faces)
@@ -276,13 +277,13 @@ def by_size(faces: Ints) -> tuple[Ints, Ints]:
 
 
 def four_corners(faces: Ints) -> Ints:
-    """Faces with four corners each (m, 4): a triangle repeats its first one at the end."""
+    """Pad faces to four corners (m, 4): a triangle repeats its first corner at the end."""
     first, last = faces[:, :1], faces[:, 3:]
     return np.c_[faces[:, :3], np.where(last < 0, first, last) if last.size else first]
 
 
 def triangulate(faces: Ints, turned: NDArray[np.bool_]) -> Ints:
-    """Triangles (t, 3) of faces whose quads are split as :func:`quad_splits` says."""
+    """Triangulate faces (t, 3); quads where `turned` is set are split along the diagonal 1-3."""
     if faces.shape[1] == 3:
         return faces
     quad = faces[:, 3] >= 0
@@ -295,11 +296,11 @@ def triangulate(faces: Ints, turned: NDArray[np.bool_]) -> Ints:
 
 
 def quad_splits(faces: Ints, he: HalfEdges) -> NDArray[np.bool_]:
-    """Which quads are split along the diagonal 1-3 instead of 0-2, so that neighbours are alike.
+    """Choose consistent diagonals: mask of the quads split along 1-3 instead of 0-2.
 
-    The choice spreads from the first face over its neighbours: nearly every regular vertex then
-    has six triangles, the only valence at which the angle defect converges (Borrelli et al.
-    2003). Around vertices of odd valence it cannot go round.
+    The choice is propagated from the first face over its neighbours. Nearly every regular
+    vertex then has six triangles, the only valence at which the angle defect converges
+    (Borrelli et al. 2003). Around vertices of odd valence it cannot be consistent.
 
     Returns
     -------
@@ -309,7 +310,7 @@ def quad_splits(faces: Ints, he: HalfEdges) -> NDArray[np.bool_]:
     Raises
     ------
     MeshError
-        A quad both of whose diagonals join vertices that are joined already.
+        Both diagonals of a quad are already edges of the mesh or diagonals of other quads.
     """
     if faces.shape[1] == 3:
         return np.zeros(len(faces), bool)
@@ -317,13 +318,13 @@ def quad_splits(faces: Ints, he: HalfEdges) -> NDArray[np.bool_]:
     inner = np.flatnonzero((he.twin > np.arange(he.twin.size)) & quad[he.face])
     inner = inner[quad[he.face[he.twin[inner]]]]
     local = _place_in_face(he, quad)
-    # Seen from each face, is the start of this half-edge on the diagonal 0-2?
+    # For each of the two faces: is the origin of this half-edge on its diagonal 0-2?
     here = local[inner] % 2 == 0
     there = local[he.twin[inner]] % 2 == 1
-    # Alike: the diagonals of two neighbours do not meet at an end of the shared edge.
+    # Consistent: the diagonals of two neighbours do not meet at an end of the shared edge.
     turn, _ = _tree_parity(len(faces), he.face[inner], he.face[he.twin[inner]], here == there)
-    # Two faces that share two edges would get triangles on the same three vertices if a line
-    # were split twice or split along an edge: such quads are split the other way.
+    # Two quads with the same diagonal, or a diagonal that is also an edge, would give a
+    # non-manifold triangulation: such quads are split the other way.
     clash = _clashing_splits(faces[quad], turn[quad], he)
     if clash.any():
         turn[quad] ^= clash
@@ -338,13 +339,13 @@ def quad_splits(faces: Ints, he: HalfEdges) -> NDArray[np.bool_]:
 
 
 def _place_in_face(he: HalfEdges, quad: NDArray[np.bool_]) -> Ints:
-    """Which corner of its face every half-edge starts at, 0 to 3."""
+    """Return the index within its face, 0 to 3, of the corner where each half-edge starts."""
     first = np.concatenate([[0], np.cumsum(np.where(quad, 4, 3))[:-1]])
     return np.arange(he.face.size) - first[he.face]
 
 
 def _clashing_splits(quads: Ints, turn: NDArray[np.bool_], he: HalfEdges) -> NDArray[np.bool_]:
-    """Which quads' diagonals are edges of the mesh or diagonals of another quad too."""
+    """Mark the quads whose diagonal is also an edge or the diagonal of another quad."""
     ends = np.where(turn[:, None], quads[:, [1, 3]], quads[:, [0, 2]])
     split = edge_keys(ends[:, 0], ends[:, 1], he.vertex_count)
     _, which, often = np.unique(split, return_inverse=True, return_counts=True)
@@ -352,9 +353,10 @@ def _clashing_splits(quads: Ints, turn: NDArray[np.bool_], he: HalfEdges) -> NDA
 
 
 def corner_triangles(faces: Ints) -> Ints:
-    """The corner triangles (previous, corner, next) of faces: four per quad, one per triangle.
+    """List the corner triangles of faces: four per quad, one per triangle.
 
-    Ordered corner, next, previous, so that a positive area means an unflipped corner.
+    Those of a quad are (corner, next, previous), so a positive area means a corner that is not
+    inverted. First all corners 0 of the quads, then all corners 1 ..., then the triangles.
     """
     if faces.shape[1] == 3:
         return faces
@@ -368,7 +370,7 @@ Stars = list[tuple[Ints, Ints]]
 
 
 def grid_stars(ids: Ints, ring: Sequence[tuple[int, int]]) -> Stars:
-    """Stars of the interior vertices of a grid (H, W) whose rings are steps (i, j) away."""
+    """List the stars of a grid's interior vertices (H, W), with rings as index offsets (i, j)."""
     h, w = ids.shape
     if min(h, w) < 3:
         return []
@@ -377,13 +379,13 @@ def grid_stars(ids: Ints, ring: Sequence[tuple[int, int]]) -> Stars:
 
 
 def vertex_stars(faces: Ints, he: HalfEdges, turned: NDArray[np.bool_]) -> tuple[Stars, Stars]:
-    """Closed stars of the interior vertices in both triangulations of the quads around them.
+    """Build closed stars of the interior vertices in two triangulations of the quads around them.
 
-    The quads around a vertex are split in turn through the vertex and across from it, and the
-    other way round: two stars that together use both diagonals of every quad, and that do not
-    depend on how the mesh is numbered. The first one is that which agrees with more of the
-    splits in `turned`. Where the number of quads is odd they cannot alternate, and both stars
-    have all quads split through the vertex. Triangles are what they are.
+    Around a vertex the quads are split alternately: along the diagonal through the vertex, and
+    along the other one. The second star swaps the two. Together they use both diagonals of
+    every quad and do not depend on the numbering of the mesh. The first star is the one that
+    agrees with more of the splits in `turned`. An odd number of quads cannot alternate: then
+    both stars split all quads through the vertex. Triangles are kept.
 
     Returns
     -------
@@ -394,7 +396,7 @@ def vertex_stars(faces: Ints, he: HalfEdges, turned: NDArray[np.bool_]) -> tuple
     Raises
     ------
     MeshError
-        Two fans of faces touch in one vertex only, or a vertex has too many faces.
+        A vertex is non-manifold (two fans of faces meet there), or has too many faces.
     """
     interior = np.flatnonzero(~he.boundary_vertex & (he.face_count > 0))
     quad = are_quads(faces)
@@ -426,7 +428,10 @@ def vertex_stars(faces: Ints, he: HalfEdges, turned: NDArray[np.bool_]) -> tuple
 
 
 def _rings(he: HalfEdges, centre: Ints, spokes: Ints, through: NDArray[np.bool_]) -> Stars:
-    """Stars of one number of faces; quads split through the centre add their far corner."""
+    """Build the stars of vertices with equal face counts, padded to :data:`RING_SIZES`.
+
+    A quad that is split through the centre adds its opposite corner to the ring.
+    """
     both = np.stack([he.dest[spokes], he.dest[he.next[spokes]]], axis=2)
     wanted = np.stack([np.ones_like(through), through], axis=2)
     both, wanted = both.reshape(len(centre), -1), wanted.reshape(len(centre), -1)
@@ -448,7 +453,7 @@ def _rings(he: HalfEdges, centre: Ints, spokes: Ints, through: NDArray[np.bool_]
 
 
 def _merged(stars: Stars) -> Stars:
-    """Stars with one entry per length of rings, vertices in their order."""
+    """Merge stars into one entry per ring length, sorted by vertex."""
     out = []
     for length in sorted({ring.shape[1] for _, ring in stars}):
         some = [(c, r) for c, r in stars if r.shape[1] == length]
@@ -459,7 +464,7 @@ def _merged(stars: Stars) -> Stars:
 
 
 def polyline_triples(he: HalfEdges, faces: Ints) -> Ints:
-    """Consecutive triples (a, b, c) along the polylines of a quad mesh, (t, 3).
+    """List consecutive triples (a, b, c) along the polylines of a quad mesh, (t, 3).
 
     Lines run straight through regular vertices (four faces inside, two on the boundary)
     and end at irregular ones.
@@ -468,7 +473,7 @@ def polyline_triples(he: HalfEdges, faces: Ints) -> Ints:
 
 
 def polyline_crosses(he: HalfEdges, faces: Ints) -> Ints:
-    """The triples of :func:`polyline_triples` and the line across (a, b, c, p, q), (t, 5).
+    """List :func:`polyline_triples` with the crossing line, (a, b, c, p, q), (t, 5).
 
     p and q are the neighbours of b on both sides of the polyline; on the boundary q is b.
     """
@@ -491,7 +496,7 @@ def polyline_crosses(he: HalfEdges, faces: Ints) -> Ints:
 
 
 def hinges(he: HalfEdges) -> Ints:
-    """The four vertices (a, b, left, right) around every interior edge of a triangulation."""
+    """List the four vertices (a, b, left, right) around every interior edge of a triangulation."""
     h = np.flatnonzero(he.twin > np.arange(he.twin.size))
     return np.stack(
         [he.origin[h], he.dest[h], he.dest[he.next[h]], he.dest[he.next[he.twin[h]]]], axis=1
@@ -499,13 +504,13 @@ def hinges(he: HalfEdges) -> Ints:
 
 
 def edges(he: HalfEdges) -> Ints:
-    """Each undirected edge once, (e, 2)."""
+    """List each undirected edge once, (e, 2)."""
     once = _once(he)
     return np.stack([he.origin[once], he.dest[once]], axis=1)
 
 
 def rim(he: HalfEdges) -> NDArray[np.bool_]:
-    """Which of :func:`edges` belong to one face only, (e,)."""
+    """Mark the boundary edges among :func:`edges`, (e,)."""
     return he.twin[_once(he)] < 0
 
 
@@ -514,15 +519,15 @@ def _once(he: HalfEdges) -> NDArray[np.bool_]:
 
 
 def boundary_loops(he: HalfEdges) -> list[Ints]:
-    """Vertex ids of each boundary loop, anticlockwise round the surface, longest first."""
+    """List the vertex ids of the boundary loops, anticlockwise round the surface, longest first."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components, depth_first_order
 
     rim = np.flatnonzero(he.twin < 0)
     if rim.size == 0:
         return []
-    # The next rim edge is found by turning round the end vertex from face to face, so that a
-    # vertex in which two fans touch counts as two.
+    # The next boundary edge is found by walking around the end vertex from face to face, so
+    # that a vertex where two fans meet is passed once per fan.
     ahead = he.next[rim]
     while (he.twin[ahead] >= 0).any():
         ahead = np.where(he.twin[ahead] >= 0, he.next[he.twin[ahead]], ahead)
@@ -531,7 +536,7 @@ def boundary_loops(he: HalfEdges) -> list[Ints]:
     _, label = connected_components(links, directed=False)
     order = np.lexsort((he.origin[rim], label))
     starts = order[np.unique(label[order], return_index=True)[1]]
-    # One more node, joined to a start of every loop, makes it one walk.
+    # An extra node, joined to a start of every loop, makes one depth-first walk visit all.
     links = coo_matrix(
         (
             np.ones(n + starts.size),

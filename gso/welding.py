@@ -1,4 +1,4 @@
-"""Merge vertices that lie on each other, and what becomes of faces and edges then."""
+"""Merging of coincident vertices, and its effect on faces and edges."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from gso.status import MeshError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# More pairs than this for each vertex: the tolerance is no longer one, but a size.
+# With more pairs per vertex than this the tolerance is larger than the edges.
 _MOST_PAIRS = 50
 
 
 def equal(points: Array) -> Ints:
-    """For each point (n, 3) the first one with the same coordinates.
+    """Find for each point (n, 3) the first one with the same coordinates.
 
     >>> equal(np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0]]))
     array([0, 1, 0])
@@ -32,17 +32,16 @@ def equal(points: Array) -> Ints:
 
 
 def near(points: Array, tolerance: float, names: Ints | None = None) -> Ints:
-    """For each point (n, 3) the first one of those that it is merged with.
+    """Find for each point (n, 3) the first point of the cluster that it is merged into.
 
-    Points within the tolerance of each other are merged, and so are those that chains of
-    such pairs connect, as long as what is merged stays small. Messages call the points by
-    their `names`, or by their places.
+    A cluster is connected by pairs of points within the tolerance. Error messages identify
+    points by their `names`, or by their indices.
 
     Raises
     ------
     MeshError
-        A chain reaches farther than twice the tolerance, so that a part of the surface
-        would shrink to a point.
+        A cluster is wider than twice the tolerance, so that a part of the surface would shrink
+        to a point; or most points have dozens of others within the tolerance.
     """
     first = equal(points)
     if not tolerance > 0:
@@ -52,8 +51,8 @@ def near(points: Array, tolerance: float, names: Ints | None = None) -> Ints:
     from scipy.spatial import cKDTree
 
     kept, index = np.unique(first, return_inverse=True)
-    # Squares of lengths must stay within double precision, and not vanish either; a power of
-    # two changes no digit.
+    # Squares of lengths must neither overflow nor underflow. Scaling by a power of two is
+    # exact.
     size = 2.0 ** float(np.floor(np.log2(np.ptp(points, axis=0).max() or 1.0)))
     apart, weld, tolerance = points[kept] / size, tolerance, min(tolerance / size, 4.0)
     tree = cKDTree(apart)
@@ -90,11 +89,11 @@ class Collapsed:
     Attributes
     ----------
     faces : ndarray, (p, 3) or (p, 4)
-        Those that are left; a quad with one edge gone is a triangle that ends in -1.
+        Remaining faces; a quad with one collapsed edge becomes a triangle that ends in -1.
     kept : ndarray, (p,)
-        Which of the faces they were.
+        Their indices among the original faces.
     turns : ndarray, (p, 3) or (p, 4)
-        Which of its corners each corner was; -1 for none.
+        For each corner, the column of the original corner; -1 for none.
     """
 
     faces: Ints
@@ -103,10 +102,10 @@ class Collapsed:
 
 
 def collapse(faces: Ints, target: Ints) -> Collapsed:
-    """Put `target[v]` in the place of every vertex v; leave out faces without area.
+    """Replace every vertex v by `target[v]` in the faces, and drop degenerate faces.
 
-    Those are triangles with two equal corners, and quads with two opposite corners or two
-    edges gone.
+    These are triangles with two equal corners, and quads with two equal opposite corners or
+    two collapsed edges.
 
     Examples
     --------
@@ -142,7 +141,7 @@ def collapse(faces: Ints, target: Ints) -> Collapsed:
 
 
 def seams(points: Array, origin: Ints, dest: Ints) -> NDArray[np.bool_]:
-    """Which of some edges (from vertex `origin` to `dest`) lie on another one of them."""
+    """Mark the edges (from vertex `origin` to `dest`) that coincide with another of them."""
     ends, index = np.unique(np.r_[origin, dest], return_inverse=True)
     place = equal(points[ends])[index.ravel()]
     a, b = place[: len(origin)], place[len(origin) :]

@@ -1,6 +1,6 @@
-"""Places in which a surface or a flat pattern is of no use: folds, crossings, overlaps, collapse.
+"""Detection of folds, self-intersections, overlaps of flat patterns, and collapsed edges.
 
-Each function returns faces or edges in the numbering of the mesh, none where all is well.
+Each function returns faces or edges in the numbering of the mesh; an empty array means none.
 """
 
 from gso.faults.crossings import crossings

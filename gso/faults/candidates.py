@@ -1,4 +1,4 @@
-"""Pairs of faces that may cross: apart in the mesh, near each other in space."""
+"""Pairs of faces that may intersect: without common vertices, and close in space."""
 
 from __future__ import annotations
 
@@ -11,22 +11,23 @@ from gso.topology import four_corners
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Share of a face's width by which two faces must reach into each other: what is less is touch.
+#: Smallest penetration depth of an intersection, relative to the width of the smaller face; less
+#: counts as touching.
 DEPTH = 1e-3
 
 
 def candidates(points: Array, faces: Ints) -> tuple[Ints, Array]:
-    """Pairs of faces without a common vertex that the simplest tests do not tell apart.
+    """Find the pairs of faces without a common vertex that two simple tests do not separate.
 
-    Those are their bounding boxes, and their extents along the line through their centres,
-    which separates most of the faces that are near each other within a smooth surface.
+    The tests compare their bounding boxes, and their extents along the line through their
+    centres, which separates most of the nearby faces of a smooth surface.
 
     Parameters
     ----------
     points : ndarray, (n, 2) or (n, 3)
         Vertices.
     faces : ndarray of int, (m, 3) or (m, 4)
-        A triangle among quads ends in -1.
+        Faces; a triangle among quads ends in -1.
 
     Returns
     -------
@@ -50,36 +51,37 @@ def candidates(points: Array, faces: Ints) -> tuple[Ints, Array]:
     length = np.sqrt((axis**2).sum(axis=0))
     here, there = (np.einsum("dkp,dp->kp", corners[:, :, k], axis) for k in (first, second))
     met = np.maximum.reduce(here) - np.minimum.reduce(there) > DEPTH * width * length
-    # Faces about the same centre are never told apart.
+    # Faces with the same centre cannot be separated along that line.
     met |= length <= DEPTH * width
     return np.stack([first, second], axis=1)[met], width[met]
 
 
 def split(faces: Ints, other: NDArray[np.bool_] | None = None) -> tuple[Ints, Ints]:
-    """Two triangles for every face (m, 2, 3), and how many of them count (m,): 1 or 2.
+    """Split faces into two triangles each (m, 2, 3), with the number of valid ones (m,): 1 or 2.
 
-    Quads are split along corners 0-2, or 1-3 where `other` says so. A triangle comes first.
+    Quads are split along corners 0-2, or 1-3 where `other` is set. The first triangle of a
+    triangular face is the face itself.
     """
     ids = four_corners(faces)
     if other is not None:
         ids = np.where(other[:, None], np.roll(ids, -1, axis=1), ids)
     count = np.where(faces[:, 3] < 0, 1, 2) if faces.shape[1] == 4 else np.ones(len(faces), int)
     triangles = np.stack([ids[:, [0, 1, 2]], ids[:, [0, 2, 3]]], axis=1)
-    # An `other` split is of quads only.
+    # Triangular faces ignore `other`.
     single = count == 1
     triangles[single, 0] = faces[single, :3]
     return triangles, count
 
 
 def by_triangles(pairs: Ints, triangles: Ints, count: Ints) -> tuple[Ints, Ints, Ints]:
-    """Pairs of faces as pairs of their triangles.
+    """Expand pairs of faces into pairs of their triangles.
 
     Returns
     -------
     which : ndarray of int, (t,)
-        The pair of faces that each pair of triangles is of.
+        Index of the pair of faces of each pair of triangles.
     first, second : ndarray of int, (t, 3)
-        Their corners.
+        Corners of the triangles.
     """
     which, first, second = [], [], []
     for i in range(2):

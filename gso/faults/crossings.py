@@ -1,4 +1,4 @@
-"""Where a surface passes through itself."""
+"""Self-intersections of a surface."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Ints = NDArray[np.int64]
 
 
 def crossings(mesh: Mesh) -> Ints:
-    """Pairs of faces that share no vertex and pass through each other.
+    """Find the pairs of faces that share no vertex and intersect each other.
 
-    Quads count as the two triangles along their first diagonal. Faces that touch, lie on each
-    other, or reach into each other by less than a thousandth of their width do not cross; and
-    neither is a crossing seen that lies along edges of both parts, to that precision.
+    Quads are split into triangles along their first diagonal. Faces that touch, are coplanar,
+    or penetrate each other by less than a thousandth of their width do not intersect. An
+    intersection that runs along edges of both parts, to that precision, is not detected.
 
     Parameters
     ----------
@@ -30,8 +30,8 @@ def crossings(mesh: Mesh) -> Ints:
 
     Notes
     -----
-    Two triangles cross when each has corners on both sides of the other's plane and the parts
-    of the planes' common line that lie in them overlap (Moeller 1997).
+    Two triangles intersect when each has corners on both sides of the other's plane, and the
+    intervals in which they meet the common line of the planes overlap (Moeller 1997).
 
     Examples
     --------
@@ -50,11 +50,11 @@ def crossings(mesh: Mesh) -> Ints:
 
 
 def _cross(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:
-    """Which pairs of triangles (t, 3, 3) pass through each other by more than a depth (t,)."""
+    """Mark the pairs of triangles (t, 3, 3) that penetrate by more than a depth (t,)."""
     out = np.zeros(len(a), bool)
     at = np.arange(len(a))
     for k in range(2):
-        # Most pairs end with the first plane: the second one is asked for the rest.
+        # The first plane separates most pairs; only the rest is tested against the second.
         base, other = (a, b) if k == 0 else (b, a)
         at = at[_both_sides(_heights(base[at], other[at])[1], depth[at])]
     a, b, depth = a[at], b[at], depth[at]
@@ -69,7 +69,7 @@ def _cross(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:
 
 
 def _heights(base: Array, other: Array) -> tuple[Array, Array]:
-    """Unit normals of triangles, and the corners of others above their planes (t, 3)."""
+    """Return unit normals of triangles, and heights (t, 3) of others' corners above them."""
     normal = np.cross(base[:, 1] - base[:, 0], base[:, 2] - base[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     return normal, np.einsum("tkd,td->tk", other - base[:, :1], normal)
@@ -80,7 +80,7 @@ def _both_sides(height: Array, depth: Array) -> NDArray[np.bool_]:
 
 
 def _extent(triangle: Array, height: Array, line: Array) -> tuple[Array, Array]:
-    """Where a triangle that has corners on both sides of a plane meets it, along a line."""
+    """Return the interval along a line in which a triangle meets a plane that it crosses."""
     above = height > 0
     lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
     row = np.arange(len(triangle))

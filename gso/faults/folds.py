@@ -13,27 +13,27 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Cosine of the angle between neighbouring normals below which a face is folded onto the next:
-#: it turns back by more than 120 degrees. Sound results stay above 0 all but always.
+#: the angle is more than 120 degrees. Valid results almost always stay above 0.
 SHARP = -0.5
-#: Share of its length below which an edge has collapsed.
+#: Ratio of lengths, result over design, below which an edge has collapsed.
 SHORT = 0.02
-#: Share of a corner's longer side, as its height, below which it has no direction.
+#: Ratio of a corner triangle's height to its longer side below which it has no normal.
 _FLAT = 1e-6
 
 
 def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
-    """Faces that are folded onto a neighbour, or onto themselves, in both triangulations.
+    """Find the faces that are folded onto a neighbour or onto themselves.
 
-    The normals of two triangles at an edge then differ by more than 120 degrees: a face is
-    inverted, or the surface has a sharp crease. Quads count as the triangles along both
-    diagonals. A quad is folded onto itself when the two triangles along a diagonal are; where
-    the mesh is no grid, along both diagonals, since an arrow-shaped one is not.
+    At a fold the normals of two triangles at an edge differ by more than 120 degrees: a face is
+    inverted, or the surface has a sharp crease. Quads are tested with the triangles of both
+    diagonals. A quad of a grid is folded onto itself if the two triangles along either
+    diagonal are. In other meshes quads may be concave, so both diagonals must fold.
 
     Parameters
     ----------
     mesh : Mesh
     below : float
-        Cosine of the angle between normals from which on it is a fold.
+        Cosine of the angle between normals below which an edge is a fold.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
     normals, fold = _corner_normals(points, mesh.faces, quad, below)
     broken = fold.all(axis=0) if mesh.grid_index is None else fold.any(axis=0)
     bad = [np.flatnonzero(broken & quad)]
-    # Triangles of a split that folds are none of the surface's.
+    # Triangles of a diagonal along which the quad folds are not tested against neighbours.
     sound = ~fold
     h = np.flatnonzero(he.twin > np.arange(he.twin.size))
     local = np.arange(he.face.size) - np.searchsorted(he.face, he.face)
@@ -63,7 +63,7 @@ def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
     sides = (h, he.twin[h])
     for k in range(2):
         for j in range(2):
-            # The triangles of the edge's two ends, on either side.
+            # On each side, the corner triangle at one of the two ends of the edge.
             here, there = (
                 (he.face[s], (local[s] + turn) % size[s])
                 for s, turn in zip(sides, (k, j), strict=True)
@@ -78,10 +78,10 @@ def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
 def _corner_normals(
     points: tuple[Array, ...], faces: Ints, quad: NDArray[np.bool_], below: float
 ) -> tuple[tuple[Array, ...], NDArray[np.bool_]]:
-    """Unit normals of the corner triangles (4, m), and quads that fold along a diagonal (2, m).
+    """Return corner triangles' unit normals (4, m), and quads that fold along a diagonal (2, m).
 
-    Corner k is cut off by the diagonal of corners k - 1 and k + 1. The corners of a triangle
-    all have its normal.
+    Corner triangle k is cut off by the diagonal between corners k - 1 and k + 1. For a
+    triangular face all four have its normal.
     """
     ids = four_corners(faces).T
     corners = [tuple(x[i] for x in points) for i in ids]
@@ -90,7 +90,7 @@ def _corner_normals(
     for k in range(4):
         normal = cross(sides[k], sides[k - 1])
         area, longest = norm(normal), np.maximum(norm2(sides[k]), norm2(sides[k - 1]))
-        # A triangle that is almost a line has no direction.
+        # A degenerate triangle has no normal.
         scale = np.divide(-1.0, area, out=np.zeros_like(area), where=area > _FLAT * longest)
         out.append([x * scale for x in normal])
     normals = [np.stack(x) for x in zip(*out, strict=True)]
@@ -103,7 +103,7 @@ def _corner_normals(
 
 
 def collapsed(before: Mesh, after: Array, *, share: float = SHORT) -> Ints:
-    """Edges of a mesh that are a small share of what they were.
+    """Find the edges of a mesh that have shrunk to a small fraction of their length.
 
     Parameters
     ----------
@@ -112,14 +112,14 @@ def collapsed(before: Mesh, after: Array, *, share: float = SHORT) -> Ints:
     after : ndarray, (n, 2) or (n, 3)
         Vertices of the result, or of the pattern.
     share : float
-        Of an edge's length before, below which it has collapsed. At a fiftieth no face of
-        common shape is left, and what is measured on it means nothing; sound results seldom
-        fall below a third.
+        Ratio of lengths, after over before, below which an edge has collapsed. At 1/50 the
+        faces are so distorted that metrics on them are meaningless; valid results seldom fall
+        below 1/3.
 
     Returns
     -------
     ndarray of int, (e, 2)
-        Ends of those edges, the smaller number first.
+        Vertices of the collapsed edges, the smaller number first.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Where a flat pattern lies on itself."""
+"""Overlaps of a flat pattern with itself."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from gso.topology import are_quads
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Angle around a vertex, beyond a full turn, from which its faces overlap.
+#: Sum of the angles around a vertex above which its faces overlap: 2 pi and a tolerance.
 _TURN = 2.0 * np.pi + 1e-2
 
 
 def overlaps(mesh: Mesh, flat: Array) -> Ints:
-    """Faces that lie on each other in a flat image, components included.
+    """Find the faces that overlap others in a flat image, also those of other components.
 
-    Faces that share an edge or touch are not meant, nor are faces that reach over each other by
-    less than a thousandth of their width, nor, by themselves, inverted faces: see
-    :func:`gso.metrics.flipped_faces` for those.
+    Faces without a common vertex overlap if they penetrate each other by more than a thousandth
+    of their width. The faces around a vertex overlap if their angles sum to more than a full
+    turn. Inverted faces are not detected as such: see :func:`gso.metrics.flipped_faces`.
 
     Parameters
     ----------
     mesh : Mesh
-        The surface; its vertices do not matter here.
+        The surface; only its connectivity is used.
     flat : ndarray, (n, 2)
-        Its image.
+        Its flat image.
 
     Returns
     -------
     ndarray of int, (f,)
-        Faces that lie on others, in increasing order.
+        Overlapping faces, in increasing order.
 
     Examples
     --------
@@ -55,19 +55,22 @@ def overlaps(mesh: Mesh, flat: Array) -> Ints:
 
 
 def _other_diagonal(points: Array, faces: Ints) -> NDArray[np.bool_]:
-    """Which quads only the diagonal of corners 1-3 splits into unflipped triangles."""
+    """Mark the quads that have an inverted triangle when split along the diagonal 0-2."""
     triangles, _ = split(faces)
     return are_quads(faces) & (_areas(points, triangles).min(axis=1) <= 0)
 
 
 def _areas(points: Array, triangles: Ints) -> Array:
-    """Doubled signed areas of triangles (..., 3)."""
+    """Return the doubled signed areas of triangles (..., 3)."""
     corners = (tuple(points[triangles[..., k]].T) for k in range(3))
     return geometry.corner_area2(*corners).T
 
 
 def _meet(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:
-    """Which pairs of triangles (t, 3, 2) no line separates: one of their sides would."""
+    """Mark the pairs of triangles (t, 3, 2) that overlap by more than a depth (t,).
+
+    By the separating-axis test: if a line separates two triangles, one of their sides does.
+    """
     met = np.ones(len(a), bool)
     for base in (a, b):
         for k in range(3):
@@ -83,7 +86,7 @@ def _meet(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:
 
 
 def _wound(points: Array, faces: Ints, triangles: Ints, count: Ints) -> Ints:
-    """Faces at vertices around which they turn by more than a full turn."""
+    """Find the faces at vertices whose face angles sum to more than a full turn."""
     every = np.concatenate([triangles[:, 0], triangles[count == 2, 1]])
     face = np.r_[np.arange(len(faces)), np.flatnonzero(count == 2)]
     turn = np.zeros(len(points))

@@ -2,9 +2,9 @@
 
 The functions take *component tuples* ``(x, y, z)`` or ``(x, y)`` and use only
 ``+ - * /`` and the few functions of :mod:`gso.geometry.ops`. The same code runs on
-NumPy arrays (metrics), torch tensors (losses) and CasADi symbols (derivatives), so a
-solver residual, a training loss and a metric cannot drift apart. Only the sizes of
-whole surfaces, :mod:`gso.geometry.size`, are of NumPy arrays of points.
+NumPy arrays (metrics), torch tensors (losses) and CasADi symbols (derivatives), so
+solver residuals, training losses and metrics always agree. Only :mod:`gso.geometry.size`,
+the sizes of point sets, takes NumPy arrays of points.
 """
 
 from gso.geometry.cells import (

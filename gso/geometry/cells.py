@@ -1,4 +1,4 @@
-"""Quantities of one quad cell with corners v0 v1 v2 v3 in cyclic order."""
+"""Quantities of one face: quads with corners v0 v1 v2 v3 in cyclic order, and triangles."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from gso.geometry.vector import Vec, cross, dot, norm, norm2, sub
 
 
 def diagonals(v0: Vec, v1: Vec, v2: Vec, v3: Vec) -> tuple[Vec, Vec]:
-    """Diagonals ``a = v0 - v2`` and ``b = v1 - v3`` (Jiang et al. 2020)."""
+    """Return the diagonals ``a = v0 - v2`` and ``b = v1 - v3`` (Jiang et al. 2020)."""
     return sub(v0, v2), sub(v1, v3)
 
 
 def diagonal_distance(v0: Vec, v1: Vec, v2: Vec, v3: Vec) -> Any:
-    """Signed distance between the lines of a quad's diagonals: zero when it is planar.
+    """Return the signed distance between the lines of a quad's diagonals; zero if it is planar.
 
     >>> corners = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (1.0, 1.0, 1.0), (0.0, 1.0, 0.0)
     >>> float(diagonal_distance(*corners))
@@ -25,10 +25,10 @@ def diagonal_distance(v0: Vec, v1: Vec, v2: Vec, v3: Vec) -> Any:
 
 
 def face_products(*corners: Vec) -> tuple[Any, Any, Any]:
-    """What isometric faces have in common (Jiang et al. 2020).
+    """Return the invariants of a face under isometries (Jiang et al. 2020).
 
-    The squared diagonals and their inner product of a quad: its midpoints' parallelogram.
-    The squared sides 01, 12, 20 of a triangle.
+    For a quad the squared diagonals and their inner product, which determine the parallelogram
+    of edge midpoints. For a triangle the squared sides 01, 12, 20.
     """
     if len(corners) == 4:
         a, b = diagonals(*corners)
@@ -38,16 +38,16 @@ def face_products(*corners: Vec) -> tuple[Any, Any, Any]:
 
 
 def isometry_defect(a: Vec, b: Vec, a2: Vec, b2: Vec) -> tuple[Any, Any, Any]:
-    """What two cells with diagonals (a, b) and (a2, b2) lack to be isometric.
+    """Return the isometry defect of two quad cells with diagonals (a, b) and (a2, b2).
 
     The differences of the diagonals' *lengths* and of their dot product, as in the
-    metric ``loss_iso-cell`` of Wang et al. 2024. All zero: the parallelograms of edge
-    midpoints are congruent.
+    metric ``loss_iso-cell`` of Wang et al. 2024. When all are zero, the parallelograms of
+    edge midpoints are congruent.
     """
     return norm(a) - norm(a2), norm(b) - norm(b2), dot(a, b) - dot(a2, b2)
 
 
 def corner_area2(p: Vec, q: Vec, r: Vec) -> Any:
-    """Doubled signed area of the plane triangle p q r; positive when anticlockwise."""
+    """Return the doubled signed area of the plane triangle p q r; positive when anticlockwise."""
     a, b = sub(q, p), sub(r, p)
     return a[0] * b[1] - a[1] * b[0]

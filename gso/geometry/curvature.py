@@ -11,13 +11,13 @@ from gso.geometry.vector import Vec, cross, dot, norm2, sub
 
 
 def _wedge(a: Vec, b: Vec) -> tuple[Any, Any]:
-    """Angle between two edges of a triangle, and its doubled area."""
+    """Return the angle between two edges of a triangle, and its doubled area."""
     twice = ops.sqrt(norm2(cross(a, b)))
     return ops.atan2(twice, dot(a, b)), twice
 
 
 def _star(centre: Vec, ring: Sequence[Vec]) -> tuple[Any, Any]:
-    """Sum of angles and sum of doubled triangle areas of a closed star."""
+    """Sum the angles and the doubled triangle areas of a closed star."""
     edges = [sub(p, centre) for p in ring]
     angles: Any = 0.0
     area2: Any = 0.0
@@ -29,22 +29,23 @@ def _star(centre: Vec, ring: Sequence[Vec]) -> tuple[Any, Any]:
 
 
 def _curvature(angles: Any, area2: Any) -> Any:
-    """Gaussian curvature of a star with that sum of angles and of doubled areas."""
+    """Return the Gaussian curvature of a star from its sums of angles and of doubled areas."""
     return (2.0 * math.pi - angles) / (0.5 * area2)
 
 
 def star_defect(centre: Vec, ring: Sequence[Vec]) -> Any:
-    """Angle defect ``2 pi - sum of angles`` of an interior vertex, radians."""
+    """Return the angle defect ``2 pi - sum of angles`` of an interior vertex, radians."""
     return 2.0 * math.pi - _star(centre, ring)[0]
 
 
 def star_area(centre: Vec, ring: Sequence[Vec]) -> Any:
-    """Sum of the full areas of the triangles of a star (three times the barycentric area)."""
+    """Sum the full areas of the triangles of a star (three times the barycentric area)."""
     return 0.5 * _star(centre, ring)[1]
 
 
-#: Steps (i, j) from a grid vertex to its ring of six, in both triangulations of the cells: split
-#: along (i, j)-(i+1, j+1) as in the published metric, and along the other diagonals.
+#: Index offsets (i, j) from a grid vertex to its ring of six neighbours, for both triangulations
+#: of the cells: split along (i, j)-(i+1, j+1) as in the published metric, and along the other
+#: diagonals.
 GRID_RINGS = (
     ((-1, 0), (-1, -1), (0, -1), (1, 0), (1, 1), (0, 1)),
     ((-1, 0), (-1, 1), (0, 1), (1, 0), (1, -1), (0, -1)),
@@ -52,14 +53,14 @@ GRID_RINGS = (
 
 
 def grid_star(points: Vec, split: int = 0) -> tuple[Vec, list[Vec]]:
-    """Interior vertices of grids and their rings of six, of components (..., H, W).
+    """Return the interior vertices of grids and their rings of six, as component tuples.
 
     Parameters
     ----------
     points : tuple of 3 arrays, (..., H, W)
-        NumPy's or torch's.
+        Components of the vertices, NumPy arrays or torch tensors.
     split : {0, 1}
-        Which triangulation: an index of :data:`GRID_RINGS`.
+        Triangulation of the cells: an index of :data:`GRID_RINGS`.
 
     Examples
     --------
@@ -77,11 +78,11 @@ def grid_star(points: Vec, split: int = 0) -> tuple[Vec, list[Vec]]:
 
 
 def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
-    """Gaussian curvature of a vertex star, 1 / length^2.
+    """Return the Gaussian curvature of a vertex star, 1 / length^2.
 
-    ``K = (2 pi - sum of angles) / (sum of full triangle areas)``, the definition with
-    which the published figures of GSO-Net (Wang et al. 2024, Eq. 1) were computed. With
-    the barycentric area of Meyer et al. 2003 it is three times as large.
+    ``K = (2 pi - sum of angles) / (sum of full triangle areas)``, the definition behind the
+    published figures of GSO-Net (Wang et al. 2024, Eq. 1). With the barycentric area of
+    Meyer et al. 2003 it is three times as large.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
         The vertex.
     ring : sequence of tuples of 3 numbers
         Its neighbours in cyclic order, three or more. A neighbour listed twice in a row
-        adds nothing, so rings of different length can share one padded layout.
+        adds nothing, so rings of different lengths can be padded to one length.
 
     Examples
     --------
@@ -103,17 +104,17 @@ def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
 
 
 def grid_curvature(points: Vec, split: int = 0) -> Any:
-    """:func:`gaussian_curvature` of the interior vertices of grids, 1 / length^2.
+    """Return :func:`gaussian_curvature` of the interior vertices of grids, 1 / length^2.
 
-    The six triangles of all stars are computed at once, where small grids take the time of
-    single steps.
+    The six triangles of all stars are computed in one batch, because on small grids the time
+    goes into the number of array operations.
 
     Parameters
     ----------
     points : tuple of 3 arrays, (..., H, W)
-        NumPy's or torch's.
+        Components of the vertices, NumPy arrays or torch tensors.
     split : {0, 1}
-        Which triangulation of the cells: an index of :data:`GRID_RINGS`.
+        Triangulation of the cells: an index of :data:`GRID_RINGS`.
 
     Returns
     -------

@@ -6,7 +6,7 @@ from gso.geometry.vector import Vec
 
 
 def second_difference(a: Vec, b: Vec, c: Vec) -> Vec:
-    """Second difference ``a - 2 b + c`` of three consecutive polyline vertices.
+    """Return the second difference ``a - 2 b + c`` of three consecutive polyline vertices.
 
     The fairness of Jiang et al. 2020 is the sum of its squares over a mesh's polylines.
 

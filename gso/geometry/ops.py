@@ -1,7 +1,7 @@
-"""Square root, atan2, minimum and stacks for whatever numbers come in.
+"""Square root, atan2, minimum and stack for NumPy, torch and CasADi numbers.
 
-The kind of number is asked of the argument itself, so that neither torch nor casadi
-is imported here: whoever holds such a number has imported its package already.
+The module is found from the type of the argument, so neither torch nor casadi is imported
+here: a caller with such a number has imported its package already.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def _module_of(x: Any) -> Any:
 
 
 def sqrt(x: Any) -> Any:
-    """Square root of ``max(x, tiny)``: finite, with a finite derivative, at zero."""
+    """Return the square root of ``max(x, tiny)``: finite, with a finite derivative, at zero."""
     mod = _module_of(x)
     if mod is None:
         return np.sqrt(np.maximum(x, TINY))
@@ -35,13 +35,13 @@ def sqrt(x: Any) -> Any:
 
 
 def atan2(y: Any, x: Any) -> Any:
-    """Angle of the vector (x, y), radians."""
+    """Return the angle of the vector (x, y), radians."""
     mod = _module_of(y)
     return np.arctan2(y, x) if mod is None else mod.atan2(y, x)
 
 
 def minimum(x: Any, y: Any) -> Any:
-    """Smaller of two numbers."""
+    """Return the smaller of two numbers."""
     mod = _module_of(x)
     if mod is None:
         return np.minimum(x, y)
@@ -51,6 +51,6 @@ def minimum(x: Any, y: Any) -> Any:
 
 
 def stack(arrays: Sequence[Any]) -> Any:
-    """Arrays of one shape, NumPy's or torch's, along a new first axis."""
+    """Stack NumPy arrays or torch tensors of one shape along a new first axis."""
     mod = _module_of(arrays[0])
     return np.stack(arrays) if mod is None else mod.stack(tuple(arrays))

@@ -8,7 +8,7 @@ from gso.geometry.vector import Vec, cross, dot, norm
 
 
 def smooth_gaussian_curvature(su: Vec, sv: Vec, suu: Vec, suv: Vec, svv: Vec) -> Any:
-    """Gaussian curvature of a parametrised surface, 1 / length^2.
+    """Return the Gaussian curvature of a parametrised surface, 1 / length^2.
 
     The determinant of the second fundamental form over that of the first,
     ``((suu.n)(svv.n) - (suv.n)^2) / |su x sv|^2`` with the unit normal n. Zero where the
@@ -17,7 +17,7 @@ def smooth_gaussian_curvature(su: Vec, sv: Vec, suu: Vec, suv: Vec, svv: Vec) ->
     Parameters
     ----------
     su, sv, suu, suv, svv : tuple of 3 numbers
-        First and second derivatives of the surface by its parameters.
+        First and second derivatives of the surface with respect to its parameters.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The shape operator of a face, from tangents and how the normal turns along them."""
+"""The shape operator of a face, from two tangents and the changes of the normal along them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Matrix = tuple[tuple[Any, Any], tuple[Any, Any]]
 
 
 def tangent_frame(a: Vec, b: Vec) -> tuple[Vec, Vec, Vec]:
-    """Orthonormal vectors ``(e, f, n)``: `e` along `a`, `f` towards `b`, `n` along ``a x b``.
+    """Return orthonormal ``(e, f, n)``: `e` along `a`, `f` towards `b`, `n` along ``a x b``.
 
     `a` and `b` must span an area.
     """
@@ -27,7 +27,7 @@ def tangent_frame(a: Vec, b: Vec) -> tuple[Vec, Vec, Vec]:
 
 
 def shape_matrix(a: Vec, b: Vec, da: Vec, db: Vec) -> Matrix:
-    """Shape operator of a face in the tangent frame of `a` and `b`, 1 / length.
+    """Return the shape operator of a face in the tangent frame of `a` and `b`, 1 / length.
 
     The linear map that takes the tangents `a` and `b` to the changes `da` and `db` of the
     normal along them, projected to their plane. For a quad these are the diagonals of the
@@ -55,20 +55,20 @@ def shape_matrix(a: Vec, b: Vec, da: Vec, db: Vec) -> Matrix:
 
 
 def determinant(s: Matrix) -> Any:
-    """Gaussian curvature of a shape operator, 1 / length^2."""
+    """Return the Gaussian curvature of a shape operator, 1 / length^2."""
     return s[0][0] * s[1][1] - s[0][1] * s[1][0]
 
 
 def half_trace(s: Matrix) -> Any:
-    """Mean curvature of a shape operator, 1 / length."""
+    """Return the mean curvature of a shape operator, 1 / length."""
     return 0.5 * (s[0][0] + s[1][1])
 
 
 def eigen(p: Any, q: Any, r: Any) -> tuple[Any, Any, Any]:
-    """Eigenvalues of the symmetric matrix ``((p, q), (q, r))``, and where the first one lies.
+    """Return the eigenvalues of ``((p, q), (q, r))``, and the angle of the first eigenvector.
 
     Returns ``(high, low, angle)``: `high` >= `low`, and the eigenvector of `high` is
-    (cos, sin) of `angle`, radians. Equal eigenvalues have the angle 0.
+    (cos, sin) of `angle`, radians. For equal eigenvalues the angle is 0.
 
     >>> [float(x) for x in eigen(0.0, 1.0, 0.0)]
     [1.0, -1.0, 0.785]

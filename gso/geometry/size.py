@@ -1,4 +1,4 @@
-"""How large a set of points is: the lengths that percentages and unit balls refer to."""
+"""Sizes of point sets: the reference lengths of percentages and of unit balls."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ Array = NDArray[np.float64]
 
 
 def box_diagonal(points: Array) -> float:
-    """Length of the diagonal of the bounding box of points (n, d)."""
+    """Return the length of the diagonal of the bounding box of points (n, d)."""
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def ball(points: Array) -> tuple[Array, float]:
-    """Centroid (d,) of points (n, d), and the largest distance of one from it."""
+    """Return the centroid (d,) of points (n, d), and the largest distance from it."""
     centre = points.mean(axis=0)
     return centre, float(np.sqrt(((points - centre) ** 2).sum(axis=1).max()))

@@ -1,9 +1,9 @@
 """Membrane strain of one triangle mapped from space to the plane.
 
-The map of a triangle is a 2 x 2 matrix F between the plane of the triangle in space and
-the flat image. With ``Q = |((F11 + F22)/2, (F21 - F12)/2)|`` (the part that turns and
-scales) and ``R = |((F11 - F22)/2, (F21 + F12)/2)|`` (the part that shears) its singular
-values are ``Q + R`` and ``Q - R``, the second one negative when the triangle is flipped.
+The map of a triangle is a 2 x 2 matrix F from the plane of the triangle in space to the flat
+image. Let ``Q = |((F11 + F22)/2, (F21 - F12)/2)|`` (its conformal part: rotation and scale)
+and ``R = |((F11 - F22)/2, (F21 + F12)/2)|`` (its shear). The singular values are ``Q + R``
+and ``Q - R``, the second one negative when the triangle is inverted.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from gso.geometry.vector import Vec, cross, dot, norm, norm2, sub
 
 
 def rest_frame(p: Vec, q: Vec, r: Vec) -> tuple[Any, Any, Any]:
-    """Upper triangle ``(m11, m12, m22)`` of the inverse rest matrix of a triangle in space.
+    """Return the inverse rest matrix of a triangle in space, upper triangle ``(m11, m12, m22)``.
 
-    In the frame of its own plane the edges ``q - p`` and ``r - p`` are the columns of
+    In the frame of the triangle's plane the edges ``q - p`` and ``r - p`` are the columns of
     ``[[l, u], [0, h]]``; this is the inverse of that matrix. It grows without bound as
-    the triangle's area vanishes: leave such triangles out.
+    the triangle's area vanishes, so leave such triangles out.
     """
     e, f = sub(q, p), sub(r, p)
     length = norm(e)
@@ -28,7 +28,7 @@ def rest_frame(p: Vec, q: Vec, r: Vec) -> tuple[Any, Any, Any]:
 
 
 def stretch(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
-    """Residuals of the membrane strain of the plane triangle p q r.
+    """Return the residuals of the membrane strain of the plane triangle p q r.
 
     Returns ``(Q - 1, c, d)``, where ``R^2 = c^2 + d^2``; twice the sum of their squares
     is ``(s1 - 1)^2 + (s2 - 1)^2``, the as-rigid-as-possible energy (Sorkine and Alexa
@@ -39,16 +39,16 @@ def stretch(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, An
 
 
 def singular_values(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, Any]:
-    """Principal stretches ``(s1, s2)`` of a triangle; ``s2 < 0`` when it is flipped."""
+    """Return the principal stretches ``(s1, s2)`` of a triangle; ``s2 < 0`` when it is inverted."""
     q_part, c, d = turn_and_shear(p, q, r, rest)
     big, small = norm(q_part), ops.sqrt(norm2((c, d)))
     return big + small, big - small
 
 
 def turn_and_shear(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Vec, Any, Any]:
-    """Parts ``((q1, q2), c, d)`` of a triangle's map, all linear in the unknowns.
+    """Return the parts ``((q1, q2), c, d)`` of a triangle's map, all linear in the unknowns.
 
-    ``Q = |(q1, q2)|`` turns and scales, ``R = |(c, d)|`` shears.
+    ``Q = |(q1, q2)|`` is the conformal part (rotation and scale), ``R = |(c, d)|`` the shear.
     """
     m11, m12, m22 = rest
     e, f = sub(q, p), sub(r, p)

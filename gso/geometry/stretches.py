@@ -1,4 +1,4 @@
-"""Stretches of a face between two surfaces, from inner products of its diagonals or sides."""
+"""Principal stretches of a face between two surfaces, from its first fundamental forms."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from gso.geometry.vector import Vec, dot, norm2, sub
 
 
 def first_form(*corners: Vec) -> tuple[Any, Any, Any]:
-    """``(E, F, G)`` of a face: squared lengths and inner product of two vectors that span it.
+    """Return ``(E, F, G)`` of a face: inner products of two vectors that span it.
 
-    The diagonals of a quad, whose midpoints' parallelogram is what it is measured by (Jiang et
-    al. 2020); the sides at the first corner of a triangle.
+    These are the diagonals of a quad, which span its parallelogram of edge midpoints (Jiang et
+    al. 2020), and the sides at the first corner of a triangle.
     """
     if len(corners) == 4:
         a, b = diagonals(*corners)
@@ -23,10 +23,11 @@ def first_form(*corners: Vec) -> tuple[Any, Any, Any]:
 
 
 def principal_stretches(rest: tuple[Any, Any, Any], image: tuple[Any, Any, Any]) -> tuple[Any, Any]:
-    """Largest and smallest ratio ``(s1, s2)`` of lengths, image over rest.
+    """Return the largest and smallest ratio ``(s1, s2)`` of lengths, image over rest.
 
-    Both surfaces may lie in space. Their product is the ratio of areas, their quotient what a
-    conformal map keeps at one. Takes two :func:`first_form`; that of the rest needs an area.
+    Takes the :func:`first_form` of the face on both surfaces, which may lie in space; `rest`
+    must have an area. The product of the stretches is the ratio of areas; their quotient is
+    one for a conformal map.
 
     >>> [round(float(s), 12) for s in principal_stretches((1.0, 0.0, 1.0), (4.0, 0.0, 9.0))]
     [3.0, 2.0]

@@ -10,12 +10,12 @@ Vec = tuple[Any, ...]
 
 
 def sub(a: Vec, b: Vec) -> Vec:
-    """Difference ``a - b``."""
+    """Return the difference ``a - b``."""
     return tuple(p - q for p, q in zip(a, b, strict=True))
 
 
 def dot(a: Vec, b: Vec) -> Any:
-    """Inner product."""
+    """Return the inner product."""
     total = a[0] * b[0]
     for p, q in zip(a[1:], b[1:], strict=True):
         total = total + p * q
@@ -23,7 +23,7 @@ def dot(a: Vec, b: Vec) -> Any:
 
 
 def cross(a: Vec, b: Vec) -> Vec:
-    """Cross product of two vectors in space."""
+    """Return the cross product of two vectors in space."""
     return (
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -32,15 +32,15 @@ def cross(a: Vec, b: Vec) -> Vec:
 
 
 def norm2(a: Vec) -> Any:
-    """Squared length."""
+    """Return the squared length."""
     return dot(a, a)
 
 
 def norm(a: Vec) -> Any:
-    """Length; zero vectors have a finite derivative."""
+    """Return the length; zero vectors have a finite derivative."""
     return ops.sqrt(norm2(a))
 
 
 def angle(a: Vec, b: Vec) -> Any:
-    """Angle between two vectors in space, radians, by atan2 (acos loses digits)."""
+    """Return the angle between vectors in space, radians, by atan2 (acos loses digits)."""
     return ops.atan2(norm(cross(a, b)), dot(a, b))

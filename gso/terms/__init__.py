@@ -1,8 +1,9 @@
-"""Energy terms: one file each, found by name.
+"""Energy terms: one module each, registered by name.
 
 A term is a stencil, constants per element, and the residual of *one* element, written
-once for any kind of number. A file in this folder that defines ``residual`` and
-``examples`` is a registered term: the conformance tests pick it up, nothing else changes.
+once for NumPy, torch and CasADi numbers. Any module of this package that defines
+``residual`` is in the registry. It also defines ``examples`` for the conformance tests,
+which find it there.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ __all__ = ["Limit", "Term", "Weighted", "registry"]
 
 
 def registry() -> dict[str, ModuleType]:
-    """Every term module of this folder by name."""
+    """Return every term module of this package by name."""
     found = {}
     for info in pkgutil.iter_modules(__path__):
         module = importlib.import_module(f"{__name__}.{info.name}")

@@ -1,4 +1,4 @@
-"""What a term is."""
+"""The data structure of energy terms: stencil, residual, weights, constants."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Residual = Callable[[Sequence[tuple[Any, ...]], Sequence[Any]], tuple[Any, ...]]
 
-#: ``limit(coordinates, direction) -> largest step``: what a step must not cross.
+#: ``limit(coordinates, direction) -> largest step``: a step limit for the line search.
 Limit = Callable[[Array, Array], float]
 
 
@@ -24,48 +24,48 @@ def _no_constants() -> Array:
 
 
 class Multipliers(Protocol):
-    """What makes a term hold exactly when solves are repeated."""
+    """Lagrange multipliers of a hard constraint that is a term (method of multipliers)."""
 
     def push(self, coordinates: Array) -> float:
-        """Take up what is left of the residuals; returns the largest (a length)."""
+        """Update the multipliers with the current residuals; return the largest (a length)."""
 
     def scale(self, factor: float) -> None:
-        """Follow a change of the weight of all other terms."""
+        """Rescale the multipliers when the weights of all other terms are scaled."""
 
 
 @dataclass(frozen=True)
 class Term:
-    """Elements of one kind that share a residual.
+    """Energy term: elements of one kind that share a residual function.
 
     Attributes
     ----------
     name : str
-        Term name; elements of the same name are reported together.
+        Term name; the energies of terms with the same name are reported together.
     residual : callable
         ``residual(points, constants) -> tuple``: the residuals of one element from the
         component tuples of its points (in the order of `stencil`) and its constants.
     stencil : tuple of (block, indices (e, k))
-        Which rows of which block of coordinates ("surface", "flat", ...) each element
-        uses.
+        Rows of each block of coordinates ("surface", "flat", ...) that the elements use.
     constants : ndarray, (c, e)
         Constants of each element.
     weights : ndarray, (e,)
         Weight of each element. Terms that average over the surface use weights that sum
-        to one, so that one set of task weights serves every resolution.
+        to one, so that the same task weights suit every resolution.
     linear : bool
-        The residual is affine in the points: its Jacobian is evaluated once.
+        Whether the residual is affine in the points: its Jacobian is then evaluated once.
     vectors : callable, optional
-        ``vectors(points, constants)`` returns, for the first residuals in their order, the
-        plane vector (u, v) whose length minus a constant the residual is. Turning such a
-        vector does not change the residual to first order, so Gauss-Newton sees no
-        stiffness there and overshoots; with the vectors it keeps the second derivative
-        of the length wherever the loss pulls (projected Newton).
+        ``vectors(points, constants)`` returns plane vectors (u, v), one for each of the first
+        residuals in their order, where that residual is the length of the vector minus a
+        constant. Rotating such a vector does not change the residual to first order, so
+        Gauss-Newton has no geometric stiffness in that direction and overshoots. With the
+        vectors, the second derivative of the length is added wherever the loss derivative
+        makes it positive (projected Newton).
     refresh : callable, optional
-        ``refresh(coordinates) -> constants``: new constants before every linearisation, from
-        the coordinate vector; for closest points, and for targets that are moved by hand.
+        ``refresh(coordinates) -> constants``: new constants from the coordinate vector before
+        every linearisation, for closest points and for shifted targets.
     multipliers : Multipliers, optional
-        For what must hold exactly: after a solve they move the targets that `refresh` gives
-        by what is left, so that the next solve leaves less.
+        For hard constraints: after each solve they shift the targets that `refresh` returns by
+        the remaining residuals, so that the next solve reduces them.
     """
 
     name: str
@@ -84,19 +84,19 @@ class Term:
         return len(self.weights)
 
     def renumbered(self, block: str, row: Ints) -> Term:
-        """The term on other rows of a block: what was row k is ``row[k]``."""
+        """Copy the term with row k of a block renumbered to ``row[k]``."""
         stencil = tuple((b, row[ids] if b == block else ids) for b, ids in self.stencil)
         return replace(self, stencil=stencil)
 
 
 def mean_weights(count: int) -> Array:
-    """Equal weights that sum to one."""
+    """Return equal weights that sum to one."""
     return np.full(count, 1.0 / max(count, 1))
 
 
 @dataclass(frozen=True)
 class Weighted:
-    """A term, its weight in the objective, and what its residuals cost."""
+    """A term with its weight in the objective and the loss of its residuals."""
 
     term: Term
     weight: float
@@ -104,6 +104,6 @@ class Weighted:
 
     @property
     def quadratic(self) -> bool:
-        """Its part of the energy is a quadratic function of the unknowns."""
+        """Whether its part of the energy is a quadratic function of the unknowns."""
         fixed = self.term.linear and self.term.refresh is None
         return fixed and isinstance(self.loss, Squared)

@@ -1,4 +1,4 @@
-"""Change of bending: second differences of a surface in its own moving frame."""
+"""Change of bending: second differences of a surface in a frame that moves with it."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from gso.mesh import Mesh
 from gso.terms import fairness
 from gso.terms.base import Array, Term
 
-#: The frame moves with the surface.
+#: Rigid motions leave the residual unchanged, because the frame moves with the surface.
 INVARIANT = ("translation", "rotation")
 
-#: Shortest edge, as a share of the typical one, that a curvature is divided by.
+#: Lower bound of the edge lengths that curvatures are divided by, relative to the mean length.
 _SHORTEST = 0.2
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Curvature of a polyline at a vertex, minus what it is wanted to be.
+    """Return the curvature of a polyline at a vertex, minus its target value.
 
-    With d the second difference of the points a, b, c, and e, f the chords along the polyline
-    and across it: d.e, d.f (the regulariser of Jiang et al. 2020, which holds the two
-    checkerboard lattices together), and d.n, with the unit normal n of the chords.
+    Let d be the second difference of the points a, b, c, and e, f the chords along the
+    polyline and across it, with unit normal n. The residuals compare d.e and d.f (the
+    regulariser of Jiang et al. 2020, which couples the two checkerboard sub-lattices), and d.n.
 
-    Points: a, b, c; the ends of f. Constants: a factor for each, then the wanted values.
+    Points: a, b, c; the ends of f. Constants: a factor for each product, then the targets.
     """
     a, b, c, p, q = points
     d = geometry.second_difference(a, b, c)
@@ -34,7 +34,10 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def hinge_residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """The same for two triangles a b c and b a d: d is what their map lacks to be affine.
+    """Return the bending across the common edge a b of two triangles a b c and b a d.
+
+    As :func:`residual`, with the linear combination of the four points that vanishes on affine
+    functions as the second difference, and the chords b - a and d - c.
 
     Points: a, b, c, d. Constants: their four coefficients, then those of :func:`residual`.
     """
@@ -54,16 +57,16 @@ def _in_frame(d: Any, e: Any, f: Any, constants: Sequence[Any]) -> tuple[Any, ..
 
 
 def build(mesh: Mesh, *, tangential: float = 1.0) -> list[Term]:
-    """Change of bending of the block "surface", whose own bending in `mesh` is wanted.
+    """Build the change of bending of the block "surface", relative to the bending of `mesh`.
 
-    Residuals are differences of curvature, one over the mesh's unit of length; half their
-    mean square, both directions added up, is the energy. On meshes with triangles they
-    belong to the edges of the triangulation.
+    Residuals are differences of curvature, 1/length in the mesh's unit. The energy is half
+    their mean square, summed over both directions. On meshes with triangles they belong to
+    the interior edges of the triangulation.
 
     Parameters
     ----------
     mesh : Mesh
-        The surface as it is wanted to bend.
+        The surface with the target bending.
     tangential : float
         Factor on the residuals within the tangent plane.
     """
@@ -99,11 +102,11 @@ def build(mesh: Mesh, *, tangential: float = 1.0) -> list[Term]:
 
 
 def _lengths(*vectors: Array) -> Array:
-    """Mean length of vectors (e, 3) by element, not much below the typical one."""
+    """Average the lengths of vectors (e, 3) by element, with a lower bound."""
     length = np.mean([np.linalg.norm(x, axis=1) for x in vectors], axis=0)
     return np.maximum(length, _SHORTEST * length.mean() if len(length) else 0.0)
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return build(mesh, tangential=0.5)

@@ -1,4 +1,4 @@
-"""Regulariser of isometric maps: second differences look alike on both meshes."""
+"""Regulariser of isometric maps: equal tangential second differences on both meshes."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from gso import geometry, topology
 from gso.mesh import Mesh
 from gso.terms.base import Array, Term
 
-#: Turning or moving a mesh changes no inner product.
+#: Rigid motions change no inner product.
 INVARIANT = ("translation", "rotation")
 
-#: Shortest chord, as a share of the mean one, that is divided by: small cells count no more.
+#: Lower bound of the chords that are divided by, relative to the mean chord, so that small cells
+#: do not get larger weights.
 _SHORTEST = 1.0
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Differences of d.(c - a), d.(p - b) and d.(q - b) between a mesh and its counterpart.
+    """Return differences of d.(c - a), d.(p - b) and d.(q - b) of a mesh and its counterpart.
 
-    With d the second difference of the points a, b, c of a polyline, and p, q the neighbours
-    of b across it: the inner products of second differences with edges, which isometric
-    surfaces share but for higher orders (the regulariser of Jiang et al. 2020). They are
-    Christoffel symbols of the first kind, and tie the two checkerboard lattices together that
-    the faces' diagonals leave loose.
+    Here d is the second difference of the points a, b, c of a polyline, and p, q are the
+    neighbours of b across it. These inner products of second differences with edges are
+    discrete Christoffel symbols of the first kind; on isometric surfaces they agree up to
+    higher-order terms (the regulariser of Jiang et al. 2020). They couple the two checkerboard
+    sub-lattices, which the faces' diagonals leave uncoupled.
 
     Points: a, b, c, p, q; then those of the counterpart, unless it is constant. Constants: a
     factor along and one across; then the counterpart's products, if constant.
@@ -44,18 +45,18 @@ def _products(a: Any, b: Any, c: Any, p: Any, q: Any) -> tuple[Any, Any, Any]:
 
 
 def build(mesh: Mesh, block: str, *, counterpart: str | None = None) -> list[Term]:
-    """The regulariser on the polylines of a mesh; none on meshes with triangles.
+    """Build the regulariser on the polylines of a mesh; an empty list for meshes with triangles.
 
     Parameters
     ----------
     mesh : Mesh
-        Its vertices are the counterpart when none is named, and give the spacing.
+        Connectivity and spacing. Its vertices are the counterpart when no block is named.
     block : str
-        Whose polylines are compared.
+        Block of the polylines.
     counterpart : str, optional
-        Block with the other polylines.
+        Block of the polylines to compare with.
 
-    Residuals are one over the mesh's unit of length; both directions of the polylines add up.
+    Residuals are 1/length in the mesh's unit; the energy sums both directions of the polylines.
     """
     if mesh.has_triangles:
         return []
@@ -85,11 +86,11 @@ def build(mesh: Mesh, block: str, *, counterpart: str | None = None) -> list[Ter
 
 
 def _lengths(chords: Array) -> Array:
-    """Lengths (t,) of chords (t, 3), at least the mean one."""
+    """Measure chords (t, 3), bounded below by :data:`_SHORTEST` times their mean length."""
     length = np.linalg.norm(chords, axis=1)
     return np.maximum(length, _SHORTEST * length.mean())
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return [*build(mesh, "surface", counterpart="flat"), *build(mesh, "flat")]

@@ -1,4 +1,4 @@
-"""Resistance of the flat image's corner triangles to being squeezed to nothing."""
+"""Barrier against the collapse of the flat image's corner triangles."""
 
 from __future__ import annotations
 
@@ -13,22 +13,23 @@ from gso.mesh import Mesh
 from gso.terms.base import Array, Ints, Term
 from gso.terms.stretch import corners_of, per_corner
 
-#: Turning or moving the flat image changes no area.
+#: Rigid motions of the flat image change no area.
 INVARIANT = ("translation", "rotation")
 
-#: The residual has no bound: a step limit keeps the areas positive.
+#: The residual is unbounded; a step limit keeps the areas positive.
 UNBOUNDED = True
 
-#: Share of its area in space below which a triangle resists.
+#: Ratio of the flat area to the area in space below which the barrier of a triangle is active.
 SQUEEZED = 0.2
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``max(0, a / A - 1)`` of each corner triangle with doubled area A.
+    """Return ``max(0, a / A - 1)`` of each corner triangle with doubled area A.
 
-    Unbounded where the area goes to zero, nothing where it is larger than `a`: with a bound
-    on the step that keeps A positive, an energy that would gain from folding does not come
-    to a halt at the first triangle that collapses. Constants: a of each corner triangle.
+    The residual is zero where A is larger than `a`, and unbounded as A goes to zero. A step
+    limit alone keeps A positive, but then an energy that decreases by folding stalls at the
+    first triangle that collapses; the barrier prevents this. Constants: a of each corner
+    triangle.
     """
     areas = [
         geometry.corner_area2(*(points[k] for k in corner)) for corner in corners_of(len(points))
@@ -39,12 +40,12 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def build(mesh: Mesh) -> list[Term]:
-    """Resistance of all corner triangles; weights average over triangles."""
+    """Build the barrier of all corner triangles; weights average over triangles."""
     return per_corner(mesh, "collapse", residual, _squeezed_areas)
 
 
 def _squeezed_areas(vertices: Array, faces: Ints) -> Array:
-    """Doubled areas below which the corner triangles of faces resist (4 or 1, e)."""
+    """Return the doubled areas (4 or 1, e) below which corner barriers are active."""
     out = []
     for corner in corners_of(faces.shape[1]):
         p, q, r = (tuple(vertices[faces[:, k]].T) for k in corner)
@@ -53,5 +54,5 @@ def _squeezed_areas(vertices: Array, faces: Ints) -> Array:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return build(mesh)

@@ -12,21 +12,21 @@ from gso.mesh import Mesh
 from gso.terms.base import Array, Ints, Term, mean_weights
 from gso.terms.isometry import typical_length
 
-#: Turning or moving a mesh changes no length.
+#: Rigid motions change no length.
 INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Differences of |a|^2, |b|^2 and a.b of a face and its counterpart, times a constant.
+    """Return differences of |a|^2, |b|^2 and a.b of a face and its counterpart, times a constant.
 
     For quads a and b are the diagonals: all zero when the parallelograms of the edge
     midpoints are congruent (Jiang et al. 2020, Eq. 1 and 2). For triangles they are the
     squared lengths of the three sides.
 
-    Points: the corners; then the corners of the counterpart, unless it is constant; then
-    the factor on the counterpart's squares, a point of one component, where the map may
-    scale. Constants: one over the typical squared length; then the counterpart's three
-    numbers, if it is constant.
+    Points: the corners; then the corners of the counterpart, unless it is constant; then, for
+    conformal maps, the factor on the counterpart's squares as a point of one component.
+    Constants: one over the typical squared length; then the counterpart's three numbers, if
+    it is constant.
     """
     points = list(points)
     scale = points.pop()[0] if len(points[-1]) == 1 else 1.0
@@ -39,16 +39,16 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 def build(
     mesh: Mesh, block: str, *, counterpart: str | None = None, scale: str | None = None
 ) -> list[Term]:
-    """Isometry defect of the faces of a block.
+    """Build the isometry defect of the faces of a block.
 
     Parameters
     ----------
     mesh : Mesh
-        Faces; its vertices are the counterpart when none is named.
+        Faces; its vertices are the counterpart when no block is named.
     block : str
-        Whose faces are compared.
+        Block of the faces.
     counterpart : str, optional
-        Block with the other faces.
+        Block of the faces to compare with.
     scale : str, optional
         Block with one number per face, in the order of ``mesh.faces``: the squared lengths
         of the counterpart are multiplied by it.
@@ -83,19 +83,19 @@ def build(
 
 
 def edge_residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Difference of the squared length of an edge and the wanted one, times a constant.
+    """Return the difference of an edge's squared length and its target, times a constant.
 
-    Constants: one over the typical squared length of an edge; the wanted squared length.
+    Constants: one over the mean squared length of the edges; the target squared length.
     """
     a, b = points
     return ((geometry.norm2(geometry.sub(b, a)) - constants[1]) * constants[0],)
 
 
 def edges(mesh: Mesh, block: str) -> Term:
-    """Change of the edges' squared lengths, averaged over the edges of the faces.
+    """Build the change of the edges' squared lengths, averaged over the edges of the faces.
 
-    On quads they say what the diagonals leave open: the two lattices of a checkerboard may
-    slide against each other and change no diagonal.
+    On quads it removes a null space of the diagonals: the two checkerboard sub-lattices can
+    shift against each other without a change of any diagonal.
     """
     a, b = mesh.vertices[mesh.edges.T]
     squared = ((b - a) ** 2).sum(axis=1)
@@ -110,7 +110,7 @@ def _products(vertices: Array, faces: Ints) -> Array:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return [
         *build(mesh, "surface"),
         *build(mesh, "flat"),

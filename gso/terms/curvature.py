@@ -16,20 +16,20 @@ INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Curvature of the first point, the others its ring."""
+    """Return the Gaussian curvature at the first point; the others are its ring."""
     return (gaussian_curvature(points[0], points[1:]),)
 
 
 def build(mesh: Mesh) -> list[Term]:
-    """One term per ring length; weights sum to one over all interior vertices.
+    """Build one term per ring length; weights sum to one over all interior vertices.
 
-    Each vertex counts half in either triangulation of the quads around it, as residuals of
-    their own: their sum would let them cancel, and one alone is blind to what happens along
-    the other diagonals.
+    On meshes with quads each vertex has a residual in each of the two triangulations, with half
+    of its weight. In the sum of the two they could cancel; one alone does not see curvature
+    along the other diagonals.
 
-    Grid vertices weigh alike, as in the published metric; those of other meshes weigh by
-    the area of their star, so that the sum does not depend on how densely a part of the
-    surface is meshed.
+    Grid vertices have equal weights, as in the published metric. Vertices of other meshes are
+    weighted by the area of their star, so that the energy does not depend on the local mesh
+    density.
     """
     terms: dict[int, list[tuple[Ints, Array]]] = {}
     for stars in mesh.splits:
@@ -56,7 +56,7 @@ def _weights(mesh: Mesh, centre: Ints, ring: Ints) -> Array:
 
 
 def star_areas(vertices: Array, centre: Ints, ring: Ints) -> Array:
-    """Areas (n,) of vertex stars."""
+    """Return the areas (n,) of vertex stars."""
     from gso.geometry import star_area
 
     return star_area(
@@ -65,5 +65,5 @@ def star_areas(vertices: Array, centre: Ints, ring: Ints) -> Array:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return build(mesh)

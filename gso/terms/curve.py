@@ -19,9 +19,9 @@ INVARIANT = ()
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Distance vector from a target, without its part along a direction.
+    """Return the vector from a target to the point, without its part along a unit direction.
 
-    Constants: the target; then the unit direction, or zero where there is none to slide in.
+    Constants: the target; then the direction, or zero where the vertex cannot slide.
     """
     dim = len(points[0])
     away = sub(points[0], tuple(constants[:dim]))
@@ -31,12 +31,13 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def build(part: OnLines, *, block: str = "surface") -> Term:
-    """Vertices near their polylines, or on them when they must be.
+    """Build the constraint of vertices to polylines, soft or hard.
 
-    Before every linearisation the nearest point is found anew, as in iterated closest
-    points; a vertex is free to move along the tangent there. Tangents turn steadily along the
-    segments: with one per segment, vertices would go to and fro at joints. Where a slide ends,
-    it may go back but not on. The block is the first of its layout.
+    The nearest point is recomputed before every linearisation, as in iterated closest points,
+    and the vertex is free to move along the tangent there. Tangents are interpolated along the
+    segments: with one tangent per segment, vertices would oscillate at joints. At an end of an
+    open line, or at a corner, a vertex can only slide back. The block must be the first of its
+    layout.
     """
     dim = part.lines.start.shape[1]
     sliding = _Sliding(part)
@@ -62,13 +63,13 @@ class _Sliding:
         self.shift = np.zeros(self.rows.shape)
 
     def constants(self, coordinates: Array) -> Array:
-        """Targets and directions, from the nearest points of now."""
+        """Return the targets and directions from the current nearest points."""
         target, tangent = self._targets(coordinates)
         shift = self.shift - (self.shift * tangent).sum(axis=1, keepdims=True) * tangent
         return np.concatenate([(target - shift).T, tangent.T])
 
     def push(self, coordinates: Array) -> float:
-        """Take up what is left; returns the largest distance from the lines."""
+        """Update the multipliers; return the largest distance from the lines."""
         points = tuple(coordinates[self.rows].T)
         value = np.stack(residual([points], list(self.constants(coordinates))), axis=1)
         feet = self.lines.nearest(coordinates[self.rows])
@@ -77,17 +78,18 @@ class _Sliding:
         return float(left.max(initial=0.0))
 
     def scale(self, factor: float) -> None:
-        """Follow a change of the weight of all other terms."""
+        """Rescale the multipliers when the weights of all other terms are scaled."""
         self.shift = factor * self.shift
 
     def _targets(self, coordinates: Array) -> tuple[Array, Array]:
-        """Nearest points, and directions that are free there, (k, dim) each."""
+        """Find the nearest points, and the directions of free sliding there, (k, dim) each."""
         points, lines = coordinates[self.rows], self.lines
         target, segment, along = lines.nearest(points)
         way = lines.way[segment]
         tangent = lines.directions(segment, along)
         for end, ends, out in ((0, lines.start, -way), (1, lines.end, way)):
-            # An end pushes back where a vertex is beyond it, or was pressed against it.
+            # The end is an active constraint where the vertex, shifted by its multiplier, is
+            # beyond it.
             beyond = ((points - ends[segment] + self.shift) * out).sum(axis=1) > 0
             held = lines.stop[segment, end] & beyond
             target = np.where(held[:, None], ends[segment], target)
@@ -96,7 +98,7 @@ class _Sliding:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     ids = np.arange(4)
     out = []
     for block, dim in (("surface", 3), ("flat", 2)):

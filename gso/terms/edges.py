@@ -11,22 +11,22 @@ from gso import geometry
 from gso.mesh import Mesh
 from gso.terms.base import Term, mean_weights
 
-#: Turning or moving the flat image changes no length.
+#: Rigid motions of the flat image change no length.
 INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``l' / l - 1``. Constants: 1 / l."""
+    """Return ``l' / l - 1``. Constants: 1 / l."""
     return (geometry.norm(vectors(points, constants)[0]) - 1.0,)
 
 
 def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """The edge in units of its length in space."""
+    """Return the edge vector divided by its length in space."""
     return (tuple(x * constants[0] for x in geometry.sub(points[1], points[0])),)
 
 
 def build(mesh: Mesh) -> Term:
-    """Change of every edge of the faces that has a length, averaged over them."""
+    """Build the relative change of all edges of non-zero length, averaged over them."""
     length = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
     measured = length > 1e-9 * length.mean()
     length = length[measured]
@@ -41,5 +41,5 @@ def build(mesh: Mesh) -> Term:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return [build(mesh)]

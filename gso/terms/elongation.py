@@ -1,4 +1,4 @@
-"""Resistance of the surface's edges to becoming much shorter or longer than in the design."""
+"""Barrier that keeps the surface's edges within a range of lengths relative to the design."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from gso.geometry import ops
 from gso.mesh import Mesh
 from gso.terms.base import Term
 
-#: Turning or moving the surface changes no length.
+#: Rigid motions change no length.
 INVARIANT = ("translation", "rotation")
 
-#: The residual has no bound where an edge shrinks to nothing.
+#: The residual is unbounded as an edge collapses.
 UNBOUNDED = True
 
-#: Ratios of lengths between which an edge is free, inside and on the boundary.
+#: Ratios of lengths between which the residual is zero, for interior and for boundary edges.
 INSIDE = (0.5, 1.8)
 BOUNDARY = (0.92, 1.08)
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``max(0, low / s - 1) + max(0, s / high - 1)`` of the ratio s of lengths, result over design.
+    """Return ``max(0, low / s - 1) + max(0, s / high - 1)`` of the length ratio s, result / design.
 
-    Zero between both ratios, so that usual changes cost nothing, and unbounded where the edge
-    collapses. Constants: 1 / length in the design, low, high.
+    It is zero between both ratios, so that moderate changes cost nothing, and unbounded as the
+    edge collapses. Constants: 1 / length in the design, low, high.
     """
     inverse, low, high = constants
     ratio = geometry.norm(geometry.sub(points[1], points[0])) * inverse
@@ -35,9 +35,9 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def build(mesh: Mesh) -> Term:
-    """Resistance of every edge of the block "surface", averaged over the edges.
+    """Build the barrier of every edge of the block "surface", averaged over the edges.
 
-    Those of the boundary keep closer to their lengths, and with them every boundary loop.
+    Boundary edges have a narrower range, which also preserves the lengths of boundary loops.
     """
     a, b = mesh.edges.T
     length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
@@ -55,5 +55,5 @@ def build(mesh: Mesh) -> Term:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return [build(mesh)]

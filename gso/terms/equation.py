@@ -1,4 +1,4 @@
-"""Linear equations between coordinates, as something to come closer to."""
+"""Linear equations between coordinates as soft constraints."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from gso.geometry import dot
 from gso.mesh import Mesh
 from gso.terms.base import Array, Ints, Term
 
-#: What is wanted does not move with the surface.
+#: The equations do not move with the surface.
 INVARIANT = ()
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``sum of a_k . p_k - b``. Constants: the components of every a_k, then b."""
+    """Return ``sum of a_k . p_k - b``. Constants: the components of every a_k, then b."""
     dim = len(points[0])
     total = -constants[-1]
     for k, point in enumerate(points):
@@ -26,7 +26,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def build(part: OnPlane | Relations, *, block: str = "surface") -> Term:
-    """Vertices near a plane, or near the images of others."""
+    """Build the soft constraint of vertices to a plane, or to affine images of other vertices."""
     if isinstance(part, OnPlane):
         count = len(part.ids)
         rows = np.tile(np.r_[part.normal, part.normal @ part.anchor], (count, 1))
@@ -50,7 +50,7 @@ def _term(index: Ints, rows: Array, block: str) -> Term:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     ids, out = np.arange(4), []
     for block, dim in (("surface", 3), ("flat", 2)):
         normal, anchor = np.full(dim, dim**-0.5), np.full(dim, 0.1)

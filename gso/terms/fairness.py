@@ -11,12 +11,13 @@ from gso import topology
 from gso.mesh import Mesh
 from gso.terms.base import Array, Ints, Term
 
-#: The target turns and moves with the reference, so only the untargeted form is invariant.
+#: Translations cancel as the coefficients sum to zero. A target does not rotate with the surface,
+#: so rotations are not declared.
 INVARIANT = ("translation",)
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Linear combination of the points minus a target vector.
+    """Return the linear combination of the points minus a target vector.
 
     Constants: one coefficient per point (they sum to zero), then the target's components.
     """
@@ -29,14 +30,16 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def differences(mesh: Mesh) -> tuple[Ints, Array]:
-    """Stencils (e, k) and coefficients (k, e) of the second differences of a mesh.
+    """Return stencils (e, k) and coefficients (k, e) of the second differences of a mesh.
 
-    On quads ``(1, -2, 1) / h^2`` along polylines. On a grid h is the length of a side over
-    its number of cells; sides less than a factor of two apart count as equally long (their
-    geometric mean), which leaves the plain second differences of the published measure.
-    On other quad meshes h is the mean edge length. On meshes with triangles, across every
-    edge of the triangulation: the combination of its four vertices that vanishes on every
-    affine function, scaled like a second derivative times the edge's share of the area.
+    On quad meshes: ``(1, -2, 1) / h^2`` along polylines. On a grid h is the length of a side
+    over its number of cells. If the sides differ by less than a factor of two, both are
+    replaced by their geometric mean, which gives the plain second differences of the published
+    measure. On other quad meshes h is the root mean square edge length.
+
+    On meshes with triangles: across every interior edge of the triangulation, the combination
+    of its four vertices that vanishes on affine functions, scaled like a second derivative
+    times the edge's share of the area.
     """
     v = mesh.vertices
     if mesh.has_triangles:
@@ -58,18 +61,18 @@ def differences(mesh: Mesh) -> tuple[Ints, Array]:
 
 
 def _spacing(grid: Array) -> tuple[float, float]:
-    """Spacing of the samples along both directions of a grid."""
+    """Return the spacing of the samples along both directions of a grid."""
     side = [np.linalg.norm(np.diff(grid, axis=a), axis=-1).sum(axis=a).mean() for a in (0, 1)]
     return spacing(side[0], side[1], grid.shape)
 
 
 def spacing(along: Any, across: Any, shape: Sequence[int]) -> tuple[Any, Any]:
-    """Spacing of a grid's samples from the mean lengths of its sides; arrays or tensors.
+    """Return a grid's spacing from the mean lengths of its sides; for arrays or tensors.
 
-    Sides less than a factor of two apart count as equally long.
+    Sides whose lengths differ by less than a factor of two count as equally long.
     """
     mean = (along * across) ** 0.5
-    # Beyond a factor of two, what exceeds it counts.
+    # Only the part of the ratio beyond a factor of two is used.
     ratio = along / across
     excess = (ratio / ratio.clip(0.5, 2.0)) ** 0.5
     return mean * excess / (shape[0] - 1), mean / excess / (shape[1] - 1)
@@ -90,7 +93,7 @@ def _hinge_differences(mesh: Mesh) -> tuple[Ints, Array]:
     wc, wd = 1.0 / high_c, 1.0 / high_d
     wb = -(along_c * wc + along_d * wd)
     wa = -(wc + wd) - wb
-    # The jump of the normal derivative over the distance of the two heights' middles.
+    # Jump of the normal derivative, divided by the distance between the midpoints of the heights.
     scale = 2.0 / (high_c + high_d)
     return stencil, np.stack([wa, wb, wc, wd]) * scale
 
@@ -102,20 +105,21 @@ def build(
     reference: Array | None = None,
     share: Array | None = None,
 ) -> Term:
-    """Fairness of a block, measured on the connectivity and spacing of `mesh`.
+    """Build the fairness of a block with the connectivity and spacing of `mesh`.
 
     Parameters
     ----------
     mesh : Mesh
         The surface.
     block : {"surface", "flat"}
-        Whose points are meant.
+        Block of the points.
     reference : ndarray, (n, dim), optional
-        Points whose own second differences are wanted instead of none.
+        Points whose second differences are the target; the target is zero when not given.
     share : ndarray, (n,), optional
-        How much of them at every vertex, 0 to 1; all of them when not given.
+        Factor on the target at every vertex, 0 to 1; one when not given.
 
-    Weights are 1 / (number of vertices) on quads, so that both directions add up.
+    Weights average over the edges on meshes with triangles. On quads they are 2 / (number of
+    differences), so that the means of both directions add up.
     """
     stencil, coefficients = differences(mesh)
     dim = 2 if block == "flat" else 3
@@ -136,5 +140,5 @@ def build(
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return [build(mesh), build(mesh, block="flat")]

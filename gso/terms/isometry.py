@@ -1,4 +1,4 @@
-"""Isometry of cells by lengths: the published flattening residuals."""
+"""Isometry defect of cells by lengths: the published flattening residuals."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from gso import geometry, topology
 from gso.mesh import Mesh
 from gso.terms.base import Array, Ints, Term
 
-#: Turning or moving the flat image changes no length.
+#: Rigid motions of the flat image change no length.
 INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Differences of the diagonals' lengths and of their dot product (Wang et al. 2024).
+    """Return differences of the diagonals' lengths and of their dot product (Wang et al. 2024).
 
-    A triangle, which has no diagonals, gives the differences of its sides' lengths.
-    Constants: |a|, |b| and a.b of the cell in space, or the three lengths.
+    For a triangle they are the differences of its sides' lengths. Constants: |a|, |b| and
+    a.b of the cell in space, or the three lengths.
     """
     lengths = [geometry.norm(v) for v in _vectors(points)]
     if len(points) == 4:
@@ -29,7 +29,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """The vectors whose lengths the first residuals compare."""
+    """Return the vectors whose lengths the first residuals compare."""
     return tuple(_vectors(points))
 
 
@@ -40,7 +40,7 @@ def _vectors(points: Sequence[tuple[Any, ...]]) -> list[Any]:
 
 
 def typical_length(mesh: Mesh) -> float:
-    """Root mean square of the lengths that are compared: diagonals, sides of triangles."""
+    """Return the root mean square of the compared lengths: diagonals, and sides of triangles."""
     quads, triangles = topology.by_size(mesh.faces)
     ends = [quads[:, c] for c in ((0, 2), (1, 3))]
     ends += [triangles[:, c] for c in ((0, 1), (1, 2), (2, 0))]
@@ -49,10 +49,10 @@ def typical_length(mesh: Mesh) -> float:
 
 
 def build(mesh: Mesh) -> list[Term]:
-    """Isometry defect of every cell of a mesh.
+    """Build the isometry defect of every cell of a mesh.
 
-    Weights are one over the number of cells and :func:`typical_length` squared, so that the
-    energy of a given strain is the same at every resolution.
+    Weights are 1 / (number of cells * :func:`typical_length` squared), so that the energy of a
+    given strain is the same at every resolution.
     """
     weight = 1.0 / (len(mesh.faces) * typical_length(mesh) ** 2)
     return [
@@ -78,5 +78,5 @@ def _rest(vertices: Array, faces: Ints) -> Array:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return build(mesh)

@@ -1,4 +1,4 @@
-"""Distances between vertices that are given."""
+"""Prescribed distances between vertices."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from gso import geometry
 from gso.mesh import Mesh
 from gso.terms.base import Array, Ints, Term
 
-#: Turning or moving a mesh changes no length.
+#: Rigid motions change no length.
 INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``(l'^2 - l^2) / 2l``, which is ``l' - l`` where that is small, and has no kink at 0.
+    """Return ``(l'^2 - l^2) / 2l``: about ``l' - l`` near zero, and smooth at ``l' = 0``.
 
-    Constants: the wanted length, and a shift, 0 for a soft term.
+    Constants: the target length l, and a shift, 0 for a soft term.
     """
     length, shift = constants
     square = geometry.norm2(geometry.sub(points[1], points[0]))
@@ -26,7 +26,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def build(pairs: Ints, lengths: Array, *, block: str = "surface", weight: float = 1.0) -> Term:
-    """Pairs of vertices (k, 2) of a block `lengths` (k,) apart, each with a weight."""
+    """Build target `lengths` (k,) between pairs (k, 2) of vertices of a block, equal weights."""
     return Term(
         "length",
         residual,
@@ -37,6 +37,6 @@ def build(pairs: Ints, lengths: Array, *, block: str = "surface", weight: float 
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     lengths = np.full(len(mesh.edges), 0.3)
     return [build(mesh.edges, lengths), build(mesh.edges, lengths, block="flat")]

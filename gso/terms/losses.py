@@ -1,6 +1,6 @@
-"""What a residual costs: squared, absolute, or bounded.
+"""Loss functions of residuals: squared, absolute, and robust by distance.
 
-Values are made of any kind of number, as the residuals are; training uses them on tensors.
+Like residuals, values are written for any kind of number; training evaluates them on tensors.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ Array = NDArray[np.float64]
 
 
 class Loss(Protocol):
-    """Cost of residuals (r, e) of elements; acts on each residual unless said otherwise."""
+    """Loss of the residuals (r, e) of elements; acts on each residual unless stated otherwise."""
 
     def value(self, r: Array) -> Array:
-        """Cost, any shape that sums to the total over its first axis, (., e)."""
+        """Return the loss (., e); its sum over the first axis is the total of each element."""
 
     def weights(self, r: Array) -> tuple[Array, Array]:
-        """First derivative, and a curvature >= 0 for the Gauss-Newton matrix, (r, e) each."""
+        """Return the derivative, and a curvature >= 0 for the Gauss-Newton matrix, (r, e) each."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class Squared:
 
 @dataclass(frozen=True)
 class Absolute:
-    """``sqrt(r^2 + eps^2) - eps``, iteratively reweighted.
+    """``sqrt(r^2 + eps^2) - eps``, as iteratively reweighted least squares.
 
-    The curvature is the weight of the majorising parabola, ``1 / sqrt(r^2 + eps^2)``.
+    The curvature is that of the majorising parabola, ``1 / sqrt(r^2 + eps^2)``.
     """
 
     eps: float
@@ -58,8 +58,7 @@ class Absolute:
 class Distance:
     """``eps (sqrt(|r|^2 + eps^2) - eps)`` of an element's residual vector.
 
-    Half the square near zero, proportional to the length far away, the same in every
-    direction.
+    It is isotropic: half the squared length near zero, proportional to the length far away.
     """
 
     eps: float

@@ -1,4 +1,4 @@
-"""Terms that hold exactly: the method of multipliers."""
+"""Hard constraints as terms: the method of multipliers."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ import numpy as np
 
 from gso.terms.base import Array, Term
 
-#: Weight of an equation that must hold: stiff beside every task's energy, and no stiffer, as
-#: the shifts do the rest.
+#: Weight of a hard constraint: large compared with every task's energy, but moderate, as the
+#: multipliers reduce the remaining residual.
 STIFF = 100.0
 
 
 class Shifts:
-    """Shifts of a term's residuals: multipliers over the term's weight.
+    """Lagrange multipliers of a term divided by its weight, as shifts of its residuals.
 
-    After each solve the residual is added to its shift, which counts as part of it in the
-    next one, so that residuals go to zero at a finite weight (Hestenes 1969; Powell 1969).
+    After each solve the residual is added to its shift. The next solve minimises the shifted
+    residual, so that residuals go to zero at a finite weight (Hestenes 1969; Powell 1969).
 
     Parameters
     ----------
     term : Term
-        Its last constants are the shifts, one per residual. It has one block, whose
-        coordinates are the first of the layout.
+        Its last constants are the shifts, one per residual. Its only block is the first of
+        the layout.
     dim : int
         Components of a point of that block.
     """
@@ -35,11 +35,11 @@ class Shifts:
         self._rows = [[dim * ids + d for d in range(dim)] for ids in index.T]
 
     def constants(self, coordinates: Array) -> Array:
-        """Constants with the shifts of now."""
+        """Return the constants with the current shifts; the coordinates are ignored."""
         return self._constants
 
     def push(self, coordinates: Array) -> float:
-        """Add what is left of the residuals; returns the largest."""
+        """Add the current residuals to the shifts; return the largest residual."""
         points = [tuple(coordinates[row] for row in rows) for rows in self._rows]
         value = np.stack(self._term.residual(points, self._constants))
         shift = self._constants[-len(value) :]
@@ -48,12 +48,12 @@ class Shifts:
         return left
 
     def scale(self, factor: float) -> None:
-        """Multiply the shifts: the weights of all other terms were."""
+        """Multiply the shifts, as the weights of all other terms were."""
         rows = len(self._term.residual([(0.0,) * len(r) for r in self._rows], self._constants))
         self._constants[-rows:] *= factor
 
 
 def hardened(term: Term, dim: int) -> Term:
-    """A term whose residuals go to zero as solves are repeated; arguments as for `Shifts`."""
+    """Make a soft term a hard constraint with multipliers; arguments as for :class:`Shifts`."""
     shifts = Shifts(term, dim)
     return replace(term, refresh=shifts.constants, multipliers=shifts)

@@ -1,4 +1,4 @@
-"""Terms of a part of a mesh, written in the part's own unit ball, on the whole mesh."""
+"""Terms of one component, built in its own unit ball, as terms of the whole mesh."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ import numpy as np
 from gso.mesh import Frame
 from gso.terms.base import Array, Ints, Residual, Term
 
-#: Constants of a part's frame: its centre, and one over its scale.
+#: Number of constants of a component's frame: its centre, and one over its scale.
 _FRAME = 4
 
 
 def placed(
     term: Term, frame: Frame, vertices: Ints, faces: Ints, *, count: int, share: float
 ) -> Term:
-    """A term of a part as one of the whole mesh.
+    """Convert a term of a component into a term of the whole mesh.
 
     Parameters
     ----------
     term : Term
-        Built on the part in its own unit ball; without multipliers. With `refresh`, its first
-        block is the first of the layout.
+        Built on the component in its own unit ball; without multipliers. With `refresh`, its
+        first block must be the first of the layout.
     frame : Frame
-        From the whole mesh's coordinates to that unit ball.
+        Transform between that unit ball and the whole mesh's coordinates.
     vertices, faces : ndarray of int
-        Which of the whole mesh the part has.
+        Indices of the component's vertices and faces in the whole mesh.
     count : int
-        Vertices of the whole mesh.
+        Number of vertices of the whole mesh.
     share : float
-        Factor on its weights: how much of the whole the part is.
+        Factor on the weights: the component's share of the whole.
     """
     kinds = tuple(block for block, index in term.stencil for _ in range(index.shape[1]))
     own = np.append(frame.centre, 1.0 / frame.scale)[:, None]
@@ -64,7 +64,7 @@ def placed(
 
 @lru_cache(maxsize=256)
 def _within(residual: Residual, kinds: tuple[str, ...]) -> Residual:
-    """The residual of points that are given in the coordinates of the whole mesh."""
+    """Wrap a residual so that it takes points in the coordinates of the whole mesh."""
 
     def within(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
         centre, factor = constants[: _FRAME - 1], constants[_FRAME - 1]

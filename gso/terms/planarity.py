@@ -11,17 +11,17 @@ from gso import geometry, topology
 from gso.mesh import Mesh
 from gso.terms.base import Ints, Term
 
-#: Turning or moving a quad leaves it as planar as it was.
+#: Rigid motions do not change planarity.
 INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Distance between the lines of the diagonals. Constants: a shift, 0 for a soft term."""
+    """Return the distance between the diagonals' lines. Constants: a shift, 0 for a soft term."""
     return (geometry.diagonal_distance(*points) + constants[0],)
 
 
 def build(quads: Ints, *, weight: float = 1.0) -> Term:
-    """Planarity of quads (k, 4), each with a weight."""
+    """Build the planarity of quads (k, 4), each with the same weight."""
     return Term(
         "planarity",
         residual,
@@ -32,6 +32,6 @@ def build(quads: Ints, *, weight: float = 1.0) -> Term:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     quads = topology.by_size(mesh.faces)[0]
     return [build(quads)] if len(quads) else []

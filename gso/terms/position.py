@@ -1,4 +1,4 @@
-"""Soft position handles."""
+"""Soft position constraints."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ INVARIANT = ()
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """Displacement from the wanted position."""
+    """Return the displacement from the target position."""
     return sub(points[0], tuple(constants))
 
 
 def build(ids: Ints, positions: Array, weights: Array, *, block: str = "surface") -> Term:
-    """Pull vertices `ids` (k,) of a block to `positions` (k, dim) with `weights` (k,)."""
+    """Build soft targets `positions` (k, dim) of vertices `ids` (k,), with `weights` (k,)."""
     return Term(
         "position",
         residual,
@@ -33,6 +33,6 @@ def build(ids: Ints, positions: Array, weights: Array, *, block: str = "surface"
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     ids = np.arange(3)
     return [build(ids, mesh.vertices[ids] + 0.1, np.ones(3))]

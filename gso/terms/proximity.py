@@ -1,4 +1,4 @@
-"""Closeness to reference points, weaker along the surface than across it."""
+"""Proximity to reference points, with a smaller weight on tangential displacement."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ INVARIANT = ()
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``t u + (1 - t) (u.n) n`` of the displacement u from the reference point.
+    """Return ``t u + (1 - t) (u.n) n`` of the displacement u from the reference point.
 
-    Constants: reference point (3), unit normal n (3), tangential weight t.
+    Constants: reference point (3), unit normal n (3), factor t on the tangential part.
     """
     u = sub(points[0], tuple(constants[0:3]))
     n = tuple(constants[3:6])
@@ -30,7 +30,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def build(mesh: Mesh, normals: Array, *, tangential: float = 1.0) -> Term:
-    """Proximity of every vertex to where it is in `mesh`.
+    """Build the proximity of every vertex to its position in `mesh`.
 
     Parameters
     ----------
@@ -54,18 +54,19 @@ def build(mesh: Mesh, normals: Array, *, tangential: float = 1.0) -> Term:
 
 
 def closest(mesh: Mesh, normals: Array, *, tangential: float = 0.0) -> Term:
-    """Proximity of the block "surface" to the surface `mesh`, wherever its vertices slide.
+    """Build the proximity of the block "surface" to the surface `mesh`, with free sliding.
 
-    The block must be the first of the layout.
-    Before every linearisation each vertex gets the point of the surface that is closest to
-    it then, and the tangent plane there (Jiang et al. 2020; as iterated closest points do).
+    Before every linearisation each vertex gets the closest point of the surface and the
+    tangent plane there as its target (iterated closest points; Jiang et al. 2020). The block
+    must be the first of the layout.
 
     Parameters
     ----------
     mesh, normals
         As for :func:`build`.
     tangential : float
-        Weight of the distance to the point itself, beside that to the tangent plane.
+        Factor on the tangential distance to the closest point; 0 leaves only the distance to
+        the tangent plane.
     """
     count = len(mesh.vertices)
     near = Nearest(mesh, normals)
@@ -79,7 +80,7 @@ def closest(mesh: Mesh, normals: Array, *, tangential: float = 0.0) -> Term:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     from gso.variables.normal import vertex_normals
 
     return [build(mesh, vertex_normals(mesh), tangential=0.5)]

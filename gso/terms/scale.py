@@ -1,4 +1,4 @@
-"""Closeness of the faces' scales to one."""
+"""Deviation of the faces' scale factors from one."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import numpy as np
 from gso.mesh import Mesh
 from gso.terms.base import Term, mean_weights
 
-#: Scales are no coordinates: moving and turning mean nothing to them.
+#: Scale factors are not coordinates, so rigid motions do not apply to them.
 INVARIANT = ()
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``s - 1``: which of the conformal maps is wanted (Jiang et al. 2020)."""
+    """Return ``s - 1``, which selects one of the conformal maps (Jiang et al. 2020)."""
     return (points[0][0] - 1.0,)
 
 
 def build(mesh: Mesh) -> Term:
-    """Deviation of the block "scale", one number per face, averaged over the faces."""
+    """Build the deviation of the block "scale", one number per face, averaged over the faces."""
     count = len(mesh.faces)
     return Term(
         "scale", residual, (("scale", np.arange(count)[:, None]),), mean_weights(count), linear=True
@@ -28,5 +28,5 @@ def build(mesh: Mesh) -> Term:
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return [build(mesh)]

@@ -10,12 +10,12 @@ from gso.mesh import Mesh
 from gso.terms.base import Term
 from gso.terms.stretch import corners_of, per_corner, rest_constants
 
-#: Turning or moving the flat image changes no shear.
+#: Rigid motions of the flat image do not change the norm of the shear.
 INVARIANT = ("translation", "rotation")
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """(c, d) of each corner triangle of a face, see :mod:`gso.geometry.strain`.
+    """Return (c, d) of each corner triangle of a face, see :mod:`gso.geometry.strain`.
 
     Constants: the three numbers of :func:`gso.geometry.rest_frame` per corner triangle.
     """
@@ -28,14 +28,13 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def build(mesh: Mesh) -> list[Term]:
-    """Shear of all corner triangles; weights average over triangles.
+    """Build the shear of all corner triangles; weights average over triangles.
 
-    Its energy is constant in its second derivative, holds neighbouring vertices together,
-    and couples no vertices but those of one face: a cheap regulariser.
+    It is a cheap regulariser: its Hessian is constant, and couples only vertices of one face.
     """
     return per_corner(mesh, "shear", residual, rest_constants, linear=True)
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return build(mesh)

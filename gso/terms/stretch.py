@@ -13,19 +13,20 @@ from gso.geometry import ops
 from gso.mesh import Mesh
 from gso.terms.base import Array, Ints, Residual, Term
 
-#: Turning or moving the flat image changes no strain.
+#: Rigid motions of the flat image change no strain.
 INVARIANT = ("translation", "rotation")
 
 _CORNERS = ((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2))
 _ROOT2 = 2.0**0.5
-#: Corners flatter than this (doubled area over the sum of its squared sides) hold no frame.
+#: Corners with a smaller ratio of doubled area to the sum of squared sides count as degenerate:
+#: they have no usable rest frame.
 _FLAT_CORNER = 1e-6
-#: Multiple of the knee from which on the cost of a strain goes on as its square.
+#: Multiple of the knee beyond which the loss continues quadratically in the strain.
 _STEEPEST = 1.3
 
 
 def corners_of(size: int) -> tuple[tuple[int, int, int], ...]:
-    """Corner triangles (corner, next, previous) of a face with 3 or 4 corners."""
+    """Return the corner triangles (corner, next, previous) of a face with 3 or 4 corners."""
     return _CORNERS if size == 4 else ((0, 1, 2),)
 
 
@@ -39,7 +40,7 @@ def _maps(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> list[A
 
 
 def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """``sqrt(2) (Q - 1)`` of each corner triangle of a face, then all c, then all d.
+    """Return ``sqrt(2) (Q - 1)`` of each corner triangle, then all sqrt(2) c, all sqrt(2) d.
 
     Half the sum of squares of a corner's three numbers is
     ``((s1 - 1)^2 + (s2 - 1)^2) / 2``. Constants: the three numbers of
@@ -54,18 +55,18 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
 
 
 def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-    """The plane vectors whose lengths are ``sqrt(2) Q``."""
+    """Return the plane vectors whose lengths are ``sqrt(2) Q``."""
     return tuple((_ROOT2 * q[0], _ROOT2 * q[1]) for q, _, _ in _maps(points, constants))
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Cost of a corner's strain s: its size, and steeply more for peaks.
+    """Loss of a corner's strain s: a low power for the mean, a high power for the peaks.
 
-    ``level^2 ((2/p) u^p + (2/q) knee^(p-q) u^q)`` with ``u = s / level``: a power `p` below two
-    lowers the mean strain, the second one keeps the largest strains down. Far beyond the
-    knee the cost goes on as a square, so that few steps bring peaks down. Measured
-    against the square alone on random surfaces, mean, 99th percentile and maximum fall.
+    ``level^2 ((2/p) u^p + (2/q) knee^(p-q) u^q)`` with ``u = s / level``. A power `p` below two
+    lowers the mean strain; the power `q` limits the largest strains. Far beyond the knee the
+    loss continues quadratically, so that a few iterations reduce the peaks. On random surfaces
+    mean, 99th percentile and maximum are lower than with the squared loss.
 
     Attributes
     ----------
@@ -74,7 +75,7 @@ class Spread:
     p, q : float
         Powers of small and of large strains.
     knee : float
-        Multiple of the level from which on the second power rules; infinite without it.
+        Multiple of the level from which on the second power dominates; infinite without it.
     eps : float
         Smoothing of the first power, relative to `level`.
     """
@@ -87,7 +88,7 @@ class Spread:
 
     @property
     def peak(self) -> float:
-        """Weight of the second power."""
+        """Factor on the second power."""
         return self.knee ** (self.p - self.q)
 
     def _squares(self, r: Array) -> tuple[Array, Array]:
@@ -95,7 +96,7 @@ class Spread:
         return parts, 0.5 / self.level**2 * (parts * parts).sum(axis=0)
 
     def value(self, r: Array) -> Array:
-        """Cost of each corner."""
+        """Return the loss of each corner."""
         y = self._squares(r)[1]
         e = self.eps**2
         low = 2.0 / self.p * ((y + e) ** (0.5 * self.p) - e ** (0.5 * self.p))
@@ -104,7 +105,7 @@ class Spread:
         return self.level**2 * (low + rise * (2.0 / self.q * held + y - held))
 
     def weights(self, r: Array) -> tuple[Array, Array]:
-        """Derivative, and the curvature without its negative part and its cross terms."""
+        """Return the derivative, and the curvature without negative part and cross terms."""
         parts, y = self._squares(r)
         held = np.minimum(y, (_STEEPEST * self.knee) ** 2)
         low = (y + self.eps**2) ** (0.5 * self.p - 1.0)
@@ -116,9 +117,9 @@ class Spread:
 
 
 def cells(mesh: Mesh) -> list[Ints]:
-    """Faces by size, (e, 4) and (e, 3): what must not turn over in the plane.
+    """List the faces that must not be inverted in the plane, by size: (e, 4) and (e, 3).
 
-    A quad with a corner of no area, or one that points inwards, is split there into two
+    A quad with a corner without area, or with a concave corner, is split there into two
     triangles.
     """
     quads, triangles = topology.by_size(mesh.faces)
@@ -133,7 +134,7 @@ def cells(mesh: Mesh) -> list[Ints]:
 
 
 def pieces(mesh: Mesh) -> list[Ints]:
-    """The :func:`cells` that carry strain: all but triangles without area."""
+    """List the :func:`cells` that carry strain: all but triangles without area."""
     out = []
     for faces in cells(mesh):
         if faces.shape[1] == 3:
@@ -144,13 +145,16 @@ def pieces(mesh: Mesh) -> list[Ints]:
 
 
 def _corner(vertices: Array, faces: Ints, corner: tuple[int, int, int]) -> tuple[Array, Array]:
-    """Doubled area vectors (e, 3) of a corner, and the sum of its squared sides."""
+    """Return doubled area vectors (e, 3) of a corner, and the sums (e,) of its squared sides."""
     p, q, r = (vertices[faces[:, k]] for k in corner)
     return np.cross(q - p, r - p), ((q - p) ** 2).sum(axis=1) + ((r - p) ** 2).sum(axis=1)
 
 
 def corner_shares(vertices: Array, quads: Ints) -> Array:
-    """Doubled area of each corner of quads (4, e), along the face's normal, over its sides."""
+    """Return the doubled signed corner areas (4, e) of quads over the sums of squared sides.
+
+    The sign is relative to the normal of the face.
+    """
     p = vertices[quads]
     normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
@@ -159,7 +163,7 @@ def corner_shares(vertices: Array, quads: Ints) -> Array:
 
 
 def rest_constants(vertices: Array, faces: Ints) -> Array:
-    """Rest frames of the corner triangles of faces, (12 or 3, e)."""
+    """Return the rest frames of the corner triangles of faces, (12 or 3, e)."""
     points = [tuple(np.ascontiguousarray(vertices[faces[:, k]].T)) for k in range(faces.shape[1])]
     rows = [
         geometry.rest_frame(*(points[k] for k in corner)) for corner in corners_of(faces.shape[1])
@@ -174,7 +178,7 @@ def per_corner(
     constants: Callable[[Array, Ints], Array],
     **more: Any,
 ) -> list[Term]:
-    """Terms on the corner triangles of a flat image, averaged over the triangles.
+    """Build terms on the corner triangles of a flat image, averaged over the triangles.
 
     Parameters
     ----------
@@ -201,14 +205,14 @@ def per_corner(
 
 
 def build(mesh: Mesh) -> list[Term]:
-    """Strain of all corner triangles; weights average over triangles.
+    """Build the strain of all corner triangles; weights average over triangles.
 
-    With squared loss the energy is the mean of ``((s1 - 1)^2 + (s2 - 1)^2) / 2``, the
+    With the squared loss the energy is the mean of ``((s1 - 1)^2 + (s2 - 1)^2) / 2``, the
     as-rigid-as-possible energy of Liu et al. 2008 with equal weights.
     """
     return per_corner(mesh, "strain", residual, rest_constants, vectors=vectors)
 
 
 def examples(mesh: Mesh) -> list[Term]:
-    """Terms for the conformance tests."""
+    """Build terms for the conformance tests."""
     return build(mesh)

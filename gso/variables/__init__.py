@@ -1,4 +1,4 @@
-"""Kinds of unknowns: one file each."""
+"""Kinds of unknowns: one module each."""
 
 from gso.variables.base import Layout, Variables
 from gso.variables.framed import ALONG, ball_bounds, framed_displacements

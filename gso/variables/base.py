@@ -1,4 +1,4 @@
-"""Unknowns and the points they make."""
+"""Unknowns, and their affine map to the coordinates."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-#: Components of a row of every block.
+#: Number of components per row of every block.
 DIMENSIONS = {"surface": 3, "flat": 2, "scale": 1}
 
 
@@ -31,7 +31,7 @@ class Layout:
         return sum(count * dim for _, count, dim in self.blocks)
 
     def where(self, name: str) -> tuple[int, int, int]:
-        """(start, count, dim) of a block."""
+        """Return (start, count, dim) of a block."""
         start = 0
         for block, count, dim in self.blocks:
             if block == name:
@@ -41,11 +41,11 @@ class Layout:
 
     @classmethod
     def of(cls, count: int, *names: str) -> Layout:
-        """Layout of the blocks named, each with `count` rows."""
+        """Make the layout of the blocks named, each with `count` rows."""
         return cls(tuple((name, count, DIMENSIONS[name]) for name in names))
 
     def split(self, coordinates: Array) -> dict[str, Array]:
-        """Arrays (count, dim) by block."""
+        """Split the coordinate vector into arrays (count, dim) by block."""
         out, start = {}, 0
         for block, count, dim in self.blocks:
             out[block] = coordinates[start : start + count * dim].reshape(count, dim)
@@ -53,25 +53,26 @@ class Layout:
         return out
 
     def columns(self, name: str, rows: Ints) -> Ints:
-        """Positions (..., dim) in the coordinate vector of rows (...) of a block."""
+        """Return the positions (..., dim) in the coordinate vector of rows (...) of a block."""
         start, _, dim = self.where(name)
         return start + np.asarray(rows)[..., None] * dim + np.arange(dim)
 
     def pack(self, blocks: dict[str, Array]) -> Array:
-        """Coordinate vector from arrays (count, dim) by block."""
+        """Concatenate arrays (count, dim) by block into the coordinate vector."""
         return np.concatenate([np.asarray(blocks[b], float).ravel() for b, _, _ in self.blocks])
 
 
-#: Products of unit columns below it are rounding errors.
+#: Entries of the normal matrix below this, relative to its largest diagonal entry, are rounding
+#: errors.
 _ROUNDING = 1e-15
 
 
 class Variables:
-    """Unknowns x that make coordinates ``offset + basis @ x``.
+    """Unknowns x with coordinates ``offset + basis @ x``.
 
     Every kind of unknowns (free vertices, offsets along normals, spline coefficients,
     joint surface and plane) is such an affine map; the kinds differ in how they are
-    built. Hard linear constraints are eliminated here: what they leave is such a map again.
+    built. Hard linear constraints are eliminated, which gives an affine map again.
 
     Parameters
     ----------
@@ -80,7 +81,7 @@ class Variables:
     basis : sparse matrix (layout.size, unknowns), or None
         None stands for the identity.
     offset : ndarray (layout.size,)
-        Coordinates at x = 0; with the identity they are the fixed part only.
+        Coordinates at x = 0; ignored with the identity.
     """
 
     def __init__(self, layout: Layout, basis: csr_matrix | None, offset: Array):
@@ -90,15 +91,15 @@ class Variables:
         self.size = layout.size if basis is None else int(basis.shape[1])
 
     def points(self, x: Array) -> Array:
-        """Coordinate vector of unknowns x."""
+        """Map unknowns x to the coordinate vector."""
         return x.copy() if self.basis is None else self.offset + self.basis @ x
 
     def direction(self, dx: Array) -> Array:
-        """Change of the coordinates for a change of the unknowns."""
+        """Map a change of the unknowns to the change of the coordinates."""
         return dx if self.basis is None else self.basis @ dx
 
     def project(self, coordinates: Array) -> Array:
-        """Unknowns whose points are closest (least squares) to the coordinates."""
+        """Find the unknowns whose coordinates are closest in the least-squares sense."""
         if self.basis is None:
             return coordinates.copy()
         from scipy.sparse import identity
@@ -115,11 +116,11 @@ class Variables:
         return splu((gram + ridge * identity(gram.shape[0], format="csc")).tocsc()).solve(rhs)
 
     def following(self, projection: csr_matrix, basis: csr_matrix, offset: Array) -> Variables:
-        """The same unknowns, with coordinates that linear equations allow.
+        """Eliminate linear constraints: restrict the map to coordinates that satisfy them.
 
-        Coordinates are projected: ``offset + projection @ c``. Where the unknowns are the
-        coordinates themselves they become those of the equations' own basis, so that each
-        of them counts.
+        The coordinates c of these unknowns are projected to ``offset + projection @ c``. If the
+        unknowns are the coordinates themselves, `basis` is used instead of `projection`, and
+        unknowns with empty columns are dropped.
 
         Parameters
         ----------

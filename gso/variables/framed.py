@@ -1,4 +1,4 @@
-"""Displacements along and across the vertex normals: three unknowns per vertex."""
+"""Displacements in normal and tangential directions: three unknowns per vertex."""
 
 from __future__ import annotations
 
@@ -6,27 +6,28 @@ import numpy as np
 
 from gso.variables.base import Array, Layout, Variables
 
-#: Bound on each of both tangential parts, as a share of that on the length ...
+#: Bound on each of the two tangential components, relative to the bound on the length.
 _TANGENTIAL = 0.3
-#: ... and what that leaves along the normal.
+#: The remaining bound on the normal component, so that the box lies in the ball.
 ALONG = (1.0 - 2.0 * _TANGENTIAL**2) ** 0.5
 
 
 def framed_displacements(layout: Layout, points: Array, normals: Array) -> Variables:
-    """Vertex = point + (unknowns along the normal and two tangents), on the block "surface".
+    """Make "surface" vertices = points + (unknowns along the normal and two tangents).
 
-    Coordinates of other blocks are unknowns themselves, after those of the surface. Unlike free
-    coordinates, the unknowns can have bounds that keep a vertex in a ball around its point.
+    Coordinates of other blocks are unknowns themselves, after those of the surface. With
+    these unknowns, simple bounds keep a vertex in a ball around its point and still allow
+    most of the displacement along the normal.
 
     Parameters
     ----------
     points, normals : ndarray, (n, 3)
-        Where displacements start, and unit normals.
+        Points at zero displacement, and unit normals.
     """
     from scipy.sparse import block_diag, csr_matrix, identity
 
     n = len(points)
-    # The axis that is farthest from the normal gives the first tangent.
+    # The coordinate axis most orthogonal to the normal gives the first tangent.
     axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
     first = np.cross(normals, axis)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
@@ -39,12 +40,12 @@ def framed_displacements(layout: Layout, points: Array, normals: Array) -> Varia
 
 
 def ball_bounds(layout: Layout, count: int, reach: float) -> tuple[Array, Array]:
-    """Bounds on :func:`framed_displacements` of `count` vertices: a box within balls.
+    """Bound :func:`framed_displacements` of `count` vertices by a box within balls.
 
     Parameters
     ----------
     reach : float
-        Radius of the balls, around the points that displacements start from.
+        Radius of the balls around the points at zero displacement.
     """
     along, across = reach * ALONG, reach * _TANGENTIAL
     high = np.full(layout.size, np.inf)

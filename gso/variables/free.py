@@ -12,5 +12,5 @@ from gso.variables.base import Layout, Variables
 
 
 def free(layout: Layout) -> Variables:
-    """Unknowns = coordinates."""
+    """Make every coordinate an unknown."""
     return Variables(layout, None, np.zeros(layout.size))

@@ -10,16 +10,17 @@ from gso.variables.base import Array, Layout, Variables
 
 
 def vertex_normals(mesh: Mesh) -> Array:
-    """Area-weighted unit normals (n, 3) at the vertices of a mesh.
+    """Return area-weighted unit normals (n, 3) at the vertices of a mesh.
 
-    Mean of both triangulations of the quads: split through the vertex, a quad counts whole,
-    otherwise with the corner at the vertex. So a symmetric surface has symmetric normals,
-    however it is numbered. Vertices without an area around them get the z direction.
+    Mean over both triangulations of the quads: a quad that is split through the vertex
+    contributes both triangles, otherwise only the corner triangle at the vertex. So a
+    symmetric surface has symmetric normals, independently of its numbering. Vertices without
+    an area around them get the z direction.
     """
     v, he = mesh.vertices, mesh.half_edges
     four = topology.four_corners(mesh.faces)
     whole = np.cross(v[four[:, 2]] - v[four[:, 0]], v[four[:, 3]] - v[four[:, 1]])
-    # A triangle is the same in both, and stands for two.
+    # A triangle belongs to both triangulations, so it counts twice.
     whole[~topology.are_quads(mesh.faces)] *= 2.0
     tri = topology.corner_triangles(topology.by_size(mesh.faces)[0])
     corner = np.cross(v[tri[:, 1]] - v[tri[:, 0]], v[tri[:, 2]] - v[tri[:, 0]])
@@ -31,12 +32,12 @@ def vertex_normals(mesh: Mesh) -> Array:
 
 
 def normal_offsets(layout: Layout, points: Array, normals: Array) -> Variables:
-    """Vertex = point + unknown * normal, on the block "surface".
+    """Make vertices = points + unknowns * normals, on the block "surface".
 
     Parameters
     ----------
     points, normals : ndarray, (n, 3)
-        Where the lines start and which way they run.
+        Points at zero offset, and unit normals.
     """
     from scipy.sparse import csr_matrix
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @lru_cache(maxsize=32)
 def spline_matrix(samples: int, controls: int) -> csr_matrix:
-    """Uniform clamped cubic B-spline basis at equally spaced samples (samples, controls).
+    """Return the uniform clamped cubic B-spline basis at uniform samples, (samples, controls).
 
     The degree falls below three when there are fewer than four control points.
     """
@@ -30,7 +30,7 @@ def spline_matrix(samples: int, controls: int) -> csr_matrix:
 
 @lru_cache(maxsize=16)
 def tensor_matrix(shape: tuple[int, int], controls: tuple[int, int]) -> csr_matrix:
-    """Bicubic basis (H W, n m) of a grid, both numbered row by row."""
+    """Return the bicubic basis (H W, n m) of a grid, both numbered row by row."""
     from scipy.sparse import kron
 
     return kron(
@@ -45,7 +45,7 @@ def spline_offsets(
     shape: tuple[int, int],
     controls: tuple[int, int],
 ) -> Variables:
-    """Vertex = point + (coarse bicubic field) * normal; one unknown per control point.
+    """Make vertices = points + (coarse bicubic field) * normals, one unknown per control point.
 
     The vertices of the block "surface" must be numbered row by row.
     """
@@ -55,19 +55,20 @@ def spline_offsets(
 
 
 def spline_surface(layout: Layout, shape: tuple[int, int], controls: tuple[int, int]) -> Variables:
-    """The block "surface" is a bicubic B-spline; all other blocks are free.
+    """Make the block "surface" a bicubic B-spline; all other blocks are free.
 
-    Three unknowns per control point, numbered row by row, in the place of the block: with
-    ("surface", "flat") first the control net, then the plane coordinates, which makes a
-    spline that is isometric to a plane (the second algorithm of Jiang et al. 2020).
-    `project` fits a given surface; the misfit is the caller's to report.
+    There are three unknowns per control point, numbered row by row, in the place of the block.
+    With the blocks ("surface", "flat") the unknowns are the control net and then the plane
+    coordinates; this gives a spline that is isometric to a plane (the second algorithm of
+    Jiang et al. 2020). :meth:`Variables.project` fits a given surface; the caller has to
+    report the misfit.
 
     Parameters
     ----------
     layout : Layout
-        The block "surface" has the points of the grid, row by row.
+        Its block "surface" has the points of the grid, row by row.
     shape, controls : (int, int)
-        Points of the grid, and control points, along both sides.
+        Numbers of grid points and of control points along both sides.
 
     Examples
     --------

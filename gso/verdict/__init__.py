@@ -1,4 +1,4 @@
-"""Whether a result can be used as what was asked for, and if not, why and where."""
+"""The verdict: whether a result is usable for the task, and if not, why and where."""
 
 from gso.verdict.asked import Asked, asked_curvature
 from gso.verdict.judge import judge

@@ -1,4 +1,4 @@
-"""What was asked for, and by what it is measured."""
+"""Requirements on a result, and the tolerances and measures they are checked with."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from typing import Any
 
 from gso import metrics
 
-#: Share by which a bound may be passed.
+#: Relative tolerance of the bounds.
 TIGHT = 1e-6
-#: Largest strain up to which a surface counts as developable where only a distance was asked for.
+#: Largest strain of a developable surface when only a maximum deviation was given.
 DEVELOPABLE = 5e-3
-#: Share by which a target of the curvature may be missed.
+#: Relative tolerance of a target curvature.
 TARGET = 0.05
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What a result must keep to, beside its task.
+    """Requirements on a result beyond those of its task.
 
     Attributes
     ----------
     max_deviation : float or None
-        Largest distance from the design, in its unit.
+        Largest allowed distance from the design, in its unit.
     max_strain : float or None
-        Largest principal strain of the pattern.
+        Largest allowed principal strain of the pattern.
     target_curvature : float or None
         Mean absolute curvature to reach, 1/size^2.
     moved : float
-        Farthest that a constraint takes a vertex of the design, in its unit: 0 where the
-        design itself keeps them all. Infinite where that has no length.
+        Largest violation of a constraint by the design, in its unit: 0 if the design satisfies
+        all constraints, infinite if a violation cannot be expressed as a length.
     """
 
     max_deviation: float | None = None
@@ -39,14 +39,14 @@ class Asked:
 
     @property
     def limits(self) -> dict[str, float]:
-        """The numbers that were asked for, by name."""
+        """The limits that were given, by name."""
         given = asdict(self)
         return {k: float(v) for k, v in given.items() if k != "moved" and v is not None}
 
 
 def asked_curvature(surface: Any, *, scale: float | None = None) -> float:
-    """The curvature that the developable task is judged by, 1/size^2.
+    """Return the curvature that the developable task is judged by, 1/size^2.
 
-    The one place that says which of :mod:`gso.metrics` it is.
+    This is the only place that chooses the function of :mod:`gso.metrics`.
     """
     return metrics.loss_gc_worst(surface, scale=scale)

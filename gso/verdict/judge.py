@@ -1,4 +1,4 @@
-"""The verdict: one place that says whether a result can be used as what was asked for."""
+"""The checks that decide whether a result is usable."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from gso.verdict.wording import places
 if TYPE_CHECKING:
     from gso.result import Result
 
-#: Tasks whose pattern is not meant to keep lengths.
+#: Tasks whose pattern does not preserve lengths.
 _STRETCHED = ("conformal",)
 
 
 def judge(result: Result, asked: Asked) -> tuple[str, ...]:
-    """Reasons against a result, each with its place; none where it can be used.
+    """List the reasons why a result is not usable, with their places; empty if it is usable.
 
     Parameters
     ----------
     result : Result
-        As the solver left it, with its `pattern` where it has one.
+        The solver's result, with its `pattern` if it has one.
     asked : Asked
-        What it must keep to.
+        Limits that were given.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What is asked of every surface and every pattern: no folds, crossings, overlaps, collapse."""
+"""Checks of every surface and pattern: no folds, self-intersections, overlaps, short edges."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ Ints = NDArray[np.int64]
 
 
 def against_surface(design: Mesh, surface: Mesh) -> Iterator[str]:
-    """Reasons against a surface; what the design has already is none."""
+    """Check a surface for folds, self-intersections and collapsed edges.
+
+    Folds and self-intersections that the design has already are ignored.
+    """
     bad = faults.folded(surface)
     if bad.size:
         bad = np.setdiff1d(bad, faults.folded(design))
@@ -32,7 +35,10 @@ def against_surface(design: Mesh, surface: Mesh) -> Iterator[str]:
 
 
 def against_pattern(surface: Mesh, pattern: Pattern, *, lengths: bool = True) -> Iterator[str]:
-    """Reasons against the pattern of a surface; `lengths`: it should keep them."""
+    """Check the pattern of a surface for inverted faces and overlaps.
+
+    Edges are checked for collapse if the pattern should preserve `lengths`.
+    """
     surface, flat = pattern.surface(surface), pattern.flat
     bad = metrics.flipped_faces(surface, flat)
     if bad.size:
@@ -45,7 +51,7 @@ def against_pattern(surface: Mesh, pattern: Pattern, *, lengths: bool = True) ->
 
 
 def _collapsed(before: Mesh, after: Array, what: str, names: Ints | None = None) -> Iterator[str]:
-    """Reasons from short edges; `names` are the numbers of the vertices for the user."""
+    """Check for collapsed edges; `names` are the vertex numbers to show to the user."""
     edges = faults.collapsed(before, after)
     if names is not None:
         edges = names[edges]
@@ -56,11 +62,11 @@ def _collapsed(before: Mesh, after: Array, what: str, names: Ints | None = None)
 
 
 def _known(design: Mesh, pairs: Ints) -> NDArray[np.bool_]:
-    """Which pairs of faces lie where the design passes through itself already."""
+    """Mark the pairs of faces where the design intersects itself already."""
     before = faults.crossings(design)
     if not before.size:
         return np.zeros(len(pairs), bool)
-    # A crossing may have moved on by a face or two.
+    # A self-intersection may have moved by up to two rings of faces.
     near = np.zeros(len(design.faces), bool)
     near[before.ravel()] = True
     he = design.half_edges

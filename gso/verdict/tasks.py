@@ -1,4 +1,4 @@
-"""What each task was asked for: the reasons against a result that belong to its task alone."""
+"""Checks that are specific to a task."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ from gso.verdict.wording import length, percent, places, sentence
 if TYPE_CHECKING:
     from gso.result import Result
 
-#: Share by which curvature or roughness must change to count as better or worse.
+#: Relative change of curvature or roughness from which on it counts as better or worse.
 _SAME = 0.01
-#: Strain of a triangle that is squeezed to a line or doubled: an inverted face.
+#: Strain from which on no pattern fits a face: it is squeezed to a line, doubled or inverted.
 _WHOLE = 0.99
-#: Share of the diagonal beyond which a result is another surface than the design.
+#: Distance from the design, relative to the diagonal of its bounding box, beyond which a result is
+#: refused whatever limit was given. Displacement that constraints require is added.
 _FAR = 0.5
 
 
 def developable(result: Result, asked: Asked) -> Iterator[str]:
-    """Less curvature than the design has, near it, and a pattern with little strain.
+    """Check that curvature decreased, and that deviation and pattern strain are within limits.
 
-    What was measured goes into the result's details, under "verdict".
+    The measured values are stored in the result's details under "verdict".
     """
     design, mesh = result.design, result.mesh
     scale = metrics.unit(design)
@@ -62,7 +63,7 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
     target = asked.target_curvature
     if target is not None and not after <= target * (1.0 + TARGET):
         yield f"mean |K| is {after:.3g}, above the target of {target:.3g}"
-    # Scipy comes with it.
+    # Imported here, as it imports scipy.
     from gso.tasks.developable import Options
 
     if asked.moved > 0 or after <= max(Options().developable_below, target or 0.0):
@@ -74,9 +75,9 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
 
 
 def _limits(diagonal: float, deviation: float, asked: Asked) -> Iterator[str]:
-    """Reasons from the distance to the design."""
+    """Check the distance to the design."""
     most = asked.max_deviation
-    # Far from the origin of the coordinates a distance is known to their rounding only.
+    # Far from the origin, distances are only known up to the rounding of the coordinates.
     if most is not None and deviation > most * (1.0 + TIGHT) + 1e-12 * diagonal:
         yield f"the result is {length(deviation)} away from the input, more than {most:g}"
     elif deviation > _FAR * diagonal + asked.moved:
@@ -85,13 +86,13 @@ def _limits(diagonal: float, deviation: float, asked: Asked) -> Iterator[str]:
 
 
 def denoise(result: Result, asked: Asked) -> Iterator[str]:
-    """No rougher than the input."""
+    """Check that the result is not rougher than the input."""
     ratio = metrics.fairness_ratio(result.design, result.mesh)
     if not asked.moved and ratio > 1.0 + _SAME:
         yield f"the result is {ratio:.3g} times as rough as the input"
 
 
-#: By task; one that is not named here is judged by its surface or pattern alone.
+#: Checks by task; other tasks only have the checks of surface and pattern.
 TASKS: dict[str, Callable[[Result, Asked], Iterator[str]]] = {
     "developable": developable,
     "denoise": denoise,

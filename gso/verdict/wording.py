@@ -1,4 +1,4 @@
-"""How reasons are put: places, lengths with their unit, the sentence that comes first."""
+"""Wording of the verdict: places, lengths with their unit, headline and summary."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 if TYPE_CHECKING:
     from gso.result import Result
 
-#: Places that a reason names.
+#: Largest number of places that a reason lists.
 _NAMED = 6
 
 
 def places(what: str, ids: Any) -> str:
-    """Elements by number, the first few of many.
+    """Format a list of elements by number; only the first few are listed.
 
     >>> places("face", [3]), places("face", range(8))
     ('face 3', 'faces 0, 1, 2, 3, 4, 5 and 2 more')
@@ -25,7 +25,7 @@ def places(what: str, ids: Any) -> str:
 
 
 def length(value: float, unit: str = "") -> str:
-    """A measured length to three digits, with its unit where there is one.
+    """Format a measured length with three digits, and its unit if given.
 
     >>> length(20.0, "mm"), length(0.5), length(0.0123456), length(1234.5)
     ('20.0 mm', '0.500', '0.0123', '1230')
@@ -41,7 +41,7 @@ def length(value: float, unit: str = "") -> str:
 
 
 def percent(value: float) -> str:
-    """A measured share to three digits.
+    """Format a measured ratio as a percentage with three digits.
 
     >>> percent(0.01741), percent(0.58), percent(1e-8)
     ('1.74 %', '58.0 %', '0 %')
@@ -51,9 +51,9 @@ def percent(value: float) -> str:
 
 
 def headline(result: Result, unit: str = "") -> str:
-    """What a developable result amounts to, in one line: strain, deviation, and the verdict.
+    """Summarise a developable result in one line: strain, deviation, and the verdict.
 
-    Empty for other tasks, and where nothing was measured.
+    The line is empty for other tasks, and if no verdict was made.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def headline(result: Result, unit: str = "") -> str:
 
 
 def summary(result: Result) -> str:
-    """What happened in a solve, in five lines at most; lengths are in the mesh's own unit.
+    """Summarise a solve in at most five lines; lengths are in the mesh's own unit.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def summary(result: Result) -> str:
 
 
 def sentence(found: dict[str, float], unit: str = "") -> str:
-    """:func:`headline` of what the verdict measured and what was asked for."""
+    """Format the :func:`headline` from the measured values and the limits that were given."""
     strain, deviation = found.get("strain_max"), found["deviation"]
     parts = [] if strain is None else [f"largest strain {percent(strain)}"]
     parts.append(f"deviation {length(deviation, unit)}")
