@@ -1,6 +1,7 @@
 """Make a surface developable by isometry: solve for the surface and its flat image together.
 
-The objective of Jiang et al. 2020, on the design scaled to the unit ball, is
+The objective, that of Jiang et al. 2020 with an added elongation term, is, on the design scaled
+to the unit ball,
 
     w_isometry / 2 mean E_iso + w_mapping / 2 mean E_reg + w_fairness / 2 (mean E_fair
     + w_flat mean E_fair') + w_closest / 2 mean d_n^2 + w_place / 2 mean |u|^2
@@ -9,9 +10,10 @@ The objective of Jiang et al. 2020, on the design scaled to the unit ball, is
 with E_iso the squared differences, between surface and plane, of the faces' squared diagonals
 and their product, relative to the mean one; E_reg the regulariser of the mapping; E_fair and
 E_fair' the squared second derivatives of surface and image; d_n the distance from the tangent
-plane at the closest point of the design; and u the displacement of a vertex from the design,
-which keeps the mesh from sliding. The fairness weight starts large and falls tenfold from stage
-to stage until E_iso is small.
+plane at the closest point of the design; u the displacement of a vertex from the design, whose
+term keeps the mesh from sliding; and the elongation of an edge zero within a range of length
+ratios. The fairness weight starts large and falls tenfold from stage to stage until E_iso is
+small.
 """
 
 from __future__ import annotations
