@@ -1,4 +1,4 @@
-"""Plane images of a surface to start from, and where the finished image is put."""
+"""Initial plane images of a surface, and the placement of the final image."""
 
 from gso.flat_start.align import align, settle
 from gso.flat_start.begin import begin, flips, given, refine, strain, upward

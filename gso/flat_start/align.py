@@ -1,4 +1,4 @@
-"""Plane images moved to where their constraints want them, before they are bent there."""
+"""Rigid alignment of plane images to their constraints, before the solve deforms them."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from gso.mesh import Mesh
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Directions tried, and steps from each: a curve has several places where an image may lie.
+#: Number of initial rotations, as alignment to a curve has several local minima, and of steps.
 _TURNS, _STEPS = 8, 60
 
 
 def align(mesh: Mesh, flat: Array, constraints: Compiled) -> Array:
-    """Move and turn an image (n, 2), part by part, as close as possible to its constraints.
+    """Move an image (n, 2) rigidly, component by component, closest to its constraints.
 
-    Iterated closest points (Besl and McKay 1992) on the vertices that have a place, a line
-    or a mirror image; handles alone are met as well as a motion can in one step.
+    Iterated closest points (Besl and McKay 1992) on the vertices with a target position, line
+    or mirror image. With handles alone one step gives the best rigid motion.
     """
     wanted = (*constraints.anchored, *_seams(mesh, constraints))
     if not wanted:
@@ -34,7 +34,7 @@ def align(mesh: Mesh, flat: Array, constraints: Compiled) -> Array:
     held = replace(constraints, parts=wanted)
     out = flat.copy()
     pieces = parts(mesh)
-    # Pieces that are glued to others come after those have their place.
+    # In a second round pieces align to those that they are glued to.
     for ids in pieces if len(pieces) == 1 else 2 * pieces:
         tries = [_closer(_turn(flat[ids], k), ids, out, held) for k in range(_TURNS)]
         out[ids] = min(tries, key=lambda t: t[0])[1]
@@ -42,7 +42,7 @@ def align(mesh: Mesh, flat: Array, constraints: Compiled) -> Array:
 
 
 def _seams(mesh: Mesh, constraints: Compiled) -> list[Part]:
-    """Glue between different parts of a mesh."""
+    """Return the glue constraints between different components of a mesh."""
     out: list[Part] = []
     for p in constraints.parts:
         if isinstance(p, Relations) and is_glue(p):
@@ -53,9 +53,9 @@ def _seams(mesh: Mesh, constraints: Compiled) -> list[Part]:
 
 
 def settle(mesh: Mesh, flat: Array, constraints: Compiled) -> Array:
-    """Leave what is anchored where it is, and lay the rest beside it.
+    """Keep the anchored components where they are, and place the others beside them.
 
-    Parts of the mesh that constraints tie to each other move together.
+    Components that constraints tie to each other move together.
     """
     label = labels(mesh, constraints.links)
     groups = [np.flatnonzero(label == k) for k in range(label.max() + 1)]
@@ -83,7 +83,7 @@ def _turn(flat: Array, k: int) -> Array:
 
 
 def _closer(image: Array, ids: Ints, flat: Array, held: Compiled) -> tuple[float, Array]:
-    """What is left to the constraints after the closest motion of one part, and its image."""
+    """Fit one component to its targets by rigid motions; return the residual and the image."""
     whole = flat.copy()
     left = np.inf
     for _ in range(_STEPS):
@@ -101,7 +101,7 @@ def _closer(image: Array, ids: Ints, flat: Array, held: Compiled) -> tuple[float
 
 
 def _moved(image: Array, p: Array, q: Array) -> Array:
-    """An image under the motion that brings points p closest to q."""
+    """Apply to an image the rigid motion that brings points p closest to q."""
     number = np.array([1.0, 1j])
     here, there = p.mean(axis=0), q.mean(axis=0)
     turn = ((p - here) @ number).conj() @ ((q - there) @ number)
@@ -111,7 +111,7 @@ def _moved(image: Array, p: Array, q: Array) -> Array:
 
 
 def _targets(flat: Array, held: Compiled) -> tuple[Ints, Array]:
-    """Vertices with a place to go, and the nearest such place, (k,) and (k, 2)."""
+    """Return the constrained vertices (k,) and the nearest target of each (k, 2)."""
     ids, there = [], []
     reduction = reduce(held.parts)
     if reduction is not None:

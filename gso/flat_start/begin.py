@@ -1,4 +1,4 @@
-"""An image of a whole mesh to start from, and one that a coarser grid gives."""
+"""Initial images of a whole mesh, computed from scratch or from a coarser grid."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from gso.topology import corner_triangles
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Sides up to which a grid's image starts from a rectangle.
+#: Largest side of a grid whose image starts from a rectangle.
 _COARSE = 40
-#: Strain from which on a start may be a bad one.
+#: Strain above which an initial image may be a bad one.
 DOUBTFUL = 0.1
 
 
 def carrying(mesh: Mesh) -> Ints:
-    """Triangles that carry strain.
+    """Return the corner triangles on which strain is measured.
 
     Raises
     ------
     MeshError
-        There are none.
+        There are none: no face has an area.
     """
     faces = pieces(mesh)
     if not faces:
@@ -44,38 +44,43 @@ def carrying(mesh: Mesh) -> Ints:
 
 
 def upward(mesh: Mesh) -> Ints:
-    """Triangles that must not turn over: all corners of the cells, unless they point inwards."""
+    """Return the triangles that must not be inverted.
+
+    These are the corner triangles of the cells. On meshes that are not grids a quad with a
+    concave or degenerate corner is split into two triangles instead.
+    """
     if mesh.grid_index is not None:
         return corner_triangles(mesh.faces)
     return np.concatenate([corner_triangles(f) for f in cells(mesh)])
 
 
 def flips(mesh: Mesh, flat: Array) -> int:
-    """Number of triangles that an image (n, 2) turns over."""
+    """Count the inverted triangles of an image (n, 2)."""
     corners = upward(mesh).T
     return int((geometry.corner_area2(*(tuple(flat[k].T) for k in corners)) <= 0).sum())
 
 
 def strain(mesh: Mesh, flat: Array) -> float:
-    """Root-mean-square strain of an image (n, 2)."""
+    """Compute the root-mean-square strain of an image (n, 2)."""
     return strain_level(mesh.vertices, carrying(mesh), flat)
 
 
 def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> Relaxed:
-    """Image without flips, close to the least squared strain, and its strain.
+    """Compute an image of low squared strain without inverted triangles, and its strain.
 
     Grids start from their rectangle, fine ones from the image of a coarser copy; other meshes
-    from the least strained image of :func:`gso.flat_start.embeddings`. Where much strain is left,
-    the other images are relaxed too, and the best result is taken.
+    from the least strained image of :func:`gso.flat_start.embeddings`. If the strain stays above
+    `doubtful`, the other embeddings are relaxed too (not on fine grids), and the best result is
+    returned.
 
     Parameters
     ----------
     mesh : Mesh
         Components with a boundary and without handles.
     iterations : int
-        Most steps of :func:`gso.flat_start.relax`.
+        Largest number of iterations of :func:`gso.flat_start.relax`.
     doubtful : float
-        Strain from which on other images are tried.
+        Strain above which the other embeddings are tried.
 
     Raises
     ------
@@ -107,7 +112,7 @@ def _grid_image(mesh: Mesh, grid: Array, iterations: int) -> Array:
 
 
 def given(mesh: Mesh, start: Array | None) -> tuple[Array | None, str]:
-    """The user's start (n, 2), or none where it has flips, and what there is to say about that."""
+    """Return the user's start (n, 2), or None and the reason if it has inverted triangles."""
     if start is None:
         return None, ""
     flat = np.ascontiguousarray(start[:, :2])
@@ -118,7 +123,7 @@ def given(mesh: Mesh, start: Array | None) -> tuple[Array | None, str]:
 
 
 def refine(coarse: Mesh, fine: Mesh, flat: Array) -> Array:
-    """Image (n, 2) of a coarse grid interpolated to a finer one; where that flips, a new start."""
+    """Interpolate an image (n, 2) to a finer grid; begin anew if that inverts triangles."""
     image = _interpolated(flat, coarse, fine)
     return begin(fine).flat if flips(fine, image) else image
 

@@ -1,4 +1,4 @@
-"""Plane images of disk-like meshes in which no face is inverted."""
+"""Plane embeddings of disk-like meshes without inverted faces."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Ints = NDArray[np.int64]
 
 
 def embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:
-    """Plane image (n, 2) of a mesh, components over each other: the best one of :func:`embeddings`.
+    """Compute the least strained image (n, 2) of :func:`embeddings`.
 
     Parameters and errors are the same.
     """
@@ -22,27 +22,27 @@ def embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:
 
 
 def embeddings(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
-    """Plane images (n, 2) of a mesh, components over each other, the least strained first.
+    """Compute plane images (n, 2) of a mesh, the least strained first; components may overlap.
 
-    Three maps are made: least-squares conformal (Levy et al. 2002), harmonic to a circle
-    (Eck et al. 1995), and Tutte's, whose faces are convex; holes do not hinder them. Of each
-    component those that turn no triangle over come first, by their strain: Tutte's is the one
-    that always exists. All are scaled to the area of the surface.
+    Three maps are computed per component: least-squares conformal (Levy et al. 2002), harmonic
+    to a circle (Eck et al. 1995), and Tutte's, whose faces are convex. Holes are allowed. Only
+    the maps with the fewest inverted triangles are kept, sorted by strain; Tutte's map always
+    exists. All are scaled to the area of the surface.
 
     Parameters
     ----------
     mesh : Mesh
         Components with a boundary and without handles.
     triangles : ndarray of int, (t, 3)
-        Triangles that carry strain.
+        Triangles on which strain is measured.
     upward : ndarray of int, (u, 3)
         Triangles that must not be inverted.
 
     Returns
     -------
     list of ndarray, (n, 2)
-        Centred at the origin; vertices of no face are there. Where a component has fewer than
-        another, its last one is repeated.
+        Centred at the origin, where vertices of no face are put. If components have different
+        numbers of images, the last image of a component is repeated.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def embeddings(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
 
 
 def flattens(mesh: Mesh) -> bool:
-    """Whether every component has a boundary and no handle, so that there is a plane image.
+    """Tell whether every component has a boundary and no handle, so that it has a plane image.
 
     >>> flattens(Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
     True
@@ -86,7 +86,7 @@ def _part(mesh: Mesh, ids: Ints) -> Mesh:
 
 
 def parts(mesh: Mesh) -> list[Ints]:
-    """Vertices of each component; those of no face are left out."""
+    """List the vertices of each component, without those of no face."""
     labels, used = mesh.components, mesh.half_edges.face_count > 0
     return [np.flatnonzero(labels == k) for k in np.unique(labels[used])]
 
@@ -111,7 +111,7 @@ def _embed(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
 
 
 def _check(mesh: Mesh, name: int) -> None:
-    """Refuse what cannot be laid out in the plane without a cut."""
+    """Raise if a component cannot be mapped to the plane without a cut."""
     where = f"the part with vertex {name}"
     loops = len(mesh.boundary_loops)
     if loops == 0:
@@ -133,13 +133,13 @@ def _perimeter(points: Array) -> float:
 
 
 def _areas(flat: Array, triangles: Ints) -> Array:
-    """Doubled signed areas."""
+    """Compute the doubled signed areas of triangles."""
     a, b = (flat[triangles[:, k]] - flat[triangles[:, 0]] for k in (1, 2))
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 def _scaled(mesh: Mesh, image: Array) -> Array:
-    """The image with the area of the surface and its centroid at the origin."""
+    """Scale an image to the area of the surface and centre it at the origin."""
     v, t = mesh.vertices, mesh.triangles
     space = np.linalg.norm(np.cross(v[t[:, 1]] - v[t[:, 0]], v[t[:, 2]] - v[t[:, 0]]), axis=1)
     plane = np.abs(_areas(image, t)).sum()
@@ -147,14 +147,14 @@ def _scaled(mesh: Mesh, image: Array) -> Array:
 
 
 def _circle(points: Array) -> Array:
-    """Points on the unit circle, apart by the lengths of a loop's edges."""
+    """Place the vertices of a loop on the unit circle, spaced by its edge lengths."""
     length = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
     angle = 2.0 * np.pi * np.r_[0.0, np.cumsum(length)[:-1]] / length.sum()
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
 def _conformal(mesh: Mesh, loop: Ints) -> Array | None:
-    """Least-squares conformal map, held at two far vertices of the boundary."""
+    """Compute the least-squares conformal map, with two distant boundary vertices fixed."""
     import igl
 
     points = mesh.vertices[loop]
@@ -169,17 +169,17 @@ def _conformal(mesh: Mesh, loop: Ints) -> Array | None:
 
 
 def spanned(mesh: Mesh, loop: Ints, at: Array) -> Array:
-    """Plane image (n, 2) of one component without handles, its boundary given.
+    """Compute a plane image (n, 2) of one component without handles, with given boundary.
 
-    Harmonic, or Tutte's where that turns triangles over.
+    The harmonic map, or Tutte's if the harmonic map inverts triangles.
 
     Parameters
     ----------
     mesh : Mesh
     loop : ndarray of int, (b,)
-        Its outer boundary, the surface to the left.
+        Its outer boundary loop, with the surface to the left.
     at : ndarray, (b, 2)
-        Where that is to be: on a convex curve, anticlockwise.
+        Positions of the loop's vertices: on a convex curve, anticlockwise.
     """
     image = _harmonic(mesh, loop, at)
     if image is not None and np.isfinite(image).all() and (_areas(image, mesh.triangles) > 0).all():
@@ -188,7 +188,7 @@ def spanned(mesh: Mesh, loop: Ints, at: Array) -> Array:
 
 
 def _harmonic(mesh: Mesh, loop: Ints, at: Array) -> Array | None:
-    """Harmonic map with cotangent weights, the loop where it is given."""
+    """Compute the harmonic map with cotangent weights and fixed boundary loop."""
     import igl
 
     try:
@@ -198,10 +198,10 @@ def _harmonic(mesh: Mesh, loop: Ints, at: Array) -> Array | None:
 
 
 def _tutte(mesh: Mesh, loop: Ints, at: Array) -> Array:
-    """Every inner vertex in the mean of its neighbours, the loop where it is given (Tutte 1963).
+    """Compute Tutte's map (1963): inner vertices at the mean of their neighbours, loop fixed.
 
-    Other loops are filled with a vertex in their middle. On a 3-connected mesh the faces
-    come out convex.
+    Other loops are filled with a central vertex. On a 3-connected mesh the faces of the image
+    are convex.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.linalg import splu

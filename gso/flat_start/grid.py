@@ -1,4 +1,4 @@
-"""The rectangle that a grid's flattening starts from."""
+"""The rectangle from which a grid's flattening starts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 
 def rectangle(grid: Array) -> Array:
-    """Flatten-init (Wang et al. 2024): a regular rectangle with the grid's mean side lengths.
+    """Compute Flatten-init (Wang et al. 2024): a regular rectangle with the mean side lengths.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where a surface closes around itself and must be cut before it is laid out."""
+"""Automatic cuts of surfaces that close around themselves, before they are flattened."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from gso.mesh import Mesh
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Root-mean-square strain up to which a layout without cuts is left as it is.
+#: Root-mean-square strain up to which a surface is not cut.
 _SMALL = 1e-3
-#: Strain from which on it is bad, and the share of it that a cut has to leave at most; below
-#: it, a cut has to do better.
+#: If the strain without cuts is above the first number, cuts must reduce it to the second share
+#: of it at most, otherwise to the third.
 _BAD, _BETTER, _MUCH_BETTER = 0.1, 0.8, 0.2
-#: Strain, relative to the least, up to which fewer cuts are preferred.
+#: Fewer cuts are preferred if their strain is at most this multiple of the smallest.
 _ALIKE = 1.1
-#: How far the turning of a loop may be from that of a hole in the plane.
+#: Tolerance on the turning angle of a loop around a hole, -2 pi in the plane.
 _TURN = 0.5 * np.pi
 
 
 class Opened(NamedTuple):
-    """A surface as it is laid out.
+    """A surface that is ready to be flattened.
 
     Attributes
     ----------
     mesh : Mesh
-        What is laid out: grids numbered row by row.
+        The surface to flatten, cut open if necessary; grids are numbered row by row.
     cut : Cut or None
-        How it was cut; None where it was not.
+        The cut; None if there is none.
     order : ndarray of int or None, (p,)
-        Vertex of ``cut.mesh`` that each vertex of `mesh` is.
+        Vertex of ``cut.mesh`` for each vertex of `mesh`.
     notes : tuple of str
         What was cut, and why.
     """
@@ -50,11 +50,11 @@ class Opened(NamedTuple):
 
     @property
     def doubtful(self) -> float:
-        """Strain from which on a start may be a bad one; a cut was chosen by its best."""
+        """Strain above which other embeddings are tried; small with cuts, whose best was rated."""
         return DOUBTFUL if self.cut is None else _SMALL
 
     def back(self, flat: Array) -> Array:
-        """Image of `mesh` in the numbering of ``cut.mesh``, or as it is without a cut."""
+        """Renumber an image of `mesh` as ``cut.mesh``; without a cut, return it unchanged."""
         if self.order is None:
             return flat
         out = np.empty_like(flat)
@@ -62,7 +62,7 @@ class Opened(NamedTuple):
         return out
 
     def faces_back(self, values: Array) -> Array:
-        """Numbers of the faces of `mesh` in the order of those of ``cut.mesh``, likewise."""
+        """Reorder values per face of `mesh` as the faces of ``cut.mesh``, likewise."""
         if self.order is None or self.cut is None:
             return values
         here, there = self.order[self.mesh.faces], self.cut.mesh.faces
@@ -76,19 +76,19 @@ class Opened(NamedTuple):
 def opened(mesh: Mesh, *, iterations: int = 100) -> Opened:
     """Cut a surface along shortest lines between its boundary loops, where that is needed.
 
-    A disk with holes lies flat with its holes; a tube does not. Both have several boundary
+    A disk with holes can be flattened without a cut; a tube cannot. Both have several boundary
     loops, so both ways are tried: without a cut, and cut along a tree of shortest lines that
-    joins the loops. The surface is cut where the strain without it is large, the strain with it
-    is much less, and the pattern does not overlap itself. Holes in the side of a tube, around
-    which the surface turns as around a hole in the plane, are left closed where that does not
-    add strain.
+    joins the loops. A component is cut if its strain without a cut is not small, the cut reduces
+    it substantially, and the cut does not make the pattern overlap itself. Loops that turn like
+    a hole in the plane, such as holes in the side of a tube, are not joined by cuts if the
+    strain is about as small without.
 
     Parameters
     ----------
     mesh : Mesh
         Components with a boundary and without handles; a grid is numbered row by row.
     iterations : int
-        Most steps of :func:`gso.flat_start.relax`, for each way.
+        Largest number of iterations of :func:`gso.flat_start.relax`, for each way.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def opened(mesh: Mesh, *, iterations: int = 100) -> Opened:
 
 
 def by_rows(mesh: Mesh) -> tuple[Mesh, Ints]:
-    """A mesh, renumbered row by row if it is a grid; and the number that each vertex had."""
+    """Renumber a grid row by row; return the mesh and the old number of each vertex."""
     same = np.arange(len(mesh.vertices))
     if mesh.grid is None or mesh.grid_index is None or (mesh.grid_index.ravel() == same).all():
         return mesh, same
@@ -123,7 +123,7 @@ def by_rows(mesh: Mesh) -> tuple[Mesh, Ints]:
 
 
 def _best(mesh: Mesh, ids: Ints, loops: list[Ints], iterations: int) -> tuple[Ints, str] | None:
-    """Edges to cut one component along, and what to say about it; None to leave it whole."""
+    """Choose the edges along which to cut one component, with a note; None for no cut."""
     uncut, lies_on_itself = _tried(mesh, ids, np.empty((0, 2), np.int64), iterations)
     if uncut <= _SMALL:
         return None
@@ -147,9 +147,9 @@ def _best(mesh: Mesh, ids: Ints, loops: list[Ints], iterations: int) -> tuple[In
 
 
 def _tried(mesh: Mesh, ids: Ints, edges: Ints, iterations: int) -> tuple[float, bool]:
-    """How one component lies flat, cut along edges, at the start of its layout.
+    """Cut one component along edges and compute its initial image.
 
-    Its root-mean-square strain, and whether it lies on itself.
+    Returns its root-mean-square strain, and whether it overlaps itself.
     """
     local = np.full(len(mesh.vertices), -1)
     local[ids] = np.arange(len(ids))
@@ -161,9 +161,9 @@ def _tried(mesh: Mesh, ids: Ints, edges: Ints, iterations: int) -> tuple[float, 
 
 
 def turning(mesh: Mesh, loop: Ints) -> float:
-    """Angle by which a boundary loop turns, seen on the surface, radians.
+    """Compute the total turning angle (geodesic curvature) of a boundary loop, in radians.
 
-    2 pi round a disk in the plane, -2 pi round a hole in it, nothing round the end of a
+    2 pi for the boundary of a disk in the plane, -2 pi for a hole in it, zero for the end of a
     cylinder.
     """
     angles = np.zeros(len(mesh.vertices))

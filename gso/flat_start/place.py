@@ -1,4 +1,4 @@
-"""Where a finished plane image is put: turned, moved, parts side by side."""
+"""Placement of a final plane image by rigid motions, components side by side."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from gso.mesh import Mesh
 
 Array = NDArray[np.float64]
 
-#: Ratio of the principal spreads above which an image counts as longer than wide.
+#: Ratio of the principal variances above which an image has a long axis.
 _OBLONG = 1.1
-#: Gap between parts, as a share of the widest.
+#: Gap between components, as a share of the largest width.
 _GAP = 0.05
 
 
 def place(mesh: Mesh, flat: Array, target: Array | None = None) -> Array:
-    """Finished image (n, 2) of a mesh where it is wanted.
+    """Place the final image (n, 2) of a mesh by rigid motions.
 
-    As close as possible to the target, if there is one. Otherwise, with the corner of its
-    bounding box at the origin, turned like Flatten-init on grids and with the long axis
-    along x on other meshes, components side by side. Vertices of no face are put at the
+    With a target, the image is moved as close to it as possible. Otherwise the corner of its
+    bounding box is at the origin: grids are rotated like Flatten-init, and other meshes have
+    their long axes along x and components side by side. Vertices of no face are put at the
     origin.
     """
     components = parts(mesh)
@@ -38,7 +38,7 @@ def place(mesh: Mesh, flat: Array, target: Array | None = None) -> Array:
 
 
 def closest_motion(flat: Array, target: Array) -> Array:
-    """The image turned and moved, not mirrored, as close as possible to a target (n, 2).
+    """Move an image rigidly, without reflection, as close as possible to a target (n, 2).
 
     Least squares over vertices (Procrustes); in the plane the angle has a closed form.
 
@@ -55,10 +55,10 @@ def closest_motion(flat: Array, target: Array) -> Array:
 
 
 def upright(flat: Array) -> Array:
-    """The image with its long axis along x, vertices numbered from left to right on the whole.
+    """Rotate an image so that its long axis is along x and vertex numbers grow along x.
 
-    An image about as wide as long has no long axis to speak of: there the direction in
-    which the vertex numbers grow runs along x.
+    If the image is about as wide as long, only the direction in which the vertex numbers grow
+    is used.
     """
     p = flat - flat.mean(axis=0)
     z = _complex(p)
@@ -75,9 +75,9 @@ def upright(flat: Array) -> Array:
 
 
 def beside(parts: list[Array]) -> list[Array]:
-    """Images moved into a row along x, a gap between them, each standing on y = 0.
+    """Translate images into a row along x with gaps between them, each with lowest y = 0.
 
-    The first one's lower left corner (of its bounding box) is the origin.
+    The lower left corner of the first one's bounding box is at the origin.
     """
     gap = _GAP * max((float(np.ptp(p[:, 0])) for p in parts), default=0.0)
     out, left = [], 0.0

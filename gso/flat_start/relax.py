@@ -1,4 +1,4 @@
-"""As-rigid-as-possible relaxation: cheap steps with one constant scalar matrix."""
+"""As-rigid-as-possible relaxation: cheap iterations with one constant scalar matrix."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Relaxed(NamedTuple):
 
 
 class _Gradients:
-    """Derivatives of functions on the triangles of a surface, as a complex matrix.
+    """Gradients of functions on the triangles of a surface, as a complex matrix.
 
-    With z = x + iy the image of the vertices, ``matrix @ z`` is twice the part of each
-    triangle's map that turns and scales (see :mod:`gso.geometry.strain`), and
-    ``conjugate @ z`` twice the part that shears.
+    With z = x + iy the image of the vertices, ``matrix @ z`` is twice the conformal part
+    (rotation and scale) of each triangle's map (see :mod:`gso.geometry.strain`), and
+    ``conjugate @ z`` twice its anticonformal part (shear).
     """
 
     def __init__(self, vertices: Array, triangles: Ints):
@@ -48,7 +48,7 @@ class _Gradients:
         self.conjugate = self.matrix.conj()
 
     def energy(self, z: Array) -> tuple[float, Array, Array]:
-        """Mean of ``((s1 - 1)^2 + (s2 - 1)^2) / 2``; ``matrix @ z`` and its size."""
+        """Compute the mean of ``((s1 - 1)^2 + (s2 - 1)^2) / 2``, ``matrix @ z`` and its modulus."""
         turn, shear = self.matrix @ z, self.conjugate @ z
         size = np.abs(turn)
         both = (0.5 * size - 1.0) ** 2 + (0.5 * np.abs(shear)) ** 2
@@ -56,7 +56,7 @@ class _Gradients:
 
 
 def strain_level(vertices: Array, triangles: Ints, flat: Array) -> float:
-    """Root-mean-square strain of triangles mapped to the plane: of both principal ones."""
+    """Compute the root mean square of both principal strains of triangles mapped to the plane."""
     return _Gradients(vertices, triangles).energy(flat @ np.array([1.0, 1j]))[0] ** 0.5
 
 
@@ -71,21 +71,22 @@ def relax(
 ) -> Relaxed:
     """Lower the as-rigid-as-possible energy of a plane image by local and global steps.
 
-    Each triangle takes the rotation closest to its map; then one linear system, the
-    same in every step, finds the image that follows the rotations best (Sorkine and
-    Alexa 2007; Liu et al. 2008, section 4). Triangles weigh alike. A step stops short of
-    turning a triangle over, which keeps the energy falling: it is convex along the way.
+    The local step finds the rotation closest to each triangle's map. The global step solves a
+    linear system, with the same matrix in every iteration, for the image that fits the
+    rotations best (Sorkine and Alexa 2007; Liu et al. 2008, section 4). All triangles have equal
+    weight. A step ends before a triangle is inverted; the energy still decreases, as the global
+    energy is convex along the step.
 
     Parameters
     ----------
     vertices, triangles : ndarray, (n, 3)
-        The surface; triangles need an area. Vertices of no triangle stay where they are.
+        The surface; its triangles must have an area. Vertices of no triangle do not move.
     flat : ndarray, (n, 2)
-        The image to start from.
+        The initial image.
     upward : ndarray of int, (u, 3), optional
-        Triangles that must not turn over, when they are others.
+        Triangles that must not be inverted, if different from `triangles`.
     iterations, tolerance : int, float
-        Most steps, and the relative fall of the energy at which to stop.
+        Largest number of iterations, and relative decrease of the energy at which to stop.
     """
     from scipy.sparse import identity
     from scipy.sparse.linalg import splu
@@ -94,7 +95,7 @@ def relax(
     m = gradients.matrix
     adjoint = m.conj().T.tocsr()
     laplacian = (adjoint @ m).real.tocsc()
-    # One unknown per component is free to move; a trace of damping holds it.
+    # Translations of each component are a null space; a little damping makes it regular.
     damping = 1e-9 * laplacian.diagonal().max()
     factor = splu(
         (laplacian + damping * identity(len(vertices))).tocsc(),

@@ -1,4 +1,4 @@
-"""Pictures of surfaces and results, drawn by Matplotlib without a display.
+"""Plots of surfaces and results, drawn with Matplotlib without a display.
 
 >>> import tempfile, os
 >>> import gso
@@ -40,12 +40,12 @@ COLOURS = ("curvature", "distance", "strain", "none")
 
 
 def require() -> None:
-    """Refuse to plot when Matplotlib is not installed.
+    """Raise an error if Matplotlib is not installed.
 
     Raises
     ------
     GSOError
-        Saying how to install it.
+        With instructions to install it.
     """
     if find_spec("matplotlib") is None:
         raise GSOError('plots need Matplotlib: pip install ".[plot]" in the folder of gso')
@@ -68,16 +68,16 @@ def plot_surface(
     mesh : Mesh, or anything that :func:`gso.as_mesh` takes
         The surface.
     values : {"none", "curvature", "distance", "strain"} or array_like
-        What the colours show: the absolute Gaussian curvature times the squared size, the
-        distance to `before` in percent of its diagonal, the larger principal strain of
-        the map from `before` to this flat pattern, or your own numbers per vertex (n,) or
+        Quantity shown by the colours: the absolute Gaussian curvature times the squared size,
+        the distance to `before` in percent of its diagonal, the larger principal strain of
+        the map from `before` to this flat pattern, or your own values per vertex (n,) or
         per face (m,).
     path : str or PathLike, optional
         A .png, .pdf or .svg file to write.
     title, label : str
-        Text over the surface, and at the colour bar of your own numbers.
+        Text above the surface, and at the colour bar of your own values.
     before : Mesh, optional
-        A surface to draw beside it, from the same side and in the same scale of colours.
+        A surface to draw beside it, from the same side and with the same colour scale.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def plot_surface(
     GSOError
         Matplotlib is not installed.
     OptionError
-        The values do not fit the mesh, or the name needs `before`.
+        The values do not match the mesh, or the quantity needs `before`.
     MeshError
         The surface cannot be used, or the file cannot be written.
     """
@@ -131,9 +131,9 @@ def _named(name: str, meshes: list[Mesh]) -> list[Panel]:
 
 
 def _flattened(design: Mesh, pattern: Pattern, scale: np.ndarray | None = None) -> list[Panel]:
-    """A surface and its flat pattern, which is turned like the picture of the surface.
+    """Make panels of a surface and its flat pattern, rotated to match the view of the surface.
 
-    They are coloured by the scale of their faces, if that is given, else by the strain.
+    They are coloured by the scale of the faces, if that is given, else by the strain.
     """
     flat, opened = pattern.flat, pattern.surface(design)
     heat = strain(opened, flat) if scale is None else scales(opened, flat, scale)
@@ -151,16 +151,16 @@ def _flattened(design: Mesh, pattern: Pattern, scale: np.ndarray | None = None) 
 def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figure:
     """Draw a result beside its design.
 
-    `developable`: the curvature before and after in one scale, and the distance between
-    the two, and the strain of the flat pattern if it has one; `bend`: the stretch instead.
-    `flatten`: the strain on the surface and on the flat pattern; `conformal`: the scale of the
-    faces. `denoise`: both surfaces in a light that grazes them, and the distance between the
-    two.
+    `developable`: the curvature before and after in one colour scale, the distance between the
+    two, and the strain of the flat pattern if there is one. `bend`: the same with the stretch
+    instead of the distance. `flatten`: the strain on the surface and on the flat pattern.
+    `conformal`: the scale of the faces on both. `denoise`: both surfaces in grazing light, and
+    the distance between the two.
 
     Parameters
     ----------
     result : Result
-        Of :func:`gso.tno.optimize`.
+        Returned by :func:`gso.tno.optimize`.
     path : str or PathLike, optional
         A .png, .pdf or .svg file to write.
 
@@ -197,7 +197,7 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
 
 
 def _curved(design: Mesh, mesh: Mesh) -> float:
-    """Mean curvature of a surface by the size of its design."""
+    """Compute the mean absolute Gaussian curvature of a surface, scaled by its design's size."""
     return metrics.mean_abs_K(mesh, scale=metrics.unit(design))
 
 
@@ -231,7 +231,7 @@ def plot_rulings(
     GSOError
         Matplotlib is not installed.
     OptionError
-        `count` is no number of lines.
+        `count` is not a whole number of lines, 1 or more.
     MeshError
         The surface cannot be used, or the file cannot be written.
     """

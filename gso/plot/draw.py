@@ -1,7 +1,7 @@
-"""Paint surfaces side by side.
+"""Drawing of surfaces side by side.
 
 Faces are painted from back to front, each in the colour of its value times its shading.
-That is faster than Matplotlib's own 3D axes and keeps the proportions.
+This is faster than Matplotlib's own 3D axes and preserves proportions.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ _RIM = (0.70, 0.70, 0.70)
 #: Widths of mesh lines and of lines on the surface, points.
 _EDGE, _STROKE = 0.35, 0.9
 
-#: Inches of a panel's width, of the room for the bars, and for the titles.
+#: Width of a panel, height of the colour bars, and height of the titles, inches.
 _WIDTH, _BAR, _TITLE = 4.0, 0.85, 0.35
 
-#: Faces up to which mesh lines leave something between them.
+#: Largest number of faces for which mesh lines are visible.
 _LINES = 2500
 
 
@@ -63,9 +63,9 @@ class Panel:
     title : str
         Text above.
     heat : Heat, optional
-        What colours the faces.
+        Values that colour the faces.
     light : ndarray, (3,)
-        Where the light comes from.
+        Direction to the light.
     shaded : bool
         Shade the faces by their normals.
     lines : sequence of ndarray, (k, 3)
@@ -90,11 +90,11 @@ class Panel:
 
 
 def draw(panels: Sequence[Panel]) -> Figure:
-    """Panels in a row, with one colour bar per scale."""
+    """Draw panels in a row, with one colour bar per scale."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    # One window for all, so that lengths compare and titles stand in a row.
+    # The same extent for all panels, so that lengths are comparable and titles align.
     span = 1.06 * np.max([np.ptp(_seen(p), axis=0) for p in panels], axis=0)
     tall = _WIDTH * float(np.clip(span[1] / span[0], 0.3, 1.3))
     below = _BAR if any(p.heat for p in panels) else 0.0
@@ -132,12 +132,12 @@ def _seen(panel: Panel) -> Array:
 
 
 def _segments(lines: Sequence[Array]) -> Array:
-    """The segments of polylines, (s, 2, 3)."""
+    """Return the segments of polylines, (s, 2, 3)."""
     return np.concatenate([np.empty((0, 2, 3)), *(np.stack([p[:-1], p[1:]], 1) for p in lines)])
 
 
 def _paint(ax: Any, panel: Panel, span: Array) -> ScalarMappable | None:
-    """Paint a panel; what a colour bar is made from."""
+    """Draw a panel; return the mappable of its colour bar."""
     from matplotlib.patches import Circle
 
     if panel.circle:
@@ -155,12 +155,12 @@ def _paint(ax: Any, panel: Panel, span: Array) -> ScalarMappable | None:
 
 
 def _polygons(panel: Panel, colours: Array) -> PolyCollection:
-    """Faces in their colours and the segments of the lines, from back to front."""
+    """Collect the coloured faces and the segments of the lines, sorted from back to front."""
     from matplotlib.collections import PolyCollection
 
     corners, strokes = panel.points[panel.corners], _segments(panel.lines)
     few = len(corners) <= _LINES
-    # A line comes after the faces that it lies on and before those that hide it.
+    # A line is drawn after the faces that it lies on and before those that hide it.
     thick = np.ptp(corners[..., 2], axis=1).max()
     depth = np.r_[corners[..., 2].mean(axis=1), strokes[..., 2].mean(axis=1) + thick]
     order = np.argsort(depth, kind="stable")
@@ -182,7 +182,7 @@ def _polygons(panel: Panel, colours: Array) -> PolyCollection:
 
 
 def _colours(panel: Panel) -> tuple[Array, ScalarMappable | None]:
-    """Colour of every face (m, 3)."""
+    """Compute the colour of every face (m, 3), and the mappable of the colour bar."""
     mappable = None
     colours = np.tile(_PLAIN, (len(panel.faces), 1))
     if panel.heat is not None:
@@ -201,7 +201,7 @@ def _colours(panel: Panel) -> tuple[Array, ScalarMappable | None]:
 
 
 def _shading(panel: Panel, ambient: float) -> Array:
-    """Brightness of every face (m,), lit from both sides alike."""
+    """Compute the brightness of every face (m,), the same for both orientations."""
     p = panel.points[panel.corners]
     normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     length = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)

@@ -1,4 +1,4 @@
-"""Quantities that colour the faces of a picture, and what the colours mean."""
+"""Quantities that colour the faces of a plot, and their colour scales."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from gso.status import OptionError
 
 Array = NDArray[np.float64]
 
-#: Percentile at which scales of curvature and strain end: spikes would leave all else pale.
+#: Percentile at which scales of curvature and strain end: a scale up to spikes would hide the rest.
 _TOP = 98.0
 
 
 @dataclass(frozen=True)
 class Scale:
-    """Range of a colour bar, its text, and the name of a Matplotlib colour map."""
+    """Range of a colour bar, its label, and the name of a Matplotlib colour map."""
 
     label: str
     colours: str
@@ -32,7 +32,7 @@ class Scale:
 
 @dataclass(frozen=True)
 class Heat:
-    """One number per face (m,), NaN where there is none; panels may share a scale."""
+    """One value per face (m,), NaN where undefined; panels may share a scale."""
 
     values: Array
     scale: Scale
@@ -40,14 +40,14 @@ class Heat:
 
 
 def per_face(mesh: Mesh, values: Array) -> Array:
-    """Numbers per face (m,) from numbers per vertex (n,): the mean of the corners that have one.
+    """Average values per vertex (n,) over the corners of each face (m,), ignoring NaN.
 
-    Numbers per face are taken as they are.
+    Values per face are returned unchanged.
 
     Raises
     ------
     OptionError
-        Neither as many as vertices nor as many as faces.
+        The values match neither the vertices nor the faces.
     """
     if values.shape == (len(mesh.vertices),):
         corners = np.where(mesh.faces >= 0, values[mesh.faces], np.nan)
@@ -63,7 +63,7 @@ def per_face(mesh: Mesh, values: Array) -> Array:
 
 
 def _rising(values: Sequence[Array], label: str, colours: str, top: float = _TOP) -> Scale:
-    """Scale over several panels, from zero to a percentile."""
+    """Make a scale for several panels, from zero to a percentile."""
     every = np.concatenate(values)
     every = every[np.isfinite(every)]
     high = max(float(np.percentile(every, top)) if every.size else 1.0, 1e-6)
@@ -72,10 +72,11 @@ def _rising(values: Sequence[Array], label: str, colours: str, top: float = _TOP
 
 
 def curvatures(meshes: Sequence[Mesh]) -> list[Heat]:
-    """Absolute Gaussian curvature times the squared size of the first mesh, in one scale.
+    """Compute the absolute Gaussian curvature times the squared size of the first mesh.
 
-    In the triangulation of the quads where it is larger. Where all have the first mesh's faces,
-    that is the size of each of its components.
+    All meshes share one colour scale. Of the two triangulations of the quads the one with the
+    larger value is used. If all meshes have the faces of the first, each component is scaled by
+    its own size in the first.
     """
     alike = all(np.array_equal(m.faces, meshes[0].faces) for m in meshes)
     size = sizes(meshes[0]) if alike else metrics.unit(meshes[0])
@@ -85,11 +86,11 @@ def curvatures(meshes: Sequence[Mesh]) -> list[Heat]:
 
 
 def distance(before: Mesh, after: Mesh) -> Heat:
-    """Distance of a surface to the one before, percent of that one's diagonal.
+    """Compute the distance of a surface to the one before, in percent of the latter's diagonal.
 
-    Of several components, each by its own, where the faces are the same. The faces show the way
-    there; the summary has the largest distance of the way back too, which is larger where a border
-    has shrunk.
+    If the faces are the same, each component uses its own diagonal. The colours show the
+    distance from `after` to `before`. The summary also has the largest distance back, which is
+    larger if a boundary has shrunk.
     """
     if several(before) and np.array_equal(before.faces, after.faces):
         percent = np.zeros(len(after.vertices))
@@ -108,12 +109,12 @@ def distance(before: Mesh, after: Mesh) -> Heat:
 
 
 def _percent(to: Mesh, of: Mesh, *, by: Mesh | None = None) -> Array:
-    """Distance of the vertices of one surface to another, percent of a diagonal."""
+    """Compute the distance of the vertices of one surface to another, percent of a diagonal."""
     return 100.0 / (by or to).diagonal * metrics.point_to_surface(of.vertices, to)
 
 
 def strain(design: Mesh, flat: Array) -> Heat:
-    """Larger principal strain of each face, percent: the largest of its corner triangles.
+    """Compute the larger principal strain per face, percent: the maximum of its corner triangles.
 
     Parameters
     ----------
@@ -138,7 +139,7 @@ def strain(design: Mesh, flat: Array) -> Heat:
 
 
 def scales(design: Mesh, flat: Array, scale: Array) -> Heat:
-    """Scale of each face (m,) in a conformal image (n, 2)."""
+    """Show the scale of each face (m,) in a conformal image (n, 2)."""
     ratio = metrics.quasi_conformal(design, flat)
     worst = 100.0 * float(np.nanmax(ratio) - 1.0)
     heat = numbers(design, scale, "length in the flat image / on the surface")
@@ -146,7 +147,7 @@ def scales(design: Mesh, flat: Array, scale: Array) -> Heat:
 
 
 def stretch(design: Mesh, mesh: Mesh) -> Heat:
-    """How far the faces' lengths are from those of the design, percent: the larger stretch."""
+    """Compute the larger deviation of each face's two principal stretches from one, percent."""
     large, small = metrics.stretches(design, mesh)
     values = 100.0 * np.maximum(np.abs(large - 1.0), np.abs(small - 1.0))
     known = values[np.isfinite(values)]
@@ -155,7 +156,7 @@ def stretch(design: Mesh, mesh: Mesh) -> Heat:
 
 
 def numbers(mesh: Mesh, values: Array, label: str) -> Heat:
-    """Numbers of the user's own, in a scale from their smallest to their largest."""
+    """Show the user's own values in a scale from their minimum to their maximum."""
     shown = per_face(mesh, values)
     known = shown[np.isfinite(shown)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)

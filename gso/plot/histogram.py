@@ -1,4 +1,4 @@
-"""Histograms of numbers per surface."""
+"""Histograms of quantities over groups of surfaces."""
 
 from __future__ import annotations
 
@@ -26,14 +26,15 @@ def plot_histograms(
     *,
     path: str | PathLike[str] | None = None,
 ) -> Figure:
-    """Draw a histogram per quantity, a line per group.
+    """Draw a histogram per quantity, with a line per group.
 
     Parameters
     ----------
     values : dict of dict of ndarray, (n,)
-        Numbers by quantity and group; each group's shares sum to one.
+        Values by quantity and group; the shares of a group sum to one.
     limits : dict of (float, float)
-        Range of each quantity; what lies beyond is in the last bar, which may be cut off.
+        Range of each quantity. Values outside count in the first or last bar; the last bar may
+        be cut off.
     path : str or PathLike, optional
         A .png, .pdf or .svg file to write.
 

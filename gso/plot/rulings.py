@@ -9,7 +9,7 @@ from gso.rulings import gauss_image, shape_operator, trace
 
 
 def ruled(mesh: Mesh, view: View, count: int) -> Panel:
-    """The surface and so many ruling lines."""
+    """Make a panel of the surface with up to `count` ruling lines."""
     rulings = trace(mesh, count=count)
     panel = Panel(view.project(mesh.vertices), mesh.faces)
     panel.lines = [view.project(line) for line in rulings.lines]
@@ -20,7 +20,7 @@ def ruled(mesh: Mesh, view: View, count: int) -> Panel:
 
 
 def gauss(mesh: Mesh, view: View, name: str = "Gauss image") -> Panel:
-    """The image of the surface on the unit sphere, seen from the same side as the surface."""
+    """Make a panel of the surface's Gauss image, seen from the same side as the surface."""
     panel = Panel(gauss_image(mesh) @ view.axes, mesh.faces, shaded=False, circle=1.0)
     panel.title = f"{name}, thickness {shape_operator(mesh).thickness:.2g}"
     return panel

@@ -1,4 +1,4 @@
-"""From which side a surface is drawn."""
+"""The view from which a surface is drawn."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gso.mesh import Frame, Mesh
 
 Array = NDArray[np.float64]
 
-#: Angles about the upright axis and over the horizon, degrees.
+#: Angles about the vertical axis and above the horizon, degrees.
 _TURN, _TILT = 25.0, 48.0
 
 
@@ -24,11 +24,11 @@ class View:
 
     @classmethod
     def of(cls, mesh: Mesh) -> View:
-        """A view in which the surface shows its face.
+        """Choose a view from the front of a surface.
 
-        A flat surface is seen from right above. Others are seen from the side that their
-        mean normal points to, turned and tilted; z is up in the picture, unless they lie
-        like a landscape: those are seen from above along their longest axis.
+        A flat surface is seen perpendicularly. Others are seen obliquely from the side of their
+        mean normal, with z up. Surfaces that face nearly along z, like a landscape, are instead
+        seen obliquely from above, with x or their longest axis to the right.
         """
         points, triangles = mesh.frame.to_unit(mesh.vertices), mesh.triangles
         a, b, c = (points[triangles[:, k]] for k in range(3))
@@ -52,12 +52,12 @@ class View:
         return cls(mesh.frame, _tilted(up, toward, np.arcsin(normal[2]) + np.radians(20.0)))
 
     def project(self, points: Array) -> Array:
-        """Points (n, 3) as right, up and towards the viewer, in units of the frame."""
+        """Project points (n, 3) to right, up and towards the viewer, in units of the frame."""
         return self.frame.to_unit(points) @ self.axes
 
 
 def _right(normal: Array, longest: Array) -> Array:
-    """Right in the picture of a surface seen from above: x if possible, else its longest axis."""
+    """Return right in a view from above: x if the normal is along z, else the longest axis."""
     level = np.hypot(normal[0], normal[1]) < 1e-6
     along = np.array([1.0, 0.0, 0.0]) if level else longest
     along = along - (along @ normal) * normal
@@ -66,7 +66,7 @@ def _right(normal: Array, longest: Array) -> Array:
 
 
 def _tilted(up: Array, toward: Array, tilt: float) -> Array:
-    """Axes of a viewer who stands in the direction `toward`, a bit aside, and looks down."""
+    """Compute the axes of a viewer in the direction `toward`, a bit aside, looking down."""
     turn = np.radians(_TURN)
     side = np.cross(up, toward)
     eye = np.cos(tilt) * (np.cos(turn) * toward + np.sin(turn) * side) + np.sin(tilt) * up

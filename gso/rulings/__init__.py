@@ -1,9 +1,9 @@
 """Rulings and curvatures by the discrete Gauss map of Jiang et al. 2020.
 
-The Gauss image of a mesh has its faces, and the unit normals at its vertices for vertices.
-How a face and its image differ is its shape operator: curvatures, and the direction in which the
-surface bends least, its ruling. A surface is developable when its image is a curve; the
-rulings are straight lines then.
+The Gauss image of a mesh has the same faces; its vertices are the unit normals at the mesh's
+vertices. The shape operator of a face maps the face to its image. It gives the curvatures and
+the ruling, the direction in which the surface bends least. If the surface is developable, its
+Gauss image is a curve and its rulings are straight lines.
 
 >>> import numpy as np
 >>> y, x = np.mgrid[:6, :9] / 8

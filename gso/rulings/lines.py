@@ -1,4 +1,4 @@
-"""Ruling lines of a surface: what they are, and how they are found."""
+"""Ruling lines of a surface."""
 
 from __future__ import annotations
 
@@ -19,31 +19,32 @@ from gso.status import MeshError, OptionError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Lines that are tried for each one that is kept; how many are enough; but so many for each.
+#: Candidate lines per line wanted; their largest total number; their smallest number per line.
 _TRIES, _ENOUGH, _FEWEST = 20, 600, 4
 
-#: Points closer than this share of the surface's size are one: lines that pass a vertex touch
-#: several triangles there.
+#: Consecutive points closer than this share of the surface's size are merged: a line through a
+#: vertex touches several triangles there.
 _SAME = 1e-10
 
 
 @dataclass(frozen=True)
 class Rulings:
-    """Polylines on a surface, each point given by a triangle of vertices.
+    """Polylines on a surface, whose points are given by barycentric coordinates.
 
     Attributes
     ----------
     mesh : Mesh
         The surface.
     corners : ndarray of int, (p, 3)
-        For the points of all lines in their order: the triangle of vertices they lie in.
+        Vertices of the triangle in which each point lies; all lines one after the other.
     weights : ndarray, (p, 3)
-        Their barycentric coordinates there.
+        Barycentric coordinates of each point in its triangle.
     starts : ndarray of int, (s + 1,)
         Line i has the points ``starts[i]`` to ``starts[i + 1] - 1``.
     complete : ndarray of bool, (s,)
-        Both ends lie on the boundary or at a flat region. Other lines have come to a place
-        where the ruling is not defined, as they do on surfaces that are not developable.
+        Whether both ends lie on the boundary or at a flat region. Other lines end where the
+        direction turns sharply, as on surfaces that are not developable, or at the largest
+        length.
     """
 
     mesh: Mesh
@@ -56,14 +57,14 @@ class Rulings:
         return len(self.starts) - 1
 
     def on(self, values: ArrayLike) -> list[Array]:
-        """Values per vertex, interpolated along each line.
+        """Interpolate values per vertex at the points of each line.
 
-        With a flat image (n, 2) of the surface these are the rulings in the pattern.
+        A flat image (n, 2) of the surface gives the rulings in the pattern.
 
         Raises
         ------
         MeshError
-            Not one row per vertex of the mesh.
+            The values do not have one row per vertex of the mesh.
         """
         table = np.asarray(values, float)
         if table.ndim == 0 or len(table) != len(self.mesh.vertices):
@@ -88,7 +89,7 @@ class Rulings:
     def straightness(self) -> Array:
         """Largest distance of each line from its chord over the line's length (s,).
 
-        0 for straight lines, which the rulings of a developable surface are.
+        0 for straight lines, such as the rulings of a developable surface.
         """
         return np.array([_bow(line) for line in self.lines]) / self.lengths
 
@@ -96,24 +97,25 @@ class Rulings:
 def trace(
     mesh: Any, *, count: int = 24, seeds: ArrayLike | None = None, flat: float = FLAT
 ) -> Rulings:
-    """Ruling lines across a surface, evenly spread.
+    """Trace evenly spread ruling lines across a surface.
 
-    A line follows the direction in which the surface's normal turns least. It ends at the
-    boundary (of holes too), at flat regions, where that direction turns by more than 60
-    degrees from a triangle to the next, and when it is as long as the surface's diagonal.
+    A line follows the direction in which the surface's normal turns least, both ways from its
+    start. It ends at the boundary (of holes too), at flat regions, where that direction turns by
+    more than 60 degrees from a triangle to the next, and when the length from the start exceeds
+    the surface's diagonal.
 
     Parameters
     ----------
     mesh : Mesh, or anything that :func:`gso.as_mesh` takes
         Quads, triangles or both; the lines run on its triangulation.
     count : int
-        Number of lines. Fewer come back when the surface has not as many different ones.
+        Number of lines; fewer are returned if the surface does not have as many distinct ones.
     seeds : array_like, (s, 3), optional
-        Points: one line passes near each of them, through the middle of the nearest
-        triangle. `count` does not matter then, and seeds in flat regions have no line.
+        Points: one line passes near each of them, through the centroid of the triangle whose
+        centroid is nearest. `count` is ignored then, and seeds in flat regions have no line.
     flat : float
-        A triangle has no ruling when its curvatures times the surface's size (distance of the
-        farthest vertex from the centroid) are below it.
+        A triangle has no ruling if its curvatures times the surface's size (distance of the
+        farthest vertex from the centroid) are below this.
 
     Returns
     -------
@@ -124,12 +126,12 @@ def trace(
     MeshError
         The surface cannot be used.
     OptionError
-        `count`, `seeds` or `flat` make no sense.
+        `count`, `seeds` or `flat` is invalid.
 
     Notes
     -----
-    Lines are spread like this: many times as many are drawn through triangles that are far from
-    each other, and those are kept to which all these triangles are near (k-medoids).
+    Many more lines than wanted are traced, from triangles far from each other. Those are kept
+    that minimise the distances of all these triangles to the nearest line (k-medoids).
 
     Examples
     --------
@@ -169,19 +171,19 @@ def _checked_seeds(seeds: ArrayLike) -> Array:
 
 
 def _nearest(middles: Array, points: Array) -> Ints:
-    """Numbers of the middles that are nearest to the points."""
+    """Return the indices of the centroids nearest to the points."""
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(middles).query(points)[1], np.int64).reshape(-1)
 
 
 def _through(mesh: Mesh, unit: Mesh, field: Field, start: Ints) -> Rulings:
-    """Lines through the middles of triangles, both ways, found on the mesh in the unit ball."""
+    """Trace lines both ways from the centroids of triangles, on the mesh in the unit ball."""
     count = start.size
     steps = walk(unit, field, np.tile(start, 2), np.repeat([1.0, -1.0], count))
     half, line = np.divmod(steps.line, max(count, 1))
     time = np.arange(line.size)
-    # The way back turned round, then the way there without the middle, which is in both.
+    # The backward half reversed, then the forward half without the centroid, which is in both.
     order = np.lexsort((np.where(half == 1, -time, time), line))
     order = order[(half[order] == 1) | (time[order] >= 2 * count)]
     line = line[order]
@@ -209,7 +211,7 @@ def _subset(rulings: Rulings, which: Ints) -> Rulings:
 
 
 def _bow(line: Array) -> float:
-    """Largest distance of a polyline's points from its chord."""
+    """Compute the largest distance of a polyline's points from the line through its ends."""
     off, chord = line - line[0], line[-1] - line[0]
     squared = float(chord @ chord)
     if squared > 0.0:

@@ -1,10 +1,10 @@
-"""Normals at the vertices: the discrete Gauss image.
+"""Vertex normals: the discrete Gauss image.
 
-A cubic height field is fitted to the vertices around each vertex (an osculating jet, Cazals
-and Pouget 2005), and its normal taken. On smooth grids the mean of the four faces' normals is
-as good inside, and satisfies Jiang's relation, but it is wrong by the first power of the
-edge length on boundaries and in irregular meshes, where the curvatures then do not converge
-at all. The jets' normals are right to the third power everywhere.
+The normal at a vertex is that of a cubic height field fitted to the vertices around it (an
+osculating jet, Cazals and Pouget 2005). Inside smooth grids the mean of the four faces' normals
+is as accurate, and satisfies the relation of Jiang et al. 2020. On boundaries and in irregular
+meshes, however, its error is of first order in the edge length, so that curvatures do not
+converge. The error of the jets' normals is of third order everywhere.
 """
 
 from __future__ import annotations
@@ -24,29 +24,29 @@ from gso.metrics import components
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Rings of vertices that a fit takes in; at a boundary they lie on one side only.
+#: Rings of vertices in a fit, inside and on the boundary, where they lie on one side only.
 RINGS, RIM_RINGS = 2, 3
 
 #: Powers (i, j) of the monomials x^i y^j, by degree.
 _POWERS = [(i - j, j) for i in range(4) for j in range(i + 1)]
 
-#: What a squared coefficient of each degree costs, per vertex of the fit. So little changes
-#: nothing, unless there are too few vertices for all coefficients: then the low ones are taken.
-#: The binomial coefficients make the cost the same in turned coordinates.
+#: Ridge penalty on a squared coefficient of each degree, per vertex of the fit. It is negligible
+#: unless there are too few vertices for all coefficients; then low degrees are preferred. The
+#: binomial coefficients make it invariant to rotations of the coordinates.
 _RIDGE = np.array([(1e-15, 1e-15, 1e-12, 1e-9)[i + j] / comb(i + j, i) for i, j in _POWERS])
 
-#: Pairs of vertices worked on at a time.
+#: Number of (vertex, neighbour) pairs per block.
 _BLOCK = 1 << 17
 
 
 def gauss_image(mesh: Any) -> Array:
-    """Unit normals at the vertices: the vertices of the discrete Gauss image.
+    """Compute unit normals at the vertices: the vertices of the discrete Gauss image.
 
-    The image has the faces of the mesh. It is a curve on the unit sphere when the surface is
-    developable. A face's `normal` and those at its corners satisfy
-    ``<n_j + n_(j+1), normal> = 2`` (Jiang et al. 2020) up to the square of the face's size.
-    Divided by the mean cosine of their angles with the normals of the faces around them they
-    do inside to the third power of it, and the shape operator stays the same to that order.
+    The image has the faces of the mesh. It is a curve on the unit sphere if the surface is
+    developable. A face's `normal` and the normals n_j at its corners satisfy
+    ``<n_j + n_(j+1), normal> = 2`` (Jiang et al. 2020) up to second order in the face's size.
+    Dividing each n_j by the mean cosine of its angles with the normals of the faces around it
+    gives third order inside, and changes the shape operator only to that order.
 
     Parameters
     ----------
@@ -56,12 +56,13 @@ def gauss_image(mesh: Any) -> Array:
     Returns
     -------
     ndarray, (n, 3)
-        On the side from which faces are anticlockwise; zero at vertices of no face.
+        They point to the side from which faces are anticlockwise; zero at vertices of no face.
 
     Notes
     -----
-    Fits reach two rings of vertices far, three on the boundary, where the vertices lie on one
-    side. Vertices beyond a fold weigh less: by the cosine of the angle between the normals.
+    Fits use two rings of vertices, on the boundary three, as they lie on one side there. A
+    vertex is weighted by the cosine of the angle between its normal and that at the centre, so
+    that vertices beyond a fold count less.
 
     Examples
     --------
@@ -88,7 +89,7 @@ def gauss_image(mesh: Any) -> Array:
 
 
 def _corners(mesh: Mesh) -> Any:
-    """Sparse matrix (n, m) with ones where a vertex is a corner of a face."""
+    """Build the sparse (n, m) incidence matrix of vertices and faces."""
     from scipy.sparse import csr_matrix
 
     he = mesh.half_edges
@@ -97,7 +98,7 @@ def _corners(mesh: Mesh) -> Any:
 
 
 def _mean_normals(mesh: Mesh, corners: Any) -> Array:
-    """Unit normals (n, 3): area-weighted means over the faces, z where they cancel."""
+    """Compute unit normals (n, 3): area-weighted means over the faces, z where they cancel."""
     p = mesh.frame.to_unit(mesh.vertices)
     sides = geometry.diagonals(*(components(p[c]) for c in topology.four_corners(mesh.faces).T))
     total = corners @ np.stack(geometry.cross(*sides), axis=1)
@@ -107,12 +108,12 @@ def _mean_normals(mesh: Mesh, corners: Any) -> Array:
 
 
 def _blocks(centre: Ints, around: Any) -> Iterator[tuple[Ints, Ints, NDArray[np.bool_]]]:
-    """Vertices, their neighbours (b, k), and which of these are none but padding."""
+    """Yield blocks of vertices, their neighbours (b, k), and a mask that is false for padding."""
     count = np.diff(around.indptr)
     order = np.argsort(count, kind="stable")
     start = 0
     while start < order.size:
-        # Rows are in order of their length, so that little is padded.
+        # Rows are sorted by length, so that there is little padding.
         width = np.maximum(count[order[start:]], 1)
         fit = np.flatnonzero(width * np.arange(1, width.size + 1) > _BLOCK)
         stop = start + max(int(fit[0]) if fit.size else width.size, 1)
@@ -127,9 +128,9 @@ def _blocks(centre: Ints, around: Any) -> Iterator[tuple[Ints, Ints, NDArray[np.
 def _jet_normals(
     points: Array, normals: Array, centre: Ints, near: Ints, there: NDArray[np.bool_]
 ) -> Array:
-    """Normals of cubic height fields over the planes normal to `normals` at `centre`."""
+    """Compute normals of cubic height fields over the planes normal to `normals` at `centre`."""
     up = normals[centre]
-    # Any vector that is not along the normal makes a frame.
+    # The coordinate axis farthest from the normal completes a frame.
     side = np.cross(up, np.eye(3)[np.abs(up).argmin(axis=1)])
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     frame = np.stack([side, np.cross(up, side), up], axis=2)

@@ -18,16 +18,16 @@ from gso.status import OptionError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Curvature times size below which a face counts as plane.
+#: Curvature times size below which a face counts as flat.
 FLAT = 0.01
 
 
 @dataclass(frozen=True)
 class ShapeOperator:
-    """How the faces of a surface are curved; arrays over its m faces.
+    """Curvatures and principal directions of a surface; arrays over its m faces.
 
     Curvatures are positive where the surface bends away from its normal, which points to the
-    side from which faces are anticlockwise: a sphere with normals to the outside has
+    side from which faces are anticlockwise: a sphere with outward normals has
     `H` = 1 / radius. Reversing the faces changes the signs of `H` and `curvatures`.
 
     Attributes
@@ -37,16 +37,16 @@ class ShapeOperator:
     normals : ndarray, (m, 3)
         Unit normals: of the parallelogram of edge midpoints, or of the triangle.
     areas : ndarray, (m,)
-        Areas of the faces, seen along their normals.
+        Areas of the faces, projected along their normals.
     K, H : ndarray, (m,)
         Gaussian and mean curvature, 1 / length^2 and 1 / length.
     curvatures : ndarray, (m, 2)
         Principal curvatures, 1 / length, the one of smaller absolute value first. Their mean is
-        `H`; their product is `K` up to the error of discretisation.
+        `H`; their product is `K` up to the discretisation error.
     directions : ndarray, (m, 2, 3)
-        Principal directions in the face's plane, orthonormal. Their signs mean nothing.
+        Principal directions in the face's plane, orthonormal. Their signs are arbitrary.
     flat : ndarray of bool, (m,)
-        Faces that count as plane: both curvatures are (nearly) zero, `directions` arbitrary.
+        Flat faces: both curvatures are (nearly) zero and `directions` arbitrary.
     """
 
     points: Array
@@ -60,7 +60,7 @@ class ShapeOperator:
 
     @property
     def rulings(self) -> Array:
-        """Direction in which the surface bends least (m, 3), zero where it is flat."""
+        """Unit direction in which the surface bends least (m, 3), zero where it is flat."""
         return np.where(self.flat[:, None], 0.0, self.directions[:, 0])
 
     @property
@@ -73,11 +73,11 @@ class ShapeOperator:
 
     @property
     def thickness(self) -> float:
-        """How far the Gauss image is from a curve: 0 for a developable surface, 1 for a sphere.
+        """Thickness of the Gauss image: 0 (a curve) for a developable surface, 1 for a sphere.
 
-        The integral of the principal curvatures' absolute product over that of the square
-        of the larger one: small disks on the surface have ellipses as images, and this is the
-        mean ratio of their width to their length. Flat faces do not count.
+        The integral of the absolute product of the principal curvatures over that of the square
+        of the larger one. The image of a small disk on the surface is an ellipse, and this is
+        the mean ratio of its width to its length. Flat faces are ignored.
         """
         low, high = self.curvatures[~self.flat].T
         areas = self.areas[~self.flat]
@@ -86,20 +86,20 @@ class ShapeOperator:
 
 
 def shape_operator(mesh: Any, *, flat: float = FLAT) -> ShapeOperator:
-    """Curvatures and principal directions of every face.
+    """Compute curvatures and principal directions of every face.
 
     The shape operator of a quad maps its diagonals to those of its image in the discrete
-    Gauss map (Jiang et al. 2020); that of a triangle is the derivative of the
-    normal interpolated from its corners (the data of Rusinkiewicz 2004). Principal curvatures
-    and directions are those of its symmetric part.
+    Gauss map (Jiang et al. 2020). That of a triangle is the derivative of the normal interpolated
+    from its corners (as in Rusinkiewicz 2004). Principal curvatures and directions are those of
+    its symmetric part.
 
     Parameters
     ----------
     mesh : Mesh, or anything that :func:`gso.as_mesh` takes
         Quads, triangles or both.
     flat : float
-        A face counts as plane when its curvatures times the surface's size (distance of the
-        farthest vertex from the centroid) are below it.
+        A face counts as flat if its curvatures times the surface's size (distance of the
+        farthest vertex from the centroid) are below this.
 
     Returns
     -------
@@ -111,13 +111,13 @@ def shape_operator(mesh: Any, *, flat: float = FLAT) -> ShapeOperator:
     MeshError
         The surface cannot be used.
     OptionError
-        `flat` is no number above zero.
+        `flat` is not a number above zero.
 
     Notes
     -----
-    `K`, `H` and the directions converge with the second power of the edge length on grids and
-    other smooth quad meshes, boundaries included, and with the first on irregular ones, on
-    triangles, and next to irregular vertices.
+    `K`, `H` and the directions converge with second order in the edge length on grids and other
+    smooth quad meshes, boundaries included, and with first order on irregular ones, on triangles,
+    and next to irregular vertices.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def shape_operator(mesh: Any, *, flat: float = FLAT) -> ShapeOperator:
     """
     surface = as_mesh(mesh)
     limit = checked_flat(flat)
-    # In the unit ball, where no square of a length is too large or too small.
+    # In the unit ball squared lengths neither overflow nor underflow.
     points, size = surface.frame.to_unit(surface.vertices), surface.frame.scale
     corners = topology.four_corners(surface.faces)
     s, (e, f, n), areas = face_matrices(points, gauss_image(surface), corners)
@@ -157,9 +157,9 @@ def shape_operator(mesh: Any, *, flat: float = FLAT) -> ShapeOperator:
 def face_matrices(
     points: Array, normals: Array, corners: Ints
 ) -> tuple[geometry.Matrix, tuple[Array, Array, Array], Array]:
-    """Shape operators of faces with four corners, their tangent frames, and their areas.
+    """Compute shape operators, tangent frames and areas of faces with four corners.
 
-    Of a triangle, whose last corner is its first one, the diagonals are two sides.
+    A triangle repeats its first corner as the last one, so that its diagonals are two sides.
     """
     tangents = geometry.diagonals(*(components(points[c]) for c in corners.T))
     turns = geometry.diagonals(*(components(normals[c]) for c in corners.T))
@@ -169,7 +169,7 @@ def face_matrices(
 
 
 def checked_flat(flat: float) -> float:
-    """The option, if it is a number above zero.
+    """Check that the option `flat` is a number above zero and return it.
 
     Raises
     ------

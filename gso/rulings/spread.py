@@ -1,4 +1,4 @@
-"""Which of many lines to keep so that they cover a surface evenly."""
+"""Selection of lines that cover a surface evenly."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from gso.mesh import Mesh
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Rounds in which lines move to the middle of what is nearest to them.
+#: Largest number of k-medoids iterations.
 _ROUNDS = 10
 
 
 def spread(points: Array, count: int) -> Ints:
-    """Numbers of `count` points (n, 3) far from each other, fewer if there are not as many.
+    """Select up to `count` points (n, 3) far from each other; return their indices.
 
-    The first is the one farthest from the centroid, each other one the farthest from those
+    The first is the one farthest from the centroid; each further one is the farthest from those
     before it (Gonzalez 1985).
 
     >>> spread(np.array([[0.0, 0, 0], [1, 0, 0], [5, 0, 0], [9, 0, 0]]), 3)
@@ -38,7 +38,7 @@ def spread(points: Array, count: int) -> Ints:
 
 
 def region_areas(mesh: Mesh, points: Array, triangles: Ints) -> Array:
-    """Area of the triangles (numbers) whose middles are nearest to each of the points (s, 3)."""
+    """Compute the area of the triangles (indices) whose centroids are nearest to each point."""
     from scipy.spatial import cKDTree
 
     if not len(points):
@@ -50,22 +50,22 @@ def region_areas(mesh: Mesh, points: Array, triangles: Ints) -> Array:
 
 
 def chosen(points: Array, lines: Sequence[Array], count: int, weights: Array) -> Ints:
-    """Numbers of `count` lines from which all points are near, in ascending order.
+    """Select up to `count` lines that are near all points; return ascending indices.
 
-    The weighted sum of the points' squared distances to the nearest line is made small by
-    k-medoids (Kaufman and Rousseeuw 1990): lines are taken one by one, the best each time;
-    then each gives way to the best one through the points that are nearest to it.
+    k-medoids (Kaufman and Rousseeuw 1990) reduces the weighted sum of squared distances of the
+    points to the nearest line. Lines are first added greedily. Then each is repeatedly replaced
+    by the best of the lines through the points nearest to it.
 
     Parameters
     ----------
     points : ndarray, (s, 3)
-        What is to be covered.
+        Points to cover.
     lines : sequence of ndarray, (k_i, 3)
-        A polyline through each of them, finely divided.
+        A finely sampled polyline through each point.
     count : int
-        How many to keep.
+        Number of lines to select.
     weights : ndarray, (s,)
-        What each point counts.
+        Weights of the points.
     """
     from scipy.spatial import cKDTree
 

@@ -1,9 +1,9 @@
-"""Lines across a triangulated surface along a field of directions, all at once.
+"""Tracing of lines along a direction field on a triangulated surface, all at once.
 
 Each triangle has one direction: that in which the normal interpolated from its corners turns
-least. Where the surface is developable the normal depends on one function only, and the
-lines are the level lines of its interpolant: they fit together across edges, and their error
-is of second order although the field is constant in each triangle.
+least. On a developable surface the normal depends on one scalar function only, and the lines
+are the level lines of its interpolant. They therefore match across edges, and their error is of
+second order although the field is constant in each triangle.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from gso.rulings.shape import face_matrices
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: A line ends where the direction turns by more than 60 degrees between two triangles.
+#: Cosine of the largest turn between two triangles, 60 degrees; at larger turns a line ends.
 _SHARP = 0.5
 
-#: Where two triangles both point to their common side a line goes along it, away from it by this
-#: share of the way so that it comes to another side.
+#: If two triangles both point to their common edge, a line follows the edge; it deviates from it
+#: by this share of the way, so that it reaches another edge.
 _TILT = 1e-3
 
-#: Share of the largest triangle's area below which one counts as having none.
+#: Triangles with less than this share of the largest triangle's area count as degenerate.
 _THIN = 1e-12
 
 
@@ -39,9 +39,9 @@ class Field:
     Attributes
     ----------
     directions : ndarray, (t, 3)
-        Unit vectors in the triangles' planes; the sign means nothing.
+        Unit vectors in the triangles' planes; the sign is arbitrary.
     rates : ndarray, (t, 3)
-        Change of the barycentric coordinates per length along them.
+        Derivatives of the barycentric coordinates along them, per length.
     flat : ndarray of bool, (t,)
         Triangles without a direction.
     """
@@ -52,10 +52,13 @@ class Field:
 
     @classmethod
     def of(cls, mesh: Mesh, limit: float) -> Field:
-        """Directions of least turn; none where curvatures are below `limit`, 1 / length."""
+        """Compute the directions in which the normal turns least.
+
+        Triangles with curvatures below `limit` (1 / length) have none.
+        """
         corners = topology.four_corners(mesh.triangles)
         s, (e, f, _), _ = face_matrices(mesh.vertices, gauss_image(mesh), corners)
-        # Eigenvectors of the transposed matrix times the matrix, whose eigenvalues are squares.
+        # Eigenvectors of s^T s; its eigenvalues are the squared singular values of s.
         (a, b), (c, d) = s
         high, _, angle = geometry.eigen(a * a + c * c, a * b + c * d, b * b + d * d)
         along = np.cos(angle)[:, None] * f - np.sin(angle)[:, None] * e
@@ -63,16 +66,16 @@ class Field:
 
     @classmethod
     def along(cls, mesh: Mesh, directions: Array, flat: NDArray[np.bool_]) -> Field:
-        """Given directions (t, 3), the lengths of which mean nothing."""
+        """Build a field from given directions (t, 3) of any length."""
         p = mesh.vertices[mesh.triangles]
         normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
         twice = np.linalg.norm(normal, axis=1)[:, None]
-        # A quad may have a triangle without area, which no line can cross.
+        # A quad may have a degenerate triangle, which no line can cross.
         thin = twice <= _THIN * twice.max()
         unit = directions / np.where(thin, 1.0, np.linalg.norm(directions, axis=1)[:, None])
         side = np.divide(np.cross(normal, unit), twice**2, out=np.zeros_like(unit), where=~thin)
-        # The gradient of a barycentric coordinate is the opposite side, turned, over twice the
-        # area.
+        # The gradient of a barycentric coordinate is the opposite edge, rotated by 90 degrees,
+        # over twice the area.
         opposite = np.roll(p, -2, axis=1) - np.roll(p, -1, axis=1)
         rates = -(opposite * side[:, None]).sum(axis=2)
         return cls(unit, rates, flat | thin[:, 0])
@@ -85,13 +88,13 @@ class Steps:
     Attributes
     ----------
     line : ndarray of int, (p,)
-        Which line.
+        Index of the line.
     triangle : ndarray of int, (p,)
-        Triangle that the point lies in.
+        Triangle in which the point lies.
     weights : ndarray, (p, 3)
-        Its barycentric coordinates.
+        Barycentric coordinates of the point.
     arrived : ndarray of bool, (lines,)
-        Lines that end at the boundary or at a flat region.
+        Whether the line ends at the boundary or at a flat region.
     """
 
     line: Ints
@@ -101,10 +104,10 @@ class Steps:
 
 
 def walk(mesh: Mesh, field: Field, start: Ints, sign: Array) -> Steps:
-    """Go from the middle of triangles along the field, with or against its directions.
+    """Trace lines from the centroids of triangles, with or against the directions of a field.
 
     Lines end at the boundary, before flat triangles, where the direction turns by more than
-    60 degrees, and when they are as long as the surface's diagonal.
+    60 degrees, and when their length reaches the surface's diagonal.
 
     Parameters
     ----------
@@ -113,7 +116,7 @@ def walk(mesh: Mesh, field: Field, start: Ints, sign: Array) -> Steps:
     field : Field
         Directions in its triangles.
     start : ndarray of int, (s,)
-        A triangle for each line, not flat.
+        Start triangle of each line, not flat.
     sign : ndarray, (s,)
         1 or -1: with the direction or against it.
     """
@@ -129,7 +132,7 @@ def walk(mesh: Mesh, field: Field, start: Ints, sign: Array) -> Steps:
     arrived = np.zeros(start.size, bool)
     found = [(at.line, at.triangle, at.weights)]
     side = at.leave()
-    # No line passes a triangle twice.
+    # Bounds the steps: a line crosses at most as many triangles as there are.
     for _ in range(len(mesh.triangles)):
         found.append((at.line, at.triangle, at.weights))
         across = twin[3 * at.triangle + side]
@@ -144,9 +147,10 @@ def walk(mesh: Mesh, field: Field, start: Ints, sign: Array) -> Steps:
 
 @dataclass
 class _Front:
-    """Where the lines under way are: in which triangle, going which way.
+    """State of the lines that have not ended: their triangles, positions and directions.
 
-    `rates` and `heading` as in :class:`Field`, with a sign; `left` is the length still to go.
+    `rates` and `heading` are `rates` and `directions` of :class:`Field` with the sign of the
+    line; `left` is the remaining length.
     """
 
     line: Ints
@@ -157,12 +161,12 @@ class _Front:
     left: Array
 
     def keep(self, which: NDArray[np.bool_]) -> None:
-        """Drop the other lines."""
+        """Drop all lines but those selected."""
         for name, values in vars(self).items():
             setattr(self, name, values[which])
 
     def leave(self) -> Ints:
-        """Go to the side of the triangle that lies ahead; return its number."""
+        """Advance to the edge of the triangle that lies ahead; return its number."""
         falling = self.rates < 0
         steps = np.full(self.rates.shape, np.inf)
         np.divide(self.weights, -self.rates, out=steps, where=falling)
@@ -178,10 +182,10 @@ class _Front:
     def cross(
         self, mesh: Mesh, field: Field, side: Ints, across: Ints, go: NDArray[np.bool_]
     ) -> Ints:
-        """Go through the next triangle to its side ahead; drop lines that end before it.
+        """Cross the next triangle to the edge ahead; drop lines that end before it.
 
-        `side` is the number of the side that the lines are on, `across` the half-edge on its
-        other side, `go` which lines have one. Returns the number of the side reached.
+        `side` is the number of the edge that the lines are on, `across` the twin half-edge, and
+        `go` selects the lines that continue. Returns the number of the edge reached.
         """
         side, across = side[go], across[go]
         self.keep(go)
@@ -203,7 +207,7 @@ class _Front:
         return self.leave()
 
     def _follow_side(self, mesh: Mesh, before: Array, side: Ints, which: NDArray[np.bool_]) -> None:
-        """Let lines that are turned back go along the side that they came through."""
+        """Make lines whose direction points back follow the edge that they came through."""
         rows = np.flatnonzero(which)
         side = side[rows]
         first = mesh.triangles[self.triangle[rows], side]

@@ -1,8 +1,8 @@
-"""Remove noise from surfaces, the amount of smoothing read off the noisy data alone.
+"""Noise removal from surfaces, with an amount of smoothing estimated from the data alone.
 
-:func:`smooth_grid` for grids, in closed form, some milliseconds at 64 x 64;
-:func:`smooth_mesh` for any mesh of triangles and quads. Both keep creases on request.
-:func:`estimate_sigma` tells only how strong a grid's noise is, and quickly.
+:func:`smooth_grid` smooths grids in closed form, in some milliseconds at 64 x 64;
+:func:`smooth_mesh` smooths any mesh of triangles and quads. Both preserve creases on request.
+:func:`estimate_sigma` only estimates the standard deviation of a grid's noise, and is faster.
 """
 
 from gso.smoothing.base import Smoothed

@@ -1,4 +1,4 @@
-"""What every smoother takes and returns: checks, a common unit of length, the result."""
+"""Shared code of the smoothers: input checks, a common unit of length, the result."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ class Smoothed:
     Attributes
     ----------
     points : ndarray
-        The surface, shaped and scaled like the input.
+        The surface, with the shape and unit of the input.
     order : int
-        Order of the differences that are penalised.
+        Order of the penalised differences.
     weight : float
-        Weight of the penalty (dimensionless). It can be handed back to the function that
-        made the result, as it is or multiplied, for less or more smoothing.
+        Weight of the penalty (dimensionless). Pass a multiple of it to the function that made
+        the result for less or more smoothing.
     sigma : float
         Estimated standard deviation of the noise per coordinate, in the unit of the input.
     dof : float
-        Degrees of freedom per coordinate that the result spends: the trace of the smoother,
-        between that of a plane (3) and the number of points.
+        Effective degrees of freedom per coordinate: the trace of the smoother, between that of
+        a plane (3) and the number of points.
     """
 
     points: Array
@@ -45,8 +45,8 @@ class Smoothed:
 class Frame:
     """Centroid and root-mean-square radius: smoothers work in ``(points - centre) / scale``.
 
-    `rounding` is the standard deviation of rounding in that unit, so that numbers far
-    from the origin are not taken for more exact than they are.
+    `rounding` is the standard deviation of rounding errors in that unit. It accounts for
+    coordinates far from the origin, which are less exact.
     """
 
     centre: Array
@@ -54,12 +54,12 @@ class Frame:
     rounding: float
 
     def to_user(self, points: Array) -> Array:
-        """Go back to the frame of the input."""
+        """Transform points back to the frame of the input."""
         return self.centre + self.scale * points
 
 
 def checked_points(points: ArrayLike, ndim: int) -> Array:
-    """Points as float64 (..., 3) with `ndim` axes.
+    """Convert points to float64 (..., 3) with `ndim` axes.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def checked_points(points: ArrayLike, ndim: int) -> Array:
 
 
 def checked_grid(points: ArrayLike) -> Array:
-    """Grid as float64 (H, W, 3).
+    """Convert a grid to float64 (H, W, 3).
 
     Raises
     ------
@@ -96,7 +96,7 @@ def checked_grid(points: ArrayLike) -> Array:
 def checked_options(
     order: int | None, orders: tuple[int, ...], weight: float | None, norm: str
 ) -> None:
-    """Refuse orders, weights and norms that mean nothing.
+    """Raise on an invalid order, weight or norm.
 
     Raises
     ------

@@ -1,15 +1,15 @@
 """Remove noise from grids with creases: folded paper, roofs, mitred sheets.
 
-The squared penalties of :mod:`gso.smoothing.grid` round creases off and ripple beside
-them. Here each second difference may be split into a *kink* z, which is charged by its
-length, and a *bend* w, which is charged only for changing along its grid line: the
-second-order relative of total generalised variation (Bredies, Kunisch and Pock 2010),
+The squared penalties of :mod:`gso.smoothing.grid` round creases off and cause ripples beside
+them. Here each second difference is split into a *kink* z, whose length is penalised, and a
+*bend* w, whose change along its grid line is penalised: a second-order relative of total
+generalised variation (Bredies, Kunisch and Pock 2010),
 
     1/2 |x - p|^2 + weight sigma sum |z| + c/2 sum |diff w|^2,     diff2 x = z + w,
 
-with z and w vectors in space. Kinks come out sparse, so that pieces between creases are
-smooth, or flat where c is infinite. Reweighting (Candes, Wakin and Boyd 2008) stops the
-charge from flattening the creases that remain.
+with z and w vectors in space. Kinks become sparse, so that pieces between creases are smooth,
+or flat if c is infinite. Reweighting (Candes, Wakin and Boyd 2008) keeps the penalty from
+flattening the remaining creases.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ Array = NDArray[np.float64]
 
 ORDERS = (2, 3)
 DEFAULT_WEIGHT = 3.0
-# Charge for changes of the bend, relative to the penalty parameter of the splitting, at
-# 64 samples; inf has no bend at all. The best one is chosen by Stein's risk estimate.
+# Weights c of changes of the bend, relative to the penalty parameter of the splitting, for
+# 64 samples; with inf there is no bend. Stein's risk estimate selects the best one.
 STIFFNESS = (np.inf, 1e5, 1e4, 1e3, 1e2, 1e1)
 ITERATIONS = 60
 REWEIGHTED_AT = (20, 30, 40)
-# Lengths in units of the noise: a kink that is charged half after reweighting, the most
-# by which one iteration shrinks a kink, and the size of the random probe.
+# Lengths in units of the noise: the kink whose weight reweighting halves, the most by which one
+# iteration shrinks a kink, and the amplitude of the random probe.
 KINK = 0.3
 STEP = 0.5
 PROBE = 0.1
@@ -42,17 +42,16 @@ PROBE = 0.1
 def smooth_creased_grid(
     points: Array, *, order: int | None = None, weight: float | None = None
 ) -> Smoothed:
-    """Smooth a noisy grid and keep its creases.
+    """Smooth a noisy grid and preserve its creases.
 
     Parameters
     ----------
     points : ndarray, (H, W, 3)
         Noisy surface, finite, from 3 x 3 up.
     order : {2, 3}, optional
-        2: pieces between creases are flat; 3: they are smooth. By default the data
-        decide.
+        2: pieces between creases are flat; 3: they are smooth. Chosen from the data by default.
     weight : float, optional
-        Charge for a kink in units of the noise, 3 by default.
+        Weight of the kinks in units of the noise, 3 by default.
 
     Returns
     -------
@@ -62,9 +61,10 @@ def smooth_creased_grid(
 
     Notes
     -----
-    Solved by alternating directions (Boyd et al. 2011): the linear step is diagonal in
-    the eigenvectors of two small matrices. The stiffness minimises Stein's unbiased
-    estimate of the risk (1981), its divergence probed as by Ramani, Blu and Unser (2008).
+    Solved by the alternating direction method of multipliers (Boyd et al. 2011), whose linear
+    step is diagonal in the eigenvectors of two small matrices. The weight c minimises Stein's
+    unbiased risk estimate (1981), with the divergence estimated by a random probe as in Ramani,
+    Blu and Unser (2008).
 
     Examples
     --------
@@ -104,7 +104,7 @@ def smooth_creased_grid(
 
 
 def _attached_frame(unit: Array) -> Array:
-    """Axes (3, 3) that turn with the grid, so that the random probe does, too."""
+    """Compute axes (3, 3) that rotate with the grid, and with them the random probe."""
     height, width = unit.shape[:2]
     along_u = np.linspace(-1, 1, height) @ unit.sum(axis=1)
     along_v = np.linspace(-1, 1, width) @ unit.sum(axis=0)
@@ -114,7 +114,7 @@ def _attached_frame(unit: Array) -> Array:
 
 
 def _stiffnesses(order: int | None, n: int) -> list[float]:
-    """Candidates; on finer grids the same bend changes less from sample to sample."""
+    """List the candidate weights c; they grow on fine grids, where w changes less per sample."""
     if order == 2:
         return [np.inf]
     finer = max(1.0, n / 64) ** 4
@@ -123,14 +123,14 @@ def _stiffnesses(order: int | None, n: int) -> list[float]:
 
 @dataclass(frozen=True)
 class Axis:
-    """Second differences along one axis, the best bend eliminated.
+    """Second differences along one axis, with the optimal bend w eliminated.
 
     Attributes
     ----------
     resist : ndarray, (n - 2, n - 2)
-        What remains of a second difference after the best bend is taken off.
+        Maps a second difference to its remainder after the optimal bend is subtracted.
     spread : ndarray, (n, n - 2)
-        Transposed second difference of that remainder.
+        `resist` followed by the transposed second difference.
     values, vectors : ndarray
         Eigendecomposition of the penalty on the n samples.
     """
@@ -154,7 +154,7 @@ def _axis(n: int, stiffness: float) -> Axis:
 
 @dataclass(frozen=True)
 class State:
-    """Kinks, scaled multipliers and charges along rows and columns."""
+    """Kinks, scaled multipliers and kink weights along both grid directions."""
 
     kink_u: Array
     kink_v: Array
@@ -167,7 +167,7 @@ class State:
 def _split(
     data: Array, charge: float, stiffness: float, start: State | None
 ) -> tuple[Array, State]:
-    """Minimise for a batch (b, 3, H, W) in units of the noise."""
+    """Minimise the energy for a batch (b, 3, H, W) in units of the noise."""
     height, width = data.shape[2:]
     along_u, along_v = _axis(height, stiffness), _axis(width, stiffness)
     rho = charge / STEP
@@ -205,5 +205,5 @@ def _length(vectors: Array) -> Array:
 
 
 def _clip(vectors: Array, radius: Array | float) -> Array:
-    """Vectors (b, 3, ...) shortened to a radius."""
+    """Shorten vectors (b, 3, ...) to at most a radius."""
     return vectors * np.minimum(1.0, radius / np.maximum(_length(vectors), 1e-300))

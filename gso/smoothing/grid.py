@@ -1,4 +1,4 @@
-"""Remove noise from grids, the amount of smoothing read off the noisy data alone."""
+"""Noise removal from grids, with an amount of smoothing estimated from the data alone."""
 
 from __future__ import annotations
 
@@ -34,34 +34,34 @@ def smooth_grid(
         mean |x - points|^2 + weight (mean |d^k x / du^k|^2 + mean |d^k x / dv^k|^2),
 
     k = `order` and both parameters on [0, 1]; polynomials of degree below k in each
-    parameter come back unchanged. It has a closed form in the eigenvectors of the
+    parameter are reproduced. It has a closed form in the eigenvectors of the
     one-dimensional penalties.
 
-    Without `weight`, each mode of the same eigenvectors keeps the share of it that is
-    signal, estimated as :mod:`gso.smoothing.spectrum` says. Orders 8, 4 and 2 are tried
-    and their results averaged by likelihood: high orders suit analytic surfaces, low
-    ones rough surfaces.
+    Without `weight`, each mode of these eigenvectors is scaled by its estimated share of
+    signal (see :mod:`gso.smoothing.spectrum`). The results of orders 8, 4 and 2 are averaged
+    with their likelihoods as weights: high orders suit analytic surfaces, low orders rough
+    ones.
 
     Parameters
     ----------
     points : array_like, (H, W, 3)
-        Noisy surface in any unit of length and any position, from 3 x 3 up; the noise is
-        taken to be independent and equally strong in every coordinate.
+        Noisy surface in any unit of length and any position, at least 3 x 3. The noise is
+        assumed to be independent and of equal variance in every coordinate.
     order : int, optional
         2 to 8; lowered to H - 1 and W - 1 on smaller grids. For ``norm="l1"``, 2 for
-        pieces that are flat or 3 for pieces that are smooth.
+        flat pieces or 3 for smooth pieces.
     weight : float, optional
         Amount of smoothing, dimensionless. For ``norm="l1"`` see
         :func:`gso.smoothing.crease.smooth_creased_grid`.
     norm : {"l2", "l1"}
-        "l1" keeps creases.
+        "l1" preserves creases.
 
     Returns
     -------
     Smoothed
-        Without `weight`, its `order` and `weight` are those of the plain smoother that
-        spends as many degrees of freedom, of the likeliest order or the next below that
-        can.
+        Without `weight`, its `weight` is that of the plain smoother with the same degrees of
+        freedom; its `order` is the most likely one, lowered if that smoother cannot have so
+        few.
 
     Raises
     ------
@@ -94,12 +94,12 @@ def smooth_grid(
 
 @lru_cache(maxsize=32)
 def modes(n: int, order: int) -> tuple[Array, Array]:
-    """Eigenvectors and eigenvalues of the free-ended difference penalty on n samples.
+    """Compute the eigenvectors and eigenvalues of the free-ended difference penalty.
 
     Parameters
     ----------
     n, order : int
-        Samples, and order of the differences; lowered to n - 1.
+        Number of samples, and order of the differences; lowered to n - 1.
 
     Returns
     -------
@@ -111,8 +111,9 @@ def modes(n: int, order: int) -> tuple[Array, Array]:
 
     Notes
     -----
-    Read-only, cached. Singular vectors of D, rather than eigenvectors of D^T D, keep
-    digits of the smoothest modes; orthogonalisation frees them of polynomials.
+    The arrays are cached and read-only. The singular vectors of D are more accurate for the
+    smoothest modes than the eigenvectors of D^T D; they are orthogonalised against the
+    polynomials.
     """
     order = min(order, n - 1)
     difference = np.diff(np.eye(n), order, axis=0)
@@ -126,7 +127,7 @@ def modes(n: int, order: int) -> tuple[Array, Array]:
 
 
 def estimate(unit: Array, order: int, rounding: float, start: Array | None) -> tuple[Law, Array]:
-    """Law of the spectrum of a centred grid in the modes of one order, and coefficients."""
+    """Fit the spectrum of a centred grid in the modes of one order; also return coefficients."""
     coefficients = _analyse(unit, order)
     energy = (coefficients**2).sum(axis=0)
     return Spectrum(energy, floor=rounding**2).fit(start), coefficients
@@ -178,22 +179,23 @@ def _whittaker(array: Array, order: int, weight: float) -> Smoothed:
 
 
 def _analyse(unit: Array, order: int) -> Array:
-    """Coefficients (3, H, W) of a grid (H, W, 3)."""
+    """Compute the coefficients (3, H, W) of a grid (H, W, 3)."""
     height, width = unit.shape[:2]
     return modes(height, order)[0].T @ np.moveaxis(unit, 2, 0) @ modes(width, order)[0]
 
 
 def _synthesise(coefficients: Array, order: int) -> Array:
-    """Grid (H, W, 3) of coefficients (3, H, W)."""
+    """Compute the grid (H, W, 3) with given coefficients (3, H, W)."""
     _, height, width = coefficients.shape
     planes = modes(height, order)[0] @ coefficients @ modes(width, order)[0].T
     return np.moveaxis(planes, 0, 2)
 
 
 def _plain_equivalent(height: int, width: int, order: int, dof: float) -> tuple[int, float]:
-    """Order and weight with which the plain smoother has a given trace.
+    """Find the order and weight with which the plain smoother has a given trace.
 
-    The order falls until its polynomials leave room for the trace, to 2 at the lowest.
+    The order is lowered, to 2 at the lowest, until its polynomials, which are always kept, are
+    fewer than the trace.
     """
     while order > 2 and min(order, height - 1) * min(order, width - 1) >= dof:
         order -= 1

@@ -1,4 +1,4 @@
-"""Remove noise from any mesh of triangles and quads, open or closed."""
+"""Noise removal from any mesh of triangles and quads, open or closed."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from gso.smoothing.select import Choice, best_weight, factor, gcv, largest_weigh
 Array = NDArray[np.float64]
 
 ORDERS = (2, 3, 4)
-# Caution of the cross-validation that chooses the first, coarse smoothing.
+# Cost of degrees of freedom in the cross-validation that chooses the first, coarse smoothing.
 CAUTION = 1.2
-# Noise below this share of the size is rounding.
+# Noise below this share of the size counts as rounding.
 NOTHING = 1e-12
 # Lower quartile of a standard normal variable.
 QUARTILE = -0.6745
-# The noise is at most so many times that of planes through single rings: mostly flat,
-# even between dense creases, but tilted where the noise is as large as the edges.
+# Upper bound on the noise, relative to an estimate from planes fitted to single rings. Such rings
+# are mostly flat, even between dense creases, but tilted if the noise is as large as the edges.
 SLACK = 1.15
-# Patches rougher than so many times the median lose trust, falling from pass to pass.
+# Roughness, relative to the median, at which a patch's trust is halved, pass by pass.
 FALLING = (np.inf, 4.0, 3.0, 2.0, 2.0, 2.0)
 
 
@@ -51,31 +51,31 @@ def smooth_mesh(
 
         mean |x - vertices|^2 + weight sum_p share_p |residual_p(x)|^2 / radius_p^(2 order)
 
-    over patches p of neighbouring vertices, where the residual is what a polynomial of
-    degree below `order` over the plane of the patch leaves
-    (:mod:`gso.smoothing.patches`), shares are shares of area, and the unit of length is
-    the root-mean-square distance from the centroid. The planes come from a mesh smoothed
-    before: by an umbrella operator whose weight minimises a generalised cross-validation,
-    then with planes on single rings. The noise is read off the patches, and the weight
-    minimises Mallows' unbiased risk estimate (:mod:`gso.smoothing.select`).
+    over patches p of neighbouring vertices. The residual is that of a fit by a polynomial of
+    degree below `order` over the plane of the patch (:mod:`gso.smoothing.patches`), shares are
+    shares of area, and the unit of length is the root-mean-square distance from the centroid.
+    The planes come from a mesh smoothed beforehand: by an umbrella operator whose weight
+    minimises a generalised cross-validation, then with planes on single rings. The noise is
+    estimated from the patches, and the weight minimises Mallows' unbiased risk estimate
+    (:mod:`gso.smoothing.select`).
 
     Parameters
     ----------
     vertices : array_like, (n, 3)
-        Noisy vertices in any unit of length and any position; the noise is taken to be
-        independent and equally strong in every coordinate.
+        Noisy vertices in any unit of length and any position. The noise is assumed to be
+        independent and of equal variance in every coordinate.
     faces : array_like of int, (m, 3) or (m, 4)
         Vertex indices; a triangle among quads ends in -1. Boundaries and holes are free.
-        Vertices of no face stay where they are and count in nothing.
+        Vertices of no face are ignored and returned unchanged.
     order : {2, 3, 4}, optional
-        2 has patches of one ring of faces, 3 and 4 of two. 4 by default; for
-        ``norm="l1"`` 2 or 3, whichever spends fewer degrees of freedom.
+        Patches have one ring of faces for 2, two rings for 3 and 4. 4 by default; for
+        ``norm="l1"`` 2 or 3, whichever has fewer degrees of freedom.
     weight : float, optional
         Amount of smoothing, dimensionless.
     norm : {"l2", "l1"}
-        "l1" keeps creases: patches that stay rougher than most are trusted less and
-        less, so that each side of a crease is smoothed by itself (iteratively reweighted
-        least squares with the Cauchy function; Holland and Welsch 1977).
+        "l1" preserves creases: patches rougher than most get lower and lower weights, so that
+        each side of a crease is smoothed separately (iteratively reweighted least squares with
+        the Cauchy function; Holland and Welsch 1977).
 
     Returns
     -------
@@ -102,7 +102,7 @@ def smooth_mesh(
     given = checked_points(vertices, 2)
     every = checked_faces(faces, len(given))
     checked_options(order, ORDERS if norm == "l2" else ORDERS[:2], weight, norm)
-    # A vertex of no face may lie anywhere: it must not count in sizes, medians and traces.
+    # Vertices of no face may lie anywhere: they must not affect sizes, medians and traces.
     used, table = used_only(every)
     points = given[used]
     unit, frame = to_unit(points)
@@ -115,7 +115,7 @@ def smooth_mesh(
     else:
         orders = ORDERS[:2] if order is None else (order,)
         trials = [_creased(unit, pilot, near, k, weight, at_most) for k in orders]
-        # Both leave residuals as large as the noise; fewer degrees of freedom explain it.
+        # Residuals of both are as large as the noise; the fewer degrees of freedom win.
         done, order, sigma = min(trials, key=lambda trial: trial[0].dof)
     smoothed = given.copy()
     smoothed[used] = frame.to_user(done.points)
@@ -176,11 +176,11 @@ def _solve(penalty: Any, unit: Array, start: float, sigma: float, weight: float 
 
 
 def noise(points: Array, local: Residuals) -> float:
-    """Standard deviation of the noise per coordinate, robust against creases.
+    """Estimate the standard deviation of the noise per coordinate, robustly against creases.
 
-    Residuals along the normals of the patches, each of which estimates the variance;
-    creases and curvature only ever add to it, so the lower quartile is taken, each value
-    divided by that of a chi-squared variable (Wilson and Hilferty 1931).
+    The residuals of each patch along its normal give one estimate. Creases and curvature only
+    increase it, so the lower quartile over the patches is used, after each estimate is divided
+    by the lower quartile for a chi-squared variable (Wilson and Hilferty 1931).
     """
     enough = local.freedom >= 3
     if not enough.any():

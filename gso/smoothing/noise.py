@@ -1,4 +1,4 @@
-"""How strong the noise of a grid is, from its differences alone."""
+"""The standard deviation of a grid's noise, from its differences alone."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ _MEDIAN = 2.0 * float(gammaincinv(1.5, 0.5))
 
 
 def estimate_sigma(points: ArrayLike) -> float:
-    """Standard deviation of a grid's noise, per coordinate.
+    """Estimate the standard deviation of a grid's noise, per coordinate.
 
-    The noise is read off mixed differences, of third order in both directions at once, as
-    Immerkaer (1996) does with second ones on images. They leave next to nothing of a surface
-    whose waves are more than ten vertices long, or of creases along the grid; their median
-    (Donoho and Johnstone 1994) does not see the few that other creases and steps make large.
-    Noise that neighbours share is underestimated. At 64 x 64 the estimate scatters by 1.8 %,
-    more than twice as much as that of :func:`smooth_grid`, which takes over ten times as long.
+    The estimate uses mixed differences, of third order in both directions at once; Immerkaer
+    (1996) uses second differences of images. They nearly cancel surfaces with wavelengths above
+    ten vertices, and creases along the grid. Their median (Donoho and Johnstone 1994) is robust
+    to the few large differences at other creases and steps. Noise that is correlated between
+    neighbours is underestimated. At 64 x 64 the estimate scatters by 1.8 %, more than twice as
+    much as that of :func:`smooth_grid`, which takes over ten times as long.
 
     Parameters
     ----------
     points : array_like, (H, W, 3)
-        Noisy surface in any unit of length and any position, from 3 x 3 up; the noise is
-        taken to be independent and equally strong in every coordinate. Orders are lowered
+        Noisy surface in any unit of length and any position, at least 3 x 3. The noise is
+        assumed to be independent and of equal variance in every coordinate. Orders are lowered
         to H - 1 and W - 1 on smaller grids.
 
     Returns
@@ -57,6 +57,6 @@ def estimate_sigma(points: ArrayLike) -> float:
     for axis in (0, 1):
         order = min(_ORDER, rest.shape[axis] - 1)
         rest = np.diff(rest, order, axis=axis)
-        # The sum of the squared binomial coefficients, by which variances grow.
+        # Variances grow by the sum of the squared binomial coefficients.
         gain *= comb(2 * order, order)
     return size * float(np.sqrt(np.median((rest**2).sum(axis=-1)) / (gain * _MEDIAN)))

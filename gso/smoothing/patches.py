@@ -1,11 +1,11 @@
-"""What a mesh is not, locally: the part of each patch that no low polynomial fits.
+"""Residuals of local polynomial fits to a mesh, as a smoothness penalty.
 
 A *patch* is a vertex and its neighbours. Over the plane of the patch, least squares fits
-each coordinate by a polynomial of degree below `order`; what is left is the residual. The
-sum of squared residuals plays the role that squared differences play on a grid: it does
-not see polynomials, and as patches at the rim are simply one-sided, it leaves free ends,
-so that boundaries and holes do not shrink (the local fits of Savitzky and Golay 1964,
-turned into a penalty as by Whittaker 1923).
+each coordinate by a polynomial of degree below `order` and leaves a residual. The sum of
+squared residuals plays the role of squared differences on a grid: it is zero for polynomials,
+and as patches at the boundary are one-sided, it has free ends, so that boundaries and holes
+do not shrink (the local fits of Savitzky and Golay 1964, turned into a penalty like that of
+Whittaker 1923).
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from gso.status import MeshError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Around a pole with hundreds of faces so many vertices are enough for a fit.
+# Largest number of vertices in a fit; more, as around a pole with hundreds of faces, are sampled.
 LARGEST = 64
 
 
 def checked_faces(faces: Any, count: int) -> Ints:
-    """Faces as integers (m, 3) or (m, 4), a missing fourth corner as -1.
+    """Convert faces to integers (m, 3) or (m, 4), with a missing fourth corner as -1.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def checked_faces(faces: Any, count: int) -> Ints:
 
 
 def used_only(faces: Ints) -> tuple[Ints, Ints]:
-    """Vertices that faces refer to, ascending, and the faces in terms of them.
+    """Return the vertices that faces refer to, ascending, and the faces renumbered to them.
 
     >>> used, table = used_only(np.array([[7, 3, 5, -1], [3, 7, 9, 4]]))
     >>> used, table.tolist()
@@ -63,7 +63,7 @@ def used_only(faces: Ints) -> tuple[Ints, Ints]:
 
 
 def neighbours(faces: Ints, count: int) -> Any:
-    """Sparse (n, n) pattern of ones: vertices that share a face, each with itself."""
+    """Build the sparse (n, n) pattern of ones of vertices that share a face, with diagonal."""
     from scipy.sparse import csr_matrix, identity
 
     real = faces >= 0
@@ -74,7 +74,7 @@ def neighbours(faces: Ints, count: int) -> Any:
 
 
 def boundary_edges(faces: Ints, count: int) -> Ints:
-    """Edges (b, 2) with one face."""
+    """Return the edges (b, 2) with one face."""
     if faces.shape[1] == 4:
         last = np.where(faces[:, 3:] < 0, faces[:, :1], faces[:, 3:])
         faces = np.hstack([faces[:, :3], last])
@@ -85,10 +85,10 @@ def boundary_edges(faces: Ints, count: int) -> Ints:
 
 
 def umbrella(near: Any, boundary: Ints) -> Any:
-    """Sparse (n, n) operator: each vertex less the mean of its neighbours.
+    """Build the sparse (n, n) umbrella operator: each vertex minus the mean of its neighbours.
 
-    Vertices of the boundary have their neighbours along the boundary only, so that the
-    operator does not pull the boundary inwards (Taubin 1995).
+    Boundary vertices use their neighbours along the boundary only, so that the operator does
+    not pull the boundary inwards (Taubin 1995).
 
     >>> faces = np.array([[0, 1, 2, 3]])
     >>> umbrella(neighbours(faces, 4), boundary_edges(faces, 4)).toarray()[0]
@@ -109,14 +109,14 @@ def umbrella(near: Any, boundary: Ints) -> Any:
 
 @dataclass(frozen=True)
 class Rings:
-    """Padded vertex lists: `index` (p, k) of vertices, `real` (p, k) which entries count."""
+    """Padded vertex lists: `index` (p, k) of vertices, `real` (p, k) false for padding."""
 
     index: Ints
     real: NDArray[np.bool_]
 
 
 def rings(near: Any, size: int) -> Rings:
-    """Vertices within `size` faces of each vertex; of very many, a regular sample."""
+    """Collect the vertices within `size` faces of each vertex; a regular sample if too many."""
     reach = near
     for _ in range(size - 1):
         reach = _pattern(reach @ near)
@@ -146,10 +146,10 @@ class Residuals:
     normal : ndarray, (p, 3)
         Normal of the plane of each patch.
     freedom : ndarray, (p,)
-        Vertices of a patch less coefficients of its fit.
+        Degrees of freedom: vertices of a patch minus coefficients of its fit.
     scale : ndarray, (p,)
-        Factor that turns squared residuals into derivatives squared times area; their
-        sum over patches does not change with the resolution.
+        Factor that turns squared residuals into squared derivatives times area, whose sum over
+        patches does not depend on the resolution.
     rows : sparse matrix, (p d, n)
         The basis, one polynomial per row.
     """
@@ -162,7 +162,7 @@ class Residuals:
     rows: Any
 
     def penalty(self, trust: Array | None = None) -> Any:
-        """Sparse (n, n) matrix of the sum of squared residuals, by patch times `trust`."""
+        """Build the sparse (n, n) matrix of the sum of squared residuals, weighted by `trust`."""
         from scipy.sparse import diags
 
         factor = self.scale if trust is None else self.scale * trust
@@ -173,7 +173,7 @@ class Residuals:
         return (diags(total) - fitted).tocsc()
 
     def heights(self, points: Array) -> Array:
-        """Root-mean-square residual of each patch along its normal, (p,); zero if fitted."""
+        """Compute the RMS residual of each patch along its normal, (p,); zero for exact fits."""
         away = np.einsum("pkc,pc->pk", points[self.rings.index], self.normal) * self.rings.real
         fit = np.einsum("pkd,pk->pd", self.basis, away)
         away = away - np.einsum("pkd,pd->pk", self.basis, fit)
@@ -186,7 +186,7 @@ def residuals(points: Array, patches: Rings, order: int) -> Residuals:
     Parameters
     ----------
     points : ndarray, (n, 3)
-        Where the patches lie; noise in them should be small beside the edges.
+        Vertices that define the planes; their noise should be small compared with the edges.
     patches : Rings
     order : int
         2: planes, 3: quadrics, 4: cubics.
@@ -215,7 +215,7 @@ def residuals(points: Array, patches: Rings, order: int) -> Residuals:
     values = np.swapaxes(basis, 1, 2)[entries]
     rows = csr_matrix((values, columns, starts), shape=(len(real) * width, len(points)))
     scale = radius ** (2 - 2 * order) * (len(points) / (radius**2).sum())
-    # Slivers must not outweigh everything else.
+    # Sliver faces must not dominate the sum.
     scale = np.minimum(scale, 100 * np.median(scale))
     freedom = np.maximum(size - known.sum(axis=1), 0).astype(float)
     return Residuals(patches, basis, axes[:, :, 0], freedom, scale, rows)

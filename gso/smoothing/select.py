@@ -1,10 +1,10 @@
-"""Choose the weight of a quadratic penalty on a mesh without trying each weight.
+"""Selection of the weight of a quadratic penalty without a solve for each weight.
 
 The smoother of weight w is H = (I + w K)^-1. Lanczos steps with the inverse of
-I + s K, one factorisation for one shift s, give Gauss quadratures of every y^T f(K) y,
-and hence residual and trace for all w within a decade or so of s (Golub and
-Meurant 2010); the trace from random signs (Hutchinson 1990). The same steps hold the
-smoothed surface for each of these weights.
+I + s K, with one factorisation for one shift s, give Gauss quadratures of every y^T f(K) y.
+Hence they give residual and trace for all w within about a decade of s (Golub and
+Meurant 2010), the trace with random signs (Hutchinson 1990), and the smoothed surface for
+each of these weights.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ Array = NDArray[np.float64]
 STEPS = 10
 PROBES = 2
 ROUNDS = 6
-REACH = np.arange(-1.5, 3.05, 0.1)  # decades around the shift that are looked at
-BAND = 500  # widest band that is factored as one
-NEAR = 1.2  # an optimum within so many decades is final
-STEEPEST = 1e14  # larger entries of weight K leave no digit of the data
+REACH = np.arange(-1.5, 3.05, 0.1)  # decades around the shift that are evaluated
+BAND = 500  # largest bandwidth for a banded factorisation
+NEAR = 1.2  # an optimum within this many decades of the shift is accepted
+STEEPEST = 1e14  # with larger entries of weight K, the identity is lost to rounding
 
 
 class Family:
@@ -59,7 +59,7 @@ class Family:
             beta = np.linalg.norm(image, axis=0)
             diagonal.append(alpha)
             beside.append(beta)
-            # A start that is spent, an eigenvector say, goes on as zeros.
+            # An exhausted Krylov space, as of an eigenvector, continues with zeros.
             last, vector = vector, image / np.where(beta > 1e-13, beta, np.inf)
         tridiagonal = np.zeros((start.shape[1], len(basis), len(basis)))
         k = np.arange(len(basis))
@@ -74,11 +74,11 @@ class Family:
 
     @property
     def weights(self) -> Array:
-        """Weights around the shift; the far ones are good enough to move it there."""
+        """Weights around the shift; far ones are just accurate enough to move the shift there."""
         return self.shift * 10**REACH
 
     def removed(self) -> tuple[Array, Array]:
-        """Sum of squared residuals, and trace of I - H, for each weight."""
+        """Compute the sum of squared residuals, and the trace of I - H, for each weight."""
         share = self.weights[:, None, None] * self.eigenvalues
         share = share / (1 + share)
         energy = self.shares[:3] * self.length[:3, None] ** 2
@@ -87,7 +87,7 @@ class Family:
         return residual, trace
 
     def smooth(self, weight: float) -> Array:
-        """The surface for a weight in range, (n, 3)."""
+        """Compute the smoothed surface (n, 3) for a weight in the range."""
         share = 1 / (1 + weight * self.eigenvalues[:3])
         mixed = (
             np.einsum("ckm,cm->ck", self.mix[:3], share * self.first[:3]) * self.length[:3, None]
@@ -108,7 +108,7 @@ Criterion = Callable[[Array, Array, int], Array]
 
 
 def largest_weight(penalty: Any) -> float:
-    """Largest weight with which I + weight K still has digits of I; inf without a penalty."""
+    """Compute the largest weight at which I is not lost in I + weight K; inf if K is zero."""
     steepest = float(np.abs(penalty.diagonal()).max())
     return STEEPEST / steepest if steepest > 0 else np.inf
 
@@ -121,7 +121,7 @@ def best_weight(penalty: Any, points: Array, start: float, criterion: Criterion)
         family = Family(penalty, points, shift)
         residual, trace = family.removed()
         score = criterion(residual, trace, len(points))
-        # A shift that sends the search up is a lower bound from then on, and conversely.
+        # A shift from which the search went up becomes a lower bound, and conversely.
         outside = (family.weights < low) | (family.weights > high)
         best = int(np.argmin(np.where(outside, np.inf, score)))
         weight = float(family.weights[best])
@@ -135,23 +135,23 @@ def best_weight(penalty: Any, points: Array, start: float, criterion: Criterion)
 
 
 def gcv(caution: float) -> Criterion:
-    """Generalised cross-validation (Golub, Heath and Wahba 1979).
+    """Return the criterion of generalised cross-validation (Golub, Heath and Wahba 1979).
 
-    `caution` above one charges more for degrees of freedom and so keeps clear of
-    interpolation (Cummins, Filloon and Nychka 2001).
+    A `caution` above one increases the cost of degrees of freedom and so avoids interpolation
+    (Cummins, Filloon and Nychka 2001).
     """
 
     def score(residual: Array, trace: Array, count: int) -> Array:
         left = count - caution * (count - trace)
         safe = np.log(np.maximum(residual, 1e-300)) - 2 * np.log(np.maximum(left, 1e-300))
-        # Where nothing is left, more smoothing is better.
+        # Without residual degrees of freedom, prefer more smoothing.
         return np.where(left > 1e-3 * count, safe, 1e6 - trace)
 
     return score
 
 
 def unbiased_risk(variance: float) -> Criterion:
-    """Mallows' unbiased risk estimate for a known noise variance per coordinate (1973)."""
+    """Return Mallows' unbiased risk estimate (1973) for a known noise variance per coordinate."""
 
     def score(residual: Array, trace: Array, count: int) -> Array:
         return residual / (3 * count) + variance * (1 - 2 * trace / count)
@@ -160,10 +160,10 @@ def unbiased_risk(variance: float) -> Criterion:
 
 
 def factor(penalty: Any, weight: float) -> Callable[[Array], Array]:
-    """Solver of (I + weight K) x = y for columns y, (n, c).
+    """Factorise I + weight K and return a solver for right-hand sides (n, c).
 
-    In the order of Cuthill and McKee (1969) a mesh of some thousand vertices is a narrow
-    band, which LAPACK factors several times faster than a sparse factorisation does.
+    In the order of Cuthill and McKee (1969) the matrix of a mesh of some thousand vertices has
+    a narrow band, which LAPACK factorises several times faster than a sparse solver does.
 
     >>> from scipy.sparse import identity
     >>> factor(identity(3), 1.0)(np.ones((3, 1))).ravel()
@@ -189,7 +189,7 @@ def factor(penalty: Any, weight: float) -> Callable[[Array], Array]:
         try:
             lower = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
         except LinAlgError:
-            pass  # rounding has made it indefinite, which the other factorisation survives
+            pass  # indefinite by rounding, which the LU factorisation tolerates
         else:
 
             def solve(right: Array) -> Array:

@@ -1,17 +1,17 @@
-"""How much of each mode of a noisy grid is signal: an empirical Bayes estimate.
+"""The share of signal in each mode of a noisy grid: an empirical Bayes estimate.
 
-A grid is taken apart into products of one-dimensional modes, mode (i, j) with energy
-E_ij, the squared length of its coefficient vector. Noise puts the same variance sigma^2
-into every mode; the surface puts more into low modes than into high ones. The signal's
-share of the variance follows a decaying law with five parameters,
+A grid is decomposed into products of one-dimensional modes. Mode (i, j) has the energy E_ij,
+the squared length of its coefficient vector. Noise has the same variance sigma^2 in every
+mode; the signal has more variance in low modes than in high ones. The ratio s of the signal's
+variance to sigma^2 follows a decaying law with five parameters,
 
     log s_ij = a - p log(1 + t_ij / p),      t_ij = T ((i / m)^q + (j / n)^q),
 
-with T such that s = 1 at (m, 0) and (0, n): m and n are the modes at which the signal
-drowns, one per direction. Large p makes it a stretched exponential, as for analytic
-surfaces, small p a power law, as for rough ones. The parameters maximise the restricted
-likelihood (Patterson and Thompson 1971): planes are fitted, not penalised. The best
-linear estimate then keeps s / (1 + s) of a mode (Wiener 1949).
+with T such that s = 1 at (m, 0) and (0, n): m and n are the modes, one per direction, at which
+signal and noise are equal. Large p gives a stretched exponential, as for analytic surfaces,
+small p a power law, as for rough ones. The parameters maximise the restricted likelihood
+(Patterson and Thompson 1971): planes are fitted, not penalised. The best linear estimate
+scales a mode by s / (1 + s) (Wiener 1949).
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Parameters are (a, log m, log n, log q, log p). The weak Gaussian prior keeps them
-# sensible on tiny grids; on ordinary ones the data decide.
+# Parameters are (a, log m, log n, log q, log p). A weak Gaussian prior regularises the fit on
+# tiny grids; on larger ones it has little effect.
 CENTRE = np.array([12.0, 1.0, 1.0, np.log(1.3), np.log(8.0)])
 SPREAD = np.array([20.0, 5.0, 5.0, 0.7, 1.0])
 LOWEST = np.array([0.5, -3.0, -3.0, np.log(0.3), np.log(0.5)])
 HIGHEST = np.array([75.0, 9.0, 9.0, np.log(8.0), np.log(60.0)])
 LARGEST_STEP = np.array([3.0, 0.7, 0.7, 0.4, 0.7])
-# Variance, of a grid of radius one, up to which no waves can be among the noise.
+# Noise variance, for a grid of radius one, up to which the fit does not look for short waves.
 NO_WAVES = 1e-8
 
 
@@ -42,7 +42,7 @@ def _starts(modes: tuple[int, ...], levels: tuple[float, ...]) -> Array:
     )
 
 
-# Where the fit begins: with smooth surfaces, and with waves that may be a few samples long.
+# Initial parameters of the fit: for smooth surfaces, and for waves as short as a few samples.
 STARTS = _starts((2, 5, 12), (6.0, 14.0))
 WAVES = _starts((2, 5, 12, 25, 45), (6.0, 14.0, 25.0))
 WAVES = WAVES[WAVES[:, 1:3].max(axis=1) > STARTS[:, 1].max()]
@@ -50,10 +50,10 @@ WAVES = WAVES[WAVES[:, 1:3].max(axis=1) > STARTS[:, 1].max()]
 
 @lru_cache(maxsize=64)
 def bins(n: int) -> tuple[NDArray[np.int64], Array, Array]:
-    """Start, size and centre of bins of neighbouring modes.
+    """Compute start, size and centre of bins of neighbouring modes.
 
-    Modes below 12 have a bin each; later bins are about an eighth of their mode number
-    wide, over which the law hardly changes. So 64 modes make 28 bins, 256 make 40.
+    Modes below 12 have a bin each; the width of later bins is about an eighth of their mode
+    number, over which the law hardly changes. So 64 modes make 28 bins, 256 make 40.
     """
     edges = [0]
     while edges[-1] < n:
@@ -65,7 +65,7 @@ def bins(n: int) -> tuple[NDArray[np.int64], Array, Array]:
 
 @dataclass(frozen=True)
 class Law:
-    """A fitted law: its parameters, the noise variance, and the criterion it minimised."""
+    """A fitted law: its parameters, the noise variance, and the value of the criterion."""
 
     parameters: Array
     variance: float
@@ -80,7 +80,7 @@ class Spectrum:
     energy : ndarray, (H, W)
         Squared lengths of the coefficient vectors.
     floor : float
-        Variance below which noise is not told from rounding.
+        Variance below which noise cannot be distinguished from rounding.
     components : int
         Components of a coefficient vector.
     """
@@ -96,18 +96,18 @@ class Spectrum:
         self.log_i, self.log_j = _log(ci), _log(cj)
 
     def fit(self, start: Array | None = None) -> Law:
-        """Find the parameters from a start, or from the likeliest ones.
+        """Fit the parameters from a given start, or from the most likely of a list.
 
-        The criterion is minus twice the restricted log-likelihood, sigma^2 profiled out,
-        plus the prior. Waves a few samples long are a second optimum, apart from that of a smooth
-        surface: where they are a likelier start, and what is taken for noise is enough to be
-        waves, the fit begins there, too.
+        The criterion is minus twice the restricted log-likelihood, with sigma^2 profiled out,
+        plus the prior. Waves a few samples long are a separate optimum from that of a smooth
+        surface. If parameters for such waves are a more likely start, and the noise variance
+        found is large enough to contain waves, the fit is repeated from there.
         """
         if start is not None:
             return self._improved(start)
         scores = self._scores(STARTS)
         law = self._improved(STARTS[scores.argmin()])
-        # Beyond the last mode signal would be as flat as noise.
+        # With m or n beyond the last mode, the signal would be as flat as noise.
         waves = WAVES[(WAVES[:, 1:3] <= [self.log_i[-1], self.log_j[-1]]).all(axis=1)]
         if law.variance > NO_WAVES and len(waves):
             among = self._scores(waves)
@@ -116,7 +116,7 @@ class Spectrum:
         return law
 
     def _improved(self, point: Array, steps: int = 40, tolerance: float = 1e-2) -> Law:
-        """Fisher scoring with Levenberg's damping."""
+        """Minimise the criterion by Fisher scoring with Levenberg's damping."""
         score, gradient, hessian, variance = self._expand(point)
         damping = 1e-2
         for _ in range(steps):
@@ -137,7 +137,7 @@ class Spectrum:
         return Law(point, variance, score)
 
     def _scores(self, points: Array) -> Array:
-        """Criterion at each of many points (n, 5)."""
+        """Compute the criterion at each of many points (n, 5)."""
         share = _log_share(points, self.log_i, self.log_j).reshape(len(points), -1)
         v = 1 + np.exp(share[:, self.keep])
         variance = (self.energy / v).sum(axis=1) / self.total
@@ -145,7 +145,7 @@ class Spectrum:
         return self.total * np.log(variance) + np.log(v) @ self.count + away.sum(axis=1)
 
     def _expand(self, point: Array) -> tuple[float, Array, Array, float]:
-        """Criterion, minus its gradient, expected Hessian, noise variance at a point."""
+        """Compute criterion, negative gradient, expected Hessian and noise variance at a point."""
         share, slope = _log_share_and_slope(point, self.log_i, self.log_j)
         signal = np.exp(share.ravel()[self.keep])
         slope = slope.reshape(5, -1)[:, self.keep]
@@ -165,7 +165,7 @@ class Spectrum:
 
 
 def shrinkage(law: Law, height: int, width: int) -> Array:
-    """Share of each mode that is signal, (H, W) in [0, 1]; one for the modes of a plane.
+    """Compute the share of signal in each mode, (H, W) in [0, 1]; one for the modes of a plane.
 
     >>> law = Law(CENTRE, 1.0, 0.0)
     >>> shrinkage(law, 4, 4)[:2, :2].round(3)
@@ -191,7 +191,7 @@ def _powers(point: Array, log_i: Array, log_j: Array) -> tuple[Array, Array]:
 
 
 def _log_share(point: Array, log_i: Array, log_j: Array) -> Array:
-    """Logarithm of s_ij / sigma^2, (..., i, j), at points (..., 5)."""
+    """Compute log s_ij, (..., i, j), at points (..., 5)."""
     u, v = _powers(point, log_i, log_j)
     a, p = point[..., 0, None, None], np.exp(point[..., 4, None, None])
     return a - p * np.log1p(np.expm1(a / p) * (u[..., :, None] + v[..., None, :]))

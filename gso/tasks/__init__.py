@@ -21,14 +21,15 @@ _SUPPORT = ("base", "held", "joined", "joint", "measured", "options", "splined")
 
 
 def names() -> list[str]:
-    """Names of the tasks."""
+    """List the names of the tasks."""
     return sorted(info.name for info in pkgutil.iter_modules(__path__) if info.name not in _SUPPORT)
 
 
 def choose(module: ModuleType, formulation: str | None, options: Any) -> tuple[str, type[Options]]:
-    """Formulation that is meant, and the class of its settings.
+    """Return the formulation to use and the class of its settings.
 
-    Without a name it is the one that the preset or the settings belong to.
+    Without a name, the preset or the class of `options` determines the formulation; failing
+    that, it is the task's default.
     """
     kinds: dict[str, type[Options]] = getattr(module, "OPTIONS", {})
     implied = getattr(module, "IMPLIES", {}).get(options) if isinstance(options, str) else None
@@ -48,7 +49,7 @@ def choose(module: ModuleType, formulation: str | None, options: Any) -> tuple[s
 
 
 def get(name: str) -> ModuleType:
-    """Module of a task."""
+    """Import the module of a task."""
     if name not in names():
         raise OptionError(f"no task {name!r}; {choices(name, names())}")
     return importlib.import_module(f"{__name__}.{name}")

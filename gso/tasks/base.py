@@ -1,4 +1,4 @@
-"""How a task tells the optimiser what to do: a request in, a plan of stages out."""
+"""The interface between tasks and optimiser: a task turns a request into a plan of stages."""
 
 from __future__ import annotations
 
@@ -22,38 +22,40 @@ Array = NDArray[np.float64]
 
 
 def same(coordinates: Array) -> Array:
-    """Take over the coordinates as they are."""
+    """Return the coordinates unchanged."""
     return coordinates
 
 
 @dataclass
 class Stage:
-    """One solve of a coarse-to-fine sequence.
+    """One solve of a continuation or coarse-to-fine sequence.
 
     Attributes
     ----------
     name : str
-        What it is called in the progress and the history.
+        Name in the progress and the history.
     layout : Layout
-        Its coordinates.
+        Blocks of its coordinates.
     items : list of Weighted
-        Its objective.
+        Weighted terms of its objective.
     variables : callable
-        Makes the unknowns from the coordinates at its start.
+        Builds the unknowns from the coordinates at the start of the stage.
     enter : callable
-        Makes its coordinates from those of the stage before.
+        Maps the final coordinates of the stage before to the initial ones of this stage.
     iterations, tolerance : int, float
-        When to stop.
+        Largest number of iterations, and relative decrease of the energy at which to stop.
     eps : sequence of float
-        Smoothing of the absolute value by iteration, for the terms named `robust`.
+        Smoothing of the absolute value in the terms named `robust`, one value per iteration.
     robust : str
-        Name of that term.
+        Name of the terms that use `eps`.
     limits : sequence of Limit
-        What a step must not cross.
+        Bounds on the step length, such as "no triangle is inverted".
     bounds : callable, optional
-        Smallest and largest value of every unknown, from the coordinates at its start.
+        Computes the lower and upper bounds of all unknowns from the coordinates at the start of
+        the stage.
     enough : callable, optional
-        Whether the coordinates at its end make the stages after it needless.
+        Stopping test of the continuation: tells from the coordinates at the end of the stage
+        whether the remaining stages can be skipped.
     """
 
     name: str
@@ -72,7 +74,7 @@ class Stage:
 
 @dataclass
 class Request:
-    """What the user wants, in the unit ball and with grids numbered row by row.
+    """A user's problem, scaled to the unit ball, with grids numbered row by row.
 
     Attributes
     ----------
@@ -81,15 +83,15 @@ class Request:
     options : Options
         Settings of the task.
     formulation : str
-        Which energy.
+        Which energy to minimise.
     constraints : Compiled
-        What must hold.
+        Hard and soft constraints.
     start : ndarray or None
-        Where to start: (n, 3), or (n, 2) for a flat image.
+        Warm start: (n, 3), or (n, 2) for a flat image.
     max_deviation : float or None
         Largest distance from the design.
     demand : float
-        Factor on the weight of what the task asks for, for searches.
+        Factor on the weight of the task's main term (curvature, isometry), which searches vary.
     """
 
     mesh: Mesh
@@ -102,13 +104,13 @@ class Request:
 
     @property
     def reach(self) -> float | None:
-        """Bound on the displacement: a hair inside what was asked for."""
+        """Bound on the displacement: `max_deviation`, reduced by a tiny margin for rounding."""
         return None if self.max_deviation is None else self.max_deviation * (1.0 - 1e-7)
 
 
 @dataclass
 class Plan:
-    """What to do: stages to solve, or a result that is there already.
+    """Stages to solve, or a result that needs no solve.
 
     Attributes
     ----------
@@ -117,29 +119,32 @@ class Plan:
     start : ndarray
         Coordinates before the first stage.
     stages : list of Stage
-        Solved in order; the last one's objective is the result's energy.
+        Solved in order. The energy of the result is the objective of the last one solved.
     status : Status, optional
-        Set when there is nothing to solve.
+        Status of the result where the task knows it beforehand, as for a design that is good
+        already.
     notes : list of str
-        What the user should know.
+        Messages to the user.
     details : dict
-        Numbers the task wants in the result.
+        Numbers that the task adds to the result.
     fallback : ndarray, optional
-        Coordinates that the result must not be worse than, by the last objective.
+        Coordinates returned instead of the result if their energy, by the last objective, is
+        lower.
     finish : callable
-        What is done to the coordinates after the last stage without changing the
-        objective: a flat image is put in its place.
+        Post-processing of the coordinates that leaves the objective unchanged, such as the
+        placement of a flat image.
     remark : callable, optional
-        What the user should know of the coordinates of the result.
+        Computes more messages to the user from the coordinates of the result.
     spline : (int, int), optional
-        Control points along both sides, where the last stage makes the surface a B-spline.
+        Control points along both sides, if the last stage makes the surface a B-spline.
     unstarted : callable, optional
-        Where a start was given: coordinates of the last stage that a solve without it would
-        begin from.
+        With a warm start: computes the coordinates, in the layout of the last stage, from which
+        a cold start would begin.
     refused : str
-        Why a start that was given is not used.
+        Why the user's start is not used; empty if it is.
     cut : Cut, optional
-        How the design was cut open: the flat image is that of the cut mesh, in its numbering.
+        The cuts made to open the design. The flat image is then that of the cut mesh, in its
+        numbering.
     """
 
     layout: Layout
@@ -157,7 +162,7 @@ class Plan:
     cut: Cut | None = None
 
     def entered(self) -> Array:
-        """Coordinates of the last stage when nothing is solved before it."""
+        """Compute the initial coordinates of the last stage if no stage before it is solved."""
         coordinates = self.start
         for stage in self.stages:
             coordinates = stage.enter(coordinates)
@@ -165,9 +170,10 @@ class Plan:
 
 
 def open_up(request: Request) -> flat_start.Opened:
-    """The design as it is laid out: cut where it closes around itself.
+    """Cut the design open where it closes around itself, ready to be flattened.
 
-    Constraints and starts are about vertices of the design as it is; with them it is not cut.
+    Constraints and warm starts refer to the vertices of the uncut design: with them it is not
+    cut.
     """
     if request.start is not None or not request.constraints.empty:
         return flat_start.Opened(request.mesh)

@@ -1,17 +1,18 @@
-"""Bend a surface by its handles and keep the lengths in it.
+"""Bend a surface by its handles and preserve its lengths.
 
 The objective, on the design scaled to the unit ball, is
 
     1/2 mean E_iso + w_edges / 2 mean (change of l^2)^2
     + w_bending / 2 mean |change of curvature|^2
 
-with E_iso the squared differences of squared diagonals of Jiang et al. 2020, relative to the
-mean one, and l the edges' lengths, likewise. Diagonals alone leave the two checkerboard
-lattices of a quad mesh all but loose, which is what the edges are for; and lengths do not say
-which of many isometric shapes is wanted. The change of bending does, measured in the surface's
-own frame: a design without handles, or with handles that move rigidly, keeps its shape. Like
-their weight of fairness, that of bending falls tenfold from stage to stage: stiff sheets find
-their shape in few steps, pliable ones keep their lengths.
+with E_iso the isometry defect of Jiang et al. 2020 (differences of the faces' squared diagonals
+and their product) and l the lengths of the edges, both relative to their means. The diagonals
+hardly couple the two checkerboard lattices of a quad mesh: the edge term does. Lengths alone
+leave a family of isometric shapes. The bending term, which measures the change of curvature in
+the surface's own frame, selects one of them: a design without handles, or with handles that
+move rigidly, keeps its shape. The bending weight falls tenfold from stage to stage, like the
+fairness weight of Jiang et al.: a large weight finds the shape in few iterations, a small one
+preserves lengths.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ Array = NDArray[np.float64]
 
 FORMULATIONS = ("isometry",)
 
-#: Relative fall of the energy at which a stage that only prepares another one stops.
+#: Tolerance (relative decrease of the energy) of all stages but the last.
 _NEARLY = 1e-3
 
 
@@ -48,12 +49,14 @@ class Options(BaseOptions):
     Attributes
     ----------
     w_bending : float
-        Weight of the mean squared change of curvature, in units of the design's unit ball.
-        About the strain that is left in a sheet that could bend without any.
+        Weight of the mean squared change of curvature, in units of the design's unit ball. It
+        is about the strain that remains in a sheet for which a strain-free shape exists.
     stiff : float
-        The same in the first stage; it falls tenfold from stage to stage.
+        Approximate bending weight of the first stage; it falls tenfold from stage to stage down
+        to `w_bending`. Not used with `x0`.
     w_edges : float
-        Weight of the edges' squared lengths, relative to that of the faces' diagonals.
+        Weight of the change of the edges' squared lengths, relative to that of the faces'
+        diagonals.
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
@@ -79,7 +82,7 @@ class Options(BaseOptions):
 
 
 def plan(request: Request) -> Plan:
-    """Stages from a surface that follows its handles smoothly to one that keeps its lengths."""
+    """Plan stages of falling bending weight, from a surface that follows its handles smoothly."""
     mesh, options = request.mesh, request.options
     layout = Layout.of(len(mesh.vertices), "surface")
     if request.constraints.empty and request.start is None:
@@ -115,7 +118,7 @@ def _change(mesh: Mesh) -> list[Weighted]:
 
 
 def _start(request: Request) -> Array:
-    """Vertices that follow their handles: those of the design, or of the user's start."""
+    """Move the vertices of the design, or of the user's start, smoothly with the handles."""
     mesh = request.mesh
     ids, targets = request.constraints.places
     if request.start is not None:
@@ -125,7 +128,7 @@ def _start(request: Request) -> Array:
 
 
 def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict[str, float]:
-    """How well lengths are kept, and how the surface is curved; units: :data:`gso.metrics.INFO`.
+    """Compute strain, length and curvature metrics; units: :data:`gso.metrics.INFO`.
 
     ``loss_iso_cell`` is left out on a mesh without quads.
     """

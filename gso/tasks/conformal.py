@@ -1,15 +1,15 @@
-"""Lay a surface out in the plane with its angles kept.
+"""Flatten a surface conformally: preserve its angles.
 
 The objective, on the design scaled to the unit ball, is
 
     1/2 mean E_conf + w_scale / 2 mean (s - 1)^2 + w_shear / 2 mean |shear|^2
 
-with E_conf the squared differences of squared lengths of Jiang et al. 2020, those of a face in
-space multiplied by its own s, which is unknown too. A disk has many conformal maps: of these,
-the second term takes the one that changes lengths least. The third, of the corner triangles,
-holds the two checkerboard lattices of a quad mesh together. The solve starts from an image
-without flips that is as rigid as possible, which is near that map, and no step turns a
-triangle over.
+with E_conf the squared differences of squared lengths of Jiang et al. 2020, where those of a
+face in space are multiplied by a scale s of that face, a further unknown. A disk has many
+conformal maps: the second term selects the one that changes lengths least. The third term, over
+the corner triangles, couples the two checkerboard lattices of a quad mesh. The solve starts from
+an as-rigid-as-possible image without inverted triangles, which is close to that map, and no step
+inverts a triangle.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ class Options(BaseOptions):
     Attributes
     ----------
     w_scale : float
-        Weight of the faces' squared scales' distance from one: about the angle distortion
-        that is left.
+        Weight of ``(s - 1)^2``, where s is the factor on a face's squared lengths. The remaining
+        angle distortion is about as large as this weight.
     w_shear : float
-        Weight of the squared shear of the corner triangles; much above `w_scale`, it is what
-        is minimised.
+        Weight of the squared shear of the corner triangles. Much above `w_scale`, the shear term
+        dominates the result.
     relax_iterations : int
-        Largest number of local and global steps before the solve.
+        Largest number of as-rigid-as-possible (local/global) iterations before the solve.
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
@@ -75,7 +75,7 @@ class Options(BaseOptions):
 
 
 def plan(request: Request) -> Plan:
-    """One stage from an image without flips.
+    """Plan one stage, from an image without inverted triangles; more under constraints.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def _terms(options: Options, mesh: Mesh) -> list[Weighted]:
 
 
 def _area_ratios(mesh: Mesh, flat: Array) -> Array:
-    """Area of every face in an image over that on the surface; one where there is none."""
+    """Compute each face's area in the image over that on the surface; one if it has no area."""
     large, small = measure.stretches(mesh, flat)
     return np.where(np.isnan(large), 1.0, large * small)
 
@@ -136,10 +136,11 @@ def _finish(
     given: Array | None,
     coordinates: Array,
 ) -> Array:
-    """The image with the surface's area, in its place; as it is when it is tied to one.
+    """Scale the image to the surface's area and place it; keep the size of constrained images.
 
-    The scales are those of lengths from here on: image over surface. Of a surface that was cut
-    open, both are in the numbering of the cut mesh.
+    The block "scale", factors on squared lengths during the solve, becomes ratios of lengths,
+    image over surface. If the surface was cut open, both blocks are returned in the numbering
+    of the cut mesh.
     """
     blocks = layout.split(coordinates)
     flat, ratio = blocks["flat"], blocks["scale"]
@@ -154,11 +155,11 @@ def _finish(
 
 
 def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[str, float]:
-    """Metrics of a conformal image (n, 2) of `mesh`; units: :data:`gso.metrics.INFO`."""
+    """Compute the metrics of a conformal image (n, 2); units: :data:`gso.metrics.INFO`."""
     distortion = measure.quasi_conformal(mesh, flat) - 1.0
     distortion = distortion[~np.isnan(distortion)]
     if not distortion.size:
-        # No face has an area to speak of.
+        # Every face is degenerate.
         return {"flipped_cells": float(measure.flips(mesh, flat))}
     lengths = np.sqrt(np.prod(measure.stretches(mesh, flat), axis=0))
     return {

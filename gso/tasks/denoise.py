@@ -1,8 +1,8 @@
-"""Remove noise, the amount of smoothing read off the noisy data alone.
+"""Remove noise, with an amount of smoothing estimated from the noisy data alone.
 
 Grids are smoothed in closed form and other meshes by sparse solves; see
-:mod:`gso.smoothing` for the methods and their sources. Where there are constraints, the
-smallest and smoothest change that satisfies them follows.
+:mod:`gso.smoothing` for the methods and their sources. If there are constraints, one more
+stage finds the smallest and smoothest change that satisfies them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from gso.tasks.options import Options as BaseOptions
 from gso.variables import Layout
 
 FORMULATIONS = ("smooth", "crease")
-#: Details that are lengths.
+#: Entries of a result's `details` that are lengths.
 LENGTHS = ("sigma",)
 
 Array = NDArray[np.float64]
@@ -36,11 +36,12 @@ class Options(BaseOptions):
     Attributes
     ----------
     order : int or None
-        Order of the differences that are penalised; chosen from the data when None.
+        Order of the penalised differences; chosen from the data when None.
     weight : float or None
-        Amount of smoothing, dimensionless; chosen from the data when None. The value in the
-        result's `details` can be given back, or a multiple of it; on grids, where none was
-        given, it is that of the plain smoother of that order which smooths as much.
+        Amount of smoothing, dimensionless; chosen from the data when None. The value used is in
+        the result's `details`; pass it, or a multiple of it, to repeat or vary the smoothing. On
+        grids with None, `details` has the weight of the plain smoother of that order with the
+        same degrees of freedom.
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {"fast": {}, "balanced": {}, "accurate": {}}
@@ -50,7 +51,7 @@ class Options(BaseOptions):
 
 
 def plan(request: Request) -> Plan:
-    """The smoothed surface, or the start that takes its place; what is left are constraints."""
+    """Smooth the surface, unless a start is given, and plan a stage for the constraints if any."""
     mesh, options = request.mesh, request.options
     if request.start is None:
         points, details = _smoothed(request)
@@ -69,7 +70,7 @@ def plan(request: Request) -> Plan:
 
 
 def _smoothed(request: Request) -> tuple[Array, dict[str, Any]]:
-    """Smoothed vertices (n, 3), and what was chosen and found."""
+    """Compute smoothed vertices (n, 3), and the order, weight, sigma and degrees of freedom."""
     mesh, options = request.mesh, request.options
     settings = {
         "order": options.order,
@@ -85,7 +86,7 @@ def _smoothed(request: Request) -> tuple[Array, dict[str, Any]]:
 
 
 def metrics(before: Mesh, after: Mesh, flat: None, scale: float) -> dict[str, float]:
-    """How much the surface changed, and how much rougher the input was."""
+    """Compute how much the surface changed, and the roughness of the result over the input's."""
     rms, largest = measure.displacement(before, after)
     return {
         "roughness_ratio": measure.fairness_ratio(before, after),

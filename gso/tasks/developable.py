@@ -1,13 +1,15 @@
-"""Make a surface developable: curvature out, as close and as fair as possible.
+"""Make a surface developable: remove its Gaussian curvature, stay close and fair.
 
 The objective, on the design scaled to the unit ball, is
 
     w_curvature mean |K| + w_fairness / 2 mean |second derivative|^2 + w_proximity mean d
+    + w_elongation / 2 mean (elongation)^2
 
-with |K| smoothed by a falling epsilon (the absolute value concentrates bending along few
-lines, which is what lets a surface become developable), and d the displacement from the
-design, tangential parts counted less, its square below `near` and its length beyond.
-Grids are solved coarse to fine.
+with |K| smoothed by a decreasing epsilon. The absolute value concentrates bending along few
+lines, which lets a surface become developable. Second derivatives are relative to a share of
+the design's own, which is large where the design is developable. d penalises the displacement
+from the design, its tangential part less: quadratically below `near`, linearly beyond. The
+elongation of an edge is zero within a range of length ratios. Grids are solved coarse to fine.
 """
 
 from __future__ import annotations
@@ -59,39 +61,41 @@ class Options(BaseOptions):
     Attributes
     ----------
     w_curvature : float
-        Weight of mean |K|, for a design whose own mean |K| is typical; it falls slowly
-        with the design's curvature.
+        Weight of mean |K| for a design with typical mean |K|; the weight used decreases slowly
+        with the design's mean |K|.
     w_fairness : float
-        Weight of the mean squared second derivative, likewise relative to the design's.
+        Weight of the mean squared second derivative for a design with typical bending; the
+        weight used decreases with the design's bending.
     w_proximity : float
-        Weight of the displacement.
+        Weight of the displacement from the design.
     w_elongation : float
-        Weight of edges that become much shorter or longer than the design's, and of those of
-        its boundary that change at all visibly.
+        Weight of edges much shorter or longer than in the design. Boundary edges are penalised
+        from a change of length of 8 % on.
     near : float
-        Displacements below it count squared, above it by their length.
+        Displacements below this are penalised quadratically, larger ones linearly.
     tangential : float
         Factor on the tangential part of a displacement.
     eps : float
-        Smoothing of |K|: curvature well below it counts squared.
+        Smoothing of |K|: curvature well below this is penalised quadratically.
     variables : {"normal", "free", "spline", "surface"}
         Unknowns of the last stage: offsets along normals, free vertices, or (on grids) a
-        coarse bicubic field of offsets, which cannot crumple. With `max_deviation` they
-        are offsets along normals, with constraints free vertices without coarser grids
-        (but for "surface"). With "surface" (on grids) they are the control points of
-        a bicubic B-spline surface, which the result then is: its `spline`.
+        coarse bicubic field of offsets, which cannot crumple. With "surface" (on grids) they are
+        the control points of a bicubic B-spline surface, returned as the result's `spline`.
+        Except with "surface", `max_deviation` implies offsets along normals, and constraints
+        imply free vertices and no coarser grids.
     controls : int
         "spline", "surface": control points along each side; fewer on small grids.
     coarse_iterations : int
-        Iterations on the coarsest grid; half as many where `x0` is given.
+        Iterations on the coarsest grid; half as many with `x0`.
     coarse_size : int
         Largest side of the coarsest grid; a grid that small is halved once.
     between_iterations : int
-        Iterations on each grid between the coarsest and the design's own, in normal
-        offsets; without `x0`, free vertices take `iterations`, halved from grid to grid.
+        Iterations on each grid between the coarsest and the design's own, where the unknowns
+        are normal offsets. With "free" and without `x0` the vertices are free there too and
+        take `iterations`, halved from grid to grid on fine grids.
     developable_below : float
-        A design whose mean |K| is below this is developable already and comes back
-        untouched.
+        A design whose mean |K| is below this is developable already and is returned unchanged,
+        unless there are constraints, `x0` or variables "surface".
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
@@ -139,19 +143,19 @@ class Options(BaseOptions):
             raise OptionError("eps and near must be positive")
 
 
-#: Factor on the weight of curvature on meshes that are no grids: more of it stays there, around
-#: irregular vertices and for want of coarser grids to begin with.
+#: Factor on the weight of curvature on meshes that are not grids: more curvature remains there,
+#: around irregular vertices and for lack of a coarse-to-fine sequence.
 GENERAL = 1.8
-#: Curvature at which half of the design's own bending counts as wanted.
+#: Gaussian curvature at which the fairness term preserves half of the design's own bending.
 FLAT_CURVATURE = 0.02
-#: A design is a developable surface with noise on it when smoothing leaves at most this
-#: much of its curvature; it then moves by at most so many standard deviations.
+#: A design counts as a developable surface with noise if smoothing leaves at most this share of
+#: its curvature. Displacements are then bounded by this many standard deviations of the noise.
 NOISE_ONLY = 0.1
 NOISE_REACH = 2.8
 
-#: Most iterations of offsets between a given start and free vertices.
+#: Iterations with normal offsets between a warm start and the stage of free vertices.
 _OFFSETS_FIRST = 12
-#: Tolerance of stages that only prepare another one.
+#: Tolerance of all stages but the last.
 _LOOSE = 1e-3
 
 #: Settings by formulation.
@@ -159,22 +163,22 @@ OPTIONS = {"curvature": Options, "isometry": joint.Options}
 
 
 def plan(request: Request) -> Plan:
-    """Stages of the solve."""
+    """Plan the stages of the solve."""
     if request.formulation == "isometry":
         return joint.plan(request, _before_joint)
     return _plan(request)
 
 
 def _before_joint(request: Request) -> Plan:
-    """What the joint solve starts from, of the same request."""
+    """Plan the curvature solve whose result the joint solve starts from."""
     bound = request.max_deviation
-    # What the joint solve can move within is a part of the ball around a vertex.
+    # The box bounds of the joint solve cover only part of the ball around a vertex.
     reach = None if bound is None else 0.99 * ALONG * bound
     return _plan(replace(request, options=Options(), max_deviation=reach))
 
 
 def _plan(request: Request) -> Plan:
-    """A coarse grid first, the design's own vertices last."""
+    """Plan the curvature formulation: coarse grids first, the design's own vertices last."""
     mesh, options = request.mesh, request.options
     notes: list[str] = []
     _check_handles(request)
@@ -184,7 +188,7 @@ def _plan(request: Request) -> Plan:
     curved = measure.loss_gc_both(mesh, scale=1.0)
     spline = splined.controls(request)
     if spline is not None:
-        # The usual solve comes first; the spline starts from its result.
+        # The spline stage starts from the result of the usual solve.
         request = replace(request, options=replace(options, variables="normal"))
     good = curved <= options.developable_below and spline is None
     if good and request.start is None and request.constraints.empty:
@@ -225,7 +229,7 @@ def _plan(request: Request) -> Plan:
 
 
 def _levels(request: Request) -> list[Mesh]:
-    """Coarser copies of the design to begin with, coarsest first."""
+    """Return the coarser copies of the design on which to solve first, coarsest first."""
     mesh = request.mesh
     if mesh.grid_index is None or not request.constraints.empty:
         return []
@@ -235,11 +239,11 @@ def _levels(request: Request) -> list[Mesh]:
 
 
 def _starts(request: Request, levels: list[Mesh]) -> list[Mesh]:
-    """Where the solve starts, on each of the coarser grids and on the design's own.
+    """Return the surfaces to start from on each coarser grid and on the design's own.
 
-    A start that was given is not carried up: what the solves of the coarser grids change in
-    it there is added to it. Its fine detail stays, and what is wrong with it at large, which
-    takes many iterations on the fine grid, is put right at a fraction of the cost.
+    A warm start keeps its fine detail: only the displacements found on the coarser grids are
+    interpolated and added to it. They correct its low-frequency error, which would take many
+    iterations on the fine grid, at a fraction of the cost.
     """
     if request.start is None:
         return [*levels, request.mesh]
@@ -248,7 +252,7 @@ def _starts(request: Request, levels: list[Mesh]) -> list[Mesh]:
 
 
 def _check_handles(request: Request) -> None:
-    """Refuse hard handles that want more than `max_deviation`."""
+    """Raise if hard constraints are incompatible with `max_deviation`."""
     c, reach = request.constraints, request.max_deviation
     if reach is None:
         return
@@ -270,7 +274,7 @@ def _check_handles(request: Request) -> None:
 
 
 def _smoothed(mesh: Mesh) -> tuple[Mesh, float]:
-    """The design without noise, and the noise's standard deviation; grids only."""
+    """Smooth the design and estimate the noise's standard deviation; on grids only."""
     if mesh.grid is None:
         return mesh, 0.0
     smoothed = smooth_grid(mesh.grid, order=4)
@@ -278,10 +282,10 @@ def _smoothed(mesh: Mesh) -> tuple[Mesh, float]:
 
 
 def _own_bending(mesh: Mesh) -> Array:
-    """How much of its own bending each vertex of a (smooth) design should keep, (n,).
+    """Compute the share (n,) of its own bending that each vertex of a smooth design should keep.
 
-    Nearly all where the design is developable already, so that fairness does not pull
-    its border in; none where it is curved.
+    The share is near one where the design is developable already, so that fairness does not
+    shrink its border, and near zero where the design has Gaussian curvature.
     """
     k = 0.5 * (np.abs(measure.curvature(mesh)) + np.abs(measure.curvature(mesh, 1)))
     grid = mesh.grid_index
@@ -293,12 +297,12 @@ def _own_bending(mesh: Mesh) -> Array:
 
 
 def kept_bending(curvature: Any) -> Any:
-    """Share of its own bending that a vertex of some Gaussian curvature should keep."""
+    """Compute the share of its own bending that a vertex of a Gaussian curvature should keep."""
     return 1.0 / (1.0 + (curvature / FLAT_CURVATURE) ** 2)
 
 
 def adapted_weights(options: Options, curved: Any, bending: Any) -> tuple[Any, Any]:
-    """Weights of curvature and fairness for a design's mean |K| and mean squared bending."""
+    """Adapt the curvature and fairness weights to a design's mean |K| and squared bending."""
     curvature = options.w_curvature * (TYPICAL_CURVATURE / curved) ** 0.2
     return curvature, options.w_fairness * (TYPICAL_BENDING / (bending + 1.0)) ** 0.5
 
@@ -310,7 +314,7 @@ def _nothing_inside(mesh: Mesh) -> MeshError:
 
 
 def _bending(mesh: Mesh) -> float:
-    """Mean squared second derivative of a mesh along its polylines."""
+    """Compute the mean squared second derivative of a mesh along its polylines."""
     stencil, coefficients = fairness.differences(mesh)
     if len(stencil) == 0:
         return 0.0
@@ -321,13 +325,13 @@ def _bending(mesh: Mesh) -> float:
 def _objective(
     request: Request, curved: float, bending: float, smooth: Mesh, mesh: Mesh
 ) -> list[Weighted]:
-    """Terms on the design or on a coarser copy of it."""
+    """Build the terms on the design or on a coarser copy of it."""
     o = request.options
     w_curvature, w_fairness = adapted_weights(o, max(curved, 1e-3), bending)
     w_curvature *= request.demand if mesh.grid_index is not None else GENERAL * request.demand
     w_proximity = o.w_proximity
     if request.max_deviation is not None:
-        # The bound keeps the result close; the terms may ask for more.
+        # The bound keeps the result close, so the other terms can be stronger.
         w_curvature, w_fairness = 4.5 * w_curvature, 3.0 * w_fairness
         w_proximity = 0.3 * w_proximity
     normals = vertex_normals(mesh)
@@ -343,7 +347,7 @@ def _objective(
 
 
 def _joined(request: Request, mesh: Mesh) -> list[Weighted]:
-    """Terms of components that constraints join, each by its own size and curvature."""
+    """Build the terms of several components, each for its own size and curvature."""
 
     def make(own: Mesh) -> list[Weighted]:
         alone = replace(request, mesh=own, constraints=Compiled())
@@ -354,7 +358,7 @@ def _joined(request: Request, mesh: Mesh) -> list[Weighted]:
 
 
 def _resampled(source: Mesh, target: Mesh) -> Array:
-    """Vertices of one grid at the resolution of another, row by row."""
+    """Resample the vertices of one grid at the resolution of another, row by row."""
     if source.grid is None or target.grid_shape is None:
         return source.vertices
     return resample(source.grid, *target.grid_shape).reshape(-1, 3)
@@ -365,7 +369,7 @@ def _layout(mesh: Mesh) -> Layout:
 
 
 def _unknowns(kind: str, mesh: Mesh, request: Request, coordinates: Array) -> Variables:
-    """Unknowns at the start of a stage; hard constraints are held."""
+    """Build the unknowns at the start of a stage; hard linear constraints are eliminated."""
     layout = _layout(mesh)
     if kind == "free":
         variables = free(layout)
@@ -383,7 +387,7 @@ def _unknowns(kind: str, mesh: Mesh, request: Request, coordinates: Array) -> Va
 
 
 def _stages(request: Request, mesh: Mesh, make: Any, coarser_grids: int) -> list[Stage]:
-    """Stages on the design's own vertices."""
+    """Plan the stages on the design's own vertices."""
     o = request.options
     items = make(mesh)
     cold = request.start is None and mesh.grid_index is None
@@ -403,12 +407,12 @@ def _stages(request: Request, mesh: Mesh, make: Any, coarser_grids: int) -> list
         )
 
     if request.max_deviation is not None:
-        # Only offsets along normals have bounds; normals are renewed half-way.
+        # Only offsets along normals have bounds. The second stage uses updated normals.
         return [stage("normal", o.iterations, e) for e in (falling, (o.eps,))]
     if cold or not request.constraints.empty:
         bound = not request.constraints.empty
         first = stage("free" if bound else "normal", 15, falling)
-        # Only free vertices can slide, stay together, or keep their distances.
+        # Sliding, gluing and length constraints need free vertices.
         last = stage("free" if bound else o.variables, o.iterations, (o.eps,))
         if not bound:
             return [first, last]
@@ -416,18 +420,18 @@ def _stages(request: Request, mesh: Mesh, make: Any, coarser_grids: int) -> list
         return [held.approach(request, start), first, last]
     last = stage(o.variables, _iterations(o, coarser_grids), falling)
     if o.variables == "free" and request.start is not None:
-        # Offsets do most of what is left, at a third of the cost.
+        # Normal offsets remove most of the remaining energy at a third of the cost.
         first = stage("normal", _OFFSETS_FIRST, falling)
         return [replace(first, tolerance=_LOOSE), last]
     return [last]
 
 
 def _iterations(options: Options, coarser_grids: int) -> int:
-    """Iterations on a grid with so many coarser ones before it.
+    """Compute the iterations on a grid that follows `coarser_grids` coarser ones.
 
-    Offsets take half as many again on fine grids, where more has to settle.
-    Free vertices are costly on very fine grids: from the third refinement on, each takes
-    half the iterations of the one before.
+    Offsets take 1.5 times as many from the second refinement on, as fine grids converge more
+    slowly. Free vertices are costly on very fine grids: from the third refinement on, each grid
+    takes half the iterations of the one before, but not fewer than 5.
     """
     if options.variables != "free":
         return options.iterations * 3 // 2 if coarser_grids > 1 else options.iterations
@@ -435,9 +439,10 @@ def _iterations(options: Options, coarser_grids: int) -> int:
 
 
 def _coarse_stage(request: Request, level: Mesh, make: Any, number: int) -> Stage:
-    """A coarse grid: free vertices on the first; the last stage's unknowns on the others.
+    """Plan the stage of a coarser grid, with free vertices on the coarsest.
 
-    Where a start was given those are offsets, which are cheaper.
+    The other grids use free vertices if the last stage does and the start is cold, else normal
+    offsets, which are cheaper. With `max_deviation` all use normal offsets.
     """
     o = request.options
     first, begun = number == 0, request.start is not None
@@ -463,14 +468,14 @@ def _coarse_stage(request: Request, level: Mesh, make: Any, number: int) -> Stag
 
 
 def _carry(coarse: Mesh, fine: Mesh, reach: float | None, coordinates: Array) -> Array:
-    """Displacement on a coarse grid, interpolated and added to a finer one."""
+    """Interpolate the displacement of a coarse grid and add it to a finer one."""
     return _inside(carry(coarse, fine, coordinates.reshape(-1, 3)), fine, reach).ravel()
 
 
 def _bounds(mesh: Mesh, reach: float | None, held: Any = ()) -> Any:
-    """Bounds on offsets along normals that keep every vertex within reach of its own place.
+    """Build the bounds on normal offsets that keep vertices within `reach` of the design's.
 
-    Vertices in `held` have no unknown.
+    Vertices in `held` are fixed and have no unknown. None without a reach.
     """
     return None if reach is None else partial(_offset_bounds, mesh, reach, held)
 
@@ -486,7 +491,7 @@ def _offset_bounds(mesh: Mesh, reach: float, held: Any, coordinates: Array) -> t
 
 
 def _inside(points: Array, mesh: Mesh, reach: float | None) -> Array:
-    """Points pulled back to within reach of where they belong."""
+    """Project points into the balls of radius `reach` around their vertices in the design."""
     if reach is None:
         return points
     u = points - mesh.vertices
@@ -495,7 +500,7 @@ def _inside(points: Array, mesh: Mesh, reach: float | None) -> Array:
 
 
 def flat_metrics(surface: Mesh, flat: Array) -> dict[str, float]:
-    """How well a flat image (n, 2) keeps the lengths of its surface."""
+    """Compute how well a flat image (n, 2) preserves the lengths of its surface."""
     strain = measure.principal_strains(surface, flat)
     out = {
         "isometry_energy": measure.isometry_energy(surface, flat),
@@ -510,7 +515,7 @@ def flat_metrics(surface: Mesh, flat: Array) -> dict[str, float]:
 
 
 def curvature_metrics(before: Mesh, after: Mesh, scale: float) -> dict[str, float]:
-    """Curvature and planarity of two surfaces, as far as their meshes have them."""
+    """Compute the curvature and planarity metrics that are defined for two surfaces."""
     found = {
         "loss_gc_before": measure.loss_gc(before, scale=scale),
         "loss_gc": measure.loss_gc(after, scale=scale),
@@ -531,7 +536,7 @@ def curvature_metrics(before: Mesh, after: Mesh, scale: float) -> dict[str, floa
 
 
 def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict[str, float]:
-    """Published and corrected metrics of a developable result (units: gso.metrics.INFO)."""
+    """Compute the published and the corrected metrics; units: :data:`gso.metrics.INFO`."""
     true = measure.surface_distance(before, after)
     percent = 100.0 / before.diagonal
     out = curvature_metrics(before, after, scale) | {

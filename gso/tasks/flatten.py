@@ -1,11 +1,11 @@
-"""Lay a surface out in the plane with as little stretch as possible.
+"""Flatten a surface into the plane with as little strain as possible.
 
-``strain`` minimises the membrane strain of all corner triangles: the sheet to cut.
-``lengths`` minimises the published isometry defect of the cells, which is blind to some
-shear: a figure to compare. ``isometry`` minimises the squared defect of Jiang et al. 2020
-with their regulariser of the mapping: what the developable task's isometry does, with the
-surface as it is. All start from an image without flips, and no step turns a triangle over.
-Grids are solved coarse to fine.
+``strain`` minimises the membrane strain of all corner triangles; use it for a pattern to cut.
+``lengths`` minimises the published isometry defect of the cells (Wang et al. 2024), which does
+not see some shear; use it for comparison. ``isometry`` minimises the squared defect of Jiang et
+al. 2020 with their regulariser of the mapping, like the isometry formulation of the developable
+task, but with the surface fixed. All start from an image without inverted triangles, and no step
+inverts a triangle. Grids are solved coarse to fine.
 """
 
 from __future__ import annotations
@@ -49,19 +49,19 @@ FORMULATIONS = ("strain", "lengths", "isometry")
 IMPLIES = {"jiang2020": "isometry"}
 BLOCK = "flat"
 
-#: Strains below it are rounding errors, and are not told apart.
+#: Lower bound on the strain level: smaller strains are rounding errors.
 _SMALLEST_LEVEL = 1e-7
 #: Root-mean-square strain above which the user is told to cut the surface.
 _FAR_FROM_FLAT = 0.1
-#: Typical strain above which large strains are made more expensive.
+#: Strain level above which the knee is lowered, so that large strains cost more.
 _LARGE_STRAIN = 0.03
-#: Relative fall of the energy at which a stage that only prepares another one stops.
+#: Tolerance (relative decrease of the energy) of all stages but the last.
 _NEARLY = 1e-2
-#: Ratio to the level at which a start is strained too much for the powers of `Spread`.
+#: Ratio of a start's strain to the level above which an "l2" stage precedes the `Spread` loss.
 _STRAINED = 1.5
-#: Weight of the squeezed triangles in ``lengths``.
+#: Weight of the collapse term in ``lengths``.
 _W_COLLAPSE = 3e-3
-#: Their weights, one after the other, on the way to a much strained image in ``strain``.
+#: Weights of the collapse term in the stages of ``strain`` before the last, for large strains.
 _UNSQUEEZE = (1e-2, 1e-3)
 
 
@@ -72,32 +72,32 @@ class Options(BaseOptions):
     Attributes
     ----------
     norm : {"mixed", "l2", "l1"}
-        What strain costs. "l2": its square (as rigid as possible). "l1": its size, for the
-        smallest mean at the price of a few large strains. "mixed": its size, and steeply
-        more for large strains; mean and peaks both come out lower than with "l2". For
+        Cost of strain. "l2": its square (as rigid as possible). "l1": its absolute value, for
+        the smallest mean at the price of a few large strains. "mixed": its absolute value, and
+        a steep power for large strains; mean and peaks are both lower than with "l2". For
         ``lengths``, "mixed" is the same as "l1".
     w_edges : float
         ``strain`` with norm "mixed": weight of the relative change of the edges' lengths,
-        beside that of the corner triangles' strain.
+        relative to the strain of the corner triangles.
     knee : float
-        ``strain`` with norm "mixed": strains of more than this many times the typical one
-        are made expensive; smaller numbers trade mean strain for smaller peaks.
+        ``strain`` with norm "mixed": multiple of the typical strain above which the steep power
+        dominates; smaller numbers trade mean strain for smaller peaks.
     w_shear : float
-        ``lengths``: weight of the squared shear, which keeps neighbouring vertices from
-        drifting apart unseen.
+        ``lengths``: weight of the squared shear. The lengths do not see some shear, by which
+        neighbouring vertices could drift apart.
     w_fairness : float
         Weight of the mean squared second derivative of the flat image, in units of the
         surface's unit ball.
     w_mapping : float
-        ``isometry``: weight of the mean squared difference of the polylines' second
-        differences, seen in the mesh itself, between surface and image.
+        ``isometry``: weight of the regulariser of the mapping: the mean squared difference,
+        between surface and image, of the inner products of second differences and edges.
     eps : float
-        ``lengths``: differences of length below this share of the cells' diagonals count
-        squared.
+        ``lengths``: length differences below this share of the cells' diagonals are penalised
+        quadratically.
     coarse_size : int
         Largest side of the coarsest grid.
     relax_iterations : int
-        Largest number of local and global steps before the first stage.
+        Largest number of as-rigid-as-possible (local/global) iterations before the first stage.
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
@@ -130,7 +130,7 @@ class Options(BaseOptions):
 
 
 def plan(request: Request) -> Plan:
-    """Stages of the solve, from an image without flips to the one wanted.
+    """Plan the stages of the solve, from an image without inverted triangles.
 
     Raises
     ------
@@ -178,7 +178,7 @@ def plan(request: Request) -> Plan:
 
 
 def _finish(opened: flat_start.Opened, given: Array | None, coordinates: Array) -> Array:
-    """The image in its place, in the numbering of the cut mesh where there is one."""
+    """Place the image; if the surface was cut, return it in the numbering of the cut mesh."""
     return opened.back(_place(opened.mesh, given, coordinates).reshape(-1, 2)).ravel()
 
 
@@ -188,14 +188,14 @@ def _remark(opened: flat_start.Opened, coordinates: Array) -> list[str]:
 
 
 def _bound(request: Request, stages: list[Stage]) -> list[Stage]:
-    """Stages under constraints: first the sheet is drawn to them, then it keeps them."""
+    """Plan stages under constraints: first soft with growing weight, then as they are given."""
     even = _strain_stage(replace(request.options, norm="l2"), request.mesh, 1.0)
     steps = held.drawing(request, replace(even, iterations=30))
     return [*steps, *(held.keeping(request, stage) for stage in (even, *stages))]
 
 
 def _settle(request: Request, coordinates: Array) -> Array:
-    """Constrained images stay where they are, but for parts that nothing holds."""
+    """Place the parts of a constrained image that no constraint anchors; keep the others."""
     mesh, flat = request.mesh, coordinates.reshape(-1, 2)
     if not request.constraints.anchored and len(flat_start.parts(mesh)) == 1:
         return _place(mesh, None, coordinates)
@@ -218,7 +218,7 @@ def _remarks(mesh: Mesh, level: float) -> list[str]:
 
 
 def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
-    """Coarse to fine; the last stage is the one wanted, the others prepare it."""
+    """Plan coarse-to-fine stages, the last of which has the objective of the formulation."""
     options, mesh = request.options, levels[-1]
     even = options if options.norm != "l1" else replace(options, norm="mixed")
     stages = [_strain_stage(even, m, level) for m in levels]
@@ -227,14 +227,14 @@ def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
     if request.formulation == "lengths":
         lengths = _length_stage(options, mesh, level)
         if len(levels) > 1:
-            # What comes from a coarser grid is near enough.
+            # The interpolated coarser image is close enough: no strain stage on this grid.
             lengths.enter = stages.pop().enter
         stages.append(lengths)
     elif request.formulation == "isometry":
         stages.append(_isometry_stage(options, mesh))
     elif options.norm == "l1":
         stages.append(_strain_stage(options, mesh, level))
-    # Without a coarser grid before it, the last stage has farther to go.
+    # On meshes that are not grids the last stage starts farther from the minimum.
     closer = 1.0 if levels[-1].grid_index is not None else 0.2
     stages[-1].iterations, stages[-1].tolerance = options.iterations, closer * options.tolerance
     if request.formulation == "strain" and level > _FAR_FROM_FLAT:
@@ -243,10 +243,10 @@ def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
 
 
 def _unsqueezing(mesh: Mesh, last: Stage) -> list[Stage]:
-    """Stages that keep triangles from being squeezed flat, before the last one.
+    """Precede the last stage by stages with a collapse term of falling weight.
 
-    Much strain is least where some triangles have no area left. A step ends at the first
-    triangle that would turn over: without resistance the solve comes to a halt there.
+    Where strain is large, the energy is lowest with some triangles collapsed. As a step ends
+    before the first triangle that would invert, the solve would stall at them without this term.
     """
     resistance = collapse.build(mesh)
     before = [
@@ -273,7 +273,7 @@ def _strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
 
 
 def _level(mesh: Mesh) -> float:
-    """Typical strain of a component among others."""
+    """Compute the typical strain of one of several components."""
     return max(flat_start.begin(mesh).level, _SMALLEST_LEVEL)
 
 
@@ -287,18 +287,18 @@ def _strain_terms(options: Options, mesh: Mesh, level: float) -> list[Weighted]:
     else:
         loss = stretch.Spread(level, knee=options.knee * float(bent(np.float64(level))))
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
-        # Level times the size is what `Spread` costs at small strains, too.
+        # `Spread` too costs level times the strain where strains are small.
         items.append(Weighted(edges.build(mesh), options.w_edges * level, Absolute(0.1 * level)))
     return items
 
 
 def bent(level: Any) -> Any:
-    """Share of the knee: less where the strain is so large that peaks must be held down."""
+    """Compute the factor on the knee: below one where the strain level is large."""
     return ((_LARGE_STRAIN / level) ** (1 / 3)).clip(0.68, 1.0)
 
 
 def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:
-    # Of several components, sizes are those of their cells, each in its own unit ball.
+    # With several components: the mean of their cells' sizes, each in its own unit ball.
     sizes = [isometry.typical_length(p.mesh) / p.mesh.frame.scale for p in parted(mesh)]
     size = float(np.mean(sizes)) if sizes else isometry.typical_length(mesh)
     eps = options.eps * size
@@ -315,7 +315,7 @@ def _length_terms(options: Options, level: float, eps: float, mesh: Mesh) -> lis
     items += [Weighted(t, _W_COLLAPSE) for t in collapse.build(mesh)]
     terms = isometry.build(mesh)
     if options.norm == "l2":
-        # Divided by the level it is as large as with "l1", and so are the other weights.
+        # Dividing by the level makes it as large as with "l1", so the other weights can stay.
         return items + [Weighted(t, 1.0 / level) for t in terms]
     size = isometry.typical_length(mesh)
     return items + [Weighted(t, size, Absolute(eps)) for t in terms]
@@ -352,7 +352,7 @@ def _unknowns(layout: Layout, coordinates: Array) -> Variables:
 
 
 def _unstarted(request: Request, levels: list[Mesh], flat: Array) -> Array:
-    """An image of the first grid on the last one, near its constraints."""
+    """Interpolate the image of the coarsest grid to the finest and align it to constraints."""
     for coarse, fine in pairwise(levels):
         flat = flat_start.refine(coarse, fine, flat)
     if not request.constraints.empty:
@@ -369,7 +369,7 @@ def _place(mesh: Mesh, given: Array | None, coordinates: Array) -> Array:
 
 
 def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[str, float]:
-    """Metrics of a flat image (n, 2) of `mesh`; units: :data:`gso.metrics.INFO`.
+    """Compute the metrics of a flat image (n, 2) of `mesh`; units: :data:`gso.metrics.INFO`.
 
     ``loss_iso_cell`` is left out on a mesh without quads.
     """

@@ -1,4 +1,4 @@
-"""What the constraints of a request mean to a stage: fewer unknowns, more terms."""
+"""Constraints in a stage: eliminated unknowns and additional terms."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from gso.variables import Layout, Variables, free
 
 Array = NDArray[np.float64]
 
-#: How far round a vertex that is moved others go along, in the unit ball.
+#: Radius around a moved vertex within which others move along, in the unit ball.
 _REACH = 0.3
-#: Weights with which a start is drawn to its constraints, one after the other.
+#: Weights of the constraints in the successive stages that bring a start closer to them.
 _DRAWN = (1.0, 30.0)
 
 
 def hold(request: Request, variables: Variables) -> Variables:
-    """Unknowns that can only make what the hard linear constraints allow."""
+    """Eliminate the hard linear constraints from the unknowns."""
     reduction = request.constraints.reduction
     if reduction is None:
         return variables
@@ -35,15 +35,15 @@ def hold(request: Request, variables: Variables) -> Variables:
 
 
 def unknowns(request: Request, layout: Layout, coordinates: Array) -> Variables:
-    """Free coordinates, as far as the hard linear constraints allow; for a stage."""
+    """Build free coordinates with the hard linear constraints eliminated, for a stage."""
     return hold(request, free(layout))
 
 
 def approach(request: Request, points: Array, *, iterations: int = 10) -> Stage:
-    """The smallest and smoothest change of a surface (n, 3) that satisfies the constraints.
+    """Plan the smallest and smoothest change of a surface (n, 3) that satisfies the constraints.
 
-    It minimises ``|u|^2 + reach^4 |second derivative of u|^2`` of the displacement u, in the
-    mean, so that a vertex takes its neighbourhood along.
+    It minimises the mean of ``|u|^2 + reach^4 |second derivative of u|^2`` over the displacement
+    u, so that a moved vertex takes its neighbourhood along.
     """
     layout = Layout.of(len(points), "surface")
     mesh = request.mesh
@@ -53,7 +53,7 @@ def approach(request: Request, points: Array, *, iterations: int = 10) -> Stage:
 
 
 def _smallest(mesh: Mesh, points: Array) -> list[Weighted]:
-    """What keeps a mesh near points (n, 3), and what is between near and far smooth."""
+    """Build the terms that keep a mesh near points (n, 3) and its displacement smooth."""
     near = proximity.build(mesh.replaced(points), np.zeros_like(points))
     return [
         Weighted(near, 1.0),
@@ -62,7 +62,7 @@ def _smallest(mesh: Mesh, points: Array) -> list[Weighted]:
 
 
 def drawing(request: Request, stage: Stage) -> list[Stage]:
-    """Copies of a stage that bring a start closer to its constraints, one after the other."""
+    """Copy a stage, with all constraints soft and of growing weight, to approach them."""
     return [
         replace(stage, name="approach", items=stage.items + _drawn(request, weight))
         for weight in _DRAWN
@@ -70,13 +70,13 @@ def drawing(request: Request, stage: Stage) -> list[Stage]:
 
 
 def keeping(request: Request, stage: Stage) -> Stage:
-    """A stage of free coordinates, which then keeps the constraints."""
+    """Copy a stage of free coordinates, with the constraints imposed."""
     variables = partial(unknowns, request, stage.layout)
     return replace(stage, items=stage.items + pulls(request), variables=variables)
 
 
 def _drawn(request: Request, weight: float) -> list[Weighted]:
-    """All constraints as terms of one weight, for a start that only comes closer to them."""
+    """Build all but planarity constraints as terms of one weight, to approach them."""
     c = request.constraints
     block = c.block
     out = []
@@ -96,10 +96,10 @@ def _drawn(request: Request, weight: float) -> list[Weighted]:
 
 
 def pulls(request: Request) -> list[Weighted]:
-    """Terms of the other constraints, for an objective on the design's own vertices.
+    """Build the terms of soft constraints and of hard non-linear ones, on the design's vertices.
 
-    The block that is constrained must be the first of the stage's layout. Terms of hard
-    constraints have `multipliers`: the last stage is repeated until they hold.
+    The constrained block must be the first of the stage's layout. Terms of hard constraints have
+    `multipliers` (augmented Lagrangian): the last stage is repeated until they hold.
     """
     c = request.constraints
     block, dim = c.block, 2 if c.flat else 3

@@ -1,4 +1,4 @@
-"""Objectives of components that constraints join: each with the weights of its own size."""
+"""Objectives of meshes with several components, each scaled to its own unit ball."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ Array = NDArray[np.float64]
 
 
 def objective(mesh: Mesh, make: Callable[..., list[Weighted]], *positions: Array) -> list[Weighted]:
-    """Terms of a mesh, each component's made in its own unit ball.
+    """Build the terms of a mesh, those of each component in its own unit ball.
 
-    Energies are means over the components, weighted by area: a small component that is joined
-    to a large one is worked on as if it were alone.
+    The energy is the mean over the components, weighted by area. A small component joined to a
+    large one by constraints is thus treated as if it were alone.
 
     Parameters
     ----------
     mesh : Mesh
-        In the solver's frame.
+        The whole mesh, in the solver's frame.
     make : callable
         ``make(mesh, *positions)`` returns the terms of one component.
     *positions : ndarray, (n, 3)
-        More positions of the vertices, in the frame of `mesh`.
+        Further positions of the vertices, in the frame of `mesh`.
     """
     parts = parted(mesh)
     if not parts:

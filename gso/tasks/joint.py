@@ -1,15 +1,19 @@
-"""Developable by isometry: the surface and its flat image are solved for together.
+"""Make a surface developable by isometry: solve for the surface and its flat image together.
 
-The objective of Jiang et al. 2020, on the design scaled to the unit ball, is
+The objective, that of Jiang et al. 2020 with an added elongation term, is, on the design scaled
+to the unit ball,
 
     w_isometry / 2 mean E_iso + w_mapping / 2 mean E_reg + w_fairness / 2 (mean E_fair
     + w_flat mean E_fair') + w_closest / 2 mean d_n^2 + w_place / 2 mean |u|^2
+    + w_elongation / 2 mean (elongation)^2
 
-with E_iso the squared differences of the faces' squared diagonals and their product between
-surface and plane, relative to the mean one, E_reg the regulariser of the mapping, E_fair and
-E_fair' the squared second derivatives of both, d_n the distance from the tangent plane at the
-closest point of the design, and u the displacement of a vertex from its own place, which
-keeps the mesh from sliding. Fairness starts strong and falls tenfold until E_iso is small.
+with E_iso the squared differences, between surface and plane, of the faces' squared diagonals
+and their product, relative to the mean one; E_reg the regulariser of the mapping; E_fair and
+E_fair' the squared second derivatives of surface and image; d_n the distance from the tangent
+plane at the closest point of the design; u the displacement of a vertex from the design, whose
+term keeps the mesh from sliding; and the elongation of an edge zero within a range of length
+ratios. The fairness weight starts large and falls tenfold from stage to stage until E_iso is
+small.
 """
 
 from __future__ import annotations
@@ -44,15 +48,15 @@ from gso.variables import (
 
 Array = NDArray[np.float64]
 
-#: Fairness falls by this factor from stage to stage.
+#: Factor by which the fairness weight falls from stage to stage.
 _FALL = 10.0
-#: Relative fall of the energy at which a stage that only prepares another one stops.
+#: Tolerance (relative decrease of the energy) of all stages but the last.
 _NEARLY = 1e-3
-#: Error of lengths up to which a flat image counts as isometric.
+#: Relative error of lengths up to which a flat image counts as isometric.
 _KEPT = 2e-3
-#: Multiple of `enough` below which a start is solved on the design's own grid only.
+#: A warm start whose isometry defect is below this multiple of `enough` needs no coarser grids.
 _ISOMETRIC = 100.0
-#: Iterations of the flat image alone, where the design needs no change.
+#: Smallest iteration limit where the design needs no change and only its image is solved for.
 _UNROLL = 100
 
 
@@ -65,38 +69,39 @@ class Options(BaseOptions):
     w_isometry : float
         Weight of the mean squared isometry defect of the faces.
     w_mapping : float
-        Weight of the mean squared difference of the polylines' second differences, seen in
-        the mesh itself, between surface and flat image.
+        Weight of the regulariser of the mapping: the mean squared difference, between surface
+        and flat image, of the inner products of second differences and edges.
     w_fairness : float
-        Smallest weight of the mean squared second derivative.
+        Final weight of the mean squared second derivative.
     stiff : float
-        Its weight at the start, which falls tenfold from stage to stage.
+        Initial fairness weight, which falls tenfold from stage to stage. Not used with `x0`.
     w_flat : float
-        Weight of the flat image's second derivative, relative to that of the surface's.
+        Fairness weight of the flat image, relative to that of the surface.
     w_closest : float
         Weight of the squared distance from the tangent plane at the closest point of the
         design.
     w_place : float
-        Weight of the squared displacement from where a vertex was.
+        Weight of the squared displacement of the vertices from the design.
     w_elongation : float
-        Weight of edges of the surface that become much shorter or longer than the design's.
+        Weight of edges of the surface much shorter or longer than in the design.
     enough : float
-        Fairness falls no further when the mean squared isometry defect is this small.
+        Stopping threshold: the remaining stages of lower fairness are skipped when the mean
+        squared isometry defect is at most this.
     begin : {"curvature", "design"}
-        Start from the result of the formulation "curvature", or from the design itself;
-        `x0` and constraints have a start of their own.
+        Start from the result of the formulation "curvature", or from the design itself.
+        Ignored with `x0` or constraints, which determine their own start.
     variables : {"free", "surface"}
         Free vertices, or (on grids) a last stage in the control points of a bicubic B-spline
-        surface, which the result then is: its `spline`.
+        surface, returned as the result's `spline`.
     controls : int
         "surface": control points along each side; fewer on small grids.
     coarse_size : int
-        "design", `x0`: largest side of the coarsest grid; 0 for the design's own alone.
+        With begin "design" or `x0`: largest side of the coarsest grid; 0 for no coarser grids.
     coarse_iterations : int
-        "design", `x0`: iterations of each stage on coarser grids.
+        With begin "design" or `x0`: iterations of each stage on coarser grids.
     developable_below : float
-        A design whose mean |K| is below this is developable already: it comes back
-        untouched, with its flat image.
+        A design whose mean |K| is below this is developable already: it is returned unchanged,
+        with its flat image, unless there are constraints, `x0` or variables "surface".
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
@@ -141,12 +146,12 @@ class Options(BaseOptions):
 
 
 def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
-    """Stages of the joint solve.
+    """Plan the stages of the joint solve.
 
     Parameters
     ----------
     request : Request
-        What is wanted; its options are those of this formulation.
+        The problem, with the options of this formulation.
     curvature : callable
         Makes the plan of the formulation "curvature", for the start.
 
@@ -174,7 +179,7 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
         before, start = first.stages, first.start.reshape(-1, 3)
     stages[0].enter = partial(_with_flat, levels[0] if levels else mesh, cut)
     if spline is not None:
-        # The spline comes after all of them.
+        # The spline stage comes last, so no stage before it may end the solve.
         stages = [replace(stage, enough=None) for stage in stages]
         stages.append(splined.stage(stages[-1], mesh, spline))
     stages = [*before, *stages]
@@ -192,7 +197,7 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
 
 
 def _check_bound(request: Request) -> None:
-    """Refuse what cannot be kept together with `max_deviation`."""
+    """Raise if constraints or options are incompatible with `max_deviation`."""
     if request.max_deviation is None:
         return
     hard = [part for part in request.constraints.parts if part.hard]
@@ -209,19 +214,19 @@ def _check_bound(request: Request) -> None:
 
 
 def _layout(mesh: Mesh, cut: Cut | None = None) -> Layout:
-    """Vertices of the surface, and of its image: those of the cut mesh where there is one."""
+    """Return the layout of the surface and its flat image, which has the vertices of a cut mesh."""
     count = len(mesh.vertices)
     flat = count if cut is None else len(cut.vertex)
     return Layout((("surface", count, 3), ("flat", flat, 2)))
 
 
 def _opened(mesh: Mesh, cut: Cut | None, points: Array) -> Mesh:
-    """A surface (n, 3), cut open where it is."""
+    """Return the surface with vertices (n, 3), cut open if there is a cut."""
     return mesh.replaced(points) if cut is None else cut.mesh.replaced(points[cut.vertex])
 
 
 def _begun(surface: Mesh) -> Array:
-    """Flat image of an open surface, in its numbering."""
+    """Compute an initial flat image of an open surface, in its numbering."""
     ready, order = flat_start.by_rows(surface)
     flat = np.empty((len(order), 2))
     flat[order] = flat_start.begin(ready).flat
@@ -229,7 +234,7 @@ def _begun(surface: Mesh) -> Array:
 
 
 def _unrolling(request: Request, opened: flat_start.Opened) -> Plan:
-    """The design as it is, and its flat image."""
+    """Plan to keep the design fixed and solve for its flat image."""
     mesh, options, cut = request.mesh, request.options, opened.cut
     flat = _begun(_opened(mesh, cut, mesh.vertices))
     stage = _stage(request, mesh, 0.0, cut)
@@ -264,10 +269,10 @@ def _flat_only(layout: Layout, coordinates: Array) -> Variables:
 
 
 def _levels(request: Request, begun: Mesh) -> list[Mesh]:
-    """Coarser copies of the design to begin with, coarsest first.
+    """Return the coarser copies of the design on which to solve first, coarsest first.
 
-    What comes of the formulation "curvature" needs none, nor does a start that has an isometric
-    image already.
+    There are none if the result of the formulation "curvature" is the start, or if a warm start
+    has a nearly isometric image already.
     """
     o = request.options
     grid = request.mesh.grid_index is not None and request.constraints.empty
@@ -282,7 +287,10 @@ def _levels(request: Request, begun: Mesh) -> list[Mesh]:
 
 
 def _chain(request: Request, levels: list[Mesh], cut: Cut | None = None) -> list[Stage]:
-    """Coarse to fine, on each grid with less and less fairness; with the least from a start."""
+    """Plan the stages, coarse to fine, with falling fairness on each grid.
+
+    With a warm start there is one stage per grid, with the lowest fairness.
+    """
     options = request.options
     weights = [options.w_fairness]
     while request.start is None and weights[0] < 0.999 * options.stiff:
@@ -324,7 +332,7 @@ def _bounds(layout: Layout, count: int, reach: float, coordinates: Array) -> tup
 
 def _objective(request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None) -> list[Weighted]:
     make = partial(_terms, request.options, request.demand, w_fairness, cut)
-    # The cut is that of the whole.
+    # A cut refers to the whole mesh, so the components are not treated separately.
     items = joined.objective(mesh, make) if cut is None else make(mesh)
     return items + (held.pulls(request) if mesh is request.mesh else [])
 
@@ -332,7 +340,7 @@ def _objective(request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None)
 def _terms(
     o: Options, demand: float, w_fairness: float, cut: Cut | None, mesh: Mesh
 ) -> list[Weighted]:
-    """Terms of one component."""
+    """Build the terms of one component."""
     normals = vertex_normals(mesh)
     sheet = mesh if cut is None else cut.mesh
     both = {"counterpart": "flat"}
@@ -358,14 +366,14 @@ def _unknowns(request: Request, mesh: Mesh, layout: Layout, coordinates: Array) 
 
 
 def _with_flat(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
-    """A surface (n, 3) and a flat image of it."""
+    """Add an initial flat image to a surface, given by the first 3n coordinates."""
     points = coordinates[: 3 * len(mesh.vertices)].reshape(-1, 3)
     flat = _begun(_opened(mesh, cut, points))
     return _layout(mesh, cut).pack({"surface": points, "flat": flat})
 
 
 def _unstarted(levels: list[Mesh], cut: Cut | None) -> Array:
-    """The design (the last of the levels) and a flat image of it, which a coarse one gives."""
+    """Return the design (the last level) and an image interpolated from that of the first level."""
     coordinates = _with_flat(levels[0], cut, levels[0].vertices.ravel())
     for coarse, fine in pairwise(levels):
         coordinates = _refine(coarse, fine, coordinates)
@@ -373,7 +381,7 @@ def _unstarted(levels: list[Mesh], cut: Cut | None) -> Array:
 
 
 def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
-    """Displacement and flat image of a coarse grid, interpolated to a finer one."""
+    """Interpolate the displacement and the flat image of a coarse grid to a finer one."""
     blocks = _layout(coarse).split(coordinates)
     points = carry(coarse, fine, blocks["surface"])
     flat = flat_start.refine(coarse, fine.replaced(points), blocks["flat"])
@@ -387,8 +395,8 @@ def _isometric(mesh: Mesh, cut: Cut | None, enough: float, coordinates: Array) -
 
 
 def lengths_remark(surface: Mesh, flat: Array) -> list[str]:
-    """That a flat image (n, 2) does not keep the lengths of its surface, where it does not."""
-    # The faces' diagonals may keep their lengths while the edges do not.
+    """Return a note if a flat image (n, 2) does not preserve the lengths of its surface."""
+    # The diagonals of the faces may preserve their lengths while the edges do not.
     faces = 0.5 * measure.isometry_energy(surface, flat) ** 0.5
     off = max(faces, measure.edge_length_error(surface, flat))
     if off <= _KEPT:

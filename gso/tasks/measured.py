@@ -1,4 +1,4 @@
-"""The metrics of a task, component by component and of the whole."""
+"""The metrics of a task, per component and combined."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ Array = NDArray[np.float64]
 
 
 def parted(design: Mesh) -> list[Component]:
-    """The components of a mesh that has several; none of a mesh that is one."""
+    """Return the components of a mesh that has several; an empty list otherwise."""
     return split(design) if several(design) else []
 
 
 def measured(task: str, design: Mesh, after: Mesh, flat: Array | None) -> dict[str, float]:
-    """Metrics of a result: of several components each by its own size, then together.
+    """Compute the metrics of a result, per component by its own size, and combine them.
 
     Parameters
     ----------
     task : str
-        Whose metrics.
+        Name of the task.
     design, after : Mesh
-        Before and after. Where their faces differ, components cannot be told to belong
-        together, and the surfaces are measured as wholes.
+        Before and after. If their faces differ, their components cannot be matched and each
+        surface is measured as a whole.
     flat : ndarray, (n, 2), or None
-        A flat image.
+        Flat image.
 
     Examples
     --------

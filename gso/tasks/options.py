@@ -13,24 +13,24 @@ from gso.status import OptionError
 
 @dataclass(frozen=True)
 class Options(KnownFields):
-    """Settings of the solver; every task adds its own.
+    """Settings of the solver, to which every task adds its own.
 
-    Change some of a preset's fields with :func:`dataclasses.replace`.
+    Use :func:`dataclasses.replace` to change some fields of a preset.
 
     Attributes
     ----------
     iterations : int
-        Largest number of iterations of the last stage; tasks adapt it to the grid's size.
+        Largest number of iterations of the last stage; tasks adapt it to the size of the grid.
     tolerance : float
-        Stop when an iteration lowers the energy by less than this share of it.
+        Stop when the relative decrease of the energy in one iteration is below this.
     method : {"gauss-newton", "levenberg-marquardt"}
-        Direction of a step.
+        How the direction of a step is computed.
     backend : str or None
         Linear solver: "banded", "superlu", "cholmod", "pardiso"; None takes the fastest
         installed one for the matrix at hand.
     threads : int
-        BLAS threads around factorisations; 0 leaves the library's own setting, which is
-        slower on a busy machine.
+        Number of BLAS threads during factorisations; 0 keeps the library's own setting, which
+        is slower on a busy machine.
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {}
@@ -52,14 +52,14 @@ class Options(KnownFields):
 
     @classmethod
     def preset(cls, name: str) -> Options:
-        """Settings of a named preset."""
+        """Return the settings of a named preset."""
         if name not in cls.PRESETS:
             raise OptionError(f"no preset {name!r}; {choices(name, cls.PRESETS)}")
         return cls(**cls.PRESETS[name])
 
     @classmethod
     def coerce(cls, given: str | Options | None) -> Options:
-        """Settings from a preset's name, an instance, or None for "balanced"."""
+        """Return settings from a preset's name, an instance, or None for "balanced"."""
         if given is None or isinstance(given, str):
             return cls.preset(given or "balanced")
         if not isinstance(given, cls):
@@ -75,7 +75,7 @@ def _named(kind: type) -> str:
 
 
 def _check_number(name: str, kind: str, value: Any) -> None:
-    """Refuse a setting annotated as int or float that is no such number, or below zero."""
+    """Raise unless a setting annotated as int or float is one, finite and not negative."""
     wanted = kind.split(" | ")
     if value is None and "None" in wanted:
         return

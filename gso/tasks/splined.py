@@ -13,14 +13,15 @@ from gso.variables import Layout, Variables, spline_surface
 
 
 def controls(request: Request) -> tuple[int, int] | None:
-    """Control points along both sides of the grid; None when no spline is wanted.
+    """Return the control points along both sides of the grid; None when no spline is wanted.
 
     Raises
     ------
     MeshError
-        The mesh is no grid.
+        The mesh is not a grid.
     OptionError
-        A bound or a hard constraint, which a spline of few control points cannot keep.
+        `max_deviation` or a hard constraint is set, which a spline with few control points
+        cannot satisfy.
     """
     if request.options.variables != "surface":
         return None
@@ -42,10 +43,10 @@ def controls(request: Request) -> tuple[int, int] | None:
 
 
 def stage(before: Stage, mesh: Mesh, wanted: tuple[int, int]) -> Stage:
-    """The stage after one on the design's own vertices, with the same objective.
+    """Build the B-spline stage that follows one on the design's vertices, with its objective.
 
-    Its block "surface" is a B-spline, at first the one closest to where the stage before
-    ended; other blocks stay free.
+    The block "surface" becomes a B-spline surface, initially the one closest to the result of
+    the stage before; other blocks stay free.
     """
     unknowns = spline_surface(before.layout, grid_of(mesh).shape[:2], wanted)
     return replace(
@@ -59,7 +60,7 @@ def stage(before: Stage, mesh: Mesh, wanted: tuple[int, int]) -> Stage:
 
 
 def closest(layout: Layout, mesh: Mesh, wanted: tuple[int, int], coordinates: Array) -> Array:
-    """Coordinates of the spline that is closest to others."""
+    """Return the coordinates of the B-spline surface closest to the given ones."""
     return _closest(spline_surface(layout, grid_of(mesh).shape[:2], wanted), coordinates)
 
 
