@@ -39,7 +39,7 @@ def many(
         from gso.tno.pool import processors
 
         workers = min(processors(), len(files))
-        workers = workers if workers > 1 else 0  # a single process is this one
+        workers = workers if workers > 1 else 0  # with one worker, use this process
     records: dict[int, dict[str, Any]] = {}
     with progress.files(len(files)) as bar, report.status_only():
         for item in job.solve_many(files, workers):

@@ -208,7 +208,7 @@ def plot(
         try:
             result = Result.load(file)
         except GSOError:
-            pass  # a mesh in an .npz file, or what load() says about it
+            pass  # an .npz mesh, or a bad file: files.load reports that
         else:
             if rulings is None:
                 pictures.plot_result(result, out)
