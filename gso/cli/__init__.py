@@ -14,12 +14,12 @@ from gso.status import GSOError
 
 __all__ = ["main"]
 
-#: What a shell reports for a program that was ended by Ctrl-C.
+#: Exit code by which shells report a program interrupted by Ctrl-C.
 INTERRUPTED = 130
 
 
 class _Commands(click.Group):
-    """Commands whose errors are one line and an exit code, never a traceback."""
+    """Command group that reports errors as one line and an exit code, without a traceback."""
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
@@ -36,7 +36,7 @@ class _Commands(click.Group):
 
 
 def _version(ctx: click.Context, option: click.Parameter, asked: bool) -> None:
-    """Print the version; reading it takes longer than the rest of this module."""
+    """Print the version; gso is imported only here because that is slow."""
     if asked:
         import gso
 

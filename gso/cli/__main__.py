@@ -1,4 +1,4 @@
-"""The command line without its entry point: ``python -m gso.cli``."""
+"""The command line as a module: ``python -m gso.cli``."""
 
 from gso.cli import main
 

@@ -1,4 +1,4 @@
-"""``gso optimize`` on many files: in parallel, one line each, failures reported and survived."""
+"""``gso optimize`` on many files in parallel: one line per file, errors do not stop the rest."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def many(
     table: str | None,
     workers: int | None,
 ) -> bool:
-    """Optimise files into a folder; whether all results are usable."""
+    """Optimise files into a folder, and return whether all results are usable."""
     outs = _outputs(files, folder, suffix)
     pictures = [None if plots is None else str(Path(plots, f"{Path(o).stem}.png")) for o in outs]
     _each_its_own(files, [p for p in pictures if p is not None])
@@ -39,7 +39,7 @@ def many(
         from gso.tno.pool import processors
 
         workers = min(processors(), len(files))
-        workers = workers if workers > 1 else 0  # a single process is this one
+        workers = workers if workers > 1 else 0  # with one worker, use this process
     records: dict[int, dict[str, Any]] = {}
     with progress.files(len(files)) as bar, report.status_only():
         for item in job.solve_many(files, workers):
@@ -65,12 +65,12 @@ def many(
 
 
 def _outputs(files: tuple[str, ...], folder: str, suffix: str | None) -> list[str]:
-    """Output of each input: its name in the folder.
+    """Return the output path of each input: its name in the folder.
 
     Raises
     ------
     OptionError
-        Two inputs would be written to one file.
+        Two inputs have the same output path.
     """
     if suffix is not None and not suffix.startswith("."):
         suffix = f".{suffix}"
@@ -83,7 +83,7 @@ def _outputs(files: tuple[str, ...], folder: str, suffix: str | None) -> list[st
 
 
 def _each_its_own(files: tuple[str, ...], outs: list[str]) -> None:
-    """Refuse to write two things to one file."""
+    """Raise an OptionError if two inputs have the same output path."""
     owner: dict[str, str] = {}
     for file, out in zip(files, outs, strict=False):
         place = os.path.realpath(out)
@@ -100,6 +100,6 @@ def _make_folder(path: str) -> None:
 
 
 def _named(file: str, message: str) -> str:
-    """The message in one line, with the file's name at its beginning."""
+    """Return the message in one line that begins with the file's name."""
     message = " ".join(message.split())
     return message if message.startswith(file) else f"{file}: {message}"

@@ -1,4 +1,4 @@
-"""``gso dataset``: build a set of surfaces, look at it, export it."""
+"""``gso dataset``: build, inspect and export a dataset of surfaces."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PLOTTED = ("train", "validation", "test", "hard")
 
 @click.group(short_help="Build and inspect sets of surfaces.")
 def dataset() -> None:
-    """Surfaces to train and to compare on."""
+    """Build, inspect and export datasets of surfaces for training and comparison."""
 
 
 @dataset.command(short_help="Build a set of surfaces with labels.")
@@ -63,10 +63,10 @@ def dataset() -> None:
 @click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that does the work instead.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 def build(out: str, quiet: bool, **given: Any) -> None:
-    """Build a set of surfaces in the folder DIR.
+    """Build a dataset of surfaces in the folder DIR.
 
-    A build that was ended, however it was, goes on where it was when the same command is
-    given again; the finished set is the same to the last byte.
+    To resume an interrupted build, run the same command again. The finished dataset is
+    identical, byte for byte, to that of an uninterrupted build.
     """
     from gso import dataset as sets
     from gso.cli import progress
@@ -102,7 +102,7 @@ def build(out: str, quiet: bool, **given: Any) -> None:
 
 
 def _memory() -> str:
-    """Peak memory, where the system tells."""
+    """Return a text on peak memory, or "" where the system does not report it."""
     try:
         import resource
     except ImportError:  # Windows
@@ -130,7 +130,7 @@ def _memory() -> str:
     "--plot", metavar="PNG", type=click.Path(), help="Picture of the features' histograms."
 )
 def info(folder: str, split: str | None, verify: bool, table: str | None, plot: str | None) -> None:
-    """Say what the set in DIR holds: surfaces per interval, metrics of the labels."""
+    """Print statistics of the dataset in DIR: surfaces per interval, metrics of the labels."""
     from gso import dataset as sets
     from gso.cli import report
     from gso.cli.dataset_text import lines
@@ -186,7 +186,7 @@ def _plot(data: Dataset, path: str) -> None:
     help="Split; all that have it. May be repeated.",
 )
 def export(folder: str, out: str, array: str, only: tuple[str, ...]) -> None:
-    """Write an array of the set in DIR as .npy files, a folder per split, a file per surface."""
+    """Write an array of the dataset in DIR as .npy files: one per surface, a folder per split."""
     from gso import dataset as sets
 
     count = sets.export(sets.open(folder), Path(out), array=array, only=only)

@@ -1,4 +1,4 @@
-"""What ``gso dataset info`` prints."""
+"""The text that ``gso dataset info`` prints."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 _MAIN = ("train", "validation", "test", "hard")
 _SIGNS = {"K_A": "K_A, mean |K|", "K_P": "K_P", "K_N": "|K_N|", "sigma2": "sigma^2, boundary"}
-#: Length of the longest bar.
+#: Length of the longest bar, in characters.
 _BAR = 30
 
 
 def lines(data: Dataset, summary: dict[str, Any], split: str | None = None) -> list[str]:
-    """A set in numbers; with the labels of a split, or else of the test split."""
+    """Format the statistics of a dataset, with label metrics of `split` (default: test)."""
     out = [_head(data), "", *_splits(summary)]
     for name in INTERVALS:
         out += ["", *_intervals(name, summary)]
@@ -58,7 +58,7 @@ def _splits(summary: dict[str, Any]) -> list[str]:
 
 
 def _intervals(name: str, summary: dict[str, Any]) -> list[str]:
-    """Counts per interval by split, and a bar for the first three together."""
+    """Format counts per interval by split, and a bar for train, validation and test together."""
     groups = {n: s["intervals"][name] for n, s in summary.items() if n in _MAIN}
     others = [s["intervals"][name] for n, s in summary.items() if n not in _MAIN]
     if others:

@@ -1,4 +1,4 @@
-"""Options about files that several commands have, and outputs that must not be inputs."""
+"""File options shared by several commands, and the check that no output replaces an input."""
 
 from __future__ import annotations
 
@@ -36,26 +36,26 @@ force = click.option("--force", is_flag=True, help="Let an output replace an inp
 
 
 def load(file: str, weld: float | None = None) -> Mesh:
-    """A mesh from a file, its vertices merged if asked for."""
+    """Read a mesh from a file, and merge vertices if `weld` is given."""
     from gso import io
 
     return io.load(file, weld=weld)
 
 
 def source(file: str, weld: float | None) -> Any:
-    """A file as :func:`gso.as_mesh` takes it, to be read elsewhere."""
+    """Return a file as input of :func:`gso.as_mesh`, for a worker process to read."""
     from gso.io import Unwelded
 
     return file if weld is None else Unwelded(file, weld)
 
 
 def spare(inputs: Iterable[str | None], outputs: Iterable[str | None], force: bool) -> None:
-    """Refuse outputs that are inputs, by whatever name: links of both kinds are followed.
+    """Raise an error if an output is also an input, through symbolic or hard links too.
 
     Raises
     ------
     OptionError
-        An output would replace an input, and nobody insists.
+        An output would replace an input, and `force` is False.
     """
     if force:
         return
@@ -70,7 +70,7 @@ def spare(inputs: Iterable[str | None], outputs: Iterable[str | None], force: bo
 
 
 def _keys(name: str) -> list[Any]:
-    """What files that are one and the same have in common, one of them at least."""
+    """Return keys of a file (real path; device and inode); equal files share at least one."""
     keys: list[Any] = []
     with suppress(OSError, ValueError):
         keys.append(os.path.realpath(name))

@@ -1,4 +1,4 @@
-"""``gso metrics``, ``gso info`` and ``gso plot``: look at surfaces."""
+"""``gso metrics``, ``gso info`` and ``gso plot``: inspect surfaces."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 @files.weld
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def metrics(before: str, after: str, weld: float | None, as_json: bool) -> None:
-    """Measure the surface AFTER against the surface BEFORE.
+    """Print metrics of the surface AFTER, relative to the surface BEFORE.
 
-    When AFTER is flat (one z everywhere) and has the faces of BEFORE, it is measured as
-    its flat pattern too.
+    If AFTER is flat (constant z) and has the same faces as BEFORE, the metrics of a flat
+    pattern of BEFORE are printed too.
     """
     import json
 
@@ -40,7 +40,7 @@ def metrics(before: str, after: str, weld: float | None, as_json: bool) -> None:
 
 
 def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[str]]:
-    """Metrics of the tasks that fit a pair of surfaces, and what was left out."""
+    """Compute the metrics that apply to a pair of surfaces, and notes on omitted ones."""
     import math
 
     import numpy as np
@@ -72,9 +72,9 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
 @click.argument("names", metavar="FILE...", nargs=-1, required=True, type=click.Path())
 @files.weld
 def info(names: tuple[str, ...], weld: float | None) -> None:
-    """Say what mesh files hold: size, connectivity, curvature.
+    """Print properties of mesh files: size, connectivity, curvature.
 
-    A file that cannot be read is reported; the exit code is then 1.
+    If a file cannot be read, an error is printed for it and the exit code is 1.
     """
     from gso.cli import report
 
@@ -95,7 +95,7 @@ def info(names: tuple[str, ...], weld: float | None) -> None:
 
 
 def _facts(mesh: Mesh) -> list[tuple[str, str]]:
-    """Names and values of what is known about a mesh."""
+    """Return names and values of the properties of a mesh."""
     import numpy as np
 
     from gso import metrics as measure
@@ -139,7 +139,7 @@ def _facts(mesh: Mesh) -> list[tuple[str, str]]:
 
 
 def _sizes(mesh: Mesh) -> str:
-    """Size of a mesh, or the range of its components'."""
+    """Format the size of a mesh, or the range of sizes of its components."""
     from gso.components import several, split
 
     if not several(mesh):
@@ -193,7 +193,7 @@ def plot(
     """Draw the surface FILE as a picture (.png, .pdf, .svg).
 
     A full result (.npz of gso optimize) is drawn beside its design, unless --before or
-    --color ask for something else.
+    --color is given.
     """
     from gso import io
     from gso import plot as pictures
@@ -208,7 +208,7 @@ def plot(
         try:
             result = Result.load(file)
         except GSOError:
-            pass  # a mesh in an .npz file, or what load() says about it
+            pass  # an .npz mesh, or a bad file: files.load reports that
         else:
             if rulings is None:
                 pictures.plot_result(result, out)

@@ -1,4 +1,4 @@
-"""``gso optimize``: one file, or many at once."""
+"""``gso optimize``: optimise one file, or many in parallel."""
 
 from __future__ import annotations
 
@@ -26,29 +26,29 @@ UNITS = ("um", "mm", "cm", "dm", "m", "in", "ft", "yd")
 
 @dataclass(frozen=True)
 class Job:
-    """What to do with every input.
+    """Settings of a run of ``gso optimize``, shared by all inputs.
 
     Attributes
     ----------
     keywords : dict
-        For :func:`gso.tno.optimize`.
+        Keyword arguments of :func:`gso.tno.optimize`.
     method : {"auto", "tno", "net", "hybrid"}
-        Who solves: the optimiser, a net alone, the optimiser from a net's result, or that
-        where it saves time.
+        Solver. "tno": the optimiser. "net": a net alone. "hybrid": the optimiser, warm-started
+        from a net's result. "auto": "hybrid" where it saves time, otherwise "tno".
     net : str, optional
         Name or file of the net.
     unit : str
-        Unit of the coordinates, for drawings.
+        Unit of the coordinates, for drawings and CAD files.
     quiet : bool
         Print nothing but errors.
     weld : float, optional
-        Vertices closer than this are merged.
+        Vertices within this distance of each other are merged.
     force : bool
-        Outputs may replace inputs.
+        Whether outputs may replace inputs.
     inputs : tuple of str
-        Files that are read besides the surfaces.
+        Other files that are read: constraints, net.
     named : str
-        The unit where it was given: what is printed has none otherwise.
+        The unit if ``--unit`` was given, else "": lengths are then printed without a unit.
     """
 
     keywords: dict[str, Any] = field(default_factory=dict)
@@ -62,7 +62,7 @@ class Job:
     named: str = ""
 
     def spare(self, files: Iterable[str], *outputs: str | None) -> None:
-        """Refuse outputs that are inputs."""
+        """Raise an error if an output is also an input, unless `force` is set."""
         spare((*files, *self.inputs), outputs, self.force)
 
     def solve(self, mesh: Any, **more: Any) -> Result:
@@ -91,7 +91,7 @@ class Job:
         return {**self.keywords, **more}
 
     def check(self, out: str, plot: str | None = None) -> None:
-        """Refuse outputs that cannot be written, before anything is computed."""
+        """Raise an error if an output cannot be written, before anything is computed."""
         from gso import io
 
         if out.lower().endswith(".svg"):
@@ -234,8 +234,8 @@ class Job:
 def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
     """Optimise the surface IN and write it to OUT.
 
-    Several inputs are worked on in parallel; OUT is then a folder. The exit code is 0 only
-    when every result can be used as what was asked for; where not, notes say why and where.
+    Several inputs are processed in parallel; OUT is then a folder. The exit code is 0 only
+    if all results are usable; otherwise notes say why a result is not usable, and where.
     """
     if given["net"] is not None and given["method"] in ("auto", "tno"):
         raise OptionError("--net goes with --method net or hybrid")
@@ -274,20 +274,20 @@ def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
 
 
 def _named_unit(unit: str) -> str:
-    """The unit, where the user named it."""
+    """Return the unit if the user gave ``--unit``, else ""."""
     source = click.get_current_context().get_parameter_source("unit")
     return unit if source is click.core.ParameterSource.COMMANDLINE else ""
 
 
 def _is_cad(out: str) -> bool:
-    """Whether a file name, or a suffix with or without its dot, is that of a CAD file."""
+    """Tell whether a file name, or a suffix with or without its dot, is that of a CAD file."""
     from gso.io import SPLINE_SUFFIXES
 
     return f".{out.lower().rpartition('.')[2]}" in SPLINE_SUFFIXES
 
 
 def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
-    """Keywords of :func:`gso.tno.optimize`, checked as far as that needs no mesh."""
+    """Return keywords of :func:`gso.tno.optimize`, checked as far as possible without a mesh."""
     from gso.tno import check
 
     formulation, kind = tasks.choose(
@@ -296,7 +296,7 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
     settings: Any = kind.coerce(given["preset"])
     if given["backend"] is not None:
         settings = replace(settings, backend=given["backend"])
-    # What a spline cannot keep is solved as a mesh, and the spline fitted to the result.
+    # With bounds or constraints the mesh is optimised, and a spline is fitted to the result.
     apart = given["max_deviation"] is not None or given["fix_boundary"]
     apart |= given["max_strain"] is not None
     apart |= given["constraints"] is not None
@@ -325,7 +325,7 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
 
 
 def _single(job: Job, file: str, out: str, plot: str | None, table: str | None) -> bool:
-    """Optimise one surface; whether the result is usable."""
+    """Optimise one surface, and return whether the result is usable."""
     from gso.cli import report
     from gso.cli.progress import iterations
 

@@ -1,4 +1,4 @@
-"""Progress bars: on the error stream, when a person watches and it takes a while."""
+"""Progress bars on the error stream, shown only in a terminal."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ PATIENCE = 1.0
 
 
 def watched() -> bool:
-    """Whether a person sees the error stream."""
+    """Tell whether the error stream is a terminal."""
     return sys.stderr is not None and sys.stderr.isatty()
 
 
 @contextmanager
 def iterations() -> Iterator[Callable[[Progress], None] | None]:
-    """A callback that shows the iterations of a solve, or None when nobody watches."""
+    """Provide a callback that shows the iterations of a solve, or None without a terminal."""
     if not watched():
         yield None
         return
@@ -53,7 +53,7 @@ def iterations() -> Iterator[Callable[[Progress], None] | None]:
 
 @contextmanager
 def files(count: int) -> Iterator[Any]:
-    """A bar over files, with `update(n)` and `write(line, file=...)`."""
+    """Provide a bar over files, with `update(n)` and `write(line, file=...)`."""
     from tqdm import tqdm
 
     with tqdm(total=count, disable=not watched(), leave=False, unit="file") as bar:
@@ -62,12 +62,12 @@ def files(count: int) -> Iterator[Any]:
 
 @dataclass
 class Counts:
-    """Bars over things that are counted, one after the other, and the time they took.
+    """Consecutive progress bars, one per kind of counted item, and the time spent on each.
 
     Attributes
     ----------
     spent : dict of str to (int, float)
-        How many were added, and in how many seconds, by name.
+        Number of items added and seconds spent, by kind of item.
     """
 
     spent: dict[str, tuple[int, float]] = field(default_factory=dict)
@@ -77,13 +77,13 @@ class Counts:
     _start: float = 0.0
 
     def tick(self, what: str, count: int, total: int) -> None:
-        """Show how many there are."""
+        """Show that `count` of `total` items of the kind `what` are done."""
         if what != self._what:
             from tqdm import tqdm
 
             self.close()
-            # The time left follows from the mean speed since the start: files of many
-            # surfaces come in bursts.
+            # Estimate the remaining time from the mean speed since the start, because files
+            # of many surfaces finish in bursts.
             self._bar = tqdm(
                 desc=what,
                 total=total,
@@ -96,14 +96,14 @@ class Counts:
         self.spent[what] = (count - self._first, time.perf_counter() - self._start)
 
     def close(self) -> None:
-        """Leave the last bar."""
+        """Close the last bar."""
         if self._bar is not None:
             self._bar.close()
 
 
 @contextmanager
 def counts() -> Iterator[Counts]:
-    """Bars over whatever is counted."""
+    """Provide bars over counted items, and close them at the end of the block."""
     bars = Counts()
     try:
         yield bars
@@ -113,7 +113,7 @@ def counts() -> Iterator[Counts]:
 
 @contextmanager
 def share() -> Iterator[Callable[[float, str], None]]:
-    """A bar over the share of some work that is done, and what is said beside it."""
+    """Provide a callback that shows the completed fraction of a task and a text."""
     from tqdm import tqdm
 
     line = "{percentage:5.1f}%|{bar}| [{elapsed}{postfix}]"

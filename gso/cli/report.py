@@ -1,4 +1,4 @@
-"""What is printed about results and surfaces: tables for people, JSON for programs."""
+"""Reports on results and surfaces: tables as text, records as JSON."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 @contextmanager
 def status_only() -> Iterator[None]:
-    """No warning where the status, which is printed, says the same."""
+    """Suppress convergence warnings, because the printed status says the same."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         yield
 
 
 def record(file: str, out: str, result: Result, unit: str = "") -> dict[str, Any]:
-    """A result without its geometry; `unit` is the name of that of its coordinates, if known."""
+    """Summarise a result without its geometry; `unit` names its unit of length, if known."""
     from gso.verdict import headline
 
     return {
@@ -51,7 +51,7 @@ def record(file: str, out: str, result: Result, unit: str = "") -> dict[str, Any
 
 
 def text(record: Mapping[str, Any]) -> str:
-    """A record: what it amounts to, a table of metrics, the status, and the notes."""
+    """Format a record: the headline, a table of metrics, the status and the notes."""
     lines = [*filter(None, [record["headline"]]), f"{record['input']} -> {record['output']}", ""]
     lines += table(record["metrics"])
     lines += ["", f"{record['task']}: {record['message']}"]
@@ -77,15 +77,15 @@ def _spline(said: Mapping[str, Any]) -> str:
 
 
 def line(record: Mapping[str, Any]) -> str:
-    """A record in one line."""
+    """Format a record in one line."""
     values = record["metrics"]
     shown = [record["headline"]] if record["headline"] else []
-    # A task's first metric says most about its results, where there is no better line.
+    # The first metric of a task says most about its result: show it if there is no headline.
     for name in [name.removesuffix("_before") for name in values][: 1 - len(shown)]:
         was = f"{_short(values[f'{name}_before'])} -> " if f"{name}_before" in values else ""
         shown.append(f"{name} {was}{_short(values[name])}")
     shown += [] if record["usable"] else ["not usable"]
-    # What stands in the first line need not be said again.
+    # The headline already gives the largest strain.
     said = [r for r in record["reasons"] if not r.startswith("largest strain")]
     return "; ".join(
         [f"{record['input']} -> {record['output']}", *shown, *said[:1], record["message"]]
@@ -93,13 +93,13 @@ def line(record: Mapping[str, Any]) -> str:
 
 
 def table(metrics: Mapping[str, Any]) -> list[str]:
-    """Lines of name, value and unit."""
+    """Format metrics as lines of name, value and unit."""
     rows = [(name, _short(value), unit(name)) for name, value in metrics.items()]
     return columns(rows)
 
 
 def columns(rows: Iterable[tuple[str, ...]]) -> list[str]:
-    """Lines of cells, left-aligned in columns."""
+    """Format rows of cells as lines with left-aligned columns."""
     rows = list(rows)
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [
@@ -109,7 +109,7 @@ def columns(rows: Iterable[tuple[str, ...]]) -> list[str]:
 
 
 def unit(name: str) -> str:
-    """Unit of a metric."""
+    """Return the unit of a metric, "" if it has none or is unknown."""
     info = INFO.get(name) or INFO.get(name.removesuffix("_before"))
     return info.unit if info else ""
 
@@ -123,7 +123,7 @@ def write_json(path: str, content: Any) -> None:
 
 
 def _number(value: Any) -> float | int | None:
-    """JSON knows neither NaN nor infinity."""
+    """Convert a metric to a JSON number, or None for NaN and infinity, which JSON lacks."""
     number = float(value)
     if not math.isfinite(number):
         return None

@@ -1,4 +1,4 @@
-"""``gso train``: nets from a configuration and a set of surfaces."""
+"""``gso train``: train a net from a configuration and a dataset."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from gso.cli import progress
 if TYPE_CHECKING:
     from gso.net.training import Report
 
-#: Figures that are shown beside the bar, by task.
+#: Metrics that are shown beside the progress bar, if the task has them.
 _SHOWN = ("loss_gc", "K_A_r", "d_H", "strain_mean", "loss_iso_cell", "theta")
-#: glibc's M_MMAP_THRESHOLD and M_TRIM_THRESHOLD, and bytes up to which it takes the former.
+#: glibc's M_MMAP_THRESHOLD and M_TRIM_THRESHOLD, and the largest value for the former (bytes).
 _MAPPED, _TRIMMED, _LARGE = -3, -1, 2**25
 
 
@@ -43,10 +43,10 @@ def train(
 ) -> None:
     """Train the net that CONFIG describes, a .toml or .json file or a name.
 
-    The same command goes on with a run that was ended. With torchrun, several processes:
-    torchrun --nproc-per-node 2 -m gso.cli train CONFIG ...
+    To resume an interrupted run, give the same command again. To train with several
+    processes, use torchrun: torchrun --nproc-per-node 2 -m gso.cli train CONFIG ...
     """
-    # Read when torch is loaded: threads that wait busily slow each other on shared cores.
+    # Set before torch is imported: busily waiting threads slow each other on shared cores.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     _keep_memory()
     from gso.net.config import read
@@ -70,7 +70,7 @@ def train(
 
 
 def _keep_memory() -> None:
-    """Let glibc keep what is freed: each step wants as much again, and new pages take time."""
+    """Let glibc keep freed memory: each step reallocates it, and mapping pages is slow."""
     try:
         keep = ctypes.CDLL(None).mallopt
     except (AttributeError, OSError, TypeError):
@@ -80,7 +80,7 @@ def _keep_memory() -> None:
 
 
 def _text(report: Report) -> str:
-    """How a run is going."""
+    """Format the progress of a run."""
     hours, minutes = divmod(round(report.left / 60), 60)
     shown = "".join(f", {n} {v:.4g}" for n, v in report.figures.items() if n in _SHOWN)
     return f"{hours}:{minutes:02d} left, step {report.step}, loss {report.loss:.4g}{shown}"

@@ -1,11 +1,11 @@
-"""Surfaces to train and to compare on: build them, open them, import and export them."""
+"""Datasets of surfaces for training and comparison: building, reading and exporting."""
 
 from __future__ import annotations
 
 import importlib
 from typing import Any
 
-# Looked up at first use, so that to read a set does not load the solver that made it.
+# Imported on first use, so that reading a dataset does not load the solver.
 _NAMES = {
     "Dataset": "gso.dataset.store",
     "Recipe": "gso.dataset.recipe",

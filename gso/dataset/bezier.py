@@ -32,7 +32,8 @@ class BezierSurface:
     def sample(self, height: int = 64, width: int | None = None) -> NDArray[np.float64]:
         """Sample a (height, width, 3) grid, normalised to the unit ball.
 
-        The same surface at any resolution; normalisation is by the samples themselves.
+        The surface does not depend on the resolution, but the normalisation (centroid and
+        radius) is computed from the samples.
         """
         width = height if width is None else width
         u = np.linspace(self.window[0, 0], self.window[0, 1], height)
@@ -43,7 +44,7 @@ class BezierSurface:
 
 
 def bernstein(degree: int, t: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Bernstein polynomials of one degree at parameters t, shape (len(t), degree + 1).
+    """Evaluate the Bernstein polynomials of a degree at parameters t, (len(t), degree + 1).
 
     >>> bernstein(2, np.array([0.5]))
     array([[0.25, 0.5 , 0.25]])
@@ -62,7 +63,7 @@ def normalise(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def boundary_length_variance(points: NDArray[np.float64]) -> float:
-    """Variance of the four boundary lengths of a grid (Wang et al. 2024, Eq. 2)."""
+    """Compute the variance of the four boundary lengths of a grid (Wang et al. 2024, Eq. 2)."""
     sides = (points[0], points[-1], points[:, 0], points[:, -1])
     return float(np.var([np.linalg.norm(np.diff(s, axis=0), axis=1).sum() for s in sides]))
 
@@ -71,8 +72,8 @@ def draw(rng: np.random.Generator) -> BezierSurface:
     """Draw one surface of the recipe, unscreened.
 
     Control net n x m with n uniform in {4..20} and m in {n..20}; x and y are the index
-    plus U(-1, 1), z is U(0, 1) (n + m) / 2; per direction the window runs from
-    U(0.1, 0.6) to an independent such draw plus U(0.3, 0.8).
+    plus U(-1, 1), z is U(0, 1) (n + m) / 2. In each direction the window runs from
+    U(0.1, 0.6) to an independent U(0.1, 0.6) + U(0.3, 0.8).
     """
     n = int(rng.integers(SMALLEST_NET, LARGEST_NET + 1))
     m = int(rng.integers(n, LARGEST_NET + 1))
@@ -87,7 +88,7 @@ def draw(rng: np.random.Generator) -> BezierSurface:
 
 @cache
 def _binomials(count: int) -> NDArray[np.float64]:
-    """Binomial coefficients (degree, k), zero where k exceeds the degree."""
+    """Return binomial coefficients (degree, k), zero where k exceeds the degree."""
     from scipy.special import comb
 
     return comb(*np.ogrid[:count, :count])
@@ -96,7 +97,7 @@ def _binomials(count: int) -> NDArray[np.float64]:
 def _padded_bernstein(
     counts: NDArray[np.int64], ranges: NDArray[np.float64], samples: int, width: int
 ) -> NDArray[np.float64]:
-    """Bernstein polynomials of many degrees (b, samples, width), zero from `counts` on."""
+    """Evaluate Bernstein polynomials of many degrees (b, samples, width); pad with zeros."""
     t = np.linspace(ranges[:, 0], ranges[:, 1], samples, axis=1)[..., None]
     k = np.arange(width)
     rest = np.maximum(counts[:, None] - 1 - k, 0)[:, None]
@@ -106,9 +107,9 @@ def _padded_bernstein(
 def sample_many(surfaces: Sequence[BezierSurface], size: int = 64) -> NDArray[np.float64]:
     """Sample (b, size, size, 3) grids, each normalised to the unit ball.
 
-    What :meth:`BezierSurface.sample` gives, up to rounding, for many surfaces at once. A
-    surface comes out the same, to the last bit, in whatever company: nets are padded
-    with zeros to one size, that of the recipe's largest.
+    The result equals that of :meth:`BezierSurface.sample` up to rounding. All control nets
+    are zero-padded to the recipe's largest size, so that the samples of a surface do not
+    depend, to the last bit, on the other surfaces in the call.
 
     >>> some = generate(3, seed=0)
     >>> bool(np.abs(sample_many(some, 16)[2] - some[2].sample(16)).max() < 1e-12)
@@ -135,10 +136,10 @@ def generate(
 ) -> list[BezierSurface]:
     """Draw `count` surfaces that pass the published screen.
 
-    Rejected are surfaces whose boundary lengths vary too much (variance > 0.5), whose
-    summed positive, negative or absolute curvature passes 10000, 10000 or 15000, and
-    those with a mean absolute curvature above `max_loss_gc` (without that the mean of a
-    set is near 0.55 with a heavy tail; with 0.9 it is the published 0.31).
+    A surface is rejected if the variance of its boundary lengths exceeds 0.5, if the sum of
+    its positive, negative or absolute Gaussian curvatures exceeds 10000, 10000 or 15000, or
+    if its mean absolute curvature exceeds `max_loss_gc`. Without the last criterion the mean
+    over a set is near 0.55 with a heavy tail; with 0.9 it is the published 0.31.
 
     Parameters
     ----------
@@ -149,7 +150,7 @@ def generate(
     size : int
         Resolution at which the screen is applied.
     max_loss_gc : float
-        Largest ``loss_gc`` kept; infinity switches this screen off.
+        Largest ``loss_gc`` that is accepted; infinity disables this criterion.
     """
     from gso.metrics import curvature_grid
 

@@ -1,9 +1,9 @@
-"""Build a set: streaming, resumable, the same bytes whatever happened on the way.
+"""Resumable, byte-reproducible builds of datasets.
 
-A folder holds files of :data:`gso.dataset.shard.LENGTH` surfaces each, and a manifest. A file
-appears under its name only when it is complete, and its content depends on the recipe
-alone; so a build that was killed goes on with the files that are not there. The manifest
-gets its checksums and statistics last.
+A dataset is a folder with a manifest and files of :data:`gso.dataset.shard.LENGTH` surfaces
+each. Files are written atomically, and their content depends only on the recipe. A resumed
+build therefore makes only the missing files. Checksums and statistics are added to the
+manifest last.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from gso.tno.linear import blas_threads
 _OTHER_RECIPE = "give its own options, or another folder"
 _OTHER_VERSIONS = "install what it was begun with, or build in another folder"
 
-#: (what is counted, how many there are, how many there will be).
+#: Progress callback: (name of the counted items, number done, total number).
 Tick = Callable[[str, int, int], None]
 
 
@@ -49,24 +49,26 @@ def build(
     scheduler: str | None = None,
     tick: Tick | None = None,
 ) -> Dataset:
-    """Build a set, or what is missing of it.
+    """Build a dataset, or its missing files.
 
     Parameters
     ----------
     folder : path
-        Where; new, empty, or with a set of the same recipe, whole or in part.
+        Folder of the dataset: new, empty, or with a complete or partial dataset of the same
+        recipe.
     recipe : Recipe, optional
-        What it is made of; the published size when not given.
+        Definition of the dataset; ``Recipe()``, with the published size, by default.
     reference : iterable of {"jiang2020"}
-        References to add to some splits, now or to a set that is there already.
+        Reference labels to add to some splits; an existing dataset can be extended.
     reference_splits : iterable of str
-        Splits that get them.
+        Splits that get the reference labels.
     workers : int, optional
-        Processes; the number of cores when not given, 0 for none (in this process).
+        Number of worker processes; the number of cores by default, 0 for this process only.
     scheduler : str, optional
         Address of a Dask cluster that does the work instead.
     tick : callable, optional
-        Told what is counted, how many there are, and how many there will be.
+        Progress callback, called with the name of the counted items, the number done and the
+        total number.
 
     Returns
     -------
@@ -77,9 +79,9 @@ def build(
     OptionError
         A reference or split is unknown.
     DatasetError
-        The folder holds something else or another recipe, another build is at work in it,
-        packages have changed since it was begun, the disk is full, a worker died on a file
-        repeatedly. Files that are complete stay.
+        The folder holds something else or another recipe, another build is running in it,
+        package versions have changed since the build began, the disk is full, or a worker
+        process died repeatedly on the same file. Complete files are kept.
 
     Examples
     --------
@@ -125,7 +127,7 @@ def build(
 def tasks(
     recipe: Recipe, selection: Selection, references: Iterable[tuple[str, str]]
 ) -> Iterator[shard.Task]:
-    """Every file of a set."""
+    """Yield one task per file of a dataset."""
     first = 0
     asked = set(references)
     for split, count in recipe.splits.items():
@@ -143,12 +145,12 @@ def tasks(
 
 
 def _begin(folder: Path, recipe: Recipe) -> dict[str, Any]:
-    """The manifest that is there, or that of a new set.
+    """Return the existing manifest, or write and return that of a new dataset.
 
     Raises
     ------
     DatasetError
-        It is that of another recipe.
+        The existing manifest has another recipe.
     """
     record = {
         "format": manifest.FORMAT,
@@ -158,7 +160,7 @@ def _begin(folder: Path, recipe: Recipe) -> dict[str, Any]:
         "files": [],
         "complete": False,
     }
-    # As it will be read: lists for tuples.
+    # A JSON round trip converts tuples to lists, for comparison with a manifest from disk.
     record = json.loads(json.dumps(record))
     if not (folder / manifest.NAME).exists():
         manifest.write(folder, record)
@@ -171,7 +173,7 @@ def _begin(folder: Path, recipe: Recipe) -> dict[str, Any]:
 def _check_same(
     folder: Path, there: dict[str, Any], what: str, new: dict[str, Any], hint: str
 ) -> None:
-    """Refuse to go on with a set that was begun otherwise."""
+    """Raise a DatasetError if `new` differs from the existing manifest's entry `what`."""
     old = there[what]
     said = [f"{k} {old.get(k)!r}, not {v!r}" for k, v in new.items() if old.get(k) != v]
     if said:
@@ -181,7 +183,7 @@ def _check_same(
 def _references(
     recipe: Recipe, names: Iterable[str], splits: Iterable[str]
 ) -> set[tuple[str, str]]:
-    """Pairs of reference and split that are asked for, checked."""
+    """Return the requested pairs of reference and split, checked."""
     from gso import tno
 
     asked = {(name, split) for name in names for split in splits}
@@ -203,7 +205,7 @@ def _make(
     scheduler: str | None,
     tick: Tick | None,
 ) -> None:
-    """Make the files that are bad or not there."""
+    """Make the files that are missing or damaged."""
     missing = [task for task in todo if task.name in bad or not _intact(place, task)]
     total = sum(len(task.ids) for task in todo)
     done = total - sum(len(task.ids) for task in missing)
@@ -236,7 +238,7 @@ def _make(
 
 
 def _intact(place: Path, task: shard.Task) -> bool:
-    """Whether a file is there and can be opened."""
+    """Tell whether a file exists and can be opened."""
     path = place / task.name
     if not path.exists():
         return False
@@ -249,7 +251,7 @@ def _intact(place: Path, task: shard.Task) -> bool:
 
 @contextmanager
 def _kept(so_far: str = "") -> Iterator[None]:
-    """Say of an error in writing that nothing is lost."""
+    """Convert write errors to a DatasetError which says that complete files are kept."""
     try:
         yield
     except (OSError, MeshError) as error:
@@ -267,7 +269,7 @@ def _listed(
     references: manifest.References,
     drawn: int,
 ) -> dict[str, Any]:
-    """Manifest of a set whose files are all there, but for its statistics."""
+    """Return the manifest of a dataset whose files all exist, without its statistics."""
     files = []
     for task in todo:
         content = (folder / task.name).read_bytes()

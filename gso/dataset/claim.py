@@ -1,4 +1,4 @@
-"""A folder that one build at a time works in."""
+"""Locking of a dataset's folder for one build at a time."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from gso.status import DatasetError
 
 @contextmanager
 def claimed(place: Path) -> Iterator[None]:
-    """Work in a folder alone, and without what a killed build left half-written.
+    """Lock a folder for one build, and delete temporary files of interrupted builds.
 
     Raises
     ------
     DatasetError
-        There is something else in it, it cannot be made, or another build works in it.
+        The folder holds something other than a dataset, cannot be made or written, or is
+        locked by another build.
     """
     from filelock import FileLock, Timeout
 

@@ -1,4 +1,4 @@
-"""Work sent to a Dask cluster."""
+"""Distribution of work to a Dask cluster."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ PATIENCE = 20
 def spread(
     function: Callable[[Any], Any], pieces: Iterable[Any], *, scheduler: str
 ) -> Generator[Done, None, None]:
-    """Apply a function to many pieces of work on a Dask cluster, results as they finish.
+    """Apply a function to many items on a Dask cluster, and yield results as they finish.
 
-    Work of a worker that is lost is done again by others, unless workers are lost with it
-    time and again.
+    If a worker is lost, its items are repeated on other workers. An item that repeatedly
+    loses its worker becomes an error.
 
     Parameters
     ----------
     function : callable
-        Of one argument; what it is made of must be installed on the workers.
+        Function of one argument; the packages that it needs must be installed on the workers.
     pieces : iterable
-        Read as workers become free.
+        The items, read lazily as workers become free.
     scheduler : str
-        Address, such as ``tcp://host:8786``.
+        Address of the scheduler, such as ``tcp://host:8786``.
 
     Yields
     ------
     Done
-        In the order of completion.
+        Results in the order of completion.
 
     Raises
     ------
     DatasetError
-        Dask is not installed, or the scheduler does not answer.
+        Dask is not installed, the scheduler does not answer, or it has no workers.
     """
     if find_spec("distributed") is None:
         raise DatasetError('a scheduler needs Dask: pip install ".[cluster]" in the folder of gso')
@@ -59,7 +59,7 @@ def spread(
         running = as_completed(loop=client.loop)
 
         def fill() -> None:
-            # Twice as much as there are workers: none waits, and results stay few.
+            # Two items per worker: no worker idles, and few results are held at a time.
             room = 2 * max(len(client.scheduler_info(n_workers=-1)["workers"]), 1) - len(waiting)
             for _ in range(room):
                 entry = next(numbered, None)
@@ -74,11 +74,11 @@ def spread(
             future = next(running)
             index = waiting.pop(future.key)
             try:
-                # This waits once more when the worker that held the value has died since.
+                # This waits for recomputation if the worker that held the value has died.
                 done = Done(index, future.result())
             except GSOError as error:
                 done = Done(index, error=str(error))
-            except Exception as error:  # whatever became of it there
+            except Exception as error:  # any exception of the worker
                 done = Done(index, error=f"{type(error).__name__}: {error}")
             del future
             yield done

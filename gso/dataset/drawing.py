@@ -1,4 +1,4 @@
-"""Many surfaces of the recipe, drawn by several processes."""
+"""Parallel generation of many random surfaces of the recipe."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from numpy.typing import NDArray
 from gso.dataset import bezier
 from gso.status import DatasetError
 
-#: Surfaces that are worth several processes: fewer are drawn sooner than those start.
+#: Smallest number of surfaces for which starting worker processes pays off.
 _MANY = 4096
 
 
 def draw_many(
     pieces: Sequence[tuple[int, int]], size: int, tick: Callable[[int], None] | None = None
 ) -> NDArray[np.float32]:
-    """Surfaces (n, size, size, 3) in the unit ball, of counts and seeds one after the other.
+    """Draw surfaces (n, size, size, 3) in the unit ball, from a sequence of counts and seeds.
 
-    They are the same whatever the number of processors.
+    The result does not depend on the number of processors.
 
     Parameters
     ----------
     pieces : sequence of (int, int)
-        How many surfaces, and the seed of these.
+        Number of surfaces and seed of each piece; their surfaces are concatenated.
     size : int
         Samples along each side.
     tick : callable, optional
-        Told how many are drawn.
+        Progress callback, called with the number of surfaces drawn.
 
     Raises
     ------
     DatasetError
-        A process failed.
+        A worker process failed.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Folders of .npy files, as the published data have them: a folder per split, a file each."""
+"""Folders of .npy files as in the published data: a folder per split, a file per surface."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ Array = NDArray[np.float64]
 
 
 def splits(path: Path) -> dict[str, list[Path]]:
-    """Files of every split, sorted by name.
+    """Return the files of every split, sorted by name.
 
     Raises
     ------
     DatasetError
-        There are none.
+        There are no such files.
     """
     try:
         folders = sorted(p for p in path.iterdir() if p.is_dir())
@@ -41,7 +41,7 @@ def splits(path: Path) -> dict[str, list[Path]]:
 
 
 def load(path: Path) -> Array:
-    """A grid of numbers (H, W, d) in a .npy file.
+    """Read a grid of finite numbers (H, W, d), d = 2 or 3, from a .npy file.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def load(path: Path) -> Array:
         The file is missing, damaged, or holds something else.
     """
     try:
-        # A map checks what the header claims against the size of the file.
+        # Memory mapping checks the shape in the header against the size of the file.
         grid = np.asarray(np.load(path, mmap_mode="r", allow_pickle=False), np.float64)
     except (OSError, ValueError, EOFError, TypeError) as error:
         raise DatasetError(f"{path} is no intact array of NumPy: {error}") from None
@@ -64,7 +64,7 @@ def load(path: Path) -> Array:
 
 
 def rows(path: Path, shape: tuple[int, ...], some: Any) -> Array:
-    """The only row of a file, in a split whose grids all have one shape."""
+    """Read a file as an array of one row and index it; all grids of a split share one shape."""
     grid = load(path)
     if grid.shape != shape:
         raise DatasetError(f"{path} holds a grid {grid.shape}; the split's first one has {shape}")
@@ -72,7 +72,7 @@ def rows(path: Path, shape: tuple[int, ...], some: Any) -> Array:
 
 
 def unit(grids: Array) -> Array:
-    """Grids (b, H, W, 3), each in the unit ball."""
+    """Normalise grids (b, H, W, 3), each to the unit ball."""
     return np.stack([normalise(grid) for grid in grids])
 
 
@@ -83,31 +83,31 @@ def export(
     array: str = "surface",
     only: tuple[str, ...] = (),
 ) -> int:
-    """Write an array of a set as .npy files, one per surface, in a folder per split.
+    """Write an array of a dataset as .npy files, one per surface, in a folder per split.
 
-    Surfaces and results have the same names, so that a folder of results goes with one of
-    surfaces.
+    File names depend only on the position in the split, so that exported surfaces and
+    exported results correspond by name.
 
     Parameters
     ----------
     data : Dataset
-        The set.
+        The dataset.
     path : path
-        Folder to write to; files in it are replaced.
+        Folder to write to; existing files of the same names are replaced.
     array : str
-        "surface", "developable", "strain", "noisy_0.005" ...
+        Name of the array: "surface", "developable", "strain", "noisy_0.005" ...
     only : tuple of str
-        Splits; all that have the array when not given.
+        Splits to export; by default all that have the array.
 
     Returns
     -------
     int
-        Files written: float64, (H, W, 3), or (H, W, 2) for flat images.
+        Number of files written: float64, (H, W, 3), or (H, W, 2) for flat images.
 
     Raises
     ------
     DatasetError
-        No split has such an array, it is no grid, or a file cannot be written.
+        No split has such an array, its rows are not grids, or a file cannot be written.
     """
     chosen = [data[name] for name in only] or list(data.values())
     chosen = [split for split in chosen if only or array in split.arrays]

@@ -1,4 +1,4 @@
-"""Files of a set: arrays of equal length by name, as HDF5."""
+"""HDF5 files of a dataset: named arrays of equal length."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ Rows = slice | NDArray[np.int64]
 
 
 def pack(arrays: dict[str, np.ndarray]) -> bytes:
-    """Arrays of equal length as an HDF5 file, the same bytes for the same arrays."""
+    """Return arrays of equal length as an HDF5 file, with the same bytes for the same arrays."""
     import h5py
 
-    # In the library's own memory, every dataset open until the end: with a Python object as
-    # the file, or datasets closed on the way, the layout depends on when other threads run.
+    # Use the HDF5 core driver and keep every dataset open until the end. With a Python file
+    # object, or datasets closed earlier, the layout depends on the timing of other threads.
     with h5py.File(
         "memory", "w", driver="core", backing_store=False, libver=("v110", "v110")
     ) as file:
         opened = []
         for name, values in arrays.items():
-            # A surface is a chunk of its own; numbers per surface stand in one piece.
+            # One chunk per surface; scalars per surface are stored contiguously.
             chunked: dict[str, Any] = {}
             if values.ndim > 1 and len(values):
                 chunked = {"chunks": (1, *values.shape[1:]), "compression": 1, "shuffle": True}
@@ -35,7 +35,7 @@ def pack(arrays: dict[str, np.ndarray]) -> bytes:
 
 
 def contents(path: str | os.PathLike[str]) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
-    """Shape and type of each array of a file, by name."""
+    """Return the shape and type of each array of a file, by name."""
     import h5py
 
     def collect(file: Any) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
@@ -52,12 +52,12 @@ def contents(path: str | os.PathLike[str]) -> dict[str, tuple[tuple[int, ...], n
 
 
 def read(path: str | os.PathLike[str], name: str, rows: Rows = slice(None)) -> np.ndarray:
-    """Rows of an array of a file; numbers of rows must rise."""
+    """Read rows of an array of a file; row indices must be increasing."""
     return _opened(path, lambda file: file[name][rows])
 
 
 def _opened(path: str | os.PathLike[str], use: Callable[[Any], Any]) -> Any:
-    """What `use` makes of an open file.
+    """Open a file and return the result of `use` for it.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def _opened(path: str | os.PathLike[str], use: Callable[[Any], Any]) -> Any:
     import h5py
 
     try:
-        # Files never change once they are there: locks, which some disks lack, are no use.
+        # Files never change once written, so locks, which some disks lack, are not needed.
         with h5py.File(path, "r", locking=False) as file:
             return use(file)
     except (OSError, KeyError, RuntimeError) as error:

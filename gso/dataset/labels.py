@@ -1,4 +1,4 @@
-"""What the solver makes of a surface: the labels of the set."""
+"""Labels of a dataset: the solver's results for each surface."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from gso.variables.spline import spline_matrix
 
 Array = NDArray[np.float64]
 
-#: Control points along a side of the spline of offsets.
+#: Control points along each side of the spline fitted to the normal offsets.
 CONTROLS = 16
-#: Status of a surface that the solver refused.
+#: Status of a surface on which the solver raised an error.
 FAILED = "FAILED"
 
 _DEVELOPABLE = (
@@ -58,11 +58,11 @@ class Kind:
     Attributes
     ----------
     arguments : dict
-        For :func:`gso.tno.optimize`.
+        Keyword arguments of :func:`gso.tno.optimize`.
     arrays : callable
-        Arrays of a result by name.
+        Function that extracts the label's arrays, by name, from a result.
     metrics : tuple of str
-        Metrics that are kept.
+        Names of the metrics that are stored.
     """
 
     arguments: dict[str, Any]
@@ -77,7 +77,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Label:
-    """A label of one surface: arrays and metrics by name, and how the solve ended."""
+    """A label of one surface: arrays and metrics by name, and the solver's status."""
 
     arrays: dict[str, Array]
     metrics: dict[str, float]
@@ -87,7 +87,7 @@ class Label:
 def solve(kind: str, points: Array) -> Label:
     """Label one surface (H, W, 3) of the unit ball.
 
-    A surface that the solver refuses gets NaN and the status :data:`FAILED`.
+    If the solver raises an error, arrays and metrics are NaN and the status is :data:`FAILED`.
 
     Examples
     --------
@@ -100,7 +100,7 @@ def solve(kind: str, points: Array) -> Label:
     try:
         mesh = Mesh.from_grid(points, weld=False)
         with warnings.catch_warnings():
-            # The status is kept, which says the same.
+            # The stored status says the same.
             warnings.simplefilter("ignore", ConvergenceWarning)
             result = tno.optimize(mesh, verdict=False, **what.arguments)
         known = _measured(result)
@@ -115,7 +115,7 @@ def solve(kind: str, points: Array) -> Label:
 
 
 def _measured(result: Result) -> dict[str, float]:
-    """Metrics of a result; of its flat image too, where a surface has one."""
+    """Return the metrics of a result, and of its flat image if a surface result has one."""
     if result.flat is None or result.task == "flatten":
         return result.metrics
     flatten = tasks.get("flatten").metrics
@@ -123,7 +123,7 @@ def _measured(result: Result) -> dict[str, float]:
 
 
 def shapes(kind: str, size: int) -> dict[str, tuple[int, ...]]:
-    """Shapes of the arrays of a label of a grid size x size."""
+    """Return the shapes of the arrays of a label of a grid size x size."""
     controls = min(CONTROLS, size)
     known: dict[str, dict[str, tuple[int, ...]]] = {
         "developable": {
@@ -140,7 +140,7 @@ def shapes(kind: str, size: int) -> dict[str, tuple[int, ...]]:
 
 
 def fit_spline(offsets: Array, controls: int = CONTROLS) -> tuple[Array, float]:
-    """Bicubic coefficients closest to a field on a grid, and the root mean square misfit.
+    """Fit a bicubic spline to a field on a grid by least squares.
 
     Parameters
     ----------
@@ -152,9 +152,9 @@ def fit_spline(offsets: Array, controls: int = CONTROLS) -> tuple[Array, float]:
     Returns
     -------
     coefficients : ndarray, (controls, controls)
-        Of the basis of :func:`gso.variables.spline.tensor_matrix`.
+        Coefficients in the basis of :func:`gso.variables.spline.tensor_matrix`.
     misfit : float
-        In the unit of the field.
+        Root mean square residual, in the unit of the field.
 
     Examples
     --------
@@ -164,7 +164,7 @@ def fit_spline(offsets: Array, controls: int = CONTROLS) -> tuple[Array, float]:
     ((16, 16), True)
     """
     along, across = (_basis(n, min(controls, n)) for n in offsets.shape)
-    # A least-squares fit by a product of bases is one fit along each direction.
+    # A least-squares fit in a tensor-product basis separates into one fit per direction.
     coefficients = along.inverse @ offsets @ across.inverse.T
     misfit = along.matrix @ coefficients @ across.matrix.T - offsets
     return coefficients, float(np.sqrt((misfit**2).mean()))
@@ -206,9 +206,9 @@ def _jiang(result: Result) -> dict[str, Array]:
     return {"jiang2020": vertices, "jiang2020_flat": _flat("jiang2020", result)}
 
 
-#: Every surface of a set has these ...
+#: Labels that a recipe may give to every surface.
 LABELS = ("developable", "strain", "lengths")
-#: ... and splits that are asked for these.
+#: Reference labels, made only for requested splits.
 REFERENCES = ("jiang2020",)
 
 KINDS = {

@@ -1,4 +1,4 @@
-"""Arrays that are read when they are indexed, from many files."""
+"""Lazy arrays: rows are read from many files when the array is indexed."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class Part:
     Attributes
     ----------
     count : int
-        How many there are.
+        Number of rows.
     read : callable
-        Makes an array of the rows asked for, which rise: a slice or an array of numbers.
+        Function that reads rows, given as a slice or as an array of increasing indices.
     """
 
     count: int
@@ -27,20 +27,20 @@ class Part:
 
 
 class LazyArray:
-    """An array whose first axis runs over parts that are read when they are indexed.
+    """An array whose rows are divided into parts and read when the array is indexed.
 
-    It is indexed as an array of NumPy is: by numbers, slices, arrays and masks, of which
-    the first belongs to the rows. Nothing is kept, so that it can be pickled and shared by
-    threads and processes; ``array[:]`` reads all of it.
+    It supports the indexing of NumPy arrays: integers, slices, index arrays and masks, of
+    which the first applies to the rows. Nothing is cached, so the array can be pickled and
+    shared by threads and processes; ``array[:]`` reads all of it.
 
     Parameters
     ----------
     parts : sequence of Part
-        Its rows.
+        The parts, in the order of their rows.
     shape : tuple of int
-        Of one row.
+        Shape of one row.
     dtype : dtype
-        Type of its numbers.
+        Type of the elements.
 
     Examples
     --------
@@ -72,7 +72,7 @@ class LazyArray:
 
     def __getitem__(self, key: Any) -> np.ndarray:
         first, *rest = key if isinstance(key, tuple) else (key,)
-        # NumPy itself says which rows those are, and refuses what it refuses.
+        # Indexing the row numbers gives NumPy's semantics and its errors.
         wanted = np.arange(len(self))[first]
         rows = self._rows(np.atleast_1d(wanted).ravel())
         out = rows.reshape((*wanted.shape, *self.shape[1:]))

@@ -1,4 +1,4 @@
-"""The manifest of a set: what it is made of, by what, its files, its statistics."""
+"""The manifest of a dataset: its recipe, package versions, files and statistics."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def load(folder: Path) -> dict[str, Any]:
     Raises
     ------
     DatasetError
-        It is missing, damaged, or of another format.
+        The manifest is missing, damaged, or of another format.
     """
     path = folder / NAME
     try:
@@ -40,18 +40,18 @@ def load(folder: Path) -> dict[str, Any]:
 
 
 def write(folder: Path, record: dict[str, Any]) -> None:
-    """Write a manifest, whole or not at all."""
+    """Write a manifest atomically."""
     with replacing(folder / NAME) as file:
         file.write(json.dumps(record, indent=1).encode() + b"\n")
 
 
 def pairs(record: dict[str, Any]) -> References:
-    """References and splits of a manifest."""
+    """Return the pairs of reference and split in a manifest."""
     return {(name, split) for name, splits in record["references"].items() for split in splits}
 
 
 def damaged(folder: Path, record: dict[str, Any]) -> list[str]:
-    """Files that are missing or not as the manifest says, by their checksums."""
+    """Return the files that are missing or do not match their checksum in the manifest."""
     return [entry["name"] for entry in record["files"] if not _good(folder, entry)]
 
 

@@ -1,4 +1,4 @@
-"""What a set is made of: everything that its bytes depend on."""
+"""The recipe of a dataset: everything that determines its bytes."""
 
 from __future__ import annotations
 
@@ -11,38 +11,38 @@ from gso.dataset import shapes
 from gso.dataset.labels import KINDS, LABELS
 from gso.status import OptionError
 
-#: Changes whenever the same recipe would give other surfaces or labels.
+#: Incremented whenever the same recipe would give other surfaces or labels.
 VERSION = 2
-#: Surfaces of the published set, and of its splits here.
+#: Number of surfaces of the published set, and of its validation and test splits here.
 PUBLISHED = 10401
 _VALIDATION, _TEST = 1040, 1041
-#: Hard surfaces for each of the others.
+#: Size of the split "hard" relative to `Recipe.n`.
 _HARD = 0.1
-#: Packages that labels may depend on, in the last digits.
+#: Packages whose version may change the last digits of labels.
 _PACKAGES = ("gso", "numpy", "scipy", "casadi", "libigl", "h5py", "cvxopt", "pypardiso")
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a set is made of.
+    """Definition of a dataset.
 
     Attributes
     ----------
     n : int
-        Surfaces of the train, validation and test splits together, 10 or more.
+        Number of surfaces in the train, validation and test splits together, 10 or more.
     seed : int
         Seed of all random numbers.
     size : int
         Samples along each side of a surface, 16 or more.
     labels : tuple of str
-        Labels that every surface gets: "developable", "strain", "lengths".
+        Labels of every surface: "developable", "strain", "lengths".
     extras : bool
-        Whether there are the small named splits of :mod:`gso.dataset.shapes`.
+        Whether to add the small named splits of :mod:`gso.dataset.shapes`.
 
     Raises
     ------
     OptionError
-        A value is out of range, or a label unknown.
+        A value is out of range, or a label is unknown or repeated.
     """
 
     n: int = PUBLISHED
@@ -65,7 +65,7 @@ class Recipe:
 
     @property
     def splits(self) -> dict[str, int]:
-        """Surfaces by split, in the proportions of 8,320, 1,040 and 1,041.
+        """Number of surfaces by split, in the proportions 8,320 : 1,040 : 1,041.
 
         >>> list(Recipe(extras=False).splits.items())
         [('train', 8320), ('validation', 1040), ('test', 1041), ('hard', 1040)]
@@ -77,7 +77,7 @@ class Recipe:
         return sizes | (dict.fromkeys(shapes.NAMES, shapes.COUNT) if self.extras else {})
 
     def as_dict(self) -> dict[str, Any]:
-        """The recipe, its version and the solver's settings, for a manifest."""
+        """Return the recipe, its version and the solver's settings, for a manifest."""
         return {
             "version": VERSION,
             **asdict(self),
@@ -87,14 +87,14 @@ class Recipe:
 
     @classmethod
     def from_dict(cls, given: dict[str, Any]) -> Recipe:
-        """The recipe of a manifest."""
+        """Return the recipe stored in a manifest."""
         return cls(
             given["n"], given["seed"], given["size"], tuple(given["labels"]), given["extras"]
         )
 
 
 def versions() -> dict[str, str]:
-    """Versions that bytes may depend on; "" for a package that is not installed."""
+    """Return the versions that may affect the bytes; "" for a package that is not installed."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
     for name in _PACKAGES:
         try:

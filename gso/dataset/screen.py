@@ -1,10 +1,10 @@
-"""Which draws of the recipe become the set: stated intervals of curvature and shape are filled.
+"""Selection of random draws so that given intervals of curvature and shape are filled.
 
-Features (Wang et al. 2024, Eq. 1 and 2), of the 64 x 64 samples in the unit ball: the means
-K_P, K_N, K_A of positive, negative and absolute Gaussian curvature, and the variance
-sigma^2 of the boundary lengths. Each cell of :data:`CURVATURE` times :data:`SHAPE` gets its
-share of the set, first come, first served; with these shares the mean K_A is the published
-0.307. Draws beyond the last intervals are kept as a split of their own, "hard".
+Features (Wang et al. 2024, Eq. 1 and 2) are computed from 64 x 64 samples in the unit ball:
+the means K_P, K_N, K_A of positive, negative and absolute Gaussian curvature, and the
+variance sigma^2 of the boundary lengths. Each cell of :data:`CURVATURE` times :data:`SHAPE`
+accepts draws in order until it has its share of the set; with these shares the mean K_A is
+the published 0.307. Draws beyond the last intervals form the separate split "hard".
 """
 
 from __future__ import annotations
@@ -24,24 +24,25 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 FEATURES = ("K_P", "K_N", "K_A", "sigma2")
-#: Samples along a side for the features, whatever the size of the set's grids.
+#: Samples along a side for the features, independent of the size of the set's grids.
 SIZE = 64
-#: Intervals of K_A and of sigma^2, and the share of the set in each. Both are near what
-#: the recipe gives by itself, where the two are next to independent of each other.
+#: Intervals of K_A and of sigma^2, and the share of the set in each. The shares are close to
+#: those of unscreened draws, where K_A and sigma^2 are almost independent.
 CURVATURE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 CURVATURE_SHARES = (0.18, 0.20, 0.19, 0.13, 0.10, 0.08, 0.05, 0.04, 0.03)
 SHAPE = (0.0, 0.03, 0.1, 0.2, 0.3, 0.4, 0.5)
 SHAPE_SHARES = (0.24, 0.25, 0.19, 0.13, 0.11, 0.08)
-#: Kinds of hard draws, a third of them each. Curved: K_A up to the published limit on the
-#: sum of |K| (15000 over 62 x 62 vertices). Wild: beyond. Uneven: only sigma^2 is large.
+#: Kinds of hard draws, a third of the split each. Curved: K_A up to the published limit on
+#: the sum of |K| (15000 over 62 x 62 vertices). Wild: K_A above it. Uneven: only sigma^2 is
+#: large.
 HARD = ("curved", "wild", "uneven")
 CURVED = 15000.0 / 62**2
 
 _GOLDEN = (5**0.5 - 1) / 2
 
-#: Draws looked at together.
+#: Number of draws evaluated together.
 _BLOCK = 256
-# Doubled cell areas below it are no surface; a mesh refuses a hundredth of that.
+# Smallest doubled area of a cell; the threshold of a mesh is a hundredth of that.
 _SMALLEST_CELL = 1e-12
 
 
@@ -52,10 +53,10 @@ class Selection:
     Attributes
     ----------
     main, hard : ndarray of int
-        Numbers of the draws. Those of `main` are in an order in which every stretch has
-        its share of each cell, and is random otherwise; those of `hard` rise.
+        Numbers of the draws. `main` is ordered such that every contiguous range has its share
+        of each cell, and is random otherwise; `hard` is increasing.
     drawn : int
-        How many draws were looked at.
+        Number of draws evaluated.
     """
 
     main: Ints
@@ -64,12 +65,12 @@ class Selection:
 
 
 def surface(seed: int, number: int) -> BezierSurface:
-    """Draw number `number` of a seed."""
+    """Return the draw with this number of a seed."""
     return draw(generator(seed, Stream.DRAWS, number))
 
 
 def features(points: Array) -> Array:
-    """K_P, K_N, K_A, sigma^2 of each grid (b, H, W, 3) of the unit ball, as (b, 4)."""
+    """Compute K_P, K_N, K_A, sigma^2 of grids (b, H, W, 3) in the unit ball, as (b, 4)."""
     return np.array(
         [(*metrics.curvature_features(p, scale=1.0), boundary_length_variance(p)) for p in points]
     ).reshape(-1, len(FEATURES))
@@ -78,16 +79,16 @@ def features(points: Array) -> Array:
 def select(
     count: int, hard: int, *, seed: int, tick: Callable[[int, int], None] | None = None
 ) -> Selection:
-    """Draw until every interval has its share.
+    """Draw surfaces until every cell and every kind of hard draw has its share.
 
     Parameters
     ----------
     count, hard : int
-        Surfaces of the set, and of the hard split.
+        Number of surfaces of the set, and of the hard split.
     seed : int
-        The same seed gives the same draws.
+        Seed of the draws.
     tick : callable, optional
-        Told how many surfaces there are, and how many are wanted.
+        Progress callback, called with the number of selected surfaces and the total number.
 
     Examples
     --------
@@ -123,7 +124,7 @@ def select(
 
 
 def quotas(count: int) -> Ints:
-    """Surfaces wanted in each cell, row by row (intervals of K_A times those of sigma^2).
+    """Return the number of surfaces per cell, row by row (intervals of K_A, then of sigma^2).
 
     >>> int(quotas(10401).sum()), int(quotas(10401).min())
     (10401, 25)
@@ -133,16 +134,16 @@ def quotas(count: int) -> Ints:
 
 
 def _spread(cell: Ints, rng: np.random.Generator) -> Ints:
-    """Order in which every stretch has its share of each cell, random within the cells."""
+    """Return an order in which every range has its share of each cell, random within cells."""
     shuffled = rng.permutation(len(cell))
     by_cell = shuffled[np.argsort(cell[shuffled], kind="stable")]
-    # Multiples of the golden ratio, modulo one, are spread evenly: so are the places in
-    # the list of cells of those that follow each other by size.
+    # Multiples of the golden ratio modulo one are evenly spread. Sorting by them therefore
+    # spreads consecutive entries evenly over the list sorted by cell.
     return by_cell[np.argsort(np.arange(len(cell)) * _GOLDEN % 1.0)]
 
 
 def _rounded(shares: Array, count: int) -> Ints:
-    """Whole numbers in proportion to shares that sum to one (largest remainders)."""
+    """Round `count` times the shares, which sum to one, to integers (largest remainders)."""
     exact = shares * count
     whole = np.floor(exact).astype(np.int64)
     most = np.argsort(whole - exact, kind="stable")
@@ -151,7 +152,7 @@ def _rounded(shares: Array, count: int) -> Ints:
 
 
 def _sound(points: Array) -> NDArray[np.bool_]:
-    """Which grids are finite and have no cell without area."""
+    """Tell which grids are finite and have no degenerate cell."""
     a = metrics.components(points[:, 1:, 1:] - points[:, :-1, :-1])
     b = metrics.components(points[:, :-1, 1:] - points[:, 1:, :-1])
     normal = np.stack(geometry.cross(a, b), axis=-1)
@@ -160,7 +161,7 @@ def _sound(points: Array) -> NDArray[np.bool_]:
 
 
 def _cell(values: Array) -> Ints:
-    """Cell of each row of features; kinds of hard draws come after the others."""
+    """Return the cell of each row of features; kinds of hard draws are numbered last."""
     k, s = values[:, FEATURES.index("K_A")], values[:, FEATURES.index("sigma2")]
     rows = np.searchsorted(CURVATURE[1:-1], k)
     columns = np.searchsorted(SHAPE[1:-1], s)
@@ -172,7 +173,7 @@ def _cell(values: Array) -> Ints:
 
 
 def _rank(cell: Ints) -> Ints:
-    """How many entries with the same value come before each."""
+    """Count, for each entry, the preceding entries with the same value."""
     order = np.argsort(cell, kind="stable")
     ordered = cell[order]
     rank = np.empty_like(cell)

@@ -1,4 +1,4 @@
-"""Streams of random numbers: every surface, noise and shuffle has its own, from one seed."""
+"""Independent random streams, derived from one seed, for every surface, noise and shuffle."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Stream(enum.IntEnum):
-    """What random numbers are for; the values are part of the recipe."""
+    """Purposes of random numbers; the values are part of the recipe."""
 
     DRAWS = 0
     NOISE = 1

@@ -1,8 +1,8 @@
-"""Small named splits of other shapes than Bezier surfaces, to see what generalises.
+"""Small named splits of other shapes than Bezier surfaces, for tests of generalisation.
 
-Analytic families (Enneper, monkey saddle, catenoid, helicoid, sphere, torus), each on
-windows of its parameter plane that are turned, moved and scaled at random; patches of the
-Utah teapot; windows of terrain. Sources of the last two: ``gso/dataset/data/README.rst``.
+These are analytic families (Enneper, monkey saddle, catenoid, helicoid, sphere, torus), each
+on randomly rotated, translated and scaled windows of its parameter plane, patches of the
+Utah teapot, and windows of terrain. Sources of the last two: ``gso/dataset/data/README.rst``.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ COUNT = 8
 
 
 class Family(NamedTuple):
-    """A parametric surface and the windows that are drawn from it.
+    """A parametric surface and the distribution of its random windows.
 
     Attributes
     ----------
     point : callable
-        (u, v, shape) to (x, y, z).
+        Function from (u, v, shape) to (x, y, z).
     centre : (2,) of float
         Largest distance of a window's centre from the origin of the (u, v) plane.
     half : (2,) of float
-        Range of half the side of a window.
+        Range of half the side length of a window.
     shape : (2,) of float
         Range of the shape parameter.
     """
@@ -48,32 +48,32 @@ class Family(NamedTuple):
 
 
 def enneper(u: Array, v: Array, shape: float) -> tuple[Array, Array, Array]:
-    """Enneper's minimal surface."""
+    """Evaluate Enneper's minimal surface."""
     return u - u**3 / 3 + u * v**2, v - v**3 / 3 + v * u**2, u**2 - v**2
 
 
 def monkey_saddle(u: Array, v: Array, shape: float) -> tuple[Array, Array, Array]:
-    """The graph of the real part of (u + iv)^3."""
+    """Evaluate the graph of the real part of (u + iv)^3."""
     return u, v, u**3 - 3 * u * v**2
 
 
 def catenoid(u: Array, v: Array, shape: float) -> tuple[Array, Array, Array]:
-    """The minimal surface of revolution."""
+    """Evaluate the catenoid, the minimal surface of revolution."""
     return np.cosh(v) * np.cos(u), np.cosh(v) * np.sin(u), v
 
 
 def helicoid(u: Array, v: Array, shape: float) -> tuple[Array, Array, Array]:
-    """The minimal screw surface."""
+    """Evaluate the helicoid, the ruled minimal surface."""
     return np.sinh(v) * np.cos(u), np.sinh(v) * np.sin(u), u
 
 
 def sphere(u: Array, v: Array, shape: float) -> tuple[Array, Array, Array]:
-    """The unit sphere by longitude and latitude."""
+    """Evaluate the unit sphere at longitude u and latitude v."""
     return np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)
 
 
 def torus(u: Array, v: Array, shape: float) -> tuple[Array, Array, Array]:
-    """A torus of radii 1 and `shape`."""
+    """Evaluate a torus of radii 1 and `shape`."""
     away = 1.0 + shape * np.cos(v)
     return away * np.cos(u), away * np.sin(u), shape * np.sin(v)
 
@@ -83,7 +83,7 @@ FAMILIES = {
     "monkey_saddle": Family(monkey_saddle, (0.3, 0.3), (0.5, 1.0)),
     "catenoid": Family(catenoid, (0.0, 0.6), (0.4, 0.9)),
     "helicoid": Family(helicoid, (0.0, 0.6), (0.4, 0.9)),
-    # Windows stay off the poles, also when they are turned by 45 degrees.
+    # Windows do not reach the poles, even when rotated by 45 degrees.
     "sphere": Family(sphere, (0.0, 0.5), (0.3, 0.6)),
     "torus": Family(torus, (0.0, np.pi), (0.4, 0.9), (0.3, 0.6)),
 }
@@ -98,7 +98,7 @@ def sample(name: str, *, seed: int, size: int = 64) -> Array:
     name : str
         One of :data:`NAMES`.
     seed : int
-        Which windows of the analytic families are drawn.
+        Seed of the random windows of the analytic families.
     size : int
         Samples along each side.
 
@@ -117,7 +117,7 @@ def sample(name: str, *, seed: int, size: int = 64) -> Array:
 
 
 def _patch(family: Family, rng: np.random.Generator, size: int) -> Array:
-    """Unnormalised points of a random window, which is turned in the parameter plane."""
+    """Sample a random window, rotated in the parameter plane, without normalisation."""
     turn = rng.uniform(0.0, 2.0 * np.pi)
     centre = rng.uniform(-1.0, 1.0, 2) * family.centre
     half = rng.uniform(*family.half)
@@ -130,7 +130,7 @@ def _patch(family: Family, rng: np.random.Generator, size: int) -> Array:
 
 
 def _teapot(net: Array) -> BezierSurface:
-    # Against the published order of columns, so that normals point out of the pot.
+    # Reverses the published order of columns, so that normals point outwards.
     return BezierSurface(net, np.array([[0.0, 1.0], [1.0, 0.0]]))
 
 
@@ -147,7 +147,7 @@ def _terrain(k: int, size: int) -> Array:
 
 @cache
 def _data(name: str) -> dict[str, np.ndarray]:
-    """Arrays of a data file of this package."""
+    """Read the arrays of a data file of this package."""
     content = (files("gso.dataset") / "data" / f"{name}.npz").read_bytes()
     with np.load(BytesIO(content), allow_pickle=False) as arrays:
         return dict(arrays)

@@ -1,7 +1,7 @@
-"""One file of the set: some surfaces of a split with their labels, as HDF5.
+"""One HDF5 file of a dataset: some surfaces of a split with their labels.
 
-The bytes are a function of the recipe and the file's place in it alone, so that it does
-not matter when, where or in what company they were made.
+The bytes depend only on the recipe and the file's place in it. They do not depend on when or
+where the file was made, or on the other files.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from gso.tno.linear import blas_threads
 
 Array = NDArray[np.float64]
 
-#: Surfaces in a file: a few seconds of work.
+#: Number of surfaces in a file: a few seconds of work.
 LENGTH = 32
-#: The part of a file's name that says what it holds, for the files with the labels.
+#: Value of :attr:`Task.part` for files with surfaces and labels (not a reference).
 LABELS = "labels"
 
-# BLAS threads and warning filters belong to the process: one file at a time in each.
+# BLAS threads and warning filters are global in a process: make one file at a time.
 _alone = threading.Lock()
 
 
@@ -36,11 +36,11 @@ class Task:
     Attributes
     ----------
     split : str
-        Split it belongs to.
+        Split that the file belongs to.
     number : int
-        Its place in the split.
+        Position of the file in the split.
     ids : tuple of int
-        Its surfaces: numbers of draws, or places in a named split.
+        Surfaces of the file: numbers of draws, or positions in a named split.
     part : str
         "labels", or the name of a reference.
     """
@@ -52,27 +52,27 @@ class Task:
 
     @property
     def name(self) -> str:
-        """Path in the set's folder."""
+        """Path of the file in the dataset's folder."""
         suffix = "" if self.part == LABELS else f".{self.part}"
         return f"{self.split}/{self.number:05d}{suffix}.h5"
 
 
 def make(recipe: Recipe, expected: dict[str, str], task: Task) -> bytes:
-    """Content of a file.
+    """Make the content of a file.
 
     Parameters
     ----------
     recipe : Recipe
-        What the set is made of.
+        Definition of the dataset.
     expected : dict
-        Versions of the set's other files (:func:`gso.dataset.recipe.versions`).
+        Versions with which the dataset was begun (:func:`gso.dataset.recipe.versions`).
     task : Task
-        Which file.
+        The file to make.
 
     Raises
     ------
     DatasetError
-        The packages here have other versions.
+        The versions in this process differ from `expected`.
     """
     here = versions()
     differing = [
@@ -102,7 +102,7 @@ def make(recipe: Recipe, expected: dict[str, str], task: Task) -> bytes:
 
 
 def surfaces(recipe: Recipe, split: str, ids: tuple[int, ...], size: int | None = None) -> Array:
-    """Grids (b, size, size, 3) of a split in the unit ball, made anew from the seed."""
+    """Regenerate grids (b, size, size, 3) of a split, in the unit ball, from the seed."""
     size = recipe.size if size is None else size
     if split in shapes.NAMES:
         return shapes.sample(split, seed=recipe.seed, size=size)[list(ids)]
@@ -110,10 +110,10 @@ def surfaces(recipe: Recipe, split: str, ids: tuple[int, ...], size: int | None 
 
 
 def _labelled(kind: str, points: Array) -> dict[str, np.ndarray]:
-    """Arrays, metrics and statuses of a kind of label, over the surfaces of a file."""
+    """Label the surfaces of a file; return arrays, metrics and statuses of a kind of label."""
     found = [labels.solve(kind, p) for p in points]
-    # Single precision changes no metric of the labels by more than a thousandth, but does
-    # those of a reference, whose surface and flat image are isometric to a few parts in 1e6.
+    # Single precision changes no metric of the labels by more than a thousandth. References
+    # need double precision: their surface and flat image are isometric to a few parts in 1e6.
     dtype = np.float64 if kind in labels.REFERENCES else np.float32
     arrays = {
         name: np.stack([label.arrays[name] for label in found]).astype(dtype)

@@ -1,4 +1,4 @@
-"""Read a set: arrays by split and name, loaded when they are looked at."""
+"""Reading of datasets: arrays by split and name, loaded when they are indexed."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from gso.status import DatasetError
 if TYPE_CHECKING:
     from gso.dataset.torch_data import TorchData
 
-#: Rows of a folder's surfaces that are read together.
+#: Number of surfaces read together when features of a folder of .npy files are computed.
 _BLOCK = 256
 
 
 class Split:
-    """The surfaces of a split and what belongs to them.
+    """The surfaces of a split with their labels and other arrays.
 
-    ``split[name]`` is an array that is read when it is indexed, ``split[i]`` a dict of all
-    arrays of surface i, ``len(split)`` the number of surfaces.
+    ``split[name]`` is an array that is read when it is indexed, ``split[i]`` is a dict with
+    the entries of all arrays for surface i, and ``len(split)`` is the number of surfaces.
 
     Attributes
     ----------
     name : str
         Name of the split.
     arrays : dict of str to LazyArray
-        See the manual for their names.
+        Arrays by name; see the manual for the names.
     """
 
     def __init__(self, name: str, count: int, arrays: Callable[[], dict[str, LazyArray]]):
@@ -84,7 +84,7 @@ class Split:
 
     @property
     def metrics(self) -> dict[str, dict[str, NDArray[np.float64]]]:
-        """Metrics of the labels: values of every surface by kind of label and metric."""
+        """Metrics of the labels: an array over the surfaces by kind of label and metric."""
         found: dict[str, dict[str, NDArray[np.float64]]] = {}
         for name, array in self.arrays.items():
             if name.startswith("metrics/"):
@@ -93,9 +93,9 @@ class Split:
         return found
 
     def torch(self, *names: str, **keywords: Any) -> TorchData:
-        """Return a torch ``Dataset`` of the arrays named, the surfaces when none is.
+        """Return a torch ``Dataset`` of the named arrays (by default the surfaces).
 
-        Keywords are those of :class:`gso.dataset.torch_data.TorchData`.
+        Keywords are passed to :class:`gso.dataset.torch_data.TorchData`.
         """
         from importlib.util import find_spec
 
@@ -107,14 +107,14 @@ class Split:
 
 
 class Dataset(Mapping[str, Split]):
-    """A set of surfaces: a mapping of names of splits to :class:`Split`.
+    """A dataset of surfaces: a mapping from names of splits to :class:`Split`.
 
     Attributes
     ----------
     path : Path
-        Its folder.
+        Folder of the dataset.
     manifest : dict
-        What it is made of; empty for a folder of .npy files.
+        Recipe, versions, files and statistics; empty for a folder of .npy files.
     """
 
     def __init__(self, path: str | PathLike[str], record: dict[str, Any] | None = None):
@@ -156,11 +156,11 @@ class Dataset(Mapping[str, Split]):
         return f"Dataset({str(self.path)!r}: {counts})"
 
     def damaged(self) -> list[str]:
-        """Files that are missing or do not have their checksum."""
+        """Return the files that are missing or do not match their checksum."""
         return manifest.damaged(self.path, self.manifest) if self.manifest else []
 
     def _stored(self, split: str) -> dict[str, LazyArray]:
-        """Arrays of a split in this package's files."""
+        """Return the arrays of a split from this package's HDF5 files."""
         by_part: dict[str, list[dict[str, Any]]] = {}
         for entry in self.manifest["files"]:
             if entry["split"] == split:
@@ -179,18 +179,18 @@ class Dataset(Mapping[str, Split]):
 
 
 def open(path: str | PathLike[str]) -> Dataset:
-    """Open a set.
+    """Open a dataset.
 
     Parameters
     ----------
     path : path
-        Folder of :func:`gso.dataset.build`, or a folder of .npy files as published: a
-        folder per split (train/, test/), in it a file (H, W, 3) per surface.
+        Folder made by :func:`gso.dataset.build`, or a folder of .npy files as published: a
+        folder per split (train/, test/) with a file (H, W, 3) per surface.
 
     Raises
     ------
     DatasetError
-        There is no set, its build is not finished, or its manifest is damaged.
+        There is no dataset, its build is not finished, or its manifest is damaged.
 
     Examples
     --------
@@ -203,14 +203,14 @@ def open(path: str | PathLike[str]) -> Dataset:
 
 
 def _files(files: list[Path]) -> dict[str, LazyArray]:
-    """The surfaces of a folder of .npy files."""
+    """Return the surfaces of .npy files as one lazy array."""
     shape = folder.load(files[0]).shape
     parts = [Part(1, partial(folder.rows, path, shape)) for path in files]
     return {"surface": LazyArray(parts, shape, np.dtype(float))}
 
 
 def _noisy(surface: LazyArray, unit: LazyArray, level: float) -> LazyArray:
-    """Surfaces with noise of a standard deviation."""
+    """Return surfaces plus noise of the standard deviation `level`."""
     parts = [
         Part(a.count, partial(_sum, a.read, b.read, level))
         for a, b in zip(surface.parts, unit.parts, strict=True)

@@ -1,4 +1,4 @@
-"""Statistics of a set: surfaces per interval of each feature, metrics of the labels."""
+"""Statistics of a dataset: surfaces per interval of each feature, metrics of the labels."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from gso.dataset.screen import CURVATURE, CURVED, SHAPE
 from gso.dataset.store import Dataset, Split
 
-#: Intervals of the features; K_N is counted by its size. Those of K_A and sigma^2 start with
-#: the ones that are filled in stated shares; the rest is for hard and named splits.
+#: Intervals of the features; K_N is counted by its absolute value. Those of K_A and sigma^2
+#: start with the intervals of :mod:`gso.dataset.screen`; the rest is for hard and named splits.
 INTERVALS: dict[str, tuple[float, ...]] = {
     "K_A": (*CURVATURE, 1.5, CURVED, np.inf),
     "K_P": (0.0, 0.01, 0.03, 0.06, 0.1, 0.2, 0.3, 0.9, np.inf),
@@ -20,23 +20,23 @@ INTERVALS: dict[str, tuple[float, ...]] = {
     "sigma2": (*SHAPE, 1.0, np.inf),
 }
 
-#: Figures of the numerical optimiser in Tables 1 and 2 of Wang et al. 2024, by metric, and
-#: which of our labels stand beside them.
+#: Values of the numerical optimiser in Tables 1 and 2 of Wang et al. 2024, by metric: for
+#: surfaces and for flat images.
 PUBLISHED = {"loss_gc_before": 0.307, "loss_gc": 0.0283, "K_A_r": 0.8888, "d_H": 0.823}
 PUBLISHED_FLAT = {"loss_iso_cell": 3.30e-4}
-#: Splits whose means are compared; others have extremes that no mean survives.
+#: Splits whose means are compared; in other splits extreme values dominate the mean.
 _EVEN = ("train", "validation", "test")
 
 
 def summarise(data: Dataset) -> dict[str, Any]:
-    """Statistics of every split, of plain numbers, for a manifest.
+    """Compute statistics of every split as plain numbers, for a manifest.
 
     Returns
     -------
     dict
         By split: ``count``; ``features`` and ``labels`` by name, each with mean, median and
         90th percentile; ``intervals`` with the counts of :data:`INTERVALS`; ``status`` with
-        how many solves of each kind of label ended how.
+        the number of solves per status, by kind of label.
     """
     return {name: _split(split) for name, split in data.items()}
 
@@ -63,7 +63,7 @@ def _split(split: Split) -> dict[str, Any]:
 
 
 def counts(feature: str, values: NDArray[np.float64]) -> list[int]:
-    """Surfaces in each interval of a feature; an interval contains its upper end.
+    """Count the surfaces in each interval of a feature; an interval contains its upper end.
 
     >>> counts("sigma2", np.array([0.0, 0.03, 0.04, 2.0]))
     [2, 1, 0, 0, 0, 0, 0, 1]
@@ -74,7 +74,7 @@ def counts(feature: str, values: NDArray[np.float64]) -> list[int]:
 
 
 def _statistics(values: NDArray[np.float64]) -> dict[str, float | None]:
-    """Mean, median and 90th percentile of what is known."""
+    """Compute mean, median and 90th percentile of the finite values."""
     known = values[np.isfinite(values)]
     if not known.size:
         return {"mean": None, "median": None, "p90": None}
@@ -86,10 +86,11 @@ def _statistics(values: NDArray[np.float64]) -> dict[str, float | None]:
 
 
 def differences(one: Any, other: Any, *, tolerance: float = 0.02) -> list[str]:
-    """Where two summaries differ by more than a tolerance, relative to the larger number.
+    """List where two summaries differ by more than a tolerance, relative to the larger number.
 
-    Counts may differ by two: a draw on the border of an interval can fall on either side of
-    it on another machine. Of the hard and the named splits only medians are compared.
+    Counts may differ by two in any case: a draw on the border of an interval can fall on
+    either side of it on another machine. For the hard and named splits, means and 90th
+    percentiles are not compared.
 
     Examples
     --------
@@ -124,7 +125,7 @@ def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 def _close(a: Any, b: Any, tolerance: float) -> bool:
     if isinstance(a, int) or isinstance(b, int):
-        # A status or an interval that only one of them has is counted as zero.
+        # A count that only one summary has is zero in the other.
         a, b = a or 0, b or 0
         return abs(a - b) <= max(2, tolerance * max(abs(a), abs(b)))
     if a is None or b is None:

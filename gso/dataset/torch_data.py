@@ -1,4 +1,4 @@
-"""A set for training in torch."""
+"""Torch datasets of the arrays of a split."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class TorchData(torch.utils.data.Dataset[tuple[torch.Tensor, ...]]):
     dtype : torch.dtype
         Type of the tensors.
     channels_first : bool
-        Grids as (d, H, W) instead of (H, W, d).
+        Whether grids are (d, H, W) instead of (H, W, d).
     in_memory : bool
-        Read everything now, instead of each surface whenever it is asked for.
+        Read all surfaces now, instead of each one on access.
     """
 
     def __init__(

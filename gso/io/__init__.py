@@ -1,4 +1,4 @@
-"""Read and write mesh files; flat patterns as drawings, lines in space.
+"""Readers and writers of mesh files; writers of flat patterns, polylines and CAD surfaces.
 
 >>> import tempfile, os
 >>> import numpy as np
@@ -51,7 +51,7 @@ __all__ = [
 
 
 class _Format(NamedTuple):
-    """Module and functions of a format; modules load when they are used."""
+    """Module and function names of a file format; the module is imported on first use."""
 
     module: str
     read: str = "read"
@@ -77,7 +77,7 @@ SUFFIXES = tuple(_FORMATS)
 
 @known_keywords()
 def load(path: str | PathLike[str], *, weld: float | None = None) -> Mesh:
-    """Read a mesh file; its suffix says which format it is.
+    """Read a mesh file; its suffix selects the format.
 
     Parameters
     ----------
@@ -87,23 +87,23 @@ def load(path: str | PathLike[str], *, weld: float | None = None) -> Mesh:
         (`vertices` and `faces`, or one grid).
     weld : float, optional
         Merge vertices that lie within this distance of each other, in the file's unit of
-        length (see :func:`welded`): for faces that have vertices of their own, as
-        exporters write them at seams, or everywhere. 0 merges equal vertices.
+        length (see :func:`welded`). Use it for files in which each face has its own copies
+        of its vertices, at seams or everywhere. 0 merges equal vertices.
 
     Returns
     -------
     Mesh
-        In the file's own unit and order of vertices. `notes` say what was changed or left
-        out; `attributes` are an OBJ file's names of faces and texture coordinates, which
-        :func:`save` writes again.
+        In the file's own unit and order of vertices. `notes` list what was changed or left
+        out. `attributes` hold the face names and texture coordinates of an OBJ file;
+        :func:`save` writes them again.
 
     Raises
     ------
     MeshError
-        The file is missing, of an unknown kind, damaged, or has a mesh that is refused.
-        The message names the file, and the line of a text file.
+        The file is missing, of an unknown format or damaged, or :class:`gso.Mesh` rejects
+        its geometry. The message names the file and, in a text file, the line.
     OptionError
-        `weld` is no length.
+        `weld` is not a finite number of 0 or more.
     """
     name = os.fsdecode(path)
     suffix = os.path.splitext(name)[1].lower()
@@ -121,10 +121,10 @@ def load(path: str | PathLike[str], *, weld: float | None = None) -> Mesh:
 
 
 def save(mesh: Any, path: str | PathLike[str]) -> None:
-    """Write a mesh to a file; its suffix says which format it is.
+    """Write a mesh to a file; its suffix selects the format.
 
-    An existing file is replaced only when the new one is complete: a run that fails or
-    is interrupted leaves it as it was.
+    An existing file is replaced only when the new one is complete: a write that fails or
+    is interrupted leaves the existing file unchanged.
 
     Parameters
     ----------
@@ -144,14 +144,14 @@ def save(mesh: Any, path: str | PathLike[str]) -> None:
     ------
     MeshError
         Unknown suffix, no such folder, no permission, or a mesh that the format cannot
-        hold. The message names the file.
+        store. The message names the file.
     """
     for note in write(mesh, path):
         warnings.warn(note, stacklevel=2)
 
 
 def write(mesh: Any, path: str | PathLike[str]) -> tuple[str, ...]:
-    """As :func:`save`, which warns of what this returns: what the format cannot hold."""
+    """Write a mesh as :func:`save` does, and return its warnings instead of issuing them."""
     check_writable(path, SUFFIXES)
     name = os.fsdecode(path)
     surface = as_mesh(mesh)
@@ -166,7 +166,7 @@ def write(mesh: Any, path: str | PathLike[str]) -> tuple[str, ...]:
 
 
 def left_out(mesh: Mesh, path: str | PathLike[str]) -> tuple[str, ...]:
-    """What a file of this name does not hold of a mesh, for the user to read."""
+    """Return notes to the user on the attributes of a mesh that this file cannot store."""
     suffix = os.path.splitext(os.fsdecode(path))[1].lower()
     if mesh.attributes is None or mesh.attributes.empty or suffix in (".obj", ".npz"):
         return ()

@@ -1,4 +1,4 @@
-"""NumPy files: grids of points as .npy, vertices and faces as .npz. Nothing is unpickled."""
+"""NumPy files: grids of points as .npy, vertices and faces as .npz; pickled data is refused."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from gso.io.surface import Surface
 from gso.mesh import Mesh
 from gso.status import MeshError
 
-# A stream of deflate cannot grow by more when it is unpacked.
+# Largest expansion factor of a deflate stream.
 _DEFLATE_RATIO = 1032
-# What the readers of zip files and of array headers raise on damaged ones.
+# Exceptions that zipfile and NumPy's header readers raise on damaged files.
 _DAMAGE = (
     zipfile.BadZipFile,
     zlib.error,
@@ -37,19 +37,19 @@ _DAMAGE = (
 
 
 def read_npy(data: bytes) -> Surface:
-    """A grid of points (H, W, 3) in a .npy file."""
+    """Read a grid of points (H, W, 3) from the bytes of a .npy file."""
     return Surface(_array(io.BytesIO(data), len(data)), None)
 
 
 def write_npy(mesh: Mesh, file: BinaryIO) -> None:
-    """Write a grid's points (H, W, 3), row by row whatever the numbering of its vertices."""
+    """Write a grid's points (H, W, 3) row by row, independent of the vertex numbering."""
     if mesh.grid is None:
         raise MeshError("the mesh is no grid, which is all that .npy holds; use .npz or .obj")
     np.lib.format.write_array(file, mesh.grid, allow_pickle=False)
 
 
 def read_npz(data: bytes) -> Surface:
-    """Surface in a .npz file: `vertices` and `faces` (or V and F), or one grid (H, W, 3)."""
+    """Read `vertices` and `faces` (or V and F), or one grid (H, W, 3), from a .npz file."""
     members = read_arrays(data)
     chosen = {name.lower(): array for name, array in members.items()}
     v = next((chosen[k] for k in ("vertices", "v") if k in chosen), None)
@@ -65,7 +65,7 @@ def read_npz(data: bytes) -> Surface:
 
 
 def read_arrays(data: bytes) -> dict[str, np.ndarray]:
-    """All arrays of a .npz file by name."""
+    """Read all arrays of a .npz file, by name."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = [m for m in archive.infolist() if m.filename.endswith(".npy")]
@@ -77,13 +77,13 @@ def read_arrays(data: bytes) -> dict[str, np.ndarray]:
 
 
 def write_npz(mesh: Mesh, file: BinaryIO) -> None:
-    """Write `vertices` and `faces`, and what else is known of the faces."""
+    """Write `vertices`, `faces` and the face attributes."""
     more: dict[str, Any] = {} if mesh.attributes is None else mesh.attributes.arrays()
     np.savez(file, vertices=mesh.vertices, faces=mesh.faces, **more)
 
 
 def _attributes(members: dict[str, np.ndarray], faces: np.ndarray) -> Attributes | None:
-    """What a file says of the faces, where it was written here."""
+    """Return the face attributes, None unless the file was written by :func:`write_npz`."""
     try:
         return Attributes.from_arrays(members, faces)
     except (LookupError, TypeError, ValueError, AttributeError) as error:
@@ -101,7 +101,7 @@ def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
 
 
 def _array(stream: IO[bytes], size: int) -> np.ndarray:
-    """One array of numbers from a stream of so many bytes; the header's claim is checked."""
+    """Read one numeric array from a stream of `size` bytes; check the header against them."""
     try:
         version = np.lib.format.read_magic(stream)
         read_header = {

@@ -1,4 +1,4 @@
-"""Write a file so that it is either there in full or not at all."""
+"""Atomic file writes: the file is either complete or unchanged."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gso.status import MeshError
 
 
 def check_writable(path: str | PathLike[str], suffixes: Collection[str] | None = None) -> None:
-    """Refuse an output path that cannot be written, before anything is computed.
+    """Reject an output path that cannot be written, before anything is computed.
 
     Parameters
     ----------
@@ -57,20 +57,21 @@ def check_writable(path: str | PathLike[str], suffixes: Collection[str] | None =
 
 @contextmanager
 def replacing(path: str | PathLike[str]) -> Iterator[BinaryIO]:
-    """Open a temporary file beside `path` that takes its place when the block ends well.
+    """Open a temporary file beside `path` that replaces it when the block ends normally.
 
-    When the block raises, KeyboardInterrupt included, the temporary file goes and what
-    was at `path` stays as it was. Permissions of a file that is replaced are kept, and a
-    symbolic link goes on pointing at its target.
+    When the block raises, KeyboardInterrupt included, the temporary file is deleted and
+    `path` stays unchanged. A replaced file keeps its permissions. A symbolic link is
+    followed: its target is replaced, the link stays.
 
     Raises
     ------
     MeshError
-        The file cannot be written (see :func:`check_writable`, and full disks).
+        The path cannot be written (see :func:`check_writable`), or writing fails, for
+        example on a full disk.
     """
     check_writable(path)
     target = os.path.realpath(os.fsdecode(path))
-    # A short name of its own: the target's may already be as long as a name can be.
+    # A short independent name: the target's name may already have the maximum length.
     temporary = os.path.join(os.path.dirname(target), f".gso-{secrets.token_hex(8)}.tmp")
     try:
         try:

@@ -1,4 +1,4 @@
-"""B-spline surfaces as CAD files."""
+"""Writers of B-spline surfaces as CAD files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gso.status import GSOError, MeshError, OptionError
 
 
 class _Format(NamedTuple):
-    """Module and function that write a format, and the package they need."""
+    """Module and function that write a format, and the package that they need."""
 
     module: str
     write: str
@@ -33,7 +33,7 @@ SPLINE_SUFFIXES = tuple(_FORMATS)
 
 
 def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
-    """Refuse a CAD file that cannot be written, before anything is computed.
+    """Reject a CAD file that cannot be written, before anything is computed.
 
     Raises
     ------
@@ -42,8 +42,8 @@ def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
     OptionError
         Unknown unit.
     GSOError
-        The package that writes the format is not there, or lacks a library of the system
-        (OpenCASCADE: libGL); the message says which.
+        The package that writes the format is not installed, or a system library that it
+        needs is missing (OpenCASCADE: libGL). The message says which.
     """
     check_writable(path, SPLINE_SUFFIXES)
     if unit not in MILLIMETRES:
@@ -75,16 +75,16 @@ def save_spline(spline: BSplineSurface, path: str | PathLike[str], *, unit: str 
     path : str or PathLike
         A .step, .stp, .iges, .igs or .3dm file.
     unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
-        Unit of the control points, which is written into the file. STEP and IGES do not know
-        "dm" and "yd": the surface is then written in millimetres.
+        Unit of the control points; it is written into the file. STEP and IGES do not support
+        "dm" and "yd": the surface is then converted to millimetres.
 
     Raises
     ------
     MeshError
         Unknown suffix, a path that cannot be written, or a surface that the format cannot
-        hold. The message names the file.
+        store. The message names the file.
     OptionError
-        Unknown unit, or `spline` is none.
+        Unknown unit, or `spline` is not a :class:`BSplineSurface`.
     GSOError
         The package that writes the format is not installed: ``pip install ".[cad]"`` in the
         folder of gso.

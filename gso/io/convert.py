@@ -1,4 +1,4 @@
-"""A mesh from whatever a user has."""
+"""Conversion of arrays, files and trimesh objects to a mesh."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from gso.status import MeshError
 
 @dataclass(frozen=True)
 class Unwelded:
-    """Something to be made a mesh by merging its vertices; :func:`as_mesh` takes it.
+    """Input of :func:`as_mesh` together with the distance within which to merge its vertices.
 
     Attributes
     ----------
     surface : Any
-        Whatever :func:`as_mesh` takes.
+        Anything that :func:`as_mesh` takes.
     weld : float
         Vertices within this distance of each other are merged.
     """
@@ -31,12 +31,12 @@ class Unwelded:
 
 
 def as_mesh(x: Any, *, weld: float | None = None) -> Mesh:
-    """Mesh from a mesh, a grid of points, vertices and faces, or a file.
+    """Make a mesh from a mesh, a grid of points, vertices and faces, or a file.
 
     Parameters
     ----------
     x : Mesh, array_like (H, W, 3), (vertices, faces), trimesh.Trimesh, str or PathLike
-        A `Mesh` comes back as it is, unless it is to be welded.
+        A `Mesh` is returned unchanged when `weld` is None.
     weld : float, optional
         Merge vertices that lie within this distance of each other (see
         :func:`gso.io.welded`).
@@ -48,9 +48,9 @@ def as_mesh(x: Any, *, weld: float | None = None) -> Mesh:
     Raises
     ------
     MeshError
-        `x` is none of these, or its geometry is refused (see :class:`gso.Mesh`).
+        `x` is none of these, or its geometry is rejected (see :class:`gso.Mesh`).
     OptionError
-        `weld` is no length.
+        `weld` is not a finite number of 0 or more.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def as_mesh(x: Any, *, weld: float | None = None) -> Mesh:
         from gso.io import load
 
         return load(os.fsdecode(x), weld=weld)
-    # Whoever holds a Trimesh has imported trimesh: no need to do it here.
+    # If x is a Trimesh, trimesh has been imported already.
     trimesh = sys.modules.get("trimesh")
     if trimesh is not None and isinstance(x, trimesh.Trimesh):
         return Surface(x.vertices, x.faces).mesh(weld)

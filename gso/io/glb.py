@@ -1,4 +1,4 @@
-"""GLB, binary glTF 2.0, through trimesh: triangles in single precision."""
+"""GLB (binary glTF 2.0) through trimesh: triangles in single precision."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from gso.mesh import Mesh
 from gso.status import MeshError
 
 _HEAD = 20
-# Instances of one mesh cost nothing in the file: this bounds what they become.
+# Instances of a mesh take no space in the file; this bounds the vertices after expansion.
 _MOST_VERTICES = 50_000_000
 
 
 def read(data: bytes) -> Surface:
-    """All meshes of a GLB file in one, each where its node puts it.
+    """Read all meshes of a GLB file as one surface, with the transforms of their nodes.
 
-    Vertices that a mesh repeats at seams of texture or shading are merged; different
-    nodes are kept apart, as components.
+    Duplicate vertices at texture or shading seams of a mesh are merged. Vertices of
+    different nodes are never merged: each node gives its own components.
     """
     _check(data)
     import trimesh
@@ -58,7 +58,7 @@ def read(data: bytes) -> Surface:
             notes += said
     except MeshError:
         raise
-    # Whatever a foreign reader raises on a damaged file.
+    # The reader may raise any exception on a damaged file.
     except Exception as error:
         raise MeshError(f"is no intact GLB file: {type(error).__name__}: {error}") from error
     if not faces:
@@ -67,7 +67,7 @@ def read(data: bytes) -> Surface:
 
 
 def _check(data: bytes) -> None:
-    """Refuse what would make the reader fetch other files or allocate without bound."""
+    """Reject files that would make the reader fetch other files or allocate without bound."""
     if data[:4] != b"glTF":
         raise MeshError("is no GLB file: it does not start with 'glTF'")
     version, length, size = (int.from_bytes(data[k : k + 4], "little") for k in (4, 8, 12))
@@ -88,7 +88,7 @@ def _check(data: bytes) -> None:
 
 
 def write(mesh: Mesh, file: BinaryIO) -> None:
-    """Write the triangulated mesh as GLB, which has single precision."""
+    """Write the triangulated mesh as GLB, in single precision."""
     import trimesh
 
     if np.abs(mesh.vertices).max() > np.finfo(np.float32).max:

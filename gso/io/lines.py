@@ -1,4 +1,4 @@
-"""Polylines in space as files."""
+"""Polylines in space as OBJ files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def save_lines(lines: Sequence[Any], path: str | PathLike[str]) -> None:
     Raises
     ------
     MeshError
-        A line is no such array or is not finite, or the file cannot be written.
+        A line does not have this shape or is not finite, or the file cannot be written.
 
     Examples
     --------
@@ -56,12 +56,12 @@ def save_lines(lines: Sequence[Any], path: str | PathLike[str]) -> None:
 
 
 def polyline(line: Any, number: int, dimension: int) -> Array:
-    """Points of a line (k, dimension), two or more and finite.
+    """Convert a line to an array (k, dimension) of two or more finite points.
 
     Raises
     ------
     MeshError
-        They are not; the message has the line's number.
+        The line is not such an array. The message has its `number`.
     """
     try:
         points = np.array(line, dtype=np.float64)

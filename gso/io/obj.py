@@ -1,4 +1,4 @@
-"""Wavefront OBJ: vertices and polygons, quads kept as quads, and what names the faces."""
+"""Wavefront OBJ: vertices, polygons (quads are kept), face names and texture coordinates."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gso.io.text import Words, write_rows
 from gso.mesh import Mesh
 from gso.status import MeshError
 
-# What is read and has no place in a mesh: keyword, and what it is.
+# Keywords whose data a mesh cannot store, and what they are called in the notes.
 _LEFT_OUT = {
     b"vn": "normals",
     b"vp": "points of curves",
@@ -25,13 +25,17 @@ _LEFT_OUT = {
 
 
 def read(data: bytes) -> Surface:
-    """Surface in an OBJ file.
+    """Read the surface in an OBJ file.
 
-    Read are ``v x y z`` (a fourth number is a weight by which the others are divided;
-    more numbers are colours and left out) and ``f`` with any of ``1``, ``1/2``, ``1//3``,
-    ``1/2/3``, counted from the front or, when negative, from the last one before the
-    line; what ``o``, ``g``, ``s`` and ``usemtl`` call the faces, ``mtllib`` and ``vt``. Notes
-    say what else there was.
+    The reader uses these lines:
+
+    - ``v x y z``. A single fourth number is a weight that divides the coordinates; further
+      numbers are colours and are left out.
+    - ``f`` with corners ``1``, ``1/2``, ``1//3`` or ``1/2/3``. Indices count from 1; negative
+      ones count back from the last element before the line.
+    - ``vt``, ``mtllib``, and the face names of ``o``, ``g``, ``s`` and ``usemtl``.
+
+    Notes list normals, curves and other known content that is left out.
     """
     words = Words(data, comment=b"#", joined=True)
     v, f = words.rows(b"v"), words.rows(b"f")
@@ -74,7 +78,7 @@ def _vertices(words: Words, v: Ints) -> Array:
 
 
 def _polygons(words: Words, v: Ints, f: Ints) -> tuple[Ints, Ints, Ints]:
-    """Words of all corners, the vertices that they refer to, and corners by polygon."""
+    """Return the words of all corners, their vertex indices, and corner counts of polygons."""
     count = words.count[f] - 1
     if (count < 3).any():
         row = f[(count < 3).argmax()]
@@ -95,7 +99,10 @@ def _polygons(words: Words, v: Ints, f: Ints) -> tuple[Ints, Ints, Ints]:
 
 
 def _from_front(number: Ints, rows: Ints, f: Ints, count: Ints) -> Ints:
-    """Places, counted from 0, of what the corners of faces in rows `f` refer to."""
+    """Convert OBJ indices of the face rows `f` (from 1, or negative) to indices from 0.
+
+    `rows` are the rows that define the elements referred to; `count` has the corners per face.
+    """
     before = np.repeat(np.searchsorted(rows, f), count)
     return np.where(number < 0, before + number, number - 1)
 
@@ -103,7 +110,7 @@ def _from_front(number: Ints, rows: Ints, f: Ints, count: Ints) -> Ints:
 def _texture(
     words: Words, f: Ints, corner: Ints, count: Ints
 ) -> tuple[Array | None, Ints | None, tuple[str, ...]]:
-    """Texture coordinates, their row for each corner or -1, and what is wrong with them."""
+    """Return texture coordinates, their index for each corner (or -1), and notes on errors."""
     vt = words.rows(b"vt")
     if vt.size == 0:
         return None, None, ()
@@ -131,7 +138,7 @@ def _texture(
 
 
 def _labels(words: Words, f: Ints, polygon: Ints) -> dict[str, Labels]:
-    """What the faces are called, by keyword."""
+    """Return the names of the faces, by keyword."""
     labels = {}
     for keyword in LABELS:
         rows = words.rows(keyword.encode())
@@ -139,7 +146,7 @@ def _labels(words: Words, f: Ints, polygon: Ints) -> dict[str, Labels]:
         said, of_face = np.unique(which, return_inverse=True)
         if said[-1] < 0:
             continue
-        # Names that no face has are left out.
+        # Names without faces are left out.
         named = said[said >= 0]
         names = tuple(words.rest(row) for row in rows[named])
         labels[keyword] = Labels(names, (of_face.ravel() - (said[0] < 0))[polygon])
@@ -159,7 +166,7 @@ def _left_out(words: Words, v: Ints) -> tuple[str, ...]:
 
 
 def write(mesh: Mesh, file: BinaryIO) -> None:
-    """Write a mesh as OBJ; coordinates read back exactly, and so do names and texture."""
+    """Write a mesh as OBJ; coordinates, face names and texture coordinates read back exactly."""
     said = mesh.attributes or Attributes()
     for name in said.libraries:
         _write_name(file, "mtllib", name)
@@ -179,7 +186,7 @@ def write(mesh: Mesh, file: BinaryIO) -> None:
 
 
 def _face_formats(number: Ints, corners: Ints | None) -> tuple[list[str], Ints]:
-    """One printf format a face, and its numbers; negative ones are padding."""
+    """Return one printf format per face, and its numbers; negative ones are padding."""
     size = (number >= 0).sum(axis=1)
     if corners is None:
         plain = {3: "f %d %d %d\n", 4: "f %d %d %d %d\n"}
@@ -193,7 +200,7 @@ def _face_formats(number: Ints, corners: Ints | None) -> tuple[list[str], Ints]:
 
 
 def _changes(said: Attributes) -> Ints:
-    """Faces before which a name changes."""
+    """Return the faces before which a face name changes."""
     every = [np.flatnonzero(np.diff(k.of_face, prepend=-1)) for k in said.labels.values()]
     return np.unique(np.concatenate(every)) if every else np.empty(0, np.int64)
 

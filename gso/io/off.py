@@ -1,4 +1,4 @@
-"""OFF, the Object File Format: vertices and polygons as text, quads kept as quads."""
+"""OFF (Object File Format): vertices and polygons as text; quads are kept."""
 
 from __future__ import annotations
 
@@ -14,19 +14,18 @@ from gso.io.text import Words, write_rows
 from gso.mesh import Mesh
 from gso.status import MeshError
 
-#: Numbers of a vertex besides its coordinates, by the letters before OFF; colours may have
-#: three numbers or four.
+#: Additional numbers of a vertex, by the letters before OFF; colours have four or three.
 _MORE = {b"ST": (2,), b"C": (4, 3), b"N": (3,)}
-#: Numbers of the colour behind a face's corners, where lines do not tell.
+#: Possible lengths of a face's colour, tried where line breaks do not delimit the faces.
 _COLOURS = (0, 3, 4, 1)
 
 
 def read(data: bytes) -> Surface:
-    """Surface in a text OFF file; colours, normals and texture coordinates are left out.
+    """Read the surface in a text OFF file, without colours, normals and texture coordinates.
 
-    Numbers may be broken into lines anywhere. Where every vertex and face begins a line,
-    whatever stands behind it on the line is left out; elsewhere vertices have the numbers
-    that the keyword announces, and all faces have equally many numbers of a colour.
+    Line breaks may be anywhere. If every vertex and face begins a line, the rest of its line
+    is ignored. Otherwise vertices have as many numbers as the keyword (such as ``CNOFF``)
+    announces, and the colours of all faces have the same length.
     """
     words = Words(data, comment=b"#")
     if words.first.size == 0:
@@ -55,9 +54,9 @@ def read(data: bytes) -> Surface:
 
 
 def _counts(words: Words, glued: bytes) -> tuple[int, int, int]:
-    """Numbers of vertices and faces, and the first word behind the counts.
+    """Return the numbers of vertices and faces, and the first word after the counts.
 
-    Some programs write no space behind the keyword.
+    `glued` is the vertex count where the file has no space after the keyword, else empty.
     """
     first = 0 if glued else 1
     if words.start.size < first + 2:
@@ -67,7 +66,7 @@ def _counts(words: Words, glued: bytes) -> tuple[int, int, int]:
     if min(n, m) < 0:
         words.fail(first, f"{n} vertices and {m} faces are announced: the file is damaged")
     body = first + 2
-    # The number of edges follows, unless a vertex does: on another line, with more numbers.
+    # The number of edges is optional. A word on a new line with more numbers is a vertex.
     row = words.row(np.array([body - 1, min(body, words.start.size - 1)]))
     if row[0] == row[1] or words.count[row[1]] == 1:
         body = min(body + 1, words.start.size)
@@ -75,7 +74,7 @@ def _counts(words: Words, glued: bytes) -> tuple[int, int, int]:
 
 
 def _found(words: Words, body: int, n: int, m: int, widths: list[int]) -> tuple[Ints, Ints, Ints]:
-    """First words of the vertices and of the faces, and the corners of the faces."""
+    """Locate the first words of the vertices and faces, and the corner counts of the faces."""
     row = int(words.row(np.array([body]))[0])
     fresh = words.first[row] == body
     rows = np.arange(row, words.first.size) if fresh else np.empty(0, np.int64)
@@ -93,14 +92,14 @@ def _found(words: Words, body: int, n: int, m: int, widths: list[int]) -> tuple[
     walks = [(v, walk) for v, place in begins for walk in _walks(words, place, m)]
     whole = [(v, walk) for v, walk in walks if walk.fits]
     if whole:
-        # Of several ways to read it, one whose corners are vertices.
+        # Of several consistent readings, prefer one whose corner indices are valid.
         v, walk = next((x for x in whole if _inside(words, x[1], n)), whole[0])
         return v, walk.faces, walk.size
     if lined and (words.count[rows[:n]] < 3).any():
         words.fail_row(rows[(words.count[rows[:n]] < 3).argmax()], "a vertex needs three numbers")
     if not walks:
         _fail_counts(words, body, n, m, "ends before the last vertex")
-    # The lines say where faces begin, if there are enough of them.
+    # Line breaks locate the faces if there are enough lines.
     walk = walks[0][1] if lined else max((w for _, w in walks), key=lambda w: w.good)
     if walk.good >= m:
         words.fail(walk.faces[-1], "more numbers follow the last face than a colour has")
@@ -112,7 +111,11 @@ def _found(words: Words, body: int, n: int, m: int, widths: list[int]) -> tuple[
 
 
 class _Walk(NamedTuple):
-    """Faces, one behind the other: their first words and sizes, how many are sound, and all."""
+    """One reading of the faces in sequence.
+
+    `faces` and `size` hold the first word and the corner count of each face, `good` is the
+    number of leading faces that are valid, `fits` tells whether this reading is consistent.
+    """
 
     faces: Ints
     size: Ints
@@ -121,7 +124,7 @@ class _Walk(NamedTuple):
 
 
 def _walks(words: Words, begin: int, m: int) -> Iterator[_Walk]:
-    """Go from face to face: each begins a line, or has a colour of a fixed length."""
+    """Yield readings of the faces: each face begins a line, or has a colour of fixed length."""
     count = words.start.size
     size = words.ints_or(np.arange(count), -1)
     last = np.arange(count) + np.where((size >= 3) & (size < count), size, count)
@@ -131,7 +134,7 @@ def _walks(words: Words, begin: int, m: int) -> Iterator[_Walk]:
     for colour in (None, *_COLOURS):
         after = after_line if colour is None else np.minimum(last + 1 + colour, count)
         jump = np.append(np.where(sound[:-1], after, count), count)
-        # Twice as many faces with every step.
+        # Pointer jumping: each step doubles the number of faces found.
         faces, twice = np.array([begin]), jump
         while faces.size < m + 1:
             faces = np.concatenate([faces, twice[faces]])

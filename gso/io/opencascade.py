@@ -1,4 +1,4 @@
-"""STEP (AP214) and IGES (5.3), through OpenCASCADE."""
+"""STEP (AP214) and IGES (5.3) through OpenCASCADE."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from gso.status import MeshError
 #: OpenCASCADE's names of the units that both formats know; IGES has another one for inches.
 _UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
 
-#: All digits of a double. The writers' own formats keep ten, and cut exponents off when they
-#: are asked for more.
+#: All digits of a double. The writers' default formats keep ten digits, and truncate
+#: exponents when asked for more.
 _FORMAT = "%.16E"
 
 #: OpenCASCADE's smallest distance between points, in the unit of the file.
@@ -25,7 +25,7 @@ _TOLERANCE = 1e-7
 
 
 def step(spline: BSplineSurface, unit: str) -> bytes:
-    """Contents of a STEP file with one face, bounded by the edges of the surface."""
+    """Return the contents of a STEP file with one face, bounded by the edges of the surface."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
     from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
     from OCP.StepData import StepData_StepWriter
@@ -48,7 +48,7 @@ def step(spline: BSplineSurface, unit: str) -> bytes:
 
 
 def iges(spline: BSplineSurface, unit: str) -> bytes:
-    """Contents of an IGES file with one B-spline surface, entity 128."""
+    """Return the contents of an IGES file with one B-spline surface (entity 128)."""
     from OCP.GeomToIGES import GeomToIGES_GeomSurface
     from OCP.IGESControl import IGESControl_Writer
     from OCP.IGESData import IGESData_IGESWriter
@@ -69,7 +69,7 @@ def iges(spline: BSplineSurface, unit: str) -> bytes:
 
 
 def _converted(spline: BSplineSurface, unit: str) -> tuple[Any, str]:
-    """OpenCASCADE's surface in a unit that it knows, and the name of the unit."""
+    """Return the OpenCASCADE surface in a supported unit, and the name of that unit."""
     from OCP import collections
     from OCP.Geom import Geom_BSplineSurface
     from OCP.gp import gp_Pnt
@@ -98,7 +98,7 @@ def _array(kind: Any, values: Any) -> Any:
 
 
 def _printed(writer: Any) -> bytes:
-    """What a writer has to say."""
+    """Return the text of a file writer."""
     text = io.BytesIO()
     if not writer.Print(text):
         raise MeshError("OpenCASCADE could not write the surface")
@@ -107,7 +107,7 @@ def _printed(writer: Any) -> bytes:
 
 @contextmanager
 def _settings(wanted: dict[str, str]) -> Iterator[None]:
-    """Set global parameters of OpenCASCADE for the time of a block."""
+    """Set global parameters of OpenCASCADE inside a block and restore them after it."""
     from OCP.Interface import Interface_Static
     from OCP.STEPControl import STEPControl_Controller
 
@@ -124,7 +124,7 @@ def _settings(wanted: dict[str, str]) -> Iterator[None]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep OpenCASCADE's reports of success off the standard output."""
+    """Suppress OpenCASCADE's messages of success on standard output."""
     from OCP.Message import Message, Message_Gravity
 
     printers: Iterable[Any] = list(Message.DefaultMessenger_s().Printers())

@@ -1,4 +1,4 @@
-"""PLY, ascii and binary: vertices and polygons, quads kept as quads."""
+"""PLY, ascii and binary: vertices and polygons; quads are kept."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ class _Element:
 
     @property
     def least_bytes(self) -> int:
-        """Size of a row whose lists are empty."""
+        """Size of a row whose lists are empty, in bytes."""
         return sum(int((p.count_kind or p.kind)[1]) for p in self.properties)
 
     def column(self, *names: str, lists: bool) -> int:
-        """Position of the property with one of these names."""
+        """Return the position of the property with one of these names."""
         for k, p in enumerate(self.properties):
             if p.name in names and (p.count_kind is not None) == lists:
                 return k
@@ -60,7 +60,7 @@ class _Header:
 
 
 def read(data: bytes) -> Surface:
-    """Surface in a PLY file; properties other than coordinates and corners are ignored."""
+    """Read the surface in a PLY file; only coordinates and corners are used."""
     header = _header(data)
     names = [e.name for e in header.elements]
     for name in ("vertex", "face"):
@@ -208,7 +208,7 @@ def _read_binary(data: bytes, header: _Header) -> tuple[Array, Ints, Ints]:
 
 
 def _even_rows(data: bytes, position: int, element: _Element, order: str) -> np.ndarray | None:
-    """All rows of an element at once, or None when their lists differ in length."""
+    """Read all rows of an element as one table, or return None if list lengths differ."""
     layout: list[tuple] = []
     size = 0
     for k, p in enumerate(element.properties):
@@ -235,7 +235,10 @@ def _even_rows(data: bytes, position: int, element: _Element, order: str) -> np.
 def _uneven_rows(
     data: bytes, position: int, element: _Element, wanted: int | None, order: str
 ) -> tuple[Ints, Ints, int]:
-    """Walk over rows of different length: where the wanted lists start, their lengths, the end."""
+    """Walk over rows of varying length; return starts and lengths of the wanted list, and the end.
+
+    All positions are byte offsets in `data`.
+    """
     steps = [
         (struct.Struct(f"{order}{_CODES[p.count_kind]}") if p.count_kind else None, int(p.kind[1]))
         for p in element.properties
@@ -266,7 +269,7 @@ _CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I"}
 
 
 def write(mesh: Mesh, file: BinaryIO) -> None:
-    """Write a mesh as binary PLY (little endian, double precision): reads back exactly."""
+    """Write a mesh as binary PLY (little endian, double precision); it reads back exactly."""
     n, m = len(mesh.vertices), len(mesh.faces)
     header = [
         "ply",

@@ -1,4 +1,4 @@
-"""3DM, the format of Rhino and openNURBS, through rhino3dm."""
+"""3DM (Rhino, openNURBS) through rhino3dm."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ _UNITS = {
     "yd": "Yards",
 }
 
-#: Tolerance of the file's model as a share of its size.
+#: Absolute tolerance of the model in the file, as a fraction of the spline's size.
 _TOLERANCE = 1e-5
 
 
 def write(spline: BSplineSurface, unit: str) -> bytes:
-    """Contents of a .3dm file with one surface, in double precision."""
+    """Return the contents of a .3dm file with one surface, in double precision."""
     import rhino3dm
 
-    # Its type stubs lack setters that it has.
+    # The type stubs of rhino3dm lack some setters.
     rhino: Any = rhino3dm
     n, m = spline.net.shape[:2]
     p, q = spline.degrees
@@ -35,7 +35,7 @@ def write(spline: BSplineSurface, unit: str) -> bytes:
     for i, row in enumerate(spline.net.tolist()):
         for j, point in enumerate(row):
             surface.Points[i, j] = rhino.Point4d(*point, 1.0)
-    # openNURBS leaves the first and the last knot out, which no basis function needs.
+    # openNURBS omits the first and the last knot, on which no basis function depends.
     for k, knot in enumerate(spline.knots_u[1:-1].tolist()):
         surface.KnotsU[k] = knot
     for k, knot in enumerate(spline.knots_v[1:-1].tolist()):

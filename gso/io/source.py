@@ -1,4 +1,4 @@
-"""What the readers of all formats share: bytes in, polygons to faces."""
+"""Helpers shared by all readers: reading bytes, converting polygons to faces."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from gso.status import MeshError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Polygons larger than this are tried from their first corners only: the work is quadratic.
+# Largest number of fan apexes tried per polygon, because the work is quadratic.
 _MOST_APEXES = 64
 
 
 def read_bytes(path: str | PathLike[str]) -> bytes:
-    """Content of a regular file; whatever is wrong with it is a MeshError.
+    """Read a file; any failure, and an empty file, raises a MeshError.
 
-    The message does not name the file: :func:`gso.io.load` puts the name before it.
+    The message does not name the file: :func:`gso.io.load` prepends the name.
     """
     if os.path.isdir(path):
         raise MeshError("is a folder; give the name of a mesh file in it")
@@ -37,13 +37,13 @@ def read_bytes(path: str | PathLike[str]) -> bytes:
 
 
 def doubles(values: np.ndarray) -> Array:
-    """A copy in double precision; signalling NaNs of damaged files do so in silence."""
+    """Copy to double precision, without warnings for signalling NaNs of damaged files."""
     with np.errstate(invalid="ignore"):
         return values.astype(np.float64)
 
 
 def ranges(first: Ints, count: Ints) -> Ints:
-    """The integers ``first[i] ... first[i] + count[i] - 1``, one range after the other.
+    """Return the integers ``first[i] ... first[i] + count[i] - 1``, range after range.
 
     >>> ranges(np.array([5, 0]), np.array([2, 3]))
     array([5, 6, 0, 1, 2])
@@ -53,18 +53,19 @@ def ranges(first: Ints, count: Ints) -> Ints:
 
 
 def face_table(corners: Ints, count: Ints, points: Array) -> tuple[Ints, tuple[str, ...]]:
-    """Faces (m, 3) or (m, 4) from polygons, and what was done to them.
+    """Convert polygons to faces (m, 3) or (m, 4); return them and notes on changes.
 
     Parameters
     ----------
     corners : ndarray of int, (sum of count,)
         Vertex indices, polygon after polygon.
     count : ndarray of int, (p,)
-        Corners of each polygon, at least three. Polygons with five and more are cut into
-        triangles that share a corner, in place.
+        Corners of each polygon, at least three. A polygon with five or more corners is
+        replaced by a triangle fan at its place in the sequence.
     points : ndarray, (n, 3)
-        The vertices: of all corners that may be shared, the one is taken with which the
-        smallest triangle is largest, so that corners in line make no empty triangle.
+        The vertices. The apex of a fan is the corner that maximises the smallest triangle
+        area (signed by the polygon normal), which avoids degenerate triangles at collinear
+        corners.
 
     Examples
     --------
@@ -80,7 +81,10 @@ def face_table(corners: Ints, count: Ints, points: Array) -> tuple[Ints, tuple[s
 
 
 def face_corners(corners: Ints, count: Ints, points: Array) -> tuple[Ints, Ints, tuple[str, ...]]:
-    """As :func:`face_table`, by places in `corners`: (m, k), and the polygon of each face (m,)."""
+    """Convert polygons to faces as :func:`face_table` does, as positions in `corners`.
+
+    Returns the positions (m, k) with -1 as padding, the polygon of each face (m,), and notes.
+    """
     first = np.cumsum(count) - count
     many = count > 4
     apex = np.zeros_like(count)
@@ -107,7 +111,7 @@ def face_corners(corners: Ints, count: Ints, points: Array) -> tuple[Ints, Ints,
 
 
 def _fan_apex(rings: Array) -> Ints:
-    """The corner of each polygon (n, k, 3) from which its triangles come out best."""
+    """Return the best fan apex of each polygon (n, k, 3): the smallest triangle is largest."""
     with np.errstate(all="ignore"):
         p = rings - rings.mean(axis=1, keepdims=True)
         normal = np.cross(p, np.roll(p, -1, axis=1)).sum(axis=1, keepdims=True)

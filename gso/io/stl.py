@@ -17,9 +17,9 @@ _HEAD = 84
 
 
 def read(data: bytes) -> Surface:
-    """Surface in an STL file; vertices with equal coordinates become one."""
+    """Read the surface in an STL file; vertices with equal coordinates are merged."""
     announced = int.from_bytes(data[80:_HEAD], "little") if len(data) >= _HEAD else -1
-    # Binary files may start with "solid" too: their length tells.
+    # Binary files may start with "solid" too; their length identifies them.
     if announced >= 0 and len(data) == _HEAD + announced * _RECORD.itemsize:
         corners = doubles(np.frombuffer(data, _RECORD, announced, _HEAD)["corners"])
     elif data.lstrip()[:5].lower() == b"solid" and b"\0" not in data:
@@ -55,7 +55,7 @@ def _read_text(data: bytes) -> np.ndarray:
 
 
 def write(mesh: Mesh, file: BinaryIO) -> None:
-    """Write the triangulated mesh as binary STL, which has single precision."""
+    """Write the triangulated mesh as binary STL, in single precision."""
     corners = mesh.vertices[mesh.triangles]
     if np.abs(corners).max() > np.finfo(np.float32).max:
         raise MeshError("the coordinates are too large for the single precision of STL")

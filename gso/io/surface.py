@@ -1,4 +1,4 @@
-"""What readers find in a file, before it is a mesh: vertices that lie on each other are merged."""
+"""Unchecked surfaces as readers return them, and merging (welding) of their vertices."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Surface:
-    """Vertices and faces that nobody has checked.
+    """Vertices and faces that have not been checked.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Surface:
     attributes: Attributes | None = None
 
     def mesh(self, weld: float | None = None) -> Mesh:
-        """The mesh, its vertices merged up to a distance first."""
+        """Make a mesh, after merging vertices within the distance `weld` if it is given."""
         if self.faces is None:
             grid = Mesh.from_grid(self.vertices)
             return grid if weld is None else welded(grid, weld)
@@ -47,12 +47,12 @@ class Surface:
 
 
 def checked(weld: Any) -> float:
-    """Refuse a distance that is none.
+    """Return a weld distance as a float after checking it.
 
     Raises
     ------
     OptionError
-        It is no number from 0 up.
+        `weld` is not a finite number of 0 or more.
     """
     number = isinstance(weld, int | float | np.number) and not isinstance(weld, bool)
     if not number or not 0 <= weld < np.inf:
@@ -61,11 +61,11 @@ def checked(weld: Any) -> float:
 
 
 def welded(mesh: Mesh, weld: float) -> Mesh:
-    """A mesh with the vertices merged that lie within a distance of each other.
+    """Merge the vertices of a mesh that lie within a distance of each other.
 
-    Vertices keep the order in which they first occur, and the first of those that are merged
-    stays where it is. Quads stay quads; one that loses an edge becomes a triangle, and
-    faces that lose more are left out. The notes say how many.
+    Vertices keep their order; merged vertices take the position of the first of them. A quad
+    that loses an edge becomes a triangle, and faces that lose more are left out. The notes
+    say how many.
 
     Parameters
     ----------
@@ -76,10 +76,10 @@ def welded(mesh: Mesh, weld: float) -> Mesh:
     Raises
     ------
     OptionError
-        `weld` is no length.
+        `weld` is not a finite number of 0 or more.
     MeshError
-        `weld` is so large that chains of vertices or all faces collapse, or the joined
-        surface is refused (see :class:`gso.Mesh`).
+        `weld` is so large that chains of vertices or all faces collapse, or the welded
+        surface is rejected (see :class:`gso.Mesh`).
 
     Examples
     --------
@@ -88,7 +88,7 @@ def welded(mesh: Mesh, weld: float) -> Mesh:
     >>> welded(apart, 1e-6)
     Mesh(6 vertices, 2 faces, quads)
     """
-    # What the notes say of the unjoined surface is no longer so.
+    # Notes that the unwelded mesh computed about itself no longer hold; keep the given ones.
     surface = Surface(mesh.vertices, mesh.faces, mesh.given_notes, mesh.attributes)
     return surface.mesh(weld)
 
@@ -100,7 +100,7 @@ def _welded(surface: Surface, weld: float) -> Surface:
         with np.errstate(invalid="ignore"):
             points, table = points.astype(np.float64), faces.astype(np.int64)
         sound &= points.ndim == 2 and points.shape[1] == 3 and bool(np.isfinite(points).all())
-        # Too far apart for numbers: the mesh says so.
+        # Squared distances would overflow; the mesh constructor reports that.
         sound &= float(np.abs(points).max(initial=0.0)) < 1e150
         sound &= table.ndim == 2 and table.shape[1] in (3, 4) and bool((table == faces).all())
         corner = np.ones(table.shape, bool)
@@ -109,7 +109,7 @@ def _welded(surface: Surface, weld: float) -> Surface:
     except (TypeError, ValueError, IndexError, OverflowError):
         sound = False
     if not sound:
-        # The mesh says what is wrong with it.
+        # The mesh constructor reports what is wrong.
         return surface
     used = np.unique(table[corner])
     target = np.arange(len(points))
@@ -141,9 +141,9 @@ def _welded(surface: Surface, weld: float) -> Surface:
 
 
 def merged(points: Array, triangles: Ints) -> tuple[Array, Ints, tuple[str, ...]]:
-    """Merge vertices with equal coordinates; triangles that collapse are left out.
+    """Merge vertices with equal coordinates and leave out triangles that collapse.
 
-    For formats that have a vertex for each corner.
+    For formats that store a separate vertex for each corner.
     """
     kept, index = np.unique(equal(points), return_inverse=True)
     done = collapse(triangles, index.ravel())

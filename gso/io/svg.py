@@ -29,7 +29,7 @@ MILLIMETRES = {
 }
 """Length of each unit that :func:`save_flat` knows, in millimetres."""
 
-# Width of a line on paper, in millimetres; finer on patterns of a few millimetres.
+# Line width on paper in millimetres, and its largest fraction of the pattern's size.
 _LINE = 0.1
 _FINEST = 1 / 500
 
@@ -46,25 +46,25 @@ def save_flat(
 ) -> None:
     """Write a flat pattern as an SVG drawing at the scale 1:1.
 
-    The pattern lies as seen from above (from positive z, with x to the right and y up),
-    so that faces which are anticlockwise in `flat` are so on paper. The layer `outline`
-    has one closed path per boundary loop, holes included; the layer `mesh` has the inner
-    edges, the layer `lines` what you give.
+    The pattern is drawn as seen from positive z, with x to the right and y up, so that
+    faces which are anticlockwise in `flat` are anticlockwise on paper. The layer `outline`
+    has one closed path per boundary loop, holes included. The layer `mesh` has the inner
+    edges, and the layer `lines` has the given polylines.
 
     Parameters
     ----------
     flat : array_like, (n, 2)
         Plane coordinates of the mesh's vertices.
     mesh : Mesh
-        The mesh that was flattened: its faces say what is outline and what is inside.
+        The mesh that was flattened; its connectivity defines the outline and inner edges.
     path : str or PathLike
         A file whose name ends in .svg. It is replaced only when the drawing is complete.
     unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
         Unit of the coordinates in `flat`. The drawing itself is in millimetres.
     mesh_lines : bool
-        Draw the inner edges too.
+        Also draw the inner edges.
     lines : sequence of array_like (k, 2)
-        Polylines in the coordinates of `flat` to draw too: the rulings, to bend along.
+        Polylines to add, in the coordinates of `flat`, such as the rulings to bend along.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def save_flat(
 def _drawing(
     points: Array, used: Ints, loops: list[Ints], edges: Ints | None, lines: Sequence[Array]
 ) -> str:
-    """SVG text; `points` in millimetres with y up."""
+    """Return the SVG text of a pattern; `points` are in millimetres with y up."""
     import svgwrite
     from svgwrite.extensions import Inkscape
 
@@ -116,7 +116,7 @@ def _drawing(
     margin = 10 * line
     width, height = (high - low + 2 * margin).tolist()
 
-    # SVG counts y downwards: turned round here once, no transform is left in the file.
+    # In SVG y points down: flip the coordinates here, so that the file needs no transform.
     def on_paper(p: Array) -> Array:
         return np.stack([p[:, 0] - low[0], high[1] - p[:, 1]], axis=1) + margin
 

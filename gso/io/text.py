@@ -1,4 +1,4 @@
-"""Text files of numbers, read and written in whole arrays."""
+"""Vectorised reading and writing of text files of numbers."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ from numpy.typing import NDArray
 from gso.io.source import Array, Ints
 from gso.status import MeshError
 
-# Larger numbers than this many digits do not fit an integer and are no vertex numbers.
+# Integers with more digits may overflow 64 bits, and are no valid vertex indices.
 _DIGITS = 18
 _BLOCK = 1 << 15
 
 
 class Words:
-    """The words of a text, found by comparing bytes, and the rows they stand in.
+    """The words of a text, separated by white space, and the rows that contain them.
 
     Parameters
     ----------
     data : bytes
         ASCII text; bytes of other encodings are part of words and never decoded.
     comment : bytes, optional
-        The character from which on a line is ignored.
+        Character that starts a comment, which extends to the end of the line.
     joined : bool
-        A backslash at the end of a line continues it on the next one.
+        Whether a backslash at the end of a line continues it on the next one.
     first_line : int
-        Number of the first line in messages.
+        Number of the first line, for error messages.
 
     Attributes
     ----------
     start, stop : ndarray of int
-        Where each word lies in the text.
+        Byte offsets of the start and end of each word.
     first, count : ndarray of int
-        Of each row that is not empty: its first word and its number of words.
+        First word and number of words of each row that is not empty.
     """
 
     def __init__(
@@ -64,11 +64,11 @@ class Words:
         self.count: Ints = np.diff(self.first, append=line.size)
 
     def row(self, words: Ints) -> Ints:
-        """Rows that words stand in."""
+        """Return the rows that contain the given words."""
         return np.searchsorted(self.first, words, side="right") - 1
 
     def rows(self, keyword: bytes) -> Ints:
-        """Rows whose first word is `keyword`."""
+        """Return the rows whose first word is `keyword`."""
         start, stop = self.start[self.first], self.stop[self.first]
         found = np.flatnonzero(stop - start == len(keyword))
         for k, letter in enumerate(keyword):
@@ -76,14 +76,14 @@ class Words:
         return found
 
     def floats(self, words: Ints) -> Array:
-        """Finite numbers in the given words (ascending)."""
+        """Parse finite numbers in the given words, which must be ascending."""
         edge = np.zeros(self._text.size + 1, np.int8)
         edge[self.start[words]] = 1
         edge[self.stop[words]] -= 1
         inside = np.cumsum(edge[:-1], dtype=np.int8) > 0
         text = np.where(inside, self._text, np.uint8(ord(" "))).tobytes()
         tokens = text.split()
-        # Python reads 1_000 as a thousand, no file format does.
+        # Python's float accepts 1_000; no file format does.
         values = None if b"_" in text else _as_floats(tokens)
         if values is None or not np.isfinite(values).all():
             bad = next(k for k, t in enumerate(tokens) if not _is_finite(t))
@@ -91,14 +91,14 @@ class Words:
         return values
 
     def ints(self, words: Ints, *, until: bytes = b"") -> Ints:
-        """Whole numbers in the given words, each read up to the character `until`."""
+        """Parse integers in the given words, each up to the character `until`."""
         start, stop = self.start[words], self.stop[words]
         if until:
             stop = self._next(start, stop, until)
         return self._whole(words, start, stop)
 
     def second_ints(self, words: Ints, between: bytes) -> Ints:
-        """Whole numbers behind the first character `between`, up to the next; 0 where none is."""
+        """Parse integers between the first and second character `between`; 0 where missing."""
         stop = self.stop[words]
         start = np.minimum(self._next(self.start[words], stop, between) + 1, stop)
         stop = self._next(start, stop, between)
@@ -108,7 +108,7 @@ class Words:
         return values
 
     def _next(self, start: Ints, stop: Ints, mark: bytes) -> Ints:
-        """Where a character stands first, from `start` up; `stop` where it does not."""
+        """Find the first position of a character from `start` on, or `stop` if there is none."""
         marks = np.flatnonzero(self._text == ord(mark))
         if not marks.size:
             return stop
@@ -117,7 +117,7 @@ class Words:
         return np.where((cut >= start) & (cut < stop), cut, stop)
 
     def _whole(self, words: Ints, start: Ints, stop: Ints) -> Ints:
-        """Whole numbers in parts of words."""
+        """Parse integers in parts of words; the first invalid one raises a MeshError."""
         values, bad = self._parsed(start, stop)
         if bad.any():
             word = words[bad.argmax()]
@@ -125,12 +125,12 @@ class Words:
         return values
 
     def ints_or(self, words: Ints, otherwise: int) -> Ints:
-        """Whole numbers in the given words, and another number for words that are none."""
+        """Parse integers in the given words, with `otherwise` for words that are no integers."""
         values, bad = self._parsed(self.start[words], self.stop[words])
         return np.where(bad, otherwise, values)
 
     def _parsed(self, start: Ints, stop: Ints) -> tuple[Ints, NDArray[np.bool_]]:
-        """Whole numbers in parts of the text, and which parts are none."""
+        """Parse integers in parts of the text; also return which parts are invalid."""
         sign = self._text[np.minimum(start, self._text.size - 1)]
         start = start + ((sign == ord("-")) | (sign == ord("+")))
         size = stop - start
@@ -145,22 +145,22 @@ class Words:
         return np.where(sign == ord("-"), -values, values), bad
 
     def raw(self, word: int | np.integer) -> bytes:
-        """A word as it stands in the text."""
+        """Return the bytes of a word."""
         return self._data[self.start[word] : self.stop[word]]
 
     def rest(self, row: int | np.integer) -> str:
-        """What a row says behind its first word, to the end of the line or to a comment."""
+        """Return the text after a row's first word, up to a comment or the end of the line."""
         if self.count[row] < 2:
             return ""
         begin = self.start[self.first[row] + 1]
         end = self._data.find(b"\n", begin)
         text = self._data[begin : len(self._data) if end < 0 else end].replace(b"\t", b" ")
-        # A # within a word is part of a name. A backslash would join lines.
+        # A '#' inside a word is part of a name. A trailing backslash would join lines.
         text = text.split(b" #")[0].strip().rstrip(b"\\").rstrip()
         return text.decode("utf-8", "surrogateescape")
 
     def quote(self, word: int | np.integer) -> str:
-        """A word as shown in messages."""
+        """Return a word as shown in error messages."""
         text = self.raw(word)
         return repr(text[:24].decode("ascii", "backslashreplace")) + ("..." if text[24:] else "")
 
@@ -175,9 +175,9 @@ class Words:
 
 
 def write_rows(file: BinaryIO, formats: str | list[str], values: Array | Ints) -> None:
-    """Write numbers by one printf format for all rows, or by one per row.
+    """Write rows of numbers with one printf format for all rows, or with one per row.
 
-    With one per row, negative numbers are padding and left out.
+    With one format per row, negative numbers are padding and are left out.
     """
     for k in range(0, len(values), _BLOCK):
         block = values[k : k + _BLOCK]

@@ -1,11 +1,11 @@
-"""GSO-Net: networks that do in one forward pass what the optimiser does by iteration."""
+"""Neural networks that approximate the optimiser's results in a forward pass (GSO-Net)."""
 
 from __future__ import annotations
 
 import importlib
 from typing import Any
 
-# Looked up at first use, so that torch is loaded only when a net is.
+# Imported on first use, so that torch is loaded only when a net is used.
 _NAMES = {
     "CoarseNet": "gso.net.coarse",
     "GSONet": "gso.net.gsonet",

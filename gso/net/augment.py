@@ -1,4 +1,4 @@
-"""Changes of surfaces that make more of them."""
+"""Data augmentation of grids."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ _SHEAR = 0.3
 
 
 def symmetries(grids: list[Tensor], generator: torch.Generator) -> list[Tensor]:
-    """Reversed and transposed square grids (B, N, N, d): the same change for all of a row.
+    """Apply random symmetries of the square to grids (B, N, N, d).
 
-    Each of the eight is as likely.
+    Entry b of every tensor in `grids` gets the same of the eight reversals and transpositions,
+    which are equally likely.
     """
     count = len(grids[0])
     flips = torch.rand(3, count, generator=generator) < 0.5
@@ -28,16 +29,17 @@ def symmetries(grids: list[Tensor], generator: torch.Generator) -> list[Tensor]:
 
 
 def shear(grids: list[Tensor], generator: torch.Generator) -> list[Tensor]:
-    """Surfaces under a random near-diagonal shear and a random turn: the same for all of a row.
+    """Apply a random near-diagonal shear and a random rotation or reflection to surfaces.
 
-    The first ones are in the unit ball again, and the others as they lie to them.
+    Entry b of every tensor in `grids` gets the same map. The first tensor is then normalised
+    to the unit ball, and the others undergo the same similarity transform.
     """
     count = len(grids[0])
     off = _SHEAR * torch.rand(count, 3, 3, generator=generator)
     eye = torch.eye(3)
     sheared = torch.where(eye.bool(), eye, off)
     turn, upper = torch.linalg.qr(torch.randn(count, 3, 3, generator=generator))
-    # Signs make the distribution uniform (Stewart 1980).
+    # The signs make the distribution of orthogonal matrices uniform (Stewart 1980).
     turn = turn * upper.diagonal(dim1=1, dim2=2).sign()[:, None]
     change = sheared @ turn
     out = [torch.einsum("bhwi,bij->bhwj", x, change.to(x)) for x in grids]

@@ -1,4 +1,4 @@
-"""What all nets have in common."""
+"""Base class of all nets."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gso.net.grids import planes, rectangle
 from gso.spelling import choices
 from gso.status import OptionError
 
-#: Samples along each side that nets are trained at.
+#: Samples along each side at which nets are trained.
 SIZE = 64
 
 
@@ -24,16 +24,16 @@ class Net(nn.Module):
     Attributes
     ----------
     task : {"developable", "flatten", "denoise"}
-        What it was made for.
+        Task of the net.
     settings : dict
-        What it is made of again, with its class.
+        Keyword arguments from which the class makes an equal net.
     passes : int
-        How often it is applied.
+        Number of passes: how often the net is applied to its own result.
     multiple : int
-        What the sides of the grids are multiples of.
+        Number of which H and W must be multiples.
     bf16 : bool
-        Convolutions run in bfloat16; what goes in and comes out, curvature above all, is in single
-        precision all the same.
+        Whether convolutions run in bfloat16. Inputs, outputs and curvatures are in single
+        precision in any case.
     """
 
     passes = 1
@@ -46,25 +46,25 @@ class Net(nn.Module):
         self.task, self.settings, self.bf16 = task, {"task": task, **settings}, False
 
     def begin_with(self, other: Net) -> None:
-        """Take the weights of another net of this kind and size; RuntimeError if they don't fit."""
+        """Copy the weights of a net of this kind and size; RuntimeError if they do not fit."""
         self.load_state_dict(other.state_dict())
 
     @abstractmethod
     def displacements(
         self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
     ) -> Tensor:
-        """Displacements (B, H, W, d) from the start.
+        """Compute the displacements (B, H, W, d) from :meth:`start`.
 
-        Gradients are those of the last pass: what the passes before it made is given to it.
+        Gradients flow through the last pass only; results of earlier passes are constants.
 
         Parameters
         ----------
         surface : Tensor, (B, H, W, 3)
             Grids of the unit ball.
         sigma : Tensor, (B,), optional
-            Standard deviation of the noise, for nets that are told.
+            Standard deviation of the noise, for nets that take it as an input.
         passes : int, optional
-            How many passes; all of the net's when not given.
+            Number of passes; all of the net's by default.
         """
 
     @abstractmethod
@@ -76,30 +76,31 @@ class Net(nn.Module):
         *,
         passes: int | None = None,
     ) -> Tensor:
-        """Displacements (B, h, w, d) of the grids `fine`, which are `surface` resampled."""
+        """Compute displacements (B, h, w, d) of `fine`, the same surfaces at another resolution."""
 
     def start(self, surface: Tensor) -> Tensor:
-        """Return what is moved: the surface, or for flat images Flatten-init."""
+        """Return what the net displaces: the surface, or for "flatten" the initial rectangle."""
         return rectangle(planes(surface)) if self.task == "flatten" else surface
 
     def forward(self, surface: Tensor, sigma: Tensor | None = None) -> Tensor:
-        """Grids (B, H, W, 3), or flat images (B, H, W, 2), of grids (B, H, W, 3)."""
+        """Compute results (B, H, W, 3), or flat images (B, H, W, 2), for grids (B, H, W, 3)."""
         return self.start(surface) + self.displacements(surface, sigma)
 
     def autocast(self, device: torch.device) -> torch.autocast:
-        """Context for convolutions."""
+        """Return the autocast context for convolutions, enabled if `bf16` is."""
         return torch.autocast(device.type, torch.bfloat16, enabled=self.bf16)
 
 
 def exact(*, tuned: bool = False) -> AbstractContextManager[None]:
-    """Context in which GPUs compute convolutions in all of single precision.
+    """Return a context in which GPUs compute convolutions in full single precision.
 
-    Their default keeps ten bits of it where a net computes in single precision; curvature
-    would show that.
+    The default of GPUs (TF32) keeps only ten bits of the mantissa, which is visible in the
+    curvature of results.
 
     Parameters
     ----------
     tuned : bool
-        Whether algorithms are tried out first: worth it for many batches of one size.
+        Whether cuDNN benchmarks its algorithms first; this pays off for many batches of one
+        size.
     """
     return torch.backends.cudnn.flags(enabled=True, benchmark=tuned, allow_tf32=False)

@@ -1,4 +1,4 @@
-"""Building blocks of the nets; all work on (B, C, H, W)."""
+"""Building blocks of the nets; all take tensors (B, C, H, W)."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from torch.nn.functional import silu
 
 from gso.net import onednn
 
-#: Channels that are normalised together.
+#: Channels per group of the group normalisation.
 _GROUP = 16
 #: Slope of the LeakyReLU for negative numbers.
 _LEAK = 0.05
-#: Positions of the unit ball times the first are near one, and so are their differences of each
-#: order, up to two, times the second once more.
+#: Scale of positions, and additional scale per order of difference (up to two), such that the
+#: scaled values of surfaces in the unit ball are of order one.
 _PLACE, _SLOPE = 2.0, 32.0
-#: Vertices up to which fewer steps make up for more multiplications: measured.
+#: Largest number of vertices for which the merged form of :class:`IMDB` is faster (measured).
 _SMALL = 64 * 64
 
 
 class Convolution(nn.Conv2d):
-    """As PyTorch's, but on CPUs single grids take the fast way of :mod:`gso.net.onednn`.
+    """A 2D convolution that uses :mod:`gso.net.onednn` for single grids on CPUs.
 
-    Changes of the weights through ``weight.data`` are not seen before the next call of ``eval()``
-    of this module, or of the :class:`IMDB` that it is in.
+    Weights changed through ``weight.data`` take effect only after the next call of ``eval()``
+    on this module, or on the :class:`IMDB` that contains it.
 
     >>> x, net = torch.ones(1, 4, 8, 8), Convolution(4, 4, 3, padding=1).eval()
     >>> with torch.inference_mode():
@@ -56,13 +56,14 @@ class Convolution(nn.Conv2d):
 
 
 class Stencils(nn.Module):
-    """A 3 x 3 convolution of positions that sees bending as well as place.
+    """A 3 x 3 convolution of positions, parametrised by scaled difference stencils.
 
-    Its weights are factors of nine stencils: mean, difference and second difference along the
-    rows, times the same along the columns, scaled so that all are near one on surfaces of the
-    unit ball with 64 vertices a side. There second differences are a thousandth of the positions:
-    kernels would need entries in the thousands to show them, which no training finds and half
-    precision does not keep. Beyond its border the grid goes on in straight lines.
+    The weights are coefficients of nine stencils: tensor products of mean, first difference
+    and second difference along rows and columns. They are scaled so that all responses are of
+    order one on surfaces in the unit ball with 64 vertices along a side. There, second
+    differences are a thousandth of the positions. A plain kernel would need entries in the
+    thousands to extract them, which training does not find and half precision cannot store.
+    Beyond the border the grid is extrapolated linearly.
 
     >>> u = torch.linspace(-0.5, 0.5, 64)
     >>> bowl = (0.5 * u.square() + 0.5 * u.square()[:, None])[None, None]
@@ -83,29 +84,29 @@ class Stencils(nn.Module):
         self.register_buffer("scale", _PLACE * _SLOPE ** order.clamp(max=2), persistent=False)
 
     def forward(self, x: Tensor) -> Tensor:
-        # Differences of neighbours lose nothing to rounding, whatever computes what follows.
+        # Differences are taken first, in the input's precision, to avoid cancellation later.
         shown = _stencilled(_stencilled(x.movedim(1, -1), 1), 2).flatten(3)
         return (shown @ (self.weight * self.scale).flatten(1).t()).movedim(-1, 1)
 
     def kernels(self) -> Tensor:
-        """What it convolves grids with (outside, inside, 3, 3)."""
+        """Return the equivalent convolution kernels (outside, inside, 3, 3)."""
         return torch.einsum("oiab,abkl->oikl", self.weight, self._stencils().to(self.weight))
 
     def factors(self, kernels: Tensor) -> Tensor:
-        """The weights that make kernels."""
+        """Return the weights that are equivalent to the given convolution kernels."""
         inverse = torch.linalg.inv(self._stencils().reshape(9, 9)).view(3, 3, 3, 3)
         found = torch.einsum("oikl,klab->oiab", kernels.double(), inverse.to(kernels.device))
         return found.to(kernels.dtype)
 
     def _stencils(self) -> Tensor:
-        """Kernels of the nine of them, scaled."""
+        """Return the scaled 3 x 3 kernels of the nine stencils."""
         points = torch.eye(9, dtype=torch.float64).view(1, 3, 3, 9)
         middle = _stencilled(_stencilled(points, 1), 2)[0, 1, 1]
         return torch.einsum("xab,ab->abx", middle, self.scale.double().cpu()).view(3, 3, 3, 3)
 
 
 def _stencilled(x: Tensor, dim: int) -> Tensor:
-    """Mean, difference and second difference of neighbours along a dimension, in a new last one."""
+    """Stack mean, first and second difference along a dimension in a new last dimension."""
     size = x.shape[dim]
     first, second = x.narrow(dim, 0, 1), x.narrow(dim, 1, 1)
     last, before = x.narrow(dim, size - 1, 1), x.narrow(dim, size - 2, 1)
@@ -118,12 +119,12 @@ def _stencilled(x: Tensor, dim: int) -> Tensor:
 class IMDB(nn.Module):
     """Information multi-distillation block (Hui et al. 2019), without biases.
 
-    Three convolutions with LeakyReLU(0.05) each hand a quarter of their channels to the end
-    and the rest on; a fourth makes the last quarter. The quarters are mixed by a 1 x 1
-    convolution and added to the input.
+    Each of three convolutions with LeakyReLU(0.05) passes a quarter of its channels to the
+    output and the rest to the next convolution. A fourth convolution computes the last quarter.
+    A 1 x 1 convolution mixes the quarters, and the result is added to the input.
 
-    For single small grids on CPUs the same is computed in fewer steps, which rounds otherwise,
-    and does not call the modules within, nor their hooks.
+    For single small grids on CPUs a merged form is computed in fewer steps. Its rounding
+    differs, and it does not call the submodules or their hooks.
 
     >>> sum(p.numel() for p in IMDB(16).parameters())
     6448
@@ -154,9 +155,10 @@ class IMDB(nn.Module):
         return x + self.mix(torch.cat(parts, dim=1))
 
     def _at_once(self, x: Tensor, weights: list[Tensor]) -> Tensor:
-        """All channels go on, where zeros meet those that are handed to the end.
+        """Compute the block from merged weights.
 
-        The mixing of the last quarters is in the last convolution.
+        Every step passes all channels on; zero weights cancel the quarter that belongs to the
+        output. The last convolution includes the mixing of the last two quarters.
         """
         x = x.contiguous(memory_format=torch.channels_last)
         *steps, last, one, two = onednn.kept(
@@ -167,13 +169,13 @@ class IMDB(nn.Module):
             made.append(onednn.convolved(made[-1], weight, leak=_LEAK))
         (kept, _), (_, channels, height, width) = self.sizes, x.shape
         rows, first, second, _ = (y.permute(0, 2, 3, 1).reshape(-1, channels) for y in made)
-        # What is changed in place stays in single precision where others have chosen half.
+        # In-place operations stay in single precision when the caller uses autocast.
         rows = rows.clone().addmm_(first[:, :kept], one).addmm_(second[:, :kept], two)
         total = rows.view(1, height, width, channels).permute(0, 3, 1, 2)
         return onednn.add_convolved(total, made[-1], last)
 
     def _merged(self, shape: torch.Size, *weights: Tensor) -> tuple[Tensor, ...]:
-        """Weights of the three steps and the last one, and what mixes the first two quarters."""
+        """Merge weights: three steps, the last convolution, the mixing of the first quarters."""
         first, second, third, last, mix = weights
         one, two, three, four = mix.double()[:, :, 0, 0].split(self.sizes[0], dim=1)
         whole = torch.einsum("oq,qrij->orij", four, last.double())
@@ -192,7 +194,10 @@ class IMDB(nn.Module):
 
 
 class Residual(nn.Module):
-    """Two normalised convolutions beside the identity; the mean over the grid joins between."""
+    """A residual block of two group-normalised convolutions.
+
+    A linear map of the mean over the grid is added between the two convolutions.
+    """
 
     def __init__(self, channels: int):
         super().__init__()

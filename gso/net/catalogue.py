@@ -1,4 +1,7 @@
-"""Which nets there are, and what their cards say; this needs no PyTorch."""
+"""Catalogue of the available nets and their cards; it does not need PyTorch.
+
+A card is the JSON file beside the weights that describes a net and its training.
+"""
 
 from __future__ import annotations
 
@@ -12,23 +15,23 @@ from gso.status import OptionError, WeightsError
 
 #: Nets that come with the package: NAME.safetensors and NAME.json.
 FOLDER = Path(__file__).parent / "weights"
-#: Version of the card.
+#: Version of the card's format.
 FORMAT = 1
-#: Tasks that there are nets for, and the components of what comes out.
+#: Tasks of nets, and the number of components of their results.
 TASKS = {"developable": 3, "flatten": 2, "denoise": 3}
-#: Nets that are applied one after the other: each sees what the one before made.
+#: Nets that are applied in sequence, each to the result of the one before.
 CHAINS = {"net-cf": ("net-c", "net-f")}
-#: The net of a task when none is named.
+#: The default net of each task.
 DEFAULTS = {"developable": "developable", "flatten": "flatten-strain", "denoise": "denoise"}
 
 
 def read_card(path: str | PathLike[str]) -> dict[str, Any]:
-    """Card of a .safetensors file.
+    """Read the card of a .safetensors file.
 
     Raises
     ------
     WeightsError
-        It is missing, or no card of this package.
+        The card is missing, damaged, or not a card of this package.
     """
     place = Path(path).with_suffix(".json")
     try:
@@ -45,7 +48,7 @@ def read_card(path: str | PathLike[str]) -> dict[str, Any]:
 
 
 def available(task: str | None = None) -> list[str]:
-    """Names of the nets that come with the package, all or those of a task.
+    """List the names of the nets that come with the package, all or those of a task.
 
     >>> set(available("flatten")) <= set(available())
     True
@@ -59,12 +62,12 @@ def available(task: str | None = None) -> list[str]:
 
 
 def located(model: str | PathLike[str]) -> Path:
-    """The file of a net.
+    """Return the file of a net, given by its name or as a .safetensors file.
 
     Raises
     ------
     WeightsError
-        No net of this name comes with the package, and there is no such file.
+        No net of this name comes with the package, or the name stands for several nets.
     """
     name = str(model)
     if Path(name).suffix == ".safetensors":
@@ -82,7 +85,7 @@ def located(model: str | PathLike[str]) -> Path:
 
 
 def chain(model: str | PathLike[str] | None, task: str) -> tuple[Path, ...]:
-    """Files of the nets that a name stands for, in the order in which they are applied."""
+    """Return the files of the nets that a name stands for, in the order of application."""
     if task not in TASKS:
         raise OptionError(f"no task {task!r} for a net; {choices(task, TASKS)}")
     name = DEFAULTS[task] if model is None else model

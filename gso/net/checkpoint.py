@@ -1,4 +1,4 @@
-"""The state of a run in one file, which appears when it is complete."""
+"""Checkpoints: the state of a training run in one file, written atomically."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Optimisers = Sequence[torch.optim.Optimizer]
 
 
 def save(path: Path, net: Net, average: Net, optimisers: Optimisers, state: dict[str, Any]) -> None:
-    """Write nets, the optimisers' moments, and numbers."""
+    """Write the net, its moving average, the optimisers' moments, and the JSON `state`."""
     from safetensors.torch import save as packed
 
     tensors: dict[str, Tensor] = {}
@@ -35,12 +35,12 @@ def save(path: Path, net: Net, average: Net, optimisers: Optimisers, state: dict
 
 
 def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> dict[str, Any]:
-    """Take up what :func:`save` wrote; returns the numbers.
+    """Restore what :func:`save` wrote into the nets and optimisers, and return `state`.
 
     Raises
     ------
     WeightsError
-        The file is damaged, or of another net.
+        The file is damaged, or belongs to another net.
     """
     from safetensors import SafetensorError, safe_open
 
@@ -62,7 +62,7 @@ def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> dict[str
 
 
 def numbers(path: Path) -> dict[str, Any]:
-    """What else than tensors :func:`save` wrote.
+    """Read the JSON `state` that :func:`save` wrote, without the tensors.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The default nets: coarse spline fields of displacements, refined in passes."""
+"""The default nets: displacements as coarse spline fields, refined in passes."""
 
 from __future__ import annotations
 
@@ -14,29 +14,30 @@ from gso.net.grids import Frame, planes
 from gso.net.resampling import spline_field
 from gso.status import OptionError
 
-#: What one means in the coefficients, in radii of the unit ball: a typical displacement.
+#: Unit of the coefficients, in radii of the unit ball: a typical displacement.
 _UNIT = {"developable": 0.01, "flatten": 0.03, "denoise": 0.01}
 
 
 class CoarseNet(Net):
     """Displacements as bicubic B-splines with few coefficients: smooth by construction.
 
-    The net sees how the surface bends and lies, in channels that its pose does not change, and
-    what its own last pass made of it; each pass adds to the coefficients. A U-Net, its finest
-    level at half the vertices' resolution, predicts two fields, a coarser and a finer one.
-    Coefficients are along the surface's own normals and grid lines (for flat images, along
-    the axes of the rectangle), so the result turns with the input.
+    The inputs are pose-invariant channels of the surface's shape and bending, and the result
+    of the previous pass. Each pass adds to the coefficients. A U-Net, whose finest level has
+    half the resolution of the vertices, predicts a coarser and a finer field. The coefficients
+    are components along the surface's normals and grid lines (for flat images, along the axes
+    of the rectangle), so the result is equivariant under rotations of the input.
 
     Parameters
     ----------
     task : {"developable", "flatten"}
-        What is moved: the surface, or the rectangle of Flatten-init.
+        Task of the net. It displaces the surface, or for "flatten" the initial rectangle.
     widths : sequence of 3 int
-        Channels at a half, a quarter and an eighth of the resolution.
+        Channels at 1/2, 1/4 and 1/8 of the resolution.
     depths : sequence of 3 int
-        Residual blocks there; at the first two on the way down and on the way up.
+        Residual blocks at these levels; the first two levels have them on the way down, and
+        one more on the way up.
     passes : int
-        How often the net is applied, with the same weights, each time to what it made last.
+        How often the net is applied, with the same weights, to its previous result.
 
     Raises
     ------
@@ -96,7 +97,7 @@ class CoarseNet(Net):
     def coefficients(
         self, surface: Tensor, frame: Frame, passes: int | None = None
     ) -> tuple[Tensor, Tensor]:
-        """Coefficients (B, d, n, m) of both fields after some passes, all when not given."""
+        """Compute coefficients (B, d, n, m) of both fields after `passes` (by default all)."""
         passes = self.passes if passes is None else passes
         with torch.no_grad():
             seen, coarse, fine = self._seen(surface, frame, passes - 1)
@@ -106,7 +107,7 @@ class CoarseNet(Net):
     def _seen(
         self, surface: Tensor, frame: Frame, passes: int
     ) -> tuple[Tensor, Tensor | float, Tensor | float]:
-        """What the net sees after some passes, and the sums of their coefficients."""
+        """Return the net's input after some passes, and the sums of their coefficients."""
         p = planes(surface)
         bent = inputs.bending(p, frame)
         known = torch.stack([*inputs.shape(p, frame), *bent], dim=1)
@@ -154,11 +155,11 @@ class CoarseNet(Net):
             body = self.body(self.to_body(middle))
             middle = self.middle_out(middle + _enlarged(self.from_body(body), middle))
             fine = self.fine_out(fine + _enlarged(self.from_middle(middle), fine))
-        # Curvature shows what is rounded here.
+        # The heads run in single precision: curvature is sensitive to rounding here.
         return self.coarse_head(middle.to(seen.dtype)), self.fine_head(fine.to(seen.dtype))
 
     def _shares(self, coarse: Tensor, fine: Tensor, height: int, width: int) -> Tensor:
-        """Displacement (B, d, height, width) along the axes of the frames."""
+        """Evaluate the displacement (B, d, height, width) along the axes of the frames."""
         both = spline_field(coarse, height, width) + spline_field(fine, height, width)
         return self.unit * both
 

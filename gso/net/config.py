@@ -1,4 +1,4 @@
-"""What a training run is made of: TOML or JSON files, checked."""
+"""Configurations of training runs, read from TOML or JSON files and checked."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ FOLDER = Path(__file__).parent / "configs"
 LOSSES = ("published", "label", "energy", "clean")
 OPTIMISERS = ("muon", "adamw")
 AUGMENTATIONS = ("none", "symmetries", "shear")
-#: Steps of a phase through the vertices that leave a grid worth training on.
+#: Largest stride of a phase; larger ones leave too few vertices.
 LARGEST_STRIDE = 4
-#: What developable surfaces are judged by, and what there is for flat images only.
+#: Loss terms equal to metrics of developable surfaces, and terms of flat images only.
 _JUDGED = ("k_left", "d_h", "fair_ratio")
 _FLAT = ("iso", "iso_w", "iso_cell", "iso_cell_w")
-#: Terms of the published losses, the figures that results are judged by, and their labels.
+#: All terms of the loss "published": published losses, metrics of results, and the label.
 TERMS = ("in", "fair", "gc", *_JUDGED, *_FLAT, "label")
-#: Terms that a task does not have.
+#: Terms that are not available for a task.
 _FOREIGN = {
     "developable": _FLAT,
     "flatten": ("in", "gc", *_JUDGED),
@@ -37,37 +37,37 @@ _FOREIGN = {
 
 @dataclass(frozen=True)
 class Phase:
-    r"""A stretch of training with one loss.
+    r"""A phase of training with one loss.
 
     Attributes
     ----------
     loss : {"published", "label", "energy", "clean"}
-        "published": the weighted terms of Wang et al. 2024, and of the figures that results
-        are judged by. "label": the distance to the optimiser's result, or a teacher's.
+        "published": a weighted sum of the terms of Wang et al. 2024 and of metrics of the
+        results. "label": the distance to the result of the optimiser or a teacher.
         "energy": the optimiser's own objective. "clean" (denoise): the distance to the
-        surface without noise, and the angle of its normals.
+        surface without noise, and the angle between the normals.
     share : float
-        Share of the run's steps or minutes, relative to the other phases'.
+        Length of the phase, relative to the other phases.
     rate : float
         Learning rate at the start of the phase, after a warm-up in the first one.
     final_rate : float
-        Rate at its end; between the two it follows a cosine.
+        Learning rate at the end of the phase; between the two it follows a cosine.
     batch : int
-        Surfaces per step, of all processes together.
+        Surfaces per step, summed over all processes.
     clip : float
-        Largest norm of the gradient.
+        Bound on the norm of the gradient, which is scaled down to it.
     weights : dict
-        "published": the factor on each term, the loss "label" among them. "energy"
+        "published": the factor of each term; "label" is one of the terms. "energy"
         (developable): `w_curvature`, `w_fairness`, `w_proximity` replace those of the task's
-        options; `balance` is the power of the design's own energy that each surface's is
-        divided by: 1 lets all surfaces weigh alike, 0 lets the curved ones rule. "clean":
-        `angle`, the factor on the normals' mean angle in degrees.
+        options. Each surface's energy is divided by its design's energy to the power
+        `balance`: with 1 all surfaces have equal weight, with 0 the curved ones dominate.
+        "clean": `angle` is the factor of the mean angle between normals in degrees.
     decay : float
-        "published": the weight of "in" falls as exp(-decay t), with t from 0 to 1.
+        "published": the weight of "in" decays as exp(-decay t), with t from 0 to 1.
     eps : tuple of 2 float
-        "energy" (developable): smoothing of \|K\| at the start and from the middle on.
+        "energy" (developable): smoothing of \|K\| at the start, and in the second half.
     stride : int
-        The nets see every so-many-th vertex along both sides: with 2 a step costs a quarter.
+        The net sees every `stride`-th vertex along both sides; a step with 2 costs a quarter.
     """
 
     loss: str = "published"
@@ -108,7 +108,7 @@ class Phase:
 
     @property
     def labelled(self) -> bool:
-        """Whether it learns labels, be it among other things."""
+        """Whether the loss has a label term."""
         return self.loss == "label" or bool(self.weights.get("label"))
 
 
@@ -121,49 +121,49 @@ class Config:
     name : str
         Name of the net.
     task : {"developable", "flatten", "denoise"}
-        What it is for.
+        Task of the net.
     model : dict
         Kind and settings of the net; see :class:`gso.net.CoarseNet`, :class:`gso.net.GSONet`.
     phases : tuple of Phase
-        What is minimised, one after the other.
+        Phases of training, in sequence.
     steps : int
         Steps of the whole run; a limit in minutes replaces it.
     seed : int
         Seed of all random numbers.
     limit : int
-        Surfaces of the train split that are used; 0 for all.
+        Number of surfaces of the train split that are used; 0 for all.
     fresh : int
-        Surfaces that are drawn by the recipe, beside those of the set, for phases that need
-        no labels, or a teacher's.
+        Number of additional surfaces drawn by the recipe. They have no labels in the dataset:
+        only phases without labels, or with a teacher, use them.
     label : str
-        Array of the set that phases with labels learn.
+        Array of the dataset with the labels.
     augment : {"none", "symmetries", "shear"}
-        What is done to surfaces: transposed and reversed grids, which labels follow; or a
-        random shear and turn, which they do not.
+        Data augmentation: "symmetries" reverses and transposes grids and their labels; "shear"
+        is a random shear and orthogonal map, to which labels cannot be adapted.
     sigma : tuple of 2 float
-        "denoise": smallest and largest noise; drawn evenly on a logarithmic scale.
+        "denoise": smallest and largest noise; its logarithm is uniformly distributed.
     init : str
-        Net to begin with: a name or a .safetensors file.
+        Net whose weights are the initial ones: a name or a .safetensors file.
     teacher : str
-        Net whose results phases with labels learn, in place of an array of the set.
+        Net whose results are the labels, in place of an array of the dataset.
     through : str
-        Net whose results take the surfaces' place: Net-F learns from those of Net-C.
+        Net whose results replace the input surfaces: Net-F is trained on those of Net-C.
     against : {"seen", "designs"}
-        With `through`, what results are compared with in training: the surfaces that the net
-        sees, as published, or those that they were before. Validation takes the latter.
+        With `through`, the surfaces with which results are compared in training: the net's
+        input, as published, or the designs. Validation always compares with the designs.
     ema : float
-        Decay of the moving average of the weights, which is what is kept in the end.
+        Decay of the moving average of the weights. The averaged net is the one saved.
     optimiser : {"muon", "adamw"}
-        Muon for the weights of layers with 8 channels or more on both sides and AdamW for the
-        rest, or AdamW for all.
+        "muon": Muon for the weights of layers with 8 or more channels on both sides, AdamW for
+        the rest. "adamw": AdamW for all.
     weight_decay : float
-        Share of the weights, over the rate, that each step takes away.
+        Decoupled weight decay: a step multiplies weights by 1 - learning rate * weight_decay.
     bf16 : bool or None
-        Convolutions in bfloat16; None where the processor has it.
+        Whether convolutions run in bfloat16; None uses it where the device supports it.
     validate_every, checkpoint_every : float
-        Seconds between two of them.
+        Seconds between two validations, and between two checkpoints.
     validate : int
-        Surfaces that validation looks at.
+        Number of surfaces used for validation.
     """
 
     name: str
@@ -218,14 +218,14 @@ class Config:
             _fits(self, phase)
 
     def as_dict(self) -> dict[str, Any]:
-        """The configuration as its file has it."""
+        """Return the configuration as a dictionary with the layout of its file."""
         out = json.loads(json.dumps(asdict(self)))
         out["phase"] = out.pop("phases")
         return out
 
 
 def _fits(config: Config, phase: Phase) -> None:
-    """Refuse losses that a task has not."""
+    """Reject combinations of a task, a loss and other settings that do not go together."""
     if (phase.loss == "clean") != (config.task == "denoise" and phase.loss != "published"):
         raise OptionError(f"loss {phase.loss!r} does not go with task {config.task!r}")
     if config.through and config.task != "developable":
@@ -247,7 +247,7 @@ def read(path: str | PathLike[str], **changes: Any) -> Config:
     Parameters
     ----------
     path : path
-        File, or the name of one in ``gso/net/configs``.
+        File, or the name of a configuration in ``gso/net/configs``.
     changes
         Values that replace those of the file, unless they are None.
 
@@ -280,7 +280,7 @@ def read(path: str | PathLike[str], **changes: Any) -> Config:
 
 
 def from_dict(given: Mapping[str, Any]) -> Config:
-    """Configuration of a dictionary as :meth:`Config.as_dict` gives it."""
+    """Make a configuration from a dictionary as :meth:`Config.as_dict` returns it."""
     rest = {"name": "net", **given}
     phases = rest.pop("phase", [])
     if not isinstance(phases, list) or not all(isinstance(p, dict) for p in phases):

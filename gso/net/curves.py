@@ -1,4 +1,4 @@
-"""What happened in a run, by step: a file of JSON lines, and TensorBoard where it is installed."""
+"""Training curves: a file of JSON lines, and TensorBoard events if it is installed."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ NAME = "curves.jsonl"
 
 
 class Curves:
-    """Numbers by step, appended to a folder.
+    """Writer of values by step.
 
     Parameters
     ----------
     folder : Path
-        Gets ``curves.jsonl``, and event files for TensorBoard where ``tensorboard`` is
-        installed.
+        Folder for ``curves.jsonl``, and for event files if ``tensorboard`` is installed.
     step : int
-        Step after which the run is taken up: what was written later is dropped.
+        Step at which the run is resumed: entries of later steps are dropped.
     """
 
     def __init__(self, folder: Path, step: int = 0):
@@ -37,7 +36,7 @@ class Curves:
             self._writer = SummaryWriter(str(folder), purge_step=step + 1)
 
     def add(self, step: int, seconds: float, **values: float) -> None:
-        """Write numbers of a step, so many seconds into the run, if they are not there."""
+        """Write values of a step at `seconds` into the run, unless they are already written."""
         row = {"step": step, "seconds": round(seconds, 3), **values}
         if _what(row) in self._known:
             return
@@ -48,7 +47,7 @@ class Curves:
                 self._writer.add_scalar(name, value, step)
 
     def close(self) -> None:
-        """Finish the event files."""
+        """Close the event files."""
         if self._writer is not None:
             self._writer.close()
 
@@ -58,7 +57,7 @@ def _what(row: dict[str, float]) -> tuple[float, frozenset[str]]:
 
 
 def read(folder: Path) -> list[dict[str, float]]:
-    """Rows of a run; a last line that was cut off is left out."""
+    """Read the rows of a run; lines that are not valid JSON (cut off) are left out."""
     rows = []
     try:
         lines = (folder / NAME).read_text().splitlines()

@@ -1,4 +1,4 @@
-"""Batches: a pure function of the step, so that a run can be taken up anywhere."""
+"""Batches as a pure function of the step, so that a run can be resumed at any step."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from gso.net.config import Config, Phase
 from gso.net.grids import ball, normalise
 from gso.status import DatasetError
 
-#: Seeds of the run's streams of random numbers.
+#: Keys of the run's random streams.
 _ORDER, _CHANGES, _FRESH = 0, 1, 2
-#: Surfaces that are drawn with one seed.
+#: Number of surfaces drawn with one seed.
 _DRAWN = 256
-#: Share of a GPU's free memory that a run's surfaces may take.
+#: Fraction of a GPU's free memory that a run's surfaces may take.
 _ROOM = 0.5
-#: Changes by their name in a configuration.
+#: Augmentations by their name in a configuration.
 _AUGMENTED = {"symmetries": augment.symmetries, "shear": augment.shear}
 
 
@@ -36,13 +36,13 @@ class Batch:
     Attributes
     ----------
     surface : Tensor, (B, H, W, 3)
-        What the net sees, in the unit ball.
+        Input of the net, in the unit ball.
     target : Tensor, (B, H, W, d), or None
-        What it is to make of it, where that is known.
+        Labels, or for "denoise" the surfaces without noise.
     sigma : Tensor, (B,), or None
-        Noise of the surfaces.
+        Standard deviation of the noise of each surface.
     design : Tensor, (B, H, W, 3), or None
-        What the result is kept close to, where that is not the surface.
+        Surfaces with which results are compared, if these differ from `surface`.
     step : int
         Step of the run.
     """
@@ -55,7 +55,7 @@ class Batch:
 
     @property
     def compared(self) -> Tensor:
-        """What results are kept close to."""
+        """Surfaces with which results are compared."""
         return self.surface if self.design is None else self.design
 
 
@@ -67,9 +67,9 @@ class Source:
     ----------
     surfaces : Tensor, (n, H, W, 3)
     labels : Tensor, (m, H, W, d), or None
-        Of the first m.
+        Labels of the first m surfaces.
     designs : Tensor, (n, H, W, 3), or None
-        What the surfaces were before another net had changed them.
+        The designs, if `surfaces` are another net's results for them.
     """
 
     surfaces: Tensor
@@ -77,7 +77,7 @@ class Source:
     designs: Tensor | None = None
 
     def placed(self, device: torch.device) -> Source:
-        """The same on a GPU, if there is room: to gather batches elsewhere takes longer."""
+        """Copy to a GPU if there is room, because gathering batches on the CPU is slower."""
         arrays = [self.surfaces, self.labels, self.designs]
         size = sum(x.numel() * x.element_size() for x in arrays if x is not None)
         if device.type != "cuda" or size > _ROOM * torch.cuda.mem_get_info(device)[0]:
@@ -94,9 +94,9 @@ class Source:
         world: int = 1,
         device: torch.device | str = "cpu",
     ) -> Batch:
-        """What process `rank` of `world` takes in a step.
+        """Return the part of a step's batch that belongs to process `rank` of `world`.
 
-        The surfaces of a step are the same whatever the number of processes.
+        The surfaces of a step do not depend on the number of processes.
         """
         if phase.labelled and self.labels is None:
             raise DatasetError(f"there are no labels {config.label!r} to learn")
@@ -125,7 +125,10 @@ class Source:
 def noisy(
     clean: Tensor, levels: tuple[float, float], generator: torch.Generator
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Surfaces with noise, what they were, and the standard deviation, in the noisy unit ball."""
+    """Add noise to surfaces; return noisy surfaces, clean surfaces and standard deviations.
+
+    The noisy surfaces are normalised to the unit ball; the other results are scaled with them.
+    """
     low, high = np.log(levels[0]), np.log(levels[1])
     sigma = torch.exp(low + (high - low) * torch.rand(len(clean), generator=generator)).to(clean)
     noise = torch.randn(clean.shape, generator=generator).to(clean)
@@ -135,12 +138,12 @@ def noisy(
 
 
 def _seed(seed: int, *key: int) -> int:
-    """A seed for each item of a stream."""
+    """Derive the seed of an item of a random stream."""
     return int(np.random.SeedSequence(seed, spawn_key=key).generate_state(1, np.uint64)[0] >> 1)
 
 
 def _rows(count: int, batch: int, step: int, seed: int) -> Tensor:
-    """Rows of a step: epoch after epoch, each in an order of its own."""
+    """Return the rows of a step; each epoch has its own random order."""
     places = np.arange(step * batch, (step + 1) * batch)
     epochs, within = np.divmod(places, count)
     return torch.from_numpy(
@@ -154,17 +157,18 @@ def _order(count: int, epoch: int, seed: int) -> Any:
 
 
 def open_source(config: Config, folder: str | Path, cache: Path, tick: Any = None) -> Source:
-    """Surfaces for a run: those of the train split, then fresh ones.
+    """Load the surfaces of a run: those of the train split, then freshly drawn ones.
 
     Parameters
     ----------
     config : Config
     folder : path
-        The set.
+        Folder of the dataset.
     cache : Path
-        File for the fresh surfaces, which are drawn once.
+        File that stores the freshly drawn surfaces.
     tick : callable, optional
-        Told what is counted, how many there are, and how many there will be.
+        Progress callback, called with the name of the counted items, the number done and the
+        total number.
     """
     split = dataset.open(folder)["train"]
     rows = slice(config.limit or None)
@@ -176,9 +180,9 @@ def open_source(config: Config, folder: str | Path, cache: Path, tick: Any = Non
     if not config.teacher and any(phase.labelled for phase in config.phases):
         centre, radius = ball(given)
         labels = torch.from_numpy(split[config.label][rows])
-        # A flat image has a place of its own.
+        # Flat images are not translated: their position is independent of the surface's.
         labels = ((labels - centre if labels.shape[-1] == 3 else labels) / radius).float()
-        # Surfaces that the solver refused have no label.
+        # Surfaces for which the solver failed have no label.
         sound = labels.isfinite().all(dim=(1, 2, 3))
         surfaces = torch.cat([surfaces[sound], surfaces[~sound]])
         labels = labels[sound]
@@ -187,10 +191,10 @@ def open_source(config: Config, folder: str | Path, cache: Path, tick: Any = Non
 
 
 def fresh(count: int, seed: int, size: int, cache: Path, tick: Any = None) -> Tensor:
-    """Surfaces (count, size, size, 3) by the recipe, other ones than any set has.
+    """Draw surfaces (count, size, size, 3) by the recipe that are in no dataset, or load them.
 
-    They are kept in a file, which is made anew when it has not so many of that size; the seed
-    is for its name to tell.
+    They are cached in a file, which is replaced if its count or size differs. The seed is not
+    checked: the name of the file must identify it.
     """
     shape = (count, size, size, 3)
     if not count:

@@ -1,7 +1,8 @@
-"""Noisy grids of any size at the size of the nets, and back.
+"""Conversion of noisy grids of any size to the size of the nets, and back.
 
-Noise has no spline between its samples: a grid with many vertices is averaged, and one with few is
-continued beyond its border, so that what a net sees is noise from vertex to vertex again.
+Interpolation would correlate the noise of neighbours. Large grids are therefore averaged and
+small ones are extended beyond their border, so that the net's input again has noise that
+varies from vertex to vertex.
 """
 
 from __future__ import annotations
@@ -15,18 +16,19 @@ from gso.resample import resample
 
 Array = NDArray[np.float64]
 
-#: Smallest side that is worth continuing so far.
+#: Smallest side that is extended to the size of the nets.
 SMALLEST = 16
-#: Vertices along a side from which on it is averaged; with fewer to each coefficient the
-#: least-squares spline would follow the noise.
+#: Sides between SIZE and this number of vertices are extended to it: with fewer than two
+#: vertices per coefficient the least-squares spline would fit the noise.
 _MANY = 2 * SIZE
 
 
 def seen(grid: Array) -> Array:
-    """A grid (H, W, 3) as (SIZE, SIZE, 3).
+    """Convert a grid (H, W, 3) to the net's input (SIZE, SIZE, 3).
 
-    Sides are first continued to SIZE or twice as many vertices, by reflection at the vertices of
-    the border; what has more becomes its least-squares spline with SIZE x SIZE coefficients.
+    Shorter sides are first extended to SIZE or 2 SIZE vertices, by point reflection at the
+    border vertices. A grid larger than SIZE x SIZE is then replaced by its least-squares
+    spline with SIZE x SIZE coefficients.
     """
     pads = [_margins(n) for n in grid.shape[:2]]
     grid = np.pad(grid, [*pads, (0, 0)], mode="reflect", reflect_type="odd")
@@ -36,30 +38,30 @@ def seen(grid: Array) -> Array:
 
 
 def back(done: Array, height: int, width: int) -> Array:
-    """What became of :func:`seen`, on the grid's own (height, width, 3) vertices."""
+    """Convert a net's result for :func:`seen` to the grid's own vertices (height, width, 3)."""
     (top, below), (left, right) = _margins(height), _margins(width)
     whole = resample(done, top + height + below, left + width + right)
     return whole[top : top + height, left : left + width]
 
 
 def share(height: int, width: int) -> float:
-    """Share of the noise's standard deviation that :func:`seen` leaves."""
+    """Return the factor by which :func:`seen` scales the standard deviation of the noise."""
     return float(np.sqrt(np.prod([SIZE / (n + sum(_margins(n))) for n in (height, width)])))
 
 
 def sigma(grid: Array, seen: Array) -> float:
-    """Standard deviation of the noise of what a net sees of a grid, estimated from both."""
+    """Estimate the standard deviation of the noise in `seen`, the net's input for a grid."""
     from gso.smoothing import estimate_sigma, smooth_grid
 
     height, width = grid.shape[:2]
     found = share(height, width) * estimate_sigma(grid)
     if max(height, width) <= SIZE:
         return found
-    # Averages have what neighbours have in common, too, which their differences do not show.
+    # Averaging also keeps noise that neighbours share, which differences do not measure.
     return max(found, smooth_grid(seen).sigma)
 
 
 def _margins(count: int) -> tuple[int, int]:
-    """Vertices that are added before and behind a side."""
+    """Return the numbers of vertices added before and after a side."""
     more = max((SIZE if count <= SIZE else _MANY) - count, 0)
     return more // 2, more - more // 2

@@ -1,7 +1,7 @@
-"""The solver's energies of whole batches of grids: what the default nets are trained on.
+"""The solver's energies for batches of grids, on which the default nets are trained.
 
-Residuals, losses and weights are those of the tasks' terms; only the sums are made here. One
-number per surface, (B,), of surfaces in the unit ball.
+Residuals, losses and weights are those of the tasks' terms; only the sums are computed here.
+Surfaces are in the unit ball, and energies are (B,), one number per surface.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from gso.tasks import developable, flatten
 from gso.terms import curvature, edges, elongation, fairness, proximity, stretch
 from gso.terms.losses import Absolute, Distance, Squared
 
-#: Designs that are flatter, by mean |K| in the unit ball, count as if they were not.
+#: Lower bound on the mean |K| of a design in the unit ball, where weights depend on it.
 LEAST_CURVATURE = 1e-3
-#: Corners of cells flatter than this carry no strain (doubled area over squared sides).
+#: Corners of cells more degenerate than this are ignored (doubled area over squared sides).
 _FLAT_CORNER = 1e-5
-#: Strain below which a flat image is good enough to be called exact.
+#: Lower bound on the typical strain of a flat image, by which its energy is divided.
 _LEAST_STRAIN = 1e-3
 
 
@@ -32,8 +32,8 @@ _LEAST_STRAIN = 1e-3
 class Developable:
     """The objective of :mod:`gso.tasks.developable`, formulation "curvature".
 
-    What does not change while the results of one batch of designs are compared is computed
-    once. The designs count as free of noise.
+    Quantities of the designs are computed once per batch. The designs are assumed to be free
+    of noise.
 
     Parameters
     ----------
@@ -73,11 +73,11 @@ class Developable:
             return self(self.design)
 
     def __call__(self, result: Tensor, eps: float | None = None) -> Tensor:
-        """Energy (B,) of results (B, H, W, 3) with |K| smoothed by `eps`."""
+        """Compute the energy (B,) of results (B, H, W, 3), with |K| smoothed by `eps`."""
         return sum(self.parts(result, eps).values())  # type: ignore[return-value]
 
     def parts(self, result: Tensor, eps: float | None = None) -> dict[str, Tensor]:
-        """Energy (B,) by term."""
+        """Compute the weighted energy (B,) of each term."""
         o = self.options
         x = planes(result)
         absolute: Any = Absolute(o.eps if eps is None else eps)
@@ -118,7 +118,7 @@ class Developable:
 
 
 def _second(x: Planes, axis: int, spacing: Tensor) -> Planes:
-    """Second derivatives along an axis, for samples (B,) that far apart."""
+    """Compute second derivatives along an axis; `spacing` (B,) is the sample distance."""
     n = x[0].shape[axis] - 2
     triple = [tuple(c.narrow(axis, k, n) for c in x) for k in range(3)]
     scale = (spacing**-2)[:, None, None].expand_as(triple[0][0])
@@ -127,7 +127,11 @@ def _second(x: Planes, axis: int, spacing: Tensor) -> Planes:
 
 
 def _bands(like: Tensor, across: int) -> tuple[Tensor, Tensor]:
-    """Ratios (1, ., .) between which edges (B, ., .) are free; the outer ones lie on the border."""
+    """Return bounds (1, ., .) on length ratios within which edges have no elongation energy.
+
+    `across` is the dimension of `like` across the edges; its first and last entries are
+    boundary edges.
+    """
     bands = []
     for inside, boundary in zip(elongation.INSIDE, elongation.BOUNDARY, strict=True):
         band = torch.full_like(like[:1], inside)
@@ -146,8 +150,8 @@ def _mean_of_three(x: Tensor, axis: int) -> Tensor:
 class Strain:
     """The objective of :mod:`gso.tasks.flatten`, formulation "strain", norm "mixed".
 
-    The typical strain, by which that objective tells large strains from small ones, is the
-    result's own: no optimum has to be known.
+    The typical strain, which scales the norm, is computed from the result itself, so that the
+    optimum need not be known.
 
     Parameters
     ----------
@@ -175,23 +179,23 @@ class Strain:
         self.lengths = [1.0 / geometry.norm(d).clamp_min(1e-9) for d in _edges(p)]
 
     def residuals(self, flat: Tensor) -> Tensor:
-        """Strain of the corners, (12, B, H-1, W-1); see :func:`gso.terms.stretch.residual`."""
+        """Compute strain residuals (12, B, H-1, W-1); see :func:`gso.terms.stretch.residual`."""
         r = torch.stack(stretch.residual(grids.corners(planes(flat)), self.rest))
         good = torch.stack(self.sound)
         return torch.where(good.repeat(3, 1, 1, 1), r, torch.zeros_like(r))
 
     def level(self, r: Tensor) -> Tensor:
-        """Root-mean-square strain (B,) from residuals."""
+        """Compute the root-mean-square strain (B,) from residuals."""
         squares = r.square().sum(dim=(0, 2, 3)) / torch.stack(self.sound).sum(dim=(0, 2, 3))
         return (0.5 * squares).sqrt()
 
     def __call__(self, flat: Tensor) -> Tensor:
-        """Energy (B,) of flat images (B, H, W, 2), over their typical strain."""
+        """Compute the energy (B,) of flat images (B, H, W, 2), divided by their typical strain."""
         o = self.options
         r = self.residuals(flat)
         level = self.level(r.detach()).clamp_min(_LEAST_STRAIN)[:, None, None].expand_as(r[0])
         knee = o.knee * flatten.bent(level)
-        # The terms' losses know elements by one axis.
+        # The terms' losses take elements along a single axis.
         spread: Any = stretch.Spread(level.reshape(-1), knee=knee.reshape(-1))  # type: ignore[arg-type]
         cost = spread.value(r.reshape(12, -1)).reshape(4, *r.shape[1:]).mean(dim=(0, 2, 3))
         typical = level[:, 0, 0]
@@ -206,5 +210,5 @@ class Strain:
 
 
 def _edges(p: Planes) -> list[Planes]:
-    """Edges of grids in both directions."""
+    """Return the edge vectors of grids in both directions."""
     return [tuple(torch.diff(c, dim=axis) for c in p) for axis in (1, 2)]

@@ -1,6 +1,7 @@
-"""Quantities of batches of grids, (B, H, W, 3) tensors, by the package's one definition of each.
+"""Geometric quantities of batches of grids (B, H, W, 3), by the package's own definitions.
 
-Inside they are component tuples of planes (B, H, W), on which :mod:`gso.geometry` works.
+Internally, points are tuples of components ("planes") of shape (B, H, W), as
+:mod:`gso.geometry` takes them.
 """
 
 from __future__ import annotations
@@ -16,46 +17,47 @@ from gso import geometry
 
 Planes = tuple[Tensor, ...]
 
-#: Shortest vector that is divided by: lengths of the unit ball are far above it.
+#: Lower bound on lengths in denominators, far below the lengths of grids in the unit ball.
 _SHORTEST = 1e-12
-#: Least length, in the unit ball, of mean directions that make axes, and of their difference.
+#: Smallest length, in the unit ball, of the mean directions that define axes, and smallest
+#: norm of the sum and difference of their unit vectors.
 _DISTINCT = 1e-5
 
 
 def planes(points: Tensor) -> Planes:
-    """Contiguous components, (B, H, W) each, of points (B, H, W, d)."""
+    """Split points (B, H, W, d) into contiguous components, (B, H, W) each."""
     return tuple(points.movedim(-1, 0).contiguous())
 
 
 def points(components: Planes) -> Tensor:
-    """Points (B, H, W, d) of their components."""
+    """Stack components to points (B, H, W, d)."""
     return torch.stack(components, dim=-1)
 
 
 def ball(grids: Tensor) -> tuple[Tensor, Tensor]:
-    """Centroids (B, 1, 1, 3) of grids (B, H, W, 3), and radii (B, 1, 1, 1) about them."""
+    """Compute centroids (B, 1, 1, 3) and radii (B, 1, 1, 1) of grids (B, H, W, 3)."""
     centre = grids.mean(dim=(1, 2), keepdim=True)
     far = (grids - centre).square().sum(dim=-1).amax(dim=(1, 2)).sqrt()
     return centre, far.clamp_min(_SHORTEST)[:, None, None, None]
 
 
 def normalise(grids: Tensor) -> Tensor:
-    """Grids (B, H, W, 3) moved and scaled to the unit ball, each by itself."""
+    """Translate and scale grids (B, H, W, 3) to the unit ball, each independently."""
     return normalise_with(grids)[0]
 
 
 def normalise_with(grids: Tensor, *others: Tensor) -> tuple[Tensor, ...]:
-    """The same, and others that lie to the results as they lay to the grids."""
+    """Normalise grids to the unit ball; `others` undergo the same similarity transform."""
     centre, radius = ball(grids)
     return tuple((x - centre) / radius for x in (grids, *others))
 
 
 def axes(grids: Tensor) -> Tensor:
-    """Rotations (B, 3, 3) whose columns are the axes that grids (B, H, W, 3) themselves give.
+    """Compute rotations (B, 3, 3) whose columns are axes defined by grids (B, H, W, 3).
 
-    x and y lie as near as two orthogonal vectors can to the mean directions of both families
-    of grid lines, by linear regression; z is across both. The unit matrix where these
-    directions are one, or none.
+    The x and y axes are the orthogonal unit vectors closest to the mean directions of the two
+    families of grid lines, which linear regression gives; z is their cross product. The result
+    is the identity if these directions are parallel or undefined.
 
     >>> u, v = torch.meshgrid(torch.linspace(0, 1, 4), torch.linspace(0, 1, 5), indexing="ij")
     >>> axes(torch.stack([v, u, 0 * u], dim=-1)[None])[0].round() + 0.0
@@ -86,29 +88,29 @@ def axes(grids: Tensor) -> Tensor:
 
 
 def curvature(p: Planes) -> Tensor:
-    """Gaussian curvature (B, H-2, W-2) of the interior vertices, 1 / length^2."""
+    """Compute the Gaussian curvature (B, H-2, W-2) of the interior vertices, 1 / length^2."""
     return geometry.grid_curvature(p)
 
 
 def absolute_curvature(p: Planes) -> Tensor:
-    r"""\|K\| (B, H-2, W-2) of the interior vertices, mean over both triangulations of the cells."""
+    r"""Compute \|K\| (B, H-2, W-2) of interior vertices, averaged over both triangulations."""
     splits = range(len(geometry.GRID_RINGS))
     return sum(geometry.grid_curvature(p, k).abs() for k in splits) / len(splits)
 
 
 def to_border(inner: Tensor) -> Tensor:
-    """Values (B, H-2, W-2) of interior vertices, and of the nearest one on the border."""
+    """Extend values (B, H-2, W-2) of interior vertices to the border by nearest neighbour."""
     return pad(inner[:, None], (1, 1, 1, 1), mode="replicate")[:, 0]
 
 
 def unit(v: Planes) -> Planes:
-    """Vectors of length one; zero where there is none."""
+    """Normalise vectors to unit length; zero vectors stay zero."""
     scale = 1.0 / geometry.norm(v).clamp_min(_SHORTEST)
     return tuple(c * scale for c in v)
 
 
 def corners(p: Planes) -> tuple[Planes, Planes, Planes, Planes]:
-    """The corners (i, j), (i+1, j), (i+1, j+1), (i, j+1) of all cells."""
+    """Return the corners (i, j), (i+1, j), (i+1, j+1), (i, j+1) of all cells."""
     low, high = slice(None, -1), slice(1, None)
     where = ((low, low), (high, low), (high, high), (low, high))
     v0, v1, v2, v3 = (tuple(c[:, i, j] for c in p) for i, j in where)
@@ -116,7 +118,7 @@ def corners(p: Planes) -> tuple[Planes, Planes, Planes, Planes]:
 
 
 def normals(p: Planes) -> Planes:
-    """Area-weighted unit normals of the vertices, as :func:`gso.variables.vertex_normals`."""
+    """Compute area-weighted unit vertex normals as :func:`gso.variables.vertex_normals` does."""
     v0, v1, v2, v3 = corners(p)
     whole = geometry.cross(geometry.sub(v2, v0), geometry.sub(v3, v1))
     at = [
@@ -127,7 +129,7 @@ def normals(p: Planes) -> Planes:
 
 
 def split_normals(p: Planes) -> Planes:
-    """The same of one triangulation, the published one: what the nets measure along."""
+    """Compute unit vertex normals of the published triangulation, for the nets' frames."""
     v0, v1, v2, v3 = corners(p)
     diagonal = geometry.sub(v2, v0)
     lower = geometry.cross(geometry.sub(v1, v0), diagonal)
@@ -137,20 +139,20 @@ def split_normals(p: Planes) -> Planes:
 
 
 def _gathered(at: list[Planes]) -> Planes:
-    """Sums at the vertices of what the cells have at their four corners."""
+    """Sum the values at the four corners of the cells at each vertex."""
     sides = ((0, 1, 0, 1), (0, 1, 1, 0), (1, 0, 1, 0), (1, 0, 0, 1))
     placed = [[pad(c, side) for c in corner] for corner, side in zip(at, sides, strict=True)]
     return tuple(a + b + c + d for a, b, c, d in zip(*placed, strict=True))
 
 
 def _slopes(x: Tensor, *axes: int) -> list[Tensor]:
-    """Derivatives along axes whose ends are one apart."""
+    """Compute first derivatives along axes, with the parameter range [0, 1]."""
     spacing = [1.0 / (x.shape[axis] - 1) for axis in axes]
     return list(torch.gradient(x, dim=axes, spacing=spacing))
 
 
 def _bend(x: Tensor, axis: int) -> Tensor:
-    """Second derivative along an axis; at the ends that of their neighbours."""
+    """Compute the second derivative along an axis over [0, 1]; the ends copy their neighbours."""
     n = x.shape[axis]
     inner = torch.diff(x, n=2, dim=axis) * (n - 1) ** 2
     first, last = inner.narrow(axis, 0, 1), inner.narrow(axis, n - 3, 1)
@@ -158,10 +160,10 @@ def _bend(x: Tensor, axis: int) -> Tensor:
 
 
 class Frame(NamedTuple):
-    """Derivatives of grids by their parameters in [0, 1]^2, and vectors to measure along.
+    """Derivatives of grids by their parameters in [0, 1]^2, and unit vectors at the vertices.
 
-    `along` and `across` are unit tangents of the grid lines, `normal` the unit normal: they
-    turn with the surface, so that what is measured along them does not depend on its pose.
+    `along` and `across` are the unit tangents of the grid lines and `normal` is the unit
+    normal. They rotate with the surface, so that components along them are pose-invariant.
     """
 
     du: Planes
@@ -172,25 +174,25 @@ class Frame(NamedTuple):
 
     @classmethod
     def of(cls, p: Planes) -> Frame:
-        """Frame of grids."""
+        """Compute the frame of grids."""
         du, dv = (d.unbind() for d in _slopes(torch.stack(p), -2, -1))
         return cls(du, dv, unit(du), unit(dv), split_normals(p))
 
     def combine(self, shares: Tensor) -> Tensor:
-        """Vectors (B, H, W, 3) with shares (B, 3, H, W) of normal, along and across."""
+        """Compute vectors (B, H, W, 3) from components (B, 3, H, W) on normal, along, across."""
         n, a, b = shares.unbind(1)
         axes = zip(self.normal, self.along, self.across, strict=True)
         return points(tuple(n * x + a * y + b * z for x, y, z in axes))
 
 
 def first_form(frame: Frame) -> Planes:
-    """Logarithms of the parameter lines' lengths, and the cosine between them."""
+    """Compute the logarithms of the norms of du and dv, and the cosine of their angle."""
     lengths = [geometry.norm(d).clamp_min(1e-6).log() for d in (frame.du, frame.dv)]
     return (*lengths, geometry.dot(frame.along, frame.across))
 
 
 def normal_curvatures(p: Planes, frame: Frame) -> Tensor:
-    """Curvature along both parameter lines, and the twist between them, (3, B, H, W)."""
+    """Compute the normal curvatures of both parameter lines, and the twist, (3, B, H, W)."""
     x = torch.stack(p)
     (twist,) = _slopes(torch.stack(frame.du), -1)
     bends = torch.stack([_bend(x, -2), _bend(x, -1), twist], dim=1)
@@ -200,7 +202,7 @@ def normal_curvatures(p: Planes, frame: Frame) -> Tensor:
 
 
 def side_lengths(p: Planes) -> tuple[Tensor, Tensor]:
-    """Mean polyline lengths (B,) along both grid directions."""
+    """Compute the mean polyline lengths (B,) along both grid directions."""
     return tuple(
         geometry.norm(tuple(torch.diff(c, dim=axis) for c in p)).sum(dim=axis).mean(dim=1)
         for axis in (1, 2)
@@ -208,9 +210,9 @@ def side_lengths(p: Planes) -> tuple[Tensor, Tensor]:
 
 
 def rectangle(p: Planes) -> Tensor:
-    """Flatten-init (B, H, W, 2): regular rectangles with the grids' mean side lengths.
+    """Compute Flatten-init (B, H, W, 2): regular rectangles with the grids' mean side lengths.
 
-    As :func:`gso.flat_start.rectangle`, but with the centre at the origin.
+    As :func:`gso.flat_start.rectangle`, but centred at the origin.
     """
     along, across = side_lengths(p)
     count, height, width = p[0].shape

@@ -18,7 +18,7 @@ _LEVELS = 3
 
 
 class GSONet(Net):
-    """GSO-Net (Wang et al. 2024): absolute positions in, displacements out.
+    """GSO-Net (Wang et al. 2024), which maps absolute positions to displacements.
 
     Three levels of `blocks` multi-distillation blocks with additive skips, no biases, no
     normalisation. 16 channels and 4 blocks are the published setting: 2,820,832 parameters,
@@ -27,22 +27,22 @@ class GSONet(Net):
     Parameters
     ----------
     task : {"developable", "flatten", "denoise"}
-        The net moves the surface; for "flatten" the rectangle of Flatten-init.
+        Task of the net. It displaces the surface, or for "flatten" the initial rectangle.
     channels : int
         Channels at full resolution (NC), a multiple of 4; they double at each level.
     blocks : int
         Blocks per level (NB).
     tanh : bool
-        Whether displacements pass a hyperbolic tangent, as the paper says and its figures'
-        code does not.
+        Whether displacements pass through tanh, as in the paper but not in the code of its
+        figures.
     sigma : bool
-        Whether the net is told the noise, as a constant fourth channel.
+        Whether the noise level is an input, as a constant fourth channel.
     aligned : bool
-        Whether grids are turned first so that their lines follow the axes, and displacements
-        turned back: the result turns with the input, which the published net's does not.
+        Whether grids are first rotated to align their lines with the axes, and displacements
+        rotated back. The result is then equivariant under rotations, unlike the published net.
     stencils : bool
-        Whether the first layer has factors of difference stencils for weights, as many as the
-        kernels' entries that the published net has: see :class:`gso.net.blocks.Stencils`.
+        Whether the first layer is parametrised by difference stencils, with as many weights as
+        the published net's kernels: see :class:`gso.net.blocks.Stencils`.
 
     Raises
     ------
@@ -96,11 +96,14 @@ class GSONet(Net):
             for a, b in reversed(steps)
         )
         self.tail = conv(channels, TASKS[task])
-        # It begins with no change, where random displacements would crumple the surface.
+        # The initial displacement is zero; random ones would crumple the surface.
         nn.init.zeros_(self.tail.weight)
 
     def begin_with(self, other: Net) -> None:
-        """Also of one with the other kind of first layer: inside of grids it computes the same."""
+        """Copy weights, also from a net with the other kind of first layer.
+
+        The converted layer is equivalent except at the border of grids.
+        """
         state, mine, its = other.state_dict(), self.head, other.head
         if isinstance(its, Stencils) and not isinstance(mine, Stencils):
             state["head.weight"] = its.kernels()
@@ -117,7 +120,7 @@ class GSONet(Net):
         if self.sigma:
             if sigma is None:
                 raise OptionError("this net must be told sigma")
-            # In hundredths, where the values of interest are near one.
+            # In units of 0.01, so that typical values are of order one.
             level = (100.0 * sigma)[:, None, None, None].expand(-1, 1, *x.shape[2:])
             x = torch.cat([x, level.to(x.dtype)], dim=1)
         x = x.contiguous(memory_format=torch.channels_last)
@@ -130,11 +133,11 @@ class GSONet(Net):
             *coarser, (finest, last) = zip(self.up, reversed(skips[1:]), strict=True)
             for step, skip in coarser:
                 y = step(y + skip)
-        # Curvature multiplies what is rounded by the square of the samples' number: the layers
-        # that take positions and make displacements compute in single precision.
+        # Curvature amplifies rounding errors by the square of the resolution: the layers that
+        # take positions or make displacements compute in single precision.
         y = self.tail(finest((y + last).to(x.dtype)) + skips[0])
         moved = (torch.tanh(y) if self.tanh else y).movedim(1, -1)
-        # Flat images lie along the axes of their rectangle.
+        # Flat images are already aligned with the axes of their rectangle.
         if turn is None or self.task == "flatten":
             return moved
         return torch.einsum("bhwj,bij->bhwi", moved, turn)

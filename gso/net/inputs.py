@@ -1,4 +1,4 @@
-"""What a coarse-field net sees of a surface: channels that do not depend on its pose."""
+"""Input channels of :class:`gso.net.CoarseNet`, which do not depend on the surface's pose."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from gso.net.grids import (
     to_border,
 )
 
-#: Curvatures are seen on a logarithmic scale from here on ...
+#: Curvature above which the asinh channel is logarithmic, 1 / size^2.
 _SMALL_CURVATURE = 0.03
-#: ... and on a bounded one up to here, 1 / size^2.
+#: Curvature at which the tanh channel saturates, 1 / size^2.
 _LARGE_CURVATURE = 2.0
-#: Channels of :func:`shape`, of :func:`bending`, and of :func:`stretching`.
+#: Numbers of channels of :func:`shape`, :func:`bending` and :func:`stretching`.
 SHAPE, BENDING, STRETCHING = 8, 5, 4
 
 
 def shape(p: Planes, frame: Frame) -> list[Tensor]:
-    """First form, position in the vertex's own frame, distance from both pairs of sides."""
+    """Compute the first form, the position in the vertex's frame, and the place in the grid."""
     _, height, width = p[0].shape
     u, v = (
         torch.linspace(-1.0, 1.0, n, dtype=p[0].dtype, device=p[0].device).abs()
@@ -36,19 +36,19 @@ def shape(p: Planes, frame: Frame) -> list[Tensor]:
 
 
 def bending(p: Planes, frame: Frame) -> list[Tensor]:
-    """Gaussian curvature on two scales, curvature and twist of the grid lines."""
+    """Compute Gaussian curvature on two scales, and curvatures and twist of the grid lines."""
     k = to_border(curvature(p))
     gauss = [_asinh(k / _SMALL_CURVATURE) / 4.0, torch.tanh(k / _LARGE_CURVATURE)]
     return [*gauss, *(_asinh(normal_curvatures(p, frame)) / 2.0)]
 
 
 def _asinh(x: Tensor) -> Tensor:
-    """Inverse hyperbolic sine, which PyTorch computes one number at a time on CPUs."""
+    """Compute the inverse hyperbolic sine; PyTorch's own is not vectorised on CPUs."""
     return (x.abs() + torch.hypot(x, torch.ones_like(x))).log().copysign(x)
 
 
 def stretching(frame: Frame, flat: Planes) -> list[Tensor]:
-    """How a flat image changes lengths, angle and area of the grid's parallelograms."""
+    """Compute how a flat image changes lengths, angle and area of the grid's parallelograms."""
     zero = torch.zeros_like(flat[0])
     x, y = flat
     image = Frame.of((x, y, zero))

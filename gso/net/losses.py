@@ -1,7 +1,7 @@
-"""The published losses (Wang et al. 2024), and the figures that results are judged by.
+"""The published losses (Wang et al. 2024), and further losses that equal metrics of results.
 
-All are made of the package's own geometry, take grids (B, H, W, d) and return one number per
-surface, (B,). None runs in less than single precision.
+All use the package's own geometry, take grids (B, H, W, d) and return one number per surface,
+(B,). None runs in less than single precision.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from gso.net import grids
 from gso.net.energy import LEAST_CURVATURE
 from gso.net.grids import Planes, planes
 
-#: Steps along the grid within which the nearest vertex is looked for.
+#: Search radius for the nearest vertex, in steps along the grid.
 _REACH = 2
-#: Sum of squared second differences of a design below which `fair_ratio` compares with this.
+#: Lower bound on a design's sum of squared second differences, for `fair_ratio`.
 _LEAST_FAIR = 1e-4
 
 
 def inside(result: Tensor, target: Tensor) -> Tensor:
-    """``in``: sum of the squared distances between vertices."""
+    """Compute ``in``, the sum of the squared distances between vertices."""
     return (result - target).square().sum(dim=(1, 2, 3))
 
 
 def fair(result: Tensor) -> Tensor:
-    """``fair``: sum of the squared second differences in both directions."""
+    """Compute ``fair``, the sum of the squared second differences in both directions."""
     x = planes(result)
     total = torch.zeros(len(result), device=result.device)
     for axis in (1, 2):
@@ -38,36 +38,36 @@ def fair(result: Tensor) -> Tensor:
 
 
 def fair_ratio(result: Tensor, design: Tensor) -> Tensor:
-    """``fair_ratio``: sum of the squared second differences, over that of the design.
+    """Compute ``fair_ratio``, the value of ``fair`` divided by that of the design.
 
-    Not among the published losses: gently and strongly bent designs weigh alike, but for those
-    flatter than `_LEAST_FAIR`.
+    Not a published loss. It gives gently and strongly bent designs equal weight, except for
+    those whose ``fair`` is below `_LEAST_FAIR`.
     """
     return fair(result) / fair(design).clamp_min(_LEAST_FAIR)
 
 
 def gc(result: Tensor) -> Tensor:
-    """``gc``: mean absolute Gaussian curvature, over both triangulations of the cells.
+    """Compute ``gc``, the mean absolute Gaussian curvature over both triangulations.
 
-    ``loss_gc``, the published loss, is that of one of them.
+    The published loss, ``loss_gc``, uses only one triangulation.
     """
     return grids.absolute_curvature(planes(result)).mean(dim=(1, 2))
 
 
 def k_left(result: Tensor, design: Tensor) -> Tensor:
-    """``k_left``: share of the design's mean absolute Gaussian curvature that is left, 1 - K_A_r.
+    """Compute ``k_left``, the remaining fraction of the design's mean absolute curvature.
 
-    Not among the published losses: curved and nearly flat designs weigh alike, but for those
-    flatter than `LEAST_CURVATURE`.
+    This is 1 - K_A_r, averaged over both triangulations. Not a published loss. It gives curved
+    and nearly flat designs equal weight, except for those flatter than `LEAST_CURVATURE`.
     """
     return gc(result) / gc(design).clamp_min(LEAST_CURVATURE)
 
 
 def d_h(result: Tensor, design: Tensor) -> Tensor:
-    """``d_h``: mean distance to the nearest vertex of the design, percent of its diagonal.
+    """Compute ``d_h``, the mean distance to the nearest design vertex, percent of the diagonal.
 
-    Not among the published losses, whose ``in`` is of squares. The nearest vertex is looked
-    for within `_REACH` steps of a vertex's own: ``d_H`` is less where it is farther.
+    Not a published loss; the published ``in`` uses squares. The nearest vertex is searched
+    within `_REACH` steps of the corresponding vertex; ``d_H`` is smaller if it is farther.
     """
     there, here = result.movedim(-1, 0), design.movedim(-1, 0)
     distance = geometry.norm(tuple(there - _nearest(there.detach(), here)))
@@ -76,7 +76,7 @@ def d_h(result: Tensor, design: Tensor) -> Tensor:
 
 
 def _nearest(points: Tensor, vertices: Tensor) -> Tensor:
-    """Which of the vertices (3, B, H, W) around each point's own is nearest to it."""
+    """Find the vertex (3, B, H, W) nearest to each point, near the corresponding vertex."""
     h, w = vertices.shape[2:]
     framed = pad(vertices, (_REACH,) * 4, mode="replicate")
     best = vertices
@@ -91,24 +91,24 @@ def _nearest(points: Tensor, vertices: Tensor) -> Tensor:
 
 
 def iso(surface: Tensor, flat: Tensor, weights: Tensor | None = None) -> Tensor:
-    """``iso``: mean over cells of the squared isometry defect.
+    """Compute ``iso``, the mean over cells of the squared isometry defect.
 
-    With `weights` (B, H-1, W-1) of the cells, Eq. 13, which makes Net-W: their weighted sum.
+    With `weights` (B, H-1, W-1) of the cells it is the weighted sum (Eq. 13, for Net-W).
     """
     return _over_cells(_defects(surface, flat).square(), weights)
 
 
 def iso_cell(surface: Tensor, flat: Tensor, weights: Tensor | None = None) -> Tensor:
-    """``iso_cell``: mean over cells of the isometry defect, ``loss_iso-cell`` itself.
+    """Compute ``iso_cell``, the mean over cells of the isometry defect (``loss_iso-cell``).
 
-    Not among the published losses: flat images are judged by it, yet only its squares are
-    minimised there. `weights` are those of :func:`iso`.
+    In the paper this is a metric of flat images, and only its squares are minimised.
+    `weights` are those of :func:`iso`.
     """
     return _over_cells(_defects(surface, flat).abs(), weights)
 
 
 def _defects(surface: Tensor, flat: Tensor) -> Tensor:
-    """The three parts of every cell's isometry defect, (3, B, H-1, W-1)."""
+    """Compute the three parts of every cell's isometry defect, (3, B, H-1, W-1)."""
     (a, b), (a2, b2) = (geometry.diagonals(*grids.corners(planes(x))) for x in (surface, flat))
     return torch.stack(geometry.isometry_defect(a, b, a2, b2))
 
@@ -119,9 +119,9 @@ def _over_cells(parts: Tensor, weights: Tensor | None) -> Tensor:
 
 
 def iso_weights(surface: Tensor) -> Tensor:
-    r"""``w_iso`` (B, H-1, W-1): one minus the curvature of a cell over the largest one.
+    r"""Compute ``w_iso`` (B, H-1, W-1): one minus a cell's curvature over the largest one.
 
-    The curvature of a cell is the mean of \|K\| over its corners inside the surface.
+    The curvature of a cell is the mean of \|K\| over its corners at interior vertices.
     """
     p = planes(surface)
     k = grids.curvature(p).abs()
@@ -135,7 +135,7 @@ def iso_weights(surface: Tensor) -> Tensor:
 
 
 def normal_angles(clean: Planes, result: Planes) -> Tensor:
-    """Mean angle (B,) between the normals of the cells, radians."""
+    """Compute the mean angle (B,) between the normals of the cells, in radians."""
     first, second = (
         geometry.cross(*geometry.diagonals(*grids.corners(p))) for p in (clean, result)
     )

@@ -1,4 +1,4 @@
-"""Muon: steps of the same size in every direction of a weight matrix."""
+"""The Muon optimiser: orthogonalised momentum steps for weight matrices."""
 
 from __future__ import annotations
 
@@ -8,32 +8,32 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-#: The polynomial whose iterates take singular values close to one.
+#: Coefficients of the polynomial whose iterates map singular values close to one.
 _QUINTIC = (3.4445, -4.7750, 2.0315)
 _ITERATIONS = 5
-#: Root mean square of AdamW's steps, over its rate: with it both take the same rates.
+#: Root mean square of AdamW's steps divided by its rate; it makes the rates comparable.
 _RMS = 0.2
-#: Layers with fewer channels than that on either side are left to AdamW, as the first and the last
-#: of the published nets.
+#: Layers with fewer channels on either side are trained by AdamW, such as the first and the
+#: last of the published nets.
 _LEAST = 8
 
 
 class Muon(torch.optim.Optimizer):
-    """Momentum whose steps are made orthogonal (Jordan et al. 2024, Liu et al. 2025).
+    """Momentum optimiser with orthogonalised steps (Jordan et al. 2024, Liu et al. 2025).
 
-    The kernels of a convolution count as a matrix with one row per output. Unlike
-    ``torch.optim.Muon`` it takes them as they are, and computes in their own precision, which
-    processors without bfloat16 need.
+    The kernels of a convolution are treated as a matrix with one row per output channel.
+    Unlike ``torch.optim.Muon``, it accepts tensors of more than two dimensions, and computes
+    in their own precision, as processors without bfloat16 need.
 
     Parameters
     ----------
     weights : iterable of Tensor
         Weights of two or more dimensions.
     lr : float
-        Rate, on the scale of AdamW's.
+        Learning rate, comparable to AdamW's.
     weight_decay, momentum : float
-        Share of the weights, over the rate, that each step takes away; share of the old steps
-        in each.
+        Decoupled weight decay: each step multiplies weights by 1 - lr * weight_decay. Decay of
+        the moving average of gradients.
 
     Examples
     --------
@@ -55,7 +55,7 @@ class Muon(torch.optim.Optimizer):
 
     @torch.no_grad()
     def step(self, closure: Any = None) -> None:  # type: ignore[override]
-        """Take a step along the gradients that the weights hold."""
+        """Take a step with the gradients stored in the weights."""
         for group in self.param_groups:
             rate, keep = group["lr"], group["momentum"]
             weights = [weight for weight in group["params"] if weight.grad is not None]
@@ -69,7 +69,7 @@ class Muon(torch.optim.Optimizer):
             torch._foreach_lerp_(means, gradients, 1.0 - keep)
             ahead = torch._foreach_lerp(gradients, means, keep)
             torch._foreach_mul_(weights, 1.0 - rate * group["weight_decay"])
-            # On a GPU those of one shape go together: starting its kernels takes longest.
+            # On a GPU, weights of equal shape are batched, because launching kernels dominates.
             alike: dict[object, list[int]] = {}
             for k, gradient in enumerate(ahead):
                 alike.setdefault(gradient.shape if gradient.is_cuda else k, []).append(k)
@@ -81,7 +81,7 @@ class Muon(torch.optim.Optimizer):
 
 
 def orthogonal(matrices: Tensor) -> Tensor:
-    """The nearest matrices (B, n, m) with orthonormal rows (or columns, if fewer), roughly.
+    """Approximate the nearest matrices (B, n, m) with orthonormal rows (or columns, if fewer).
 
     >>> values = torch.linalg.svdvals(orthogonal(torch.randn(3, 20, 50)))
     >>> bool((values > 0.5).all() and (values < 1.5).all())
@@ -91,7 +91,7 @@ def orthogonal(matrices: Tensor) -> Tensor:
     tall = matrices.shape[-2] > matrices.shape[-1]
     x = matrices.mT if tall else matrices
     x = x / x.norm(dim=(-2, -1), keepdim=True).clamp_min(1e-12)
-    # Of the iterates p(x x') x only the small factors before x are computed.
+    # Of the iterates p(x x') x, only the small square factors on the left of x are computed.
     square = x @ x.mT
     before = torch.eye(x.shape[-2], dtype=x.dtype, device=x.device)
     one = a * before
@@ -104,7 +104,7 @@ def orthogonal(matrices: Tensor) -> Tensor:
 
 
 def optimisers(net: nn.Module, kind: str, weight_decay: float) -> list[torch.optim.Optimizer]:
-    """What trains a net: Muon its matrices and AdamW the rest, or AdamW everything."""
+    """Make the optimisers of a net: Muon for matrices and AdamW for the rest, or only AdamW."""
     matrices: list[Tensor] = []
     rest: list[Tensor] = []
     for weight in net.parameters():

@@ -1,4 +1,4 @@
-"""What a phase of training minimises."""
+"""The objective of a phase of training."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from gso.net.data import Batch
 from gso.net.grids import planes
 from gso.tasks import developable, flatten
 
-#: Least size of a label's displacement that its misfit is divided by.
+#: Lower bound on the size of a label's displacement, by which the misfit is divided.
 _LEAST = 3e-3
-#: Least energy of a design that results are compared with.
+#: Lower bound on a design's energy, by which that of results is divided.
 _LEAST_ENERGY = 3e-5
 
 Cost = Callable[[Tensor], Tensor]
@@ -27,16 +27,16 @@ Term = Callable[[Tensor, Tensor], Tensor]
 
 
 class Objective(nn.Module):
-    """A net and its loss as one module, so that several processes share the backward pass."""
+    """A net and its loss as one module, as DistributedDataParallel needs it."""
 
     def __init__(self, net: Net):
         super().__init__()
         self.net = net
 
     def forward(self, batch: Batch, phase: Phase, progress: float) -> Tensor:
-        """Mean loss of a batch; `progress` runs from 0 to 1 within the phase."""
+        """Compute the mean loss of a batch; `progress` runs from 0 to 1 within the phase."""
         start = self.net.start(batch.surface)
-        # Each step is for one of the passes; those before it only make what it begins with.
+        # Steps train the passes in turn; earlier passes only compute the input of the last one.
         passes = 1 + batch.step % self.net.passes
         moved = self.net.displacements(batch.surface, batch.sigma, passes=passes)
         cost = _COSTS[phase.loss](self.net.task, batch, start, phase, progress)
@@ -60,11 +60,11 @@ def _published(task: str, batch: Batch, start: Tensor, phase: Phase, progress: f
 
 
 def _weighted(term: Callable[..., Tensor]) -> Term:
-    """A term of flat images with the weights of Eq. 13."""
+    """Return a term of flat images with the weights of Eq. 13."""
     return lambda flat, surface: term(surface, flat, losses.iso_weights(surface))
 
 
-#: Terms of the loss "published", of results and what they are compared with.
+#: Terms of the loss "published", as functions of results and of the surfaces compared with.
 _TERMS: dict[str, Term] = {
     "in": losses.inside,
     "fair": lambda result, _: losses.fair(result),
@@ -80,7 +80,7 @@ _TERMS: dict[str, Term] = {
 
 
 def _label(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
-    """Root mean square misfit over that of the start."""
+    """Return the root-mean-square distance to the label, divided by that of the start."""
     if batch.target is None:
         raise ValueError("a batch without labels")
     target = aligned(batch.target, start) if task == "flatten" else batch.target
@@ -126,7 +126,7 @@ _COSTS = {"published": _published, "label": _label, "energy": _energy, "clean": 
 
 
 def aligned(flat: Tensor, start: Tensor) -> Tensor:
-    """Flat images (B, H, W, 2), turned, mirrored and moved to lie closest to others."""
+    """Align flat images (B, H, W, 2) to `start` by the best rigid motion or reflection."""
     a, b = (x - x.mean(dim=(1, 2), keepdim=True) for x in (flat, start))
     middle = start.mean(dim=(1, 2), keepdim=True)
     u, _, vt = torch.linalg.svd(torch.einsum("bhwi,bhwj->bij", a, b))

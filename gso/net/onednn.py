@@ -1,10 +1,10 @@
-"""Convolutions of single grids on CPUs, by oneDNN itself.
+"""Convolutions of single grids on CPUs by direct calls of oneDNN.
 
-A single grid with few values PyTorch hands to a loop of its own, which takes up to twice the
-time of the oneDNN that it uses for all others; and that puts the weights in an order of its own
-at every call, which takes up to half the time. Here it gets all grids, and weights are kept in
-that order until they change; changes through ``weight.data`` are not seen before the next call of
-:func:`forget`, that is, of the module's ``eval()``.
+For a single small grid PyTorch uses its own loop, which takes up to twice the time of oneDNN,
+its backend for all other grids. Moreover, oneDNN reorders the weights at every call, which
+takes up to half the time. This module calls oneDNN for all single grids and caches the
+reordered weights until they change. Changes through ``weight.data`` are not detected; they
+take effect after :func:`forget`, which the module's ``eval()`` calls.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import conv2d, leaky_relu
 
-#: Whether PyTorch has oneDNN, and lets it be called.
+#: Whether PyTorch has oneDNN and exposes it.
 _CALLED = torch.backends.mkldnn.is_available() and hasattr(torch, "mkldnn_convolution")
-#: What puts weights into its order, what computes with them, and what adds to what is there.
+#: oneDNN operations: reorder weights, convolve with them, and convolve and add in place.
 _reordered: Any = getattr(torch._C._nn, "mkldnn_reorder_conv2d_weight", None)
 _convolved: Any = getattr(torch.ops.mkldnn, "_convolution_pointwise", None)
 _added: Any = getattr(getattr(torch.ops.mkldnn, "_convolution_pointwise_", None), "binary", None)
 
 
 class How(NamedTuple):
-    """How a convolution goes over its grid; by default 3 x 3, onto the same grid."""
+    """Parameters of a convolution; by default those of 3 x 3 kernels that keep the grid size."""
 
     padding: tuple[int, ...] = (1, 1)
     stride: tuple[int, ...] = (1, 1)
@@ -39,7 +39,7 @@ _SAME = How()
 
 
 class _Kept(NamedTuple):
-    """Weights in oneDNN's order, what they were made of and when, and for what grids."""
+    """Cache entry: reordered weights, their source tensors and versions, and the grid shape."""
 
     made_of: tuple[Tensor, ...]
     versions: tuple[int, ...]
@@ -47,12 +47,12 @@ class _Kept(NamedTuple):
     weights: tuple[Tensor, ...]
 
 
-#: By module, and not in it, where copies and files of nets would take them along.
+#: Cache by module. It is not stored in the module, where copies of nets would include it.
 _KEPT: WeakKeyDictionary[nn.Module, _Kept] = WeakKeyDictionary()
 
 
 def takes(x: Tensor, weight: Tensor) -> bool:
-    """Whether a grid (1, C, H, W) is for oneDNN although PyTorch might not give it to that."""
+    """Tell whether to call oneDNN directly for a grid (1, C, H, W)."""
     return (
         _CALLED
         and x.is_cpu
@@ -64,7 +64,7 @@ def takes(x: Tensor, weight: Tensor) -> bool:
 
 
 def keeps(module: nn.Module, *weights: Tensor) -> bool:
-    """Whether weights may be kept: outside of training, where they tell when they change."""
+    """Tell whether weights may be cached: not in training, and only if their version is known."""
     return reorders() and not module.training and not any(w.is_inference() for w in weights)
 
 
@@ -74,7 +74,10 @@ def kept(
     weights: Sequence[Tensor],
     make: Callable[..., tuple[Tensor, ...]],
 ) -> tuple[Tensor, ...]:
-    """What `make` makes of a module's weights for grids of a shape, made again when they change."""
+    """Return the cached result of `make` for a module's weights and a grid shape.
+
+    `make` is called again when the weights or the shape change.
+    """
     known = _KEPT.get(module)
     if (
         known is None
@@ -84,7 +87,7 @@ def kept(
             for old, version, w in zip(known.made_of, known.versions, weights, strict=True)
         )
     ):
-        # What they are made of is kept, too: no other weights can take its place in memory then.
+        # Keep the source tensors, so that no other weights can reuse their memory addresses.
         made_of = tuple(w.detach() for w in weights)
         versions = tuple(w._version for w in weights)
         known = _KEPT[module] = _Kept(made_of, versions, shape, make(*made_of))
@@ -92,12 +95,12 @@ def kept(
 
 
 def forget(module: nn.Module) -> None:
-    """Make a module's weights anew the next time."""
+    """Drop a module's cached weights."""
     _KEPT.pop(module, None)
 
 
 def reordered(weight: Tensor, shape: torch.Size, how: How = _SAME) -> Tensor:
-    """A weight in the order that suits grids of a shape."""
+    """Reorder a weight for grids of a shape."""
     return _reordered(weight.contiguous().to_mkldnn(), *how, shape)
 
 
@@ -108,19 +111,19 @@ def convolved(
     how: How = _SAME,
     leak: float | None = None,
 ) -> Tensor:
-    """A grid convolved by a reordered weight; with `leak`, and a LeakyReLU of that slope."""
+    """Convolve a grid with a reordered weight; `leak` is the slope of a LeakyReLU after it."""
     after = ("none", []) if leak is None else ("leaky_relu", [leak])
     return _convolved(x, weight, bias, *how, *after, "")
 
 
 def add_convolved(total: Tensor, x: Tensor, weight: Tensor) -> Tensor:
-    """Add a grid convolved by a reordered weight to `total`, which it changes."""
+    """Convolve a grid with a reordered weight and add the result to `total` in place."""
     return _added(total, x, weight, None, *_SAME, "add", None, None, [], None)
 
 
 @cache
 def reorders() -> bool:
-    """Whether this version of PyTorch has all that weights in that order need, and as here."""
+    """Tell whether this version of PyTorch supports reordered weights, by a small computation."""
     if not _CALLED:
         return False
     weight = -torch.ones(4, 4, 3, 3, device="cpu")

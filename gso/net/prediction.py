@@ -1,4 +1,4 @@
-"""Nets at work: surfaces in their own unit and position in, results out."""
+"""Application of nets to surfaces in any unit of length and position."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 #: Smallest side of a grid that is resampled to the size of the nets.
 SMALLEST = 4
-#: Surfaces that go through a net together.
+#: Number of surfaces per batch.
 _BATCH = 64
 
 
@@ -37,14 +37,14 @@ def predict(
     sigma: float | None = None,
     device: str | None = None,
 ) -> Array:
-    """Let a net make surfaces developable, flatten or denoise them.
+    """Make surfaces developable, flatten or denoise them with a net.
 
-    Surfaces are moved and scaled to the unit ball and back. The nets are trained on 64 x 64
-    vertices; other grids are resampled to that by cubic splines, and the displacements are
-    carried back to the grid's own vertices: by evaluating their spline there (the default
-    nets), or by cubic interpolation. For "denoise" grids with more vertices are averaged to that
-    number, and what becomes of it interpolated, without details between its vertices; ones with
-    fewer are continued beyond their border.
+    Surfaces are normalised to the unit ball, and results are transformed back. The nets are
+    trained on 64 x 64 vertices. Other grids are resampled to that size by cubic splines, and
+    the displacements are carried back to the grid's vertices: by evaluating their spline
+    there (the default nets), or by cubic interpolation. For "denoise", larger grids are
+    averaged to that size and the result is interpolated, without details between its
+    vertices; smaller grids are extended beyond their border.
 
     Parameters
     ----------
@@ -55,25 +55,25 @@ def predict(
         What to do.
     model : str, path or Net, optional
         Name of a net that comes with the package (:func:`gso.net.available`), a
-        .safetensors file, or a net; the task's default when not given.
+        .safetensors file, or a net; the task's default net by default.
     repeat : int
-        How often the last net is applied, each time to what it made before; surfaces are
-        normalised anew. Only where surfaces come out.
+        How often the last net is applied, each time to its previous result, normalised anew.
+        Not for "flatten".
     passes : int, optional
-        At most so many passes: the default nets correct their own results a few times, and
-        take time in proportion. All of a net's when not given.
+        Largest number of passes; all of a net's by default. The default nets correct their own
+        results in a few passes, and their time is proportional to the number.
     sigma : float, optional
-        "denoise": standard deviation of the noise, in the unit of the input; estimated for
-        each surface when not given (:func:`gso.smoothing.estimate_sigma`). Nets that are not
-        told ignore it.
+        "denoise": standard deviation of the noise, in the unit of the input; by default it is
+        estimated for each surface (:func:`gso.smoothing.estimate_sigma`). Nets without a noise
+        input ignore it.
     device : str, optional
-        "cpu", "cuda" ...; where there is a GPU, that when not given.
+        "cpu", "cuda" ...; by default the GPU if there is one.
 
     Returns
     -------
     ndarray of float64
-        (..., H, W, 3), or (..., H, W, 2) for "flatten": in the unit of the input, with its
-        centre at the origin.
+        Surfaces (..., H, W, 3) in the unit and position of the input, or flat images
+        (..., H, W, 2) for "flatten", in the unit of the input and centred at the origin.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def predict(
 def _denoised(
     batch: Array, nets: list[Net], passes: int | None, sigma: float | None, device: str
 ) -> Array:
-    """As :func:`_predicted`, of grids of any size as :mod:`gso.net.denoising` has them."""
+    """Predict for noisy grids of any size, which :mod:`gso.net.denoising` converts."""
     height, width = batch.shape[1:3]
     if (height, width) == (SIZE, SIZE):
         return _predicted(batch, nets, passes, sigma, device)
@@ -184,7 +184,7 @@ def _device(device: str | None) -> str:
 
 
 def _checked(surface: Any) -> Array:
-    """Grids as an array, or a message that says what is wrong with them."""
+    """Return grids as an array, or raise a MeshError that says what is wrong."""
     try:
         points = np.asarray(surface, dtype=np.float64)
     except (TypeError, ValueError):
@@ -208,8 +208,8 @@ def _checked(surface: Any) -> Array:
 
 
 def _normalised(batch: Array) -> tuple[Array, Array, Array]:
-    """Grids of the unit ball, their centroids (B, 1, 1, 3) and radii (B, 1, 1, 1)."""
-    # About the first vertex, so that grids far from the origin lose no digits.
+    """Normalise grids to the unit ball; return them, centroids and radii (B, 1, 1, 3 or 1)."""
+    # Relative to the first vertex, so that grids far from the origin lose no digits.
     origin = batch[:, :1, :1]
     local = batch - origin
     middle = local.mean(axis=(1, 2), keepdims=True)
@@ -220,21 +220,21 @@ def _normalised(batch: Array) -> tuple[Array, Array, Array]:
 
 
 def _resampled(unit: Array) -> Array:
-    """Grids at the size of the nets."""
+    """Resample grids to the size of the nets."""
     if unit.shape[1:3] == (SIZE, SIZE):
         return unit
     return np.stack([resample(grid, SIZE, SIZE) for grid in unit])
 
 
 def _told(net: Net) -> bool:
-    """Whether a net is told how strong the noise is."""
+    """Tell whether the noise level is an input of a net."""
     return bool(getattr(net, "sigma", False))
 
 
 def _sigma(
     net: Net, unit: Array, scale: Array, sigma: float | Array | None, device: str
 ) -> torch.Tensor | None:
-    """Noise of each surface in the unit ball, (B,)."""
+    """Return the noise (B,) of each surface in the unit ball, None if the net does not use it."""
     if not _told(net):
         return None
     if sigma is not None:

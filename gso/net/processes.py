@@ -1,4 +1,4 @@
-"""The processes of a run, as torchrun starts them; one without it."""
+"""The processes of a training run: those started by torchrun, or a single one."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from gso.status import OptionError
 
 @dataclass(frozen=True)
 class Processes:
-    """A process among those of a run.
+    """One process of a run, and its communication with the others.
 
     Attributes
     ----------
     rank, world : int
-        Its number, and how many there are.
+        Number of this process, and number of processes.
     device : torch.device
-        What it computes on.
+        Device of this process.
     """
 
     rank: int
@@ -33,11 +33,11 @@ class Processes:
 
     @property
     def first(self) -> bool:
-        """Whether it is the one that writes files."""
+        """Whether this is the process that writes files (rank 0)."""
         return self.rank == 0
 
     def agreed(self, value: float) -> float:
-        """A number of the first process, in all of them."""
+        """Broadcast a number from the first process to all."""
         if self.world == 1:
             return value
         shared = torch.tensor([value], dtype=torch.float64, device=self.device)
@@ -45,7 +45,7 @@ class Processes:
         return float(shared)
 
     def summed(self, value: torch.Tensor) -> torch.Tensor:
-        """The sum of what all processes have, in all of them."""
+        """Sum a tensor over all processes; every process gets the sum."""
         if self.world == 1:
             return value
         shared = value.to(self.device)
@@ -53,14 +53,17 @@ class Processes:
         return shared.to(value.device)
 
     def wait(self) -> None:
-        """Until all are here."""
+        """Wait for all processes (barrier)."""
         if self.world > 1:
             distributed.barrier()
 
 
 @contextmanager
 def interruption() -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C was pressed since; a second one interrupts at once."""
+    """Defer Ctrl-C: provide a function that tells whether it was pressed.
+
+    A second Ctrl-C interrupts at once.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield lambda: False
         return
@@ -80,7 +83,7 @@ def interruption() -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def processes(device: str | None = None) -> Iterator[Processes]:
-    """Join the other processes for the length of a run.
+    """Join the process group of torchrun, if there is one, for the duration of a block.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Grids at another resolution, and splines on grids, as products of matrices."""
+"""Spline fields and resampling of grids in torch, as matrix products."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from gso.variables.spline import spline_matrix
 @lru_cache(maxsize=64)
 def _basis(samples: int, controls: int, dtype: torch.dtype, device: torch.device) -> Tensor:
     matrix = spline_matrix(samples, controls).toarray()
-    # It outlives the call: made in inference mode, it would be of no use in training.
+    # The cached tensor may be used in training, so it must not be an inference tensor.
     with torch.inference_mode(False):
         return torch.tensor(matrix, dtype=dtype, device=device)
 
 
 def spline_field(coefficients: Tensor, height: int, width: int) -> Tensor:
-    """Values (B, c, height, width) of clamped bicubic splines with coefficients (B, c, n, m).
+    """Evaluate clamped bicubic splines, coefficients (B, c, n, m), as (B, c, height, width).
 
     The basis is that of :func:`gso.variables.spline.tensor_matrix`.
 
@@ -35,7 +35,7 @@ def spline_field(coefficients: Tensor, height: int, width: int) -> Tensor:
 
 
 def resampled(values: Tensor, height: int, width: int) -> Tensor:
-    """Values (B, H, W, d) of grids, interpolated to (B, height, width, d) by cubic splines."""
+    """Interpolate values (B, H, W, d) to (B, height, width, d) by cubic splines, on the CPU."""
     if values.shape[1:3] == (height, width):
         return values
     each = values.detach().cpu().double().numpy()

@@ -1,4 +1,4 @@
-"""A run: everything that changes in it, how it begins, what it leaves in its folder."""
+"""The state of a training run: how it is started or resumed, and the files that it writes."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ from gso.status import OptionError
 CHECKPOINT, MODEL = "checkpoint.safetensors", "model.safetensors"
 #: Seed of the noise that validation adds.
 _NOISE = 7
-#: Surfaces that a process passes through another net before the next one's turn.
+#: Number of surfaces per block when the processes apply another net to the surfaces.
 _BLOCK = 64
-#: Told what is counted, how many there are, and how many there will be.
+#: Progress callback: (name of the counted items, number done, total number).
 Tick = Callable[[str, int, int], None]
 
 
 @dataclass
 class Run:
-    """Everything of a run that changes."""
+    """The complete state of a training run."""
 
     config: Config
     folder: Path
@@ -59,13 +59,13 @@ class Run:
 
     @property
     def progress(self) -> float:
-        """Share of the run that is done; the same in all processes."""
+        """Completed fraction of the run; it is the same in all processes."""
         if self.limit is None:
             return self.step / self.config.steps
         return self.here.agreed(self.spent / self.limit)
 
     def follow(self) -> None:
-        """Take the moving average of the weights a step on."""
+        """Update the moving average of the weights."""
         decay = min(self.config.ema, (1 + self.step) / (10 + self.step))
         with torch.no_grad():
             means: list[Tensor] = list(self.average.parameters())
@@ -73,7 +73,7 @@ class Run:
             torch._foreach_lerp_(means, values, 1.0 - decay)
 
     def keep(self) -> None:
-        """Write a checkpoint."""
+        """Write a checkpoint, in the first process only."""
         if self.here.first:
             state = {
                 "step": self.step,
@@ -85,11 +85,11 @@ class Run:
             checkpoint.save(path, self.net, self.average, self.optimisers, state)
 
     def same(self) -> dict[str, Any]:
-        """What must be the same when the run is taken up."""
+        """Return the values that must be unchanged when the run is resumed."""
         return {"config": _kept(self.config), "data": self.origin["data"], "limit": self.limit}
 
     def validate(self) -> None:
-        """Measure the averaged net, and write it with its card."""
+        """Compute validation metrics of the averaged net, and write it with its card."""
         if self.here.first:
             surfaces, truths, sigma = self.check
             results = applied(self.average.eval(), surfaces, sigma)
@@ -115,7 +115,7 @@ class Run:
 
     @property
     def _goes_on(self) -> bool:
-        """Whether it begins with the weights of an earlier run of the same net."""
+        """Whether the run starts from the weights of an earlier run of the same net."""
         return self.begun_with.get("name") == self.config.name
 
     @property
@@ -123,7 +123,7 @@ class Run:
         return float(self.begun_with.get("hours", 0.0)) if self._goes_on else 0.0
 
     def _curve(self) -> list[list[float]]:
-        """Hours and the figure that nets are judged by, of earlier runs of this net, too."""
+        """Return rows of hours and validation score, including earlier runs of this net."""
         name = SCORE[self.config.task]
         curve = list(self.begun_with.get("curve", [])) if self._goes_on else []
         for row in read(self.folder):
@@ -133,13 +133,13 @@ class Run:
         return curve
 
     def close(self) -> None:
-        """Finish the curves."""
+        """Close the training curves."""
         if self.curves is not None:
             self.curves.close()
 
 
 def _kept(config: Config) -> dict[str, Any]:
-    """What must be the same when a run is taken up: all but how often it is looked at."""
+    """Return the settings that must be unchanged on resuming: all but those of monitoring."""
     rest = config.as_dict()
     for name in ("validate_every", "checkpoint_every", "validate"):
         del rest[name]
@@ -154,7 +154,7 @@ def begin(
     here: Processes,
     tick: Tick | None,
 ) -> Run:
-    """A new run, or the one that is there."""
+    """Start a new run, or resume the one in `folder` from its checkpoint."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -170,7 +170,7 @@ def begin(
     average.bf16 = False
     cache = folder / f"fresh-{config.seed}.npy"
     if here.first:
-        # The other processes read what the first one draws.
+        # The first process draws fresh surfaces; the others read them from its cache file.
         source = open_source(config, data, cache, tick)
     here.wait()
     if not here.first:
@@ -211,7 +211,7 @@ def begin(
 
 
 def _take(net: Net, other: Net, name: str) -> None:
-    """Begin with the weights of another net."""
+    """Initialise a net with the weights of another net of the same kind."""
     if other.settings.keys() != net.settings.keys() or type(other) is not type(net):
         raise OptionError(f"init: {name} is a net of another kind")
     try:
@@ -221,7 +221,7 @@ def _take(net: Net, other: Net, name: str) -> None:
 
 
 def _other(config: Config, word: str, here: Processes) -> Net | None:
-    """Another net that the configuration names, for the same task."""
+    """Load the net that the configuration names under `word`; it must have the same task."""
     name = getattr(config, word)
     if not name:
         return None
@@ -232,7 +232,7 @@ def _other(config: Config, word: str, here: Processes) -> Net | None:
 
 
 def _sizes_fit(config: Config, net: Net, source: Source) -> None:
-    """Refuse strides that leave grids which the net cannot take."""
+    """Reject strides for which the number of vertices does not suit the net."""
     size = source.surfaces.shape[1]
     for phase in config.phases:
         left = -(-size // phase.stride)
@@ -244,9 +244,9 @@ def _sizes_fit(config: Config, net: Net, source: Source) -> None:
 
 
 def _pass_through(run: Run, net: Net, tick: Tick | None) -> None:
-    """What another net makes of the surfaces takes their place, normalised anew.
+    """Replace the surfaces by another net's results, normalised to the unit ball.
 
-    The designs follow: they lie to the new surfaces as they lay to the net's results.
+    The designs undergo the same similarity transform as the results.
     """
 
     def done(surfaces: Tensor) -> tuple[Tensor, Tensor]:
@@ -260,7 +260,7 @@ def _pass_through(run: Run, net: Net, tick: Tick | None) -> None:
 
 
 def _results(net: Net, surfaces: Tensor, here: Processes, tick: Tick | None, what: str) -> Tensor:
-    """Results (n, H, W, d) of a net, to which each process does its share."""
+    """Compute the results (n, H, W, d) of a net; the processes share the work."""
     out = torch.zeros(*surfaces.shape[:3], TASKS[net.task])
     for start in range(here.rank * _BLOCK, len(surfaces), here.world * _BLOCK):
         block = slice(start, start + _BLOCK)
@@ -271,7 +271,7 @@ def _results(net: Net, surfaces: Tensor, here: Processes, tick: Tick | None, wha
 
 
 def _validation(config: Config, data: Path) -> tuple[Tensor, Tensor, Tensor | None]:
-    """Surfaces that a net sees, what they are compared with, and their noise."""
+    """Return input surfaces for validation, the surfaces to compare with, and the noise."""
     split = dataset.open(data)["validation"]
     clean = normalise(torch.from_numpy(split["surface"][: config.validate])).float()
     if config.task != "denoise":
@@ -280,7 +280,7 @@ def _validation(config: Config, data: Path) -> tuple[Tensor, Tensor, Tensor | No
 
 
 def _fast(device: torch.device) -> bool:
-    """Whether bfloat16 is fast on a device."""
+    """Tell whether convolutions in bfloat16 pay off on a device."""
     if device.type == "cuda":
         return torch.cuda.is_bf16_supported()
     known = getattr(torch.cpu, "_is_avx512_bf16_supported", lambda: False)
@@ -288,7 +288,7 @@ def _fast(device: torch.device) -> bool:
 
 
 def _origin(data: Path, here: Processes) -> dict[str, Any]:
-    """Data, packages and hardware, for the card."""
+    """Describe data, package versions and hardware, for the card."""
     manifest = dataset.open(data).manifest
     hardware = platform.processor() or platform.machine()
     if here.device.type == "cuda":

@@ -1,4 +1,4 @@
-"""Where a run is: which phase, how far into it, at what learning rate."""
+"""Schedule of a run: phase, progress within the phase, and learning rate."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 from gso.net.config import Phase
 
-#: Share of the run over which the rate rises in the beginning.
+#: Fraction of the run over which the learning rate is warmed up.
 _WARM_UP = 0.01
 
 
 class Place(NamedTuple):
-    """A phase, its number, the progress within it from 0 to 1, and the learning rate."""
+    """Position in a run: number of the phase, phase, progress in it (0 to 1), learning rate."""
 
     number: int
     phase: Phase
@@ -22,7 +22,7 @@ class Place(NamedTuple):
 
 
 def place(phases: Sequence[Phase], progress: float) -> Place:
-    """Where a run is at a progress from 0 to 1.
+    """Return the position in a run at a progress from 0 to 1.
 
     >>> at = place([Phase(weights={"gc": 1.0}), Phase("energy", share=3.0, rate=0.5)], 0.25)
     >>> at.number, at.progress, at.rate

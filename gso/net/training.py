@@ -1,4 +1,4 @@
-"""Train a net: a loop that can be killed anywhere and goes on where it was."""
+"""Training of nets in a loop that can be interrupted and resumed."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from gso.status import OptionError
 
 __all__ = ["MODEL", "Report", "train"]
 
-#: Steps between two entries of the loss.
+#: Number of steps between two records of the loss.
 _REPORT = 20
 
 
 class Report(NamedTuple):
-    """How a run is going.
+    """Progress report of a run.
 
     Attributes
     ----------
     step : int
-        Steps done.
+        Number of steps done.
     progress : float
-        Share of the run that is done.
+        Completed fraction of the run.
     left : float
-        Seconds that are left, at the mean speed so far.
+        Estimated remaining seconds, from the mean speed so far.
     loss : float
         Mean loss of the last steps.
     figures : dict of str to float
-        Metrics on validation surfaces, when last measured.
+        Metrics of the last validation.
     """
 
     step: int
@@ -60,28 +60,29 @@ def train(
     show: Callable[[Report], None] | None = None,
     tick: Tick | None = None,
 ) -> dict[str, Any]:
-    """Train a net, or go on with a run that was ended.
+    """Train a net, or resume an interrupted run.
 
-    ``out/model.safetensors`` is the net with its card, renewed at each validation; a killed
-    run goes on from its last checkpoint, and ends with the same weights if it counts steps
-    and not minutes. Under ``torchrun`` each step's surfaces are shared among the processes.
+    The net is written to ``out/model.safetensors``, with its card, at each validation. A killed
+    run resumes from its last checkpoint. It ends with the same weights if its length is given
+    in steps, not in minutes. Under ``torchrun`` the processes share the surfaces of each step.
 
     Parameters
     ----------
     config : Config
-        What to do; see :func:`gso.net.config.read`.
+        Configuration; see :func:`gso.net.config.read`.
     data : path
-        Set of surfaces with the splits train and validation.
+        Dataset with the splits train and validation.
     out : path
         Folder of the run.
     minutes : float, optional
-        Length of the run, validation included; instead of the configuration's steps.
+        Length of the run including validation; it replaces the configuration's steps.
     device : str, optional
-        "cpu", "cuda" ...; where there is a GPU, that when not given.
+        "cpu", "cuda" ...; by default the GPU if there is one.
     show : callable, optional
-        Given a :class:`Report` now and then.
+        Callback that gets a :class:`Report` from time to time.
     tick : callable, optional
-        Told what is counted before training, how many there are, how many there will be.
+        Progress callback for the preparation, called with the name of the counted items, the
+        number done and the total number.
 
     Returns
     -------
@@ -91,11 +92,12 @@ def train(
     Raises
     ------
     OptionError
-        The configuration does not fit, or `out` holds a run with another one.
+        The configuration is inconsistent, or `out` holds a run with another configuration,
+        dataset or number of minutes.
     DatasetError
-        The set cannot be read or lacks what is to be learnt.
+        The dataset cannot be read or lacks the labels.
     WeightsError
-        The checkpoint or a net to begin with is damaged.
+        The checkpoint, or a net named by the configuration, is missing or damaged.
     """
     if minutes is not None and not minutes > 0:
         raise OptionError(f"minutes is {minutes!r}; it must be positive")
@@ -132,7 +134,7 @@ def _loop(run: Run, show: Callable[[Report], None] | None, interrupted: Callable
         loss = objective(batch, at.phase, at.progress)
         loss.backward()
         norm = torch.nn.utils.clip_grad_norm_(run.net.parameters(), at.phase.clip)
-        # A surface without a finite gradient costs one step, and not the run.
+        # A step with a non-finite gradient is skipped; it must not spoil the run.
         if bool(norm.isfinite()):
             for optimiser in run.optimisers:
                 optimiser.step()

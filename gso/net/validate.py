@@ -1,4 +1,4 @@
-"""Figures of a net on surfaces that it was not trained on."""
+"""Validation metrics of a net, on surfaces that it was not trained on."""
 
 from __future__ import annotations
 
@@ -13,16 +13,15 @@ from gso.mesh import Mesh
 
 Array = NDArray[np.float64]
 
-#: What a net is judged by while it is trained; lower is better.
+#: The main validation metric of each task; lower is better.
 SCORE = {"developable": "score", "flatten": "strain_mean", "denoise": "theta"}
 
 
 def figures(task: str, before: Array, result: Array) -> dict[str, float]:
-    """Metrics of one result; for "denoise" `before` is the surface without noise.
+    """Compute metrics of one result; for "denoise" `before` is the surface without noise.
 
-    "score" weighs what is left of the curvature, by the worse triangulation, against the
-    distance as the published figures of Net-CF do: each counts as much as a tenth of its own
-    figure.
+    "score" is the sum of 1 - K_A_r_worst, d_H and loss_gc_worst, each divided by the
+    published value of Net-CF.
     """
     if task == "denoise":
         return {"theta": metrics.normal_angle(before, result)}
@@ -50,7 +49,7 @@ def figures(task: str, before: Array, result: Array) -> dict[str, float]:
 
 
 def mean_figures(task: str, befores: Array, results: Array) -> dict[str, float]:
-    """Means of :func:`figures` over surfaces; for "flatten" also the share without flips."""
+    """Average :func:`figures` over surfaces; for "flatten" add the fraction without flips."""
     rows = [figures(task, a, b) for a, b in zip(befores, results, strict=True)]
     out = {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
     if task == "flatten":
@@ -62,7 +61,7 @@ def mean_figures(task: str, befores: Array, results: Array) -> dict[str, float]:
 def applied(
     net: Any, surfaces: torch.Tensor, sigma: torch.Tensor | None = None, *, batch: int = 32
 ) -> Array:
-    """Results (n, H, W, d) of a net for surfaces of the unit ball, on its own device."""
+    """Apply a net on its device to surfaces in the unit ball; return results (n, H, W, d)."""
     device = next(net.parameters()).device
     out = []
     for k in range(0, len(surfaces), batch):

@@ -1,4 +1,4 @@
-"""Nets in files: safetensors beside a JSON card that says what it is and where it is from."""
+"""Files of nets: weights as safetensors, with a JSON card that describes net and training."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from gso.status import GSOError, OptionError, WeightsError
 
 #: Kinds of nets, as cards and configurations name them.
 KINDS: dict[str, type[Net]] = {"coarse": CoarseNet, "gsonet": GSONet}
-#: Largest file that is read: far more than any net of this package has.
+#: Size limit of files in bytes, far above that of any net of this package.
 _LARGEST = 1 << 30
 
 
 def make(settings: dict[str, Any]) -> Net:
-    """A new net from ``{"kind": ..., "task": ..., ...}``.
+    """Make a new net from ``{"kind": ..., "task": ..., ...}``.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def make(settings: dict[str, Any]) -> Net:
 
 
 def kind_of(net: Net) -> str:
-    """Kind of a net, as cards name it."""
+    """Return the kind of a net, as cards name it."""
     return next(name for name, cls in KINDS.items() if type(net) is cls)
 
 
@@ -65,11 +65,11 @@ def save(
     Parameters
     ----------
     net : Net
-        The net; what is written is on the CPU.
+        The net, on any device.
     path : path
-        The .safetensors file; the card is beside it, with the suffix .json.
+        The .safetensors file; the card is written beside it with the suffix .json.
     card : dict, optional
-        What else the card says: data, configuration, hardware, metrics.
+        Further entries of the card: data, configuration, hardware, metrics.
     dtype : torch.dtype
         Type of the numbers in the file.
 
@@ -103,7 +103,7 @@ def write_card(path: Path, card: dict[str, Any]) -> None:
 
 
 def load(model: str | PathLike[str], *, device: str | torch.device = "cpu") -> Net:
-    """A net, ready to be used; files are never executed.
+    """Load a net in evaluation mode; no code in the files is executed.
 
     Parameters
     ----------
@@ -111,13 +111,13 @@ def load(model: str | PathLike[str], *, device: str | torch.device = "cpu") -> N
         Name of a net that comes with the package (see :func:`available`), or a
         .safetensors file with its card beside it.
     device : str or torch.device
-        Where it is to be.
+        Device of the net.
 
     Raises
     ------
     WeightsError
-        The file is missing, damaged, not the one that its card belongs to, or holds
-        another net.
+        The file or its card is missing or damaged, they do not belong together, or the file
+        does not hold the net that the card describes.
     """
     path = located(model)
     card = read_card(path)
@@ -135,17 +135,17 @@ def load(model: str | PathLike[str], *, device: str | torch.device = "cpu") -> N
 
 
 def placed(net: Net, device: str | torch.device) -> Net:
-    """The net on a device, its weights laid out as convolutions like them best."""
+    """Move a net to a device, with weights in the channels-last memory format."""
     return net.to(device=device, memory_format=torch.channels_last)  # type: ignore[call-overload]
 
 
 def _filled(settings: dict[str, Any], data: bytes, path: Path) -> Net:
-    """A net with the numbers of a file."""
+    """Make a net with the weights of a file."""
     from safetensors import SafetensorError
     from safetensors.torch import load as unpacked
 
     try:
-        # Without memory: what the card claims is compared with the file before any is taken.
+        # On the meta device, which allocates no memory: compare the card with the file first.
         with torch.device("meta"):
             shapes = {k: v.shape for k, v in make(settings).state_dict().items()}
         tensors = unpacked(data)
@@ -162,7 +162,7 @@ def _filled(settings: dict[str, Any], data: bytes, path: Path) -> Net:
 
 
 def cached(path: Path, device: str) -> Net:
-    """:func:`load`, once for each version of a file."""
+    """Load a net with :func:`load`, and cache it by path, device and modification time."""
     try:
         stamp = path.stat().st_mtime_ns
     except OSError:
