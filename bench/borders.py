@@ -1,14 +1,14 @@
-"""What the developable task does to borders, edges, symmetry and folds, on designs of our own.
+"""Borders, edges, symmetry and folds of developable results, on designs of our own.
 
     python bench/borders.py                       balanced, all designs (a minute)
     python bench/borders.py holes symmetric       some of them
     python bench/borders.py --preset accurate     fast, balanced, accurate or isometry
     python bench/borders.py --seed 1              surfaces of another seed
 
-Loops and edges are lengths out over in: the smallest and the largest of the boundary loops,
-and the smallest of the edges. Asymmetry is a share of the diagonal, distances are percent of
-it, folds the largest angle between two faces that share an edge, in degrees. No fold, no
-symmetry and no distance is anything that the solver sees.
+Loops and edges are ratios of lengths, result over design: the smallest and the largest ratio of
+the boundary loops, and the smallest of the edges. Asymmetry is a share of the diagonal, distances
+are percent of the diagonal, and folds the largest angle between two faces that share an edge, in
+degrees. The solver minimises none of folds, asymmetry and distances directly.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def solved(mesh: gso.Mesh, preset: str) -> gso.Mesh:
 
 
 def figures(design: designs.Design, after: gso.Mesh) -> list[Any]:
-    """A row of the table, without the time."""
+    """Figures of a table row, without the time."""
     before = design.mesh
     loops, edges = metrics.loop_ratios(before, after), metrics.edge_ratios(before, after)
     true = metrics.surface_distance(before, after)
@@ -70,7 +70,7 @@ def figures(design: designs.Design, after: gso.Mesh) -> list[Any]:
 
 
 def borders(kind: str, preset: str, seed: int) -> list[list[Any]]:
-    """Print the table of one kind of design; its rows."""
+    """Print the table of one kind of design and return its rows."""
     rows: list[list[Any]] = []
     for design in progress(KINDS[kind](seed), f"{kind} {preset}"):
         start = time.perf_counter()

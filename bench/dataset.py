@@ -1,11 +1,11 @@
-"""Compare a set of surfaces with the one whose statistics are in the repository.
+"""Compare the statistics of a set of surfaces with those in the repository.
 
     gso dataset build --n 10401 --seed 0 -o DIR     makes the set
     python bench/dataset.py DIR                     compares it; exit code 1 if they differ
     python bench/dataset.py DIR --write             replaces the statistics
 
-Surfaces are those of the seed on every machine. The labels differ in their last digits
-between machines and versions, which the tolerance of two percent covers.
+The surfaces depend on the seed only. The labels differ in their last digits between machines
+and versions; the tolerance of two percent covers these differences.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ COMMITTED = Path(__file__).resolve().parent / "data" / "dataset_manifest.json"
 
 
 def main() -> None:
-    """Compare, or write."""
+    """Compare the statistics, or replace them."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,15 +1,15 @@
-"""What a net's start is worth to the optimiser.
+"""Time and energy of the optimiser with a warm start from a net, against a cold start.
 
     python bench/hybrid.py                    everything (an hour on two cores)
     python bench/hybrid.py speed -n 16        one section, on fewer surfaces
     python bench/hybrid.py --plot FILE        the curve of the section "anytime"
 
-Sections: "speed", cold and hybrid on the same surfaces, one after the other; "sizes", the
-same on finer and coarser grids, by which the command line chooses; "guard", the
-energy against the cold solve's on the whole test split and the hard one; "general", the
-same on triangulated patches in random order, some with a hole; "anytime", quality against
-time. Surfaces are those of the test split, which no net has seen: they follow from the
-seed, or are read from a set (``--data``).
+Sections: "speed", cold and hybrid solves of the same surfaces, one after the other; "sizes", the
+same on finer and coarser grids, from which the thresholds of ``gso.hybrid.worth`` were chosen;
+"guard", the energy relative to the cold solve's on the whole splits test and hard; "general", the
+same on triangulated patches in random order, some with a hole; "anytime", quality against time.
+The surfaces are those of the test split, which no net was trained on. They are drawn again from
+the seed, or read from a set (``--data``).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-# What a machine of two cores has when nothing is said.
+# The default on a machine of two cores.
 os.environ.setdefault("OMP_NUM_THREADS", "2")
 
 import numpy as np
@@ -41,7 +41,7 @@ from gso.resample import resample
 from gso.tno import Start, optimize
 from gso.tno.pool import spread
 
-#: What is compared: task and keywords.
+#: Cases that are compared: task and keywords.
 CASES = {
     "balanced": ("developable", {}),
     "accurate": ("developable", {"options": "accurate"}),
@@ -49,20 +49,20 @@ CASES = {
     "strain": ("flatten", {}),
     "lengths": ("flatten", {"formulation": "lengths"}),
 }
-#: Iterations at which the curve has points.
+#: Numbers of iterations at which the curve of the section "anytime" has points.
 POINTS = (0, 1, 2, 3, 4, 6, 8, 12, 18, 24)
 #: Vertices along the sides of the section "sizes", and the presets compared there.
 SIZES, PRESETS = (32, 64, 128, 256), ("balanced", "accurate")
-#: Share by which the sections "guard" and "general" stretch designs along x, to see how far apart
-#: the cold solves of two designs end that nobody can tell apart.
+#: Share by which the sections "guard" and "general" stretch designs along x, to measure how much
+#: the cold solves of two practically equal designs differ.
 STRETCH = 1e-6
 _STRETCHED = f"cold, its input stretched by {STRETCH:g}"
-#: Holes of the general meshes, as shares of the side; every other one has none.
+#: Side of the hole in general meshes, as a share of the mesh's side; every other mesh has no hole.
 HOLES = (0.0, 0.15)
 
 
 def timed(function: Callable[..., Any], *given: Any, **keywords: Any) -> tuple[Any, float]:
-    """Result and milliseconds of a call."""
+    """Call a function and return its result and the milliseconds."""
     start = time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", gso.ConvergenceWarning)
@@ -71,12 +71,12 @@ def timed(function: Callable[..., Any], *given: Any, **keywords: Any) -> tuple[A
 
 
 def first(surfaces: Surfaces, count: int) -> list[np.ndarray]:
-    """The first surfaces of a split."""
+    """Return the first surfaces of a split."""
     return [surfaces[k] for k in range(min(count, len(surfaces)))]
 
 
 def energy(result: gso.Result) -> float:
-    """What the solve minimised."""
+    """Return the final value of the objective."""
     return sum(result.energy.values())
 
 
@@ -87,10 +87,10 @@ def compared(
     workers: int | None = 0,
     stretched: bool = False,
 ) -> dict[str, np.ndarray]:
-    """Cold and hybrid on every design: milliseconds, energies, and which were started by a net.
+    """Solve every design cold and hybrid: milliseconds, energies, and which used the net's start.
 
-    Times mean something without workers only. When asked for, also energies of cold solves of
-    the stretched designs, which show how far such minima lie apart by chance.
+    Times are meaningful with ``workers=0`` only. With `stretched`, the energies of cold solves of
+    the stretched designs are included; they show how much such minima differ by chance.
     """
     rows = []
     solved = partial(_solved, task, keywords, stretched)
@@ -122,13 +122,13 @@ def _solved(task: str, keywords: dict[str, Any], stretched: bool, design: Any) -
 
 
 def ratios(energies: np.ndarray) -> str:
-    """Energies over the cold solve's, in words."""
+    """Summarise energies relative to the cold solve's."""
     shares = ", ".join(f"{(energies <= most).mean():.2%} <= {most}" for most in (1.01, 1.05))
     return f"median {np.median(energies):.4f}, {shares}, worst {energies.max():.4f}"
 
 
 def costs(found: dict[str, np.ndarray]) -> str:
-    """Times and energies, cold and hybrid, in words."""
+    """Summarise times and energies, cold and hybrid."""
     share = np.median(found["hybrid"] / found["cold"])
     return (
         f"cold {np.median(found['cold']):6.0f}  hybrid {np.median(found['hybrid']):6.0f} "
@@ -138,7 +138,7 @@ def costs(found: dict[str, np.ndarray]) -> str:
 
 
 def speed(test: Surfaces, count: int) -> None:
-    """Time and energy, cold and from the net's result."""
+    """Print time and energy, cold and from the net's result."""
     chosen = first(test, count)
     print(
         f"\nSpeed: medians over {len(chosen)} surfaces, milliseconds; energies over the cold ones"
@@ -147,7 +147,7 @@ def speed(test: Surfaces, count: int) -> None:
         if DEFAULTS[task] not in available(task):
             print(f"  {name:10s} no net comes with the package")
             continue
-        compared(chosen[:2], task, keywords)  # what is made at first use only
+        compared(chosen[:2], task, keywords)  # imports and code generation of the first use
         found = compared(watched(chosen, name), task, keywords)
         print(f"  {name:10s} {costs(found)}", flush=True)
     denoised = [timed(optimize, p, task="denoise")[1] for p in chosen]
@@ -155,7 +155,7 @@ def speed(test: Surfaces, count: int) -> None:
 
 
 def sizes(test: Surfaces, count: int) -> None:
-    """The same on other grids."""
+    """Print time and energy on grids of other sizes."""
     chosen = first(test, count)
     print(f"\nSizes: medians over {len(chosen)} surfaces, milliseconds, PyTorch loaded before")
     for side in SIZES:
@@ -168,7 +168,7 @@ def sizes(test: Surfaces, count: int) -> None:
 
 
 def guard(splits: dict[str, Surfaces], count: int | None) -> None:
-    """Energies against the cold solve's at "balanced"."""
+    """Print energies relative to the cold solve's, with the preset "balanced"."""
     print("\nGuard: energy of the hybrid solve over that of the cold one, balanced")
     for name, split in splits.items():
         total = min(count or len(split), len(split))
@@ -179,7 +179,7 @@ def guard(splits: dict[str, Surfaces], count: int | None) -> None:
 
 
 def general(test: Surfaces, count: int) -> None:
-    """The same on meshes that are no grids."""
+    """Print energies relative to the cold solve's on meshes that are not grids."""
     chosen = first(test, count)
     meshes = [patch(p, HOLES[k % len(HOLES)], seed=k) for k, p in enumerate(chosen)]
     found = compared(watched(meshes, "general"), "developable", {}, stretched=True)
@@ -189,7 +189,7 @@ def general(test: Surfaces, count: int) -> None:
 
 
 def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:
-    """A grid as triangles in random order, with a hole in its middle."""
+    """Return a grid as triangles in random order, with a hole in its middle."""
     whole = Mesh.from_grid(grid)
     sides = (np.linspace(-1, 1, n) for n in grid.shape[:2])
     at = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
@@ -203,7 +203,7 @@ def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:
 
 
 def anytime(test: Surfaces, count: int, plot: str) -> None:
-    """Energy over that of the cold solve, against time, for solves that are cut off."""
+    """Plot energy relative to the cold solve's against time, for solves that are stopped early."""
     curves: dict[str, list[tuple[float, float]]] = {"TNO": [], "hybrid": []}
     chosen = first(test, count)
     final = [energy(timed(optimize, p)[0]) for p in watched(chosen, "anytime")]

@@ -1,4 +1,4 @@
-"""Figures of the isometries of Jiang et al. 2020: developable, bending, conformal, sessions.
+"""Figures of the isometric mappings of Jiang et al. 2020: developable, bend, conformal, sessions.
 
     python bench/jiang.py                  everything (about six minutes on two cores)
     python bench/jiang.py interactive      one section
@@ -32,20 +32,20 @@ FRAMES = 40
 
 
 def sheet(size: int) -> np.ndarray:
-    """A flat square of side two."""
+    """Return a flat square grid of side two."""
     u = np.linspace(-1.0, 1.0, size)
     return np.stack([*np.meshgrid(u, u, indexing="ij"), np.zeros((size, size))], axis=-1)
 
 
 def rolled(points: np.ndarray, angle: float) -> np.ndarray:
-    """Points of the sheet (k, 3) on a cylinder; its side at x = -1 stays where it is."""
+    """Map points of the sheet (k, 3) to a cylinder; the side at x = -1 stays fixed."""
     radius = 2.0 / angle
     s = (points[:, 0] + 1.0) / radius
     x, z = radius * np.sin(s) - 1.0, radius * (1.0 - np.cos(s))
     return np.stack([x, points[:, 1], z], axis=1)
 
 
-#: What the developable section compares: formulation and preset.
+#: Formulation and preset of the rows of the section "developable".
 SOLVES = {
     "jiang2020": ("isometry", "jiang2020"),
     "isometry fast": ("isometry", "fast"),
@@ -56,7 +56,7 @@ SOLVES = {
 
 
 def developable() -> dict[str, Any]:
-    """The classical reference beside the package's default, on the reference surfaces."""
+    """Compare the classical reference with the package's default, on the reference surfaces."""
     surfaces, _ = reference()
     rows, out = [], {}
     for name, (formulation, options) in SOLVES.items():
@@ -90,9 +90,10 @@ _COLUMNS += ("median s", "max s")
 
 
 def tradeoff() -> dict[str, Any]:
-    """What the isometry energy alone reaches as its weight and that of fairness change.
+    """Vary the weights of isometry and fairness in solves with the isometry energy alone.
 
-    On surfaces of another seed, cold, with the other weights of ``jiang2020``.
+    The surfaces have another seed, the start is cold, and the other weights are those of
+    ``jiang2020``.
     """
     surfaces = [s.sample(64) for s in bezier.generate(8, seed=2002)]
     frozen = gso.IsometryOptions.preset("jiang2020")
@@ -122,7 +123,7 @@ def tradeoff() -> dict[str, Any]:
 
 
 def interactive() -> dict[str, Any]:
-    """Frames per second while handles are dragged, and how far the surface lags behind."""
+    """Measure frames per second while handles are dragged, and the lag of the surface."""
     rows, out = [], {}
     for name, drag in _drags().items():
         for steps in (1, 2):
@@ -141,7 +142,7 @@ def interactive() -> dict[str, Any]:
 
 
 def _drags() -> dict[str, tuple[gso.tno.Session, Any, Any]]:
-    """Sessions, the vertices in hand, and where these are at a share of the way."""
+    """Return sessions, their dragged vertices, and the positions of these at a share of the way."""
     flat = sheet(64)
     v = flat.reshape(-1, 3)
     first, last = np.arange(128), np.arange(64 * 62, 64 * 64)
@@ -149,8 +150,8 @@ def _drags() -> dict[str, tuple[gso.tno.Session, Any, Any]]:
     bend = gso.tno.Session(flat, constraints=held)
     found = {"bend 64 x 64, rolled up": (bend, last, lambda s: rolled(v[last], max(3.0 * s, 1e-9)))}
     curved = bezier.generate(1, seed=77)[0]
-    # How far a corner is drawn towards the opposite one, and up: relative to their distance.
-    # Corners that have to become developable are held softly: their own shape cannot stay.
+    # Share of the distance to the opposite corner by which a corner is moved towards it, and up.
+    # The handles of developable solves are soft, because the shape of the corners must change.
     for task, formulation, size, reach, weight in (
         ("bend", "isometry", 64, 0.15, None),
         ("developable", "curvature", 64, 0.05, 0.1),
@@ -188,7 +189,7 @@ def _normal(mesh: Mesh) -> np.ndarray:
 
 
 def _dragged(session: gso.tno.Session, ids: Any, place: Any, steps: int) -> dict[str, Any]:
-    """Drag there in a number of frames and measure; the session is back at the start then."""
+    """Settle a session at the start, drag its handles to the end, and measure."""
     session.move(ids, place(0.0))
     session.settle()
     seconds = []
@@ -211,7 +212,7 @@ def _dragged(session: gso.tno.Session, ids: Any, place: Any, steps: int) -> dict
 
 
 def bend() -> dict[str, Any]:
-    """Sheets rolled up by their ends: lengths, and the distance from the cylinder."""
+    """Roll up sheets by their ends: length errors, and the distance from the cylinder."""
     rows, out = [], {}
     for size in (32, 64):
         v = sheet(size).reshape(-1, 3)
@@ -248,7 +249,7 @@ def bend() -> dict[str, Any]:
 
 
 def conformal() -> dict[str, Any]:
-    """Angle distortion on the 24 surfaces, beside libigl's least-squares conformal map."""
+    """Compare angle distortion on the 24 surfaces with libigl's least-squares conformal map."""
     surfaces = [Mesh.from_grid(s) for s in reference()[0]]
     rows, out = [], {}
     for name in ("fast", "balanced", "accurate", "libigl LSCM"):

@@ -1,17 +1,17 @@
-"""Figures of the nets on the surfaces that none was trained on, and what they cost.
+"""Metrics and times of the nets on surfaces that none was trained on.
 
     python bench/net.py DIR                    the table of all nets (DIR: a set of surfaces)
     python bench/net.py DIR --cards            the same, and writes it into the nets' cards
     python bench/net.py DIR --model RUN/model.safetensors    one net
-    python bench/net.py DIR --others           the splits that are no Bezier surfaces, too
+    python bench/net.py DIR --others           also the splits that are not Bezier surfaces
     python bench/net.py --curve [NET...] --plot FILE         quality against training time
-    python bench/net.py DIR --rounding RUN     what half precision changes in a run's net
+    python bench/net.py DIR --rounding RUN     effect of half precision on the net of a run
     python bench/net.py DIR --grid FILE        figure 5: loss against parameters (hours;
                                                with --stride 2 a quarter of them)
 
-Figures are means over the test split; times are medians for one surface, from array to
-array, on the CPU, with the threads that OMP_NUM_THREADS allows: the least of several such
-medians, because what else runs on a shared machine only adds to them.
+Figures are means over the test split. Times are for one surface, from array to array, on the
+CPU, with OMP_NUM_THREADS threads: the smallest of several medians, because other work on a
+shared machine can only increase them.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-# What a machine of two cores has when nothing is said.
+# The default on a machine of two cores.
 os.environ.setdefault("OMP_NUM_THREADS", "2")
 
 import numpy as np
@@ -53,14 +53,14 @@ OTHERS = (
     "teapot",
     "terrain",
 )
-#: What denoising is timed on.
+#: Array that denoising is timed on.
 TIMED = f"noisy_{LEVELS[1]:.3f}"
 #: Figure 5: blocks per level, channels, surfaces, epochs.
 BLOCKS, CHANNELS, SURFACES, EPOCHS = (2, 4, 6), (8, 16, 32), 2000, 10
 
 
 def measured(task: str, model: Any, split: Any, count: int | None = None) -> dict[str, float]:
-    """Mean figures of a net over a split."""
+    """Return the mean metrics of a net over a split."""
     if task == "denoise":
         named = isinstance(model, str | Path)
         card = catalogue.read_card(catalogue.chain(model, task)[-1]) if named else {}
@@ -81,7 +81,7 @@ def measured(task: str, model: Any, split: Any, count: int | None = None) -> dic
 def over(
     task: str, model: Any, split: Any, array: str, count: int | None
 ) -> list[dict[str, float]]:
-    """Figures of every surface of a split."""
+    """Return the metrics of every surface of a split."""
     rows = []
     total = min(len(split), count or len(split))
     for k in watched(range(0, total, 32), f"{model or 'default'} {split.name} {array}"):
@@ -96,7 +96,7 @@ def over(
 def milliseconds(
     task: str, model: Any, surface: np.ndarray, times: int = 20, rounds: int = 10
 ) -> float:
-    """Least of several medians of the time of one surface, from array to array."""
+    """Return the smallest of several medians of the time for one surface, array to array."""
     spent = np.empty((rounds, times))
     net.predict(surface, task=task, model=model)
     for place in np.ndindex(spent.shape):
@@ -107,7 +107,7 @@ def milliseconds(
 
 
 def line(name: str, found: dict[str, float], published: dict[str, float]) -> str:
-    """One net in one line, published figures in brackets."""
+    """Format one net as one line, with published figures in brackets."""
     parts = []
     for key, value in found.items():
         beside = f" ({published[key]:.4g})" if key in published else ""
@@ -116,7 +116,7 @@ def line(name: str, found: dict[str, float], published: dict[str, float]) -> str
 
 
 def rows(arguments: argparse.Namespace) -> None:
-    """Print the table of nets, and write it into their cards."""
+    """Print the table of nets; with ``--cards`` also write it into their cards."""
     data = dataset.open(arguments.data)
     names = [arguments.model] if arguments.model else net.available()
     if not names:
@@ -148,12 +148,12 @@ def rows(arguments: argparse.Namespace) -> None:
 
 
 def counted(found: dict[str, float], split: Any, most: int | None) -> dict[str, float]:
-    """Figures with the number of surfaces that they are means of."""
+    """Add the number of surfaces that the metrics are means of."""
     return found | {"surfaces": min(len(split), most or len(split))}
 
 
 def rounding(arguments: argparse.Namespace) -> None:
-    """Print the change of every figure by writing a net in half precision."""
+    """Print the change of every metric when a net is stored in half precision."""
     data = dataset.open(arguments.data)
     with tempfile.TemporaryDirectory() as folder:
         exact = weights.load(arguments.rounding / "model.safetensors")
@@ -168,7 +168,7 @@ def rounding(arguments: argparse.Namespace) -> None:
 
 
 def curve(names: list[str], target: str) -> None:
-    """Plot what validation showed against the hours of training, as the cards have it."""
+    """Plot the validation metric in the cards against the hours of training."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -186,15 +186,15 @@ def curve(names: list[str], target: str) -> None:
 
 
 def _told(show: Any, name: str, report: Any) -> None:
-    """How the training of one of the nets is going."""
+    """Show the progress of training one of the nets."""
     show(report.progress, f"{name}: {report.left / 60:.0f} min left, loss {report.loss:.4g}")
 
 
 def grid(arguments: argparse.Namespace) -> None:
-    """Figure 5: nets of several sizes, supervised on the optimiser's results.
+    """Train the nets of figure 5: several sizes, supervised on the optimiser's results.
 
-    Nets that the file has already are not trained again; one that was cut off goes on from
-    its run, in a folder beside the file.
+    Nets that are already in the file are not trained again. An interrupted net resumes from its
+    run, in a folder beside the file.
     """
     path, stride = Path(arguments.grid), arguments.stride
     record = json.loads(path.read_text()) if path.exists() else {"stride": stride, "rows": []}
@@ -241,7 +241,7 @@ def grid(arguments: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    """Run what was asked for."""
+    """Run what the command line asks for."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,14 +1,14 @@
-"""Everything at once: the paper's tables and figures, times, and peers, as one report.
+"""The paper's tables and figures, times, and comparisons with peers, as one report.
 
     python bench/run_all.py --quick      a few surfaces of the repository (five minutes)
     python bench/run_all.py              the test split (an hour on two cores)
-    python bench/run_all.py --data DIR   the test split of a set that is there already
-    python bench/run_all.py --store      the same, and keeps its figures in bench/data
-    python bench/run_all.py --tune       chooses the peers' parameters anew
+    python bench/run_all.py --data DIR   the test split of an existing set
+    python bench/run_all.py --store      the same, and stores its figures in bench/data
+    python bench/run_all.py --tune       chooses the peers' parameters again
 
-Writes ``report.html``, ``report.md``, ``results.json`` and the figures. Killed, it goes on
-where it was; what depends on code, options or packages that changed is made anew. Peers need
-``pip install ".[bench]"``; those that are missing are named in the report.
+Writes ``report.html``, ``report.md``, ``results.json`` and the figures. An interrupted run
+resumes; results that depend on changed code, options or packages are measured again. Peers need
+``pip install ".[bench]"``; the report names those that are missing.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import os
 import sys
 from pathlib import Path
 
-# Before NumPy: every process of the run has one thread.
+# Every process of the run has one thread; this must be set before NumPy is imported.
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 os.environ["MKL_NUM_THREADS"] = "1"
-# And nets run where the optimiser does.
+# Nets run on the CPU, as the optimiser does.
 os.environ["CUDA_VISIBLE_DEVICES"] = ""
 
 BENCH = Path(__file__).resolve().parent
@@ -88,7 +88,7 @@ def _screened(out: Path, split: str) -> surfaces.Surfaces:
 
 
 def _store(name: str, result: dict[str, object]) -> None:
-    """Keep what the README and the tests need; a quick run does not replace a whole one."""
+    """Store the figures for docs and tests; a quick run does not replace those of a full run."""
     records, whole = result.pop("records"), BENCH / "data" / "results.json"
     if name == QUICK.name:
         kept = {key: result[key] for key in ("command", "machine", "surfaces")}

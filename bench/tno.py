@@ -1,12 +1,12 @@
-"""Figures of the optimiser on the 24 reference surfaces, and what it costs.
+"""Quality and cost of the optimiser on the 24 reference surfaces.
 
     python bench/tno.py                  everything (about ten minutes on two cores)
     python bench/tno.py developable      one section
     python bench/tno.py --json out.json  the figures as JSON, with machine and versions
 
-Surfaces and noise come from ``bench/data/bench24.npz`` and are for reporting only:
-presets were tuned on surfaces of other seeds. Times are medians per surface, one process,
-BLAS on one thread.
+Surfaces and noise come from ``bench/data/bench24.npz`` and are for reporting only: the presets
+were tuned on surfaces of other seeds. Times are medians per surface, with one process and BLAS
+on one thread.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ PURE = "pure SciPy"
 
 
 def reference() -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """The 24 surfaces and their unit noise."""
+    """Return the 24 surfaces and their unit noise."""
     data = np.load(ROOT / "bench" / "data" / "bench24.npz")
     return [s.astype(float) for s in data["surfaces"]], [
         n.astype(float) for n in data["unit_noise"]
@@ -51,19 +51,19 @@ def reference() -> tuple[list[np.ndarray], list[np.ndarray]]:
 
 
 def progress(items: Any, text: str) -> Any:
-    """A progress bar when a person is watching."""
+    """Wrap an iterable in a progress bar, if stderr is a terminal."""
     return tqdm(items, desc=text, leave=False, disable=not sys.stderr.isatty())
 
 
 def timed(function: Callable[[], Any]) -> tuple[Any, float]:
-    """Result and seconds of a call."""
+    """Call a function and return its result and the seconds."""
     start = time.perf_counter()
     value = function()
     return value, time.perf_counter() - start
 
 
 class without_extras:
-    """Hide the optional linear backends."""
+    """A context in which the optional linear backends are hidden."""
 
     def __enter__(self) -> None:
         from gso.tno import linear
@@ -97,7 +97,7 @@ def table(title: str, columns: list[str], rows: list[list[Any]]) -> None:
 
 
 def quality(before: np.ndarray, after: np.ndarray) -> tuple[float, ...]:
-    """loss_gc, K_A-r, d_H, fairness ratio."""
+    """Return loss_gc, K_A-r, d_H and the fairness ratio."""
     return (
         metrics.loss_gc(after, scale=metrics.unit(before)),
         metrics.K_A_r(before, after),
@@ -107,7 +107,11 @@ def quality(before: np.ndarray, after: np.ndarray) -> tuple[float, ...]:
 
 
 def honest(before: np.ndarray, after: np.ndarray) -> tuple[float, ...]:
-    """Both splits, the worse one, every second vertex, K_A-r of the worse, d_H, fairness ratio."""
+    """Return the metrics of both triangulations (splits) of the quads.
+
+    loss_gc of either split, of the worse one and of every second vertex, K_A-r of the worse
+    split, d_H, fairness ratio.
+    """
     unit = metrics.unit(before)
     return (
         metrics.loss_gc(after, scale=unit),
@@ -121,7 +125,7 @@ def honest(before: np.ndarray, after: np.ndarray) -> tuple[float, ...]:
 
 
 def developable() -> dict[str, Any]:
-    """The three presets, and `balanced` without the optional backends."""
+    """Measure the three presets, and `balanced` without the optional backends."""
     surfaces, _ = reference()
     rows, out = [], {}
     for preset in (*PRESETS, PURE):
@@ -169,12 +173,12 @@ def developable() -> dict[str, Any]:
 
 
 def _strained(points: np.ndarray) -> float:
-    """Largest strain of a surface's pattern."""
+    """Return the largest strain of a surface's pattern."""
     return strains_of(gso.Mesh.from_grid(points))["strain_max"]
 
 
 def flat_figures(surface: Any, flat: np.ndarray) -> tuple[float, ...]:
-    """loss_iso-cell, strain mean and p99, edge-length error, flipped cells."""
+    """Return loss_iso-cell, strain mean and p99, edge-length error and flipped cells."""
     strains = metrics.principal_strains(surface, flat)
     faces = None if isinstance(surface, np.ndarray) else surface.faces
     return (
@@ -187,7 +191,7 @@ def flat_figures(surface: Any, flat: np.ndarray) -> tuple[float, ...]:
 
 
 def flatten() -> dict[str, Any]:
-    """Both formulations, and libigl's ARAP in the same run."""
+    """Measure two formulations, and libigl's ARAP in the same run."""
     surfaces, _ = reference()
     runs: dict[str, Callable[[np.ndarray], np.ndarray]] = {
         "strain": lambda p: gso.tno.optimize(p, task="flatten").flat_grid,
@@ -220,7 +224,7 @@ def flatten() -> dict[str, Any]:
 
 
 def denoise() -> dict[str, Any]:
-    """Blind denoising at the four noise levels."""
+    """Measure denoising at four noise levels that the method is not given."""
     surfaces, noise = reference()
     rows, out = [], {}
     floors = {0.001: 0.30, 0.005: 0.82, 0.010: 1.30, 0.015: 1.70}
@@ -245,7 +249,7 @@ def denoise() -> dict[str, Any]:
 
 
 def last_problem(points: np.ndarray, task: str, options: str) -> tuple[Any, np.ndarray]:
-    """Problem of a task's last stage, and unknowns to evaluate it at."""
+    """Return the problem of a task's last stage, and unknowns to evaluate it at."""
     from gso import tasks
     from gso.constraints import Compiled
     from gso.tasks.base import Request
@@ -266,7 +270,7 @@ def last_problem(points: np.ndarray, task: str, options: str) -> tuple[Any, np.n
 
 
 def breakdown() -> dict[str, Any]:
-    """Milliseconds of one iteration at 64 x 64: evaluation with assembly, and factorisation."""
+    """Time one iteration at 64 x 64: evaluation with assembly, and factorisation."""
     from gso.tno import linear
 
     surfaces, _ = reference()
@@ -306,7 +310,7 @@ def breakdown() -> dict[str, Any]:
 
 
 def resolution() -> dict[str, Any]:
-    """The same surfaces at three resolutions, same weights."""
+    """Solve the same surfaces at three resolutions with the same weights."""
     shapes = bezier.generate(24, seed=77)
     rows, out = [], {}
     for preset, count in (("balanced", 24), ("accurate", 8)):
@@ -327,7 +331,7 @@ def resolution() -> dict[str, Any]:
 
 
 def questions() -> dict[str, Any]:
-    """`max_deviation` and `target_curvature`."""
+    """Measure the limits `max_deviation` and `target_curvature`."""
     surfaces, _ = reference()
     rows, out = [], {}
     for share in (0.0025, 0.005, 0.01):
@@ -397,7 +401,7 @@ def questions() -> dict[str, Any]:
 
 
 def general() -> dict[str, Any]:
-    """Meshes that are no grids: flatten, denoise, developable."""
+    """Flatten, denoise and make developable meshes that are not grids."""
     sys.path.insert(0, str(ROOT / "examples"))
     import irregular
     import teapot
@@ -466,7 +470,7 @@ def general() -> dict[str, Any]:
 
 
 def best_trimesh(mesh: gso.Mesh, noisy: np.ndarray) -> tuple[float, str]:
-    """The smallest theta of trimesh's smoothers over a grid of their settings (an oracle)."""
+    """Return the smallest theta of trimesh's smoothers over their settings (an oracle)."""
     import trimesh
     from trimesh import smoothing
 
@@ -500,7 +504,7 @@ def best_trimesh(mesh: gso.Mesh, noisy: np.ndarray) -> tuple[float, str]:
 
 
 def sizes() -> dict[str, Any]:
-    """Larger grids: time per vertex against 64 x 64, and peak memory."""
+    """Measure larger grids: time per vertex relative to 64 x 64, and peak memory."""
     rows, out = [], {}
     for task, preset in (
         ("developable", "balanced"),
@@ -538,7 +542,7 @@ def sizes() -> dict[str, Any]:
 
 
 def components() -> dict[str, Any]:
-    """A panel of 4 m alone and beside copies: what it gets must not depend on them."""
+    """Solve a panel of 4 m alone and beside copies; its result must not depend on them."""
     grid = bezier.generate(1, seed=5)[0].sample(33)
     panel = gso.Mesh.from_grid(4000.0 * grid / metrics.unit(grid))
     size, count = panel.frame.scale, len(panel.vertices)
@@ -554,7 +558,7 @@ def components() -> dict[str, Any]:
     ]
 
     def solved(shifts: list[list[float]], added: Any, wanted: tuple[str, str, str]) -> list[Any]:
-        """What each copy gets, in its own place."""
+        """Return the result of each copy, moved back to the panel's place."""
         points = panel.vertices + added
         mesh = gso.Mesh(
             np.concatenate([points + s for s in shifts]),
@@ -613,7 +617,7 @@ def components() -> dict[str, Any]:
 
 
 def startup() -> dict[str, Any]:
-    """A cold process, and what `import gso` costs."""
+    """Time a new process that solves the panel, and `import gso`."""
 
     def median(command: list[str], repeats: int = 5) -> float:
         runs = [
@@ -659,7 +663,7 @@ SECTIONS: dict[str, Callable[[], dict[str, Any]]] = {
 
 
 def machine() -> dict[str, Any]:
-    """What the figures were measured on."""
+    """Describe the machine and the versions of packages."""
     packages = ("numpy", "scipy", "casadi", "libigl", "trimesh")
     return {
         "python": platform.python_version(),

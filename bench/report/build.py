@@ -1,4 +1,4 @@
-"""The whole run: measure what is missing, then write JSON, Markdown, figures and HTML."""
+"""A whole run: measure what is not stored yet, then write JSON, Markdown, figures and HTML."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from report.timing import Timing, pieces, timings
 from report.verdict import Loss, losses, unmeasured
 
 TITLE = "gso: quality and time, beside the paper and its peers"
-#: Packages whose versions are told, beside those of ``bench/tno.py``.
+#: Packages whose versions are reported, in addition to those of ``bench/tno.py``.
 _PACKAGES = ("gso", "cvxopt", "pypardiso", "torch", "matplotlib", "pymeshlab", "vtk")
 
 
 @contextmanager
 def bar(total: int, text: str) -> Iterator[Callable[..., None]]:
-    """A progress bar, or lines where nobody is watching."""
+    """Show a progress bar; print lines instead if stderr is not a terminal."""
     watched = sys.stderr.isatty()
     with tqdm(total=total, desc=text, disable=not watched) as shown:
         done, told = 0, -1
@@ -51,7 +51,10 @@ def bar(total: int, text: str) -> Iterator[Callable[..., None]]:
 
 
 def run(settings: Settings, surfaces: Surfaces, out: Path, command: str) -> dict[str, Any]:
-    """Measure, and write the report to a folder; returns what ``results.json`` holds."""
+    """Measure, write the report to a folder, and return the results.
+
+    They are the content of ``results.json`` and the "records" of the first surfaces.
+    """
     kept = Store(out / "pieces")
     total = sum(b.stop - b.start for b in blocks(settings, surfaces))
     with bar(total, "surfaces") as tick:
@@ -143,7 +146,7 @@ COMPARED = 2
 
 
 def _first(records: Records) -> dict[str, list[Any]]:
-    """What the tables show of the first surfaces, by task, level and method."""
+    """Return the tables' metrics of the first surfaces, by task, level and method."""
     shown = {column for section in SECTIONS for column in section.columns}
     return {
         "/".join((task, f"{sigma:g}", name)): [

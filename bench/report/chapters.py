@@ -1,4 +1,4 @@
-"""What the report says, part by part."""
+"""The text of the report, chapter by chapter."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def chapters(
     found: list[Loss],
     drawn: dict[str, list[Figure]],
 ) -> list[pages.Chapter]:
-    """Every part of the report, in order."""
+    """Return the chapters of the report, in order."""
     known, some = result["machine"], result["surfaces"]
     about = [
         f"Surfaces: {some['name']}; {some['count']:,} of them, mean loss_gc {some['loss_gc']:.3f} "

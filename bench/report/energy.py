@@ -1,7 +1,7 @@
-"""The package's objective as other solvers want it: residuals with derivatives, or expressions.
+"""The package's objective in the form of other solvers: residuals with Jacobian, or expressions.
 
-All are made of the terms of a :class:`gso.tno.problem.Problem`, so that the derivatives
-are the same to the last bit. Losses become residuals whose half square they are.
+All are built from the terms of a :class:`gso.tno.problem.Problem`, so that the derivatives are
+the same to the last bit. Each loss is expressed by residuals, half of whose squared norm it is.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def residuals(problem: Problem, x: Array) -> Array:
-    """Numbers whose half sum of squares is the objective."""
+    """Return residuals of which half the sum of squares is the objective."""
     coordinates = problem.variables.points(x)
     quadratic = problem._quadratic
     parts = [quadratic.a @ x - quadratic.b]
@@ -30,7 +30,7 @@ def residuals(problem: Problem, x: Array) -> Array:
 
 
 def jacobian(problem: Problem, x: Array) -> Any:
-    """Sparse derivatives of :func:`residuals`."""
+    """Return the sparse Jacobian of :func:`residuals`."""
     from scipy.sparse import csr_matrix, vstack
 
     coordinates = problem.variables.points(x)
@@ -50,7 +50,10 @@ def jacobian(problem: Problem, x: Array) -> Any:
 
 
 def _rooted(loss: Loss, r: Array) -> tuple[Array, Array]:
-    """Numbers whose half square is the loss of residuals (r, e), and derivatives (r, r, e)."""
+    """Return numbers of which half the squared norm is the loss, and their derivatives (r, r, e).
+
+    `r` are the residuals of the elements, (r, e).
+    """
     same = np.eye(len(r))[:, :, None]
     if isinstance(loss, Squared):
         return r, np.broadcast_to(same, (len(r), *r.shape))
@@ -66,7 +69,7 @@ def _rooted(loss: Loss, r: Array) -> tuple[Array, Array]:
 
 
 def expressions(problem: Problem) -> tuple[Any, Any]:
-    """CasADi's unknowns, and :func:`residuals` as an expression of them."""
+    """Return CasADi symbols of the unknowns, and :func:`residuals` as their expression."""
     import casadi
 
     ca: Any = casadi

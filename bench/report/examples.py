@@ -1,4 +1,4 @@
-"""Results that are drawn: some surfaces of different curvature, by several methods."""
+"""Results for the figures: some surfaces of different curvature, by several methods."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from report.settings import Settings
 from report.store import Store
 from report.surfaces import Case, Surfaces
 
-#: Methods that are drawn, by task; those that cannot run are left out.
+#: Methods in the figures, by task; those that cannot run are left out.
 DRAWN = {
     "developable": ("TNO jiang2020", "TNO balanced", "Net-S", "Net-C", "Net-CF", "Net", "hybrid"),
     "flatten": ("Init", "TNO lengths", "TNO strain", "Net", "Net-W", "Net strain", "libigl ARAP"),
     "denoise": ("TNO", "Net"),
 }
-#: Surfaces among which the examples are looked for.
+#: Number of surfaces among which the examples are chosen.
 _AMONG = 64
 
 
 @dataclass
 class Example:
-    """A surface, what was given of it, and the results by method."""
+    """A case, its number in the set, and the results by method."""
 
     case: Case
     number: int
@@ -39,7 +39,7 @@ class Example:
 
 
 def chosen(settings: Settings, surfaces: Surfaces) -> list[int]:
-    """Surfaces whose mean curvature is nearest to what is asked for."""
+    """Return the surfaces whose mean curvature is nearest to the values in the settings."""
     among = min(_AMONG, len(surfaces))
     curved = np.array([loss_gc(surfaces[k], scale=1.0) for k in range(among)])
     return [int(np.abs(curved - wanted).argmin()) for wanted in settings.examples]
@@ -48,14 +48,14 @@ def chosen(settings: Settings, surfaces: Surfaces) -> list[int]:
 def solved(
     settings: Settings, surfaces: Surfaces, kept: Store, tick: Callable[..., None]
 ) -> dict[tuple[str, float], list[Example]]:
-    """Examples by task and level of the noise."""
+    """Solve the examples, by task and level of the noise."""
     found: dict[tuple[str, float], list[Example]] = {}
     numbers = chosen(settings, surfaces)
     with warnings.catch_warnings(), blas_threads(1):
         warnings.simplefilter("ignore", ConvergenceWarning)
         for task in TASKS:
             for sigma in levels(task):
-                # A row of the figure of denoising is a surface at every level.
+                # The figure of denoising shows one surface, with a row for each level.
                 some = numbers[:1] if task == "denoise" else numbers
                 found[task, sigma] = [_example(surfaces, k, task, sigma, kept) for k in some]
             tick(task)
@@ -77,8 +77,8 @@ def _example(surfaces: Surfaces, k: int, task: str, sigma: float, kept: Store) -
 
 
 def _points(method: Method, case: Case) -> dict[str, Array]:
-    """What is drawn; nothing of a method that fails, which its row in the tables says."""
+    """Return the points to draw; none where a method fails, which its table row reports."""
     try:
         return {"points": method(case).points}
-    except Exception:  # a peer may raise anything, and the others are drawn
+    except Exception:  # a peer may raise anything; the others are still drawn
         return {"points": np.empty(0)}

@@ -1,4 +1,4 @@
-"""The figures: those of the paper, and time against size."""
+"""The figures of the paper, and time against size."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ from report.timing import METHODS, PHASES, Timing, exponent
 
 Array = NDArray[np.float64]
 
-#: The runs of figure 5, and the command that makes them.
+#: The file with the runs of figure 5, and the command that writes it.
 GRID = BENCH / "data" / "architecture_grid.json"
 GRID_COMMAND = "python bench/net.py DIR --grid bench/data/architecture_grid.json"
 #: Methods of figure 6.
 CURVES = ("TNO jiang2020", "TNO balanced", "Net-S", "Net-C", "Net-CF", "Net", "hybrid")
-#: Percentile at which scales that several panels share end.
+#: Percentile of all values that is the upper end of a colour scale shared by several panels.
 _TOP = 99.0
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture and the text below it; without a picture, why there is none."""
+    """A picture and its caption; without a picture the caption says why there is none."""
 
     number: str
     caption: str
@@ -48,7 +48,7 @@ class Figure:
 
 
 def intervals(records: Records, metric: str, name: str) -> list[dict[str, float]]:
-    """Means of a metric of a developable method over intervals of the input's curvature."""
+    """Average a metric of a developable method over intervals of the input's curvature."""
     good = [r["figures"] for r in records["developable", 0.0, name] if "error" not in r]
     curved = np.array([f["loss_gc_before"] for f in good])
     values = np.array([f[metric] for f in good])
@@ -61,7 +61,7 @@ def intervals(records: Records, metric: str, name: str) -> list[dict[str, float]
 
 
 def figure_5(folder: Path) -> Figure:
-    """Loss against parameters of nets of several sizes, from the stored runs."""
+    """Plot loss against parameters of nets of several sizes, from the stored runs."""
     text = "Figure 5: loss of nets supervised on the optimiser's results, against their size"
     if not GRID.exists():
         return Figure("5", f"{text}. Not run yet: {GRID_COMMAND}")
@@ -82,7 +82,7 @@ def figure_5(folder: Path) -> Figure:
 
 
 def figure_6(folder: Path, records: Records) -> Figure:
-    """Curvature removed and distance, against intervals of the input's curvature."""
+    """Plot curvature removed and distance against intervals of the input's curvature."""
     canvas, axes = _canvas(2)
     for name in (n for n in CURVES if not of("developable", n).absent()):
         for ax, metric in zip(axes, ("K_A_r_worst", "d_H"), strict=True):
@@ -98,7 +98,7 @@ def figure_6(folder: Path, records: Records) -> Figure:
 
 
 def figure_7(folder: Path, examples: Iterable[Example]) -> list[Figure]:
-    """Developable surfaces: curvature before and after, and distance."""
+    """Draw developable surfaces: curvature before and after, and distance."""
     found = []
     for k, example in enumerate(examples):
         design = Mesh.from_grid(example.case.surface, weld=False)
@@ -125,7 +125,7 @@ def figure_7(folder: Path, examples: Iterable[Example]) -> list[Figure]:
 
 
 def figure_8(folder: Path, examples: Iterable[Example]) -> list[Figure]:
-    """Flat images: the published defect and the strain of every cell."""
+    """Draw flat images: the published isometry defect and the strain of every cell."""
     found = []
     for k, example in enumerate(examples):
         design = Mesh.from_grid(example.case.surface, weld=False)
@@ -152,7 +152,7 @@ def figure_8(folder: Path, examples: Iterable[Example]) -> list[Figure]:
 
 
 def figure_9(folder: Path, examples: dict[float, list[Example]]) -> list[Figure]:
-    """Denoised surfaces at every level: the angle of each cell's normal to the clean one's."""
+    """Draw denoised surfaces at every level: angles of the cells' normals to the clean ones."""
     found = []
     for sigma, some in examples.items():
         for example in some:
@@ -174,7 +174,7 @@ def figure_9(folder: Path, examples: dict[float, list[Example]]) -> list[Figure]
 
 
 def time_against_size(folder: Path, timings: Sequence[Timing]) -> Figure:
-    """Seconds against vertices by task, with exponents and the physical limit."""
+    """Plot seconds against vertices by task, with exponents and the time of factorisations."""
     canvas, axes = _canvas(len(TASKS))
     for ax, task in zip(axes, TASKS, strict=True):
         for name in METHODS:
@@ -198,7 +198,7 @@ def time_against_size(folder: Path, timings: Sequence[Timing]) -> Figure:
 
 
 def shares(folder: Path, timings: Sequence[Timing]) -> Figure:
-    """Where the time goes, by size."""
+    """Plot the share of each phase in the time, by size."""
     some = [t for t in timings if t.shares and t.method != "Net"]
     canvas, axes = _canvas(1, width=max(7.0, 0.45 * len(some)))
     base = np.zeros(len(some))
@@ -225,7 +225,7 @@ def _defect(design: Mesh, flat: Array) -> Heat:
 
 
 def _angles(clean: Mesh, mesh: Mesh) -> Heat:
-    """Angle of each cell's normal to the clean surface's, degrees."""
+    """Return the angle of each cell's normal to the clean surface's, degrees."""
     one, other = (metrics.components(metrics.face_normals(m)) for m in (clean, mesh))
     values = np.degrees(np.asarray(geometry.angle(one, other)))
     scale = Scale("angle of the normals (degrees)", "OrRd", 0.0, float(values.max()))
@@ -233,7 +233,7 @@ def _angles(clean: Mesh, mesh: Mesh) -> Heat:
 
 
 def _shared(heats: Sequence[Heat]) -> list[Heat]:
-    """Heats in one scale, that of a high percentile of all."""
+    """Give heat maps one colour scale, which ends at a high percentile of all values."""
     every = np.concatenate([h.values[np.isfinite(h.values)] for h in heats])
     high = max(float(np.percentile(every, _TOP)), 1e-9)
     scale = replace(heats[0].scale, high=high, extend="max" if every.max() > high else "neither")
@@ -241,10 +241,10 @@ def _shared(heats: Sequence[Heat]) -> list[Heat]:
 
 
 def _laid(design: Mesh, flat: Array) -> Array:
-    """A flat image as a panel has it, its longer side across."""
+    """Rotate a flat image so that its longer side is horizontal."""
     points = (flat - flat.mean(axis=0)) / design.frame.scale
     _, _, axes = np.linalg.svd(points, full_matrices=False)
-    # Turned, not mirrored.
+    # A rotation, not a reflection.
     axes[1] *= np.sign(np.linalg.det(axes))
     return np.c_[points @ axes.T, np.zeros(len(points))]
 

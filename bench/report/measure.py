@@ -1,4 +1,4 @@
-"""Time, memory and shares of one method at one size: a script, in a process of its own.
+"""Time, memory and phases of one method at one size: a script that runs in its own process.
 
 ``python measure.py '{"task": "flatten", "method": "TNO", "size": 64, ...}'`` prints JSON.
 """
@@ -26,21 +26,21 @@ from gso.tno import codegen, linear, problem
 
 #: Noise of the denoising task.
 SIGMA = 0.005
-#: Side of the grid that everything is tried on before; kernels are made at first use.
+#: Side of the largest grid of the first, untimed solve, which generates the kernels.
 _WARM = 32
-#: Backends are tried whose own estimate is at most so many times the smallest.
+#: Backends are timed if their estimated cost is at most this many times the smallest.
 _HOPEFUL = 4.0
 
 
 class Clock:
-    """Time spent in functions, without that of timed functions that they call."""
+    """Time spent in functions, excluding timed functions that they call."""
 
     def __init__(self) -> None:
         self.spent: defaultdict[str, float] = defaultdict(float)
         self._inner = [0.0]
 
     def timed(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The function, whose time counts under a name."""
+        """Wrap a function so that its time is added to `spent` under a name."""
 
         def run(*arguments: Any, **keywords: Any) -> Any:
             self._inner.append(0.0)
@@ -56,7 +56,7 @@ class Clock:
 
 
 class Factored:
-    """A backend's solver that remembers the last matrix and counts."""
+    """A backend's solver that keeps the last matrix and counts factorisations."""
 
     def __init__(self, pattern: linear.Pattern, solver: Any, clock: Clock):
         self.pattern, self.name, self.count = pattern, solver.name, 0
@@ -72,10 +72,10 @@ class Factored:
 
 
 def peak_mb() -> float:
-    """Most memory that the process has had, MB."""
+    """Return the peak memory of the process, MB."""
     status = Path("/proc/self/status")
     if status.exists():
-        # What getrusage tells begins with the memory of the process that started this one.
+        # The peak of getrusage includes that of the process that started this one.
         fields = dict(line.split(":", 1) for line in status.read_text().splitlines())
         return float(fields["VmHWM"].split()[0]) / 1e3
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -84,7 +84,7 @@ def peak_mb() -> float:
 
 
 def case(task: str, size: int) -> np.ndarray:
-    """The surface that all sizes are samples of; with noise for denoising."""
+    """Sample the surface that is used at all sizes; with noise for denoising."""
     points = bezier.generate(1, seed=77)[0].sample(size)
     if task == "denoise":
         points = points + SIGMA * np.random.default_rng(0).standard_normal(points.shape)
@@ -92,7 +92,7 @@ def case(task: str, size: int) -> np.ndarray:
 
 
 def solve(task: str, method: str, model: str, points: np.ndarray) -> Any:
-    """Let a method solve; what comes back has iterations unless it is a net's."""
+    """Solve with a method; returns an array for nets, and a Result otherwise."""
     if method == "Net":
         return gso.net.predict(points, task=task, model=model)
     if method == "hybrid":
@@ -103,7 +103,7 @@ def solve(task: str, method: str, model: str, points: np.ndarray) -> Any:
 
 
 def shares(run: Callable[[], Any]) -> dict[str, Any]:
-    """Where the time of a solve goes, and the time of its factorisations alone."""
+    """Measure the share of each phase of a solve, and the time of its factorisations alone."""
     clock, stages = Clock(), list[Factored]()
 
     def chosen(pattern: linear.Pattern, name: str | None = None) -> Factored:
@@ -128,7 +128,7 @@ def shares(run: Callable[[], Any]) -> dict[str, Any]:
         for owner, name, function in before:
             setattr(owner, name, function)
     spent = dict(clock.spent)
-    # A net alone makes an array, and nothing else is done.
+    # A net alone returns an array, and all of its time is the net's.
     net = total if isinstance(result, np.ndarray) else result.seconds.get("net")
     if net is not None:
         spent["net"] = net
@@ -138,7 +138,7 @@ def shares(run: Callable[[], Any]) -> dict[str, Any]:
 
 
 def limit(result: Any, stages: list[Factored]) -> dict[str, Any]:
-    """Seconds of one numeric factorisation per iteration, by the fastest backend."""
+    """Measure the seconds of one numeric factorisation per iteration, by the fastest backend."""
     history = getattr(result, "history", [])
     done = Counter(entry.stage for entry in history if entry.iteration > 0)
     iterations = [done[stage] for stage in sorted({entry.stage for entry in history})]
@@ -157,7 +157,7 @@ def limit(result: Any, stages: list[Factored]) -> dict[str, Any]:
 
 
 def _fastest(stage: Factored) -> tuple[float, str]:
-    """Seconds of one factorisation of a stage's last matrix, and whose."""
+    """Return the seconds of one factorisation of a stage's last matrix, and the backend."""
     usable = {k: m for k, m in linear.backends().items() if m.available()}
     least = min(m.cost(stage.pattern) for m in usable.values())
     found = []
@@ -179,9 +179,10 @@ def _fastest(stage: Factored) -> tuple[float, str]:
 def main(
     task: str, method: str, model: str, size: int, repeats: int, budget: float
 ) -> dict[str, Any]:
-    """Measure; after two solves, no further one is begun that the budget has no time for.
+    """Time up to `repeats` solves, at least two.
 
-    The last is the one whose shares are told.
+    A further solve begins only if it is expected to end within the budget of seconds. The shares
+    are those of the last solve.
     """
 
     def run() -> Any:

@@ -1,4 +1,4 @@
-"""What a method is: a name, a function, and what its results depend on."""
+"""Methods that are compared: a name, a function, and everything that the results depend on."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TASKS = ("developable", "flatten", "denoise")
 #: Parameters of the peers by task, method and level of noise; made by ``--tune``.
 TUNED = Path(__file__).with_name("tuned.json")
 
-#: What makes the inputs and measures the results.
+#: Files that define the inputs and the metrics of the results.
 _MEASURED = tuple(Path(__file__).with_name(name) for name in ("quality.py", "surfaces.py"))
 _CORE = ("numpy", "scipy", "casadi", "libigl", "cvxopt", "pypardiso")
 
@@ -31,8 +31,8 @@ _CORE = ("numpy", "scipy", "casadi", "libigl", "cvxopt", "pypardiso")
 class Solved:
     """A result: a surface (H, W, 3) or a flat image (H, W, 2).
 
-    `more` gives figures that the method itself knows, such as what is left of an objective; it is
-    called when the clock has stopped.
+    `more` returns further figures of the method, such as the remaining objective; it is called
+    outside the timing.
     """
 
     points: Array
@@ -47,30 +47,30 @@ class Method:
     Attributes
     ----------
     name : str
-        What it is called in the report; unique in its task.
+        Name in the report; unique in its task.
     task : str
-        What it does.
+        Task that it solves.
     run : callable
         ``run(case, **parameters)`` returns a :class:`Solved`.
     peer : bool
-        It is not the package's.
+        Whether it is not a method of this package.
     pace : {"fast", "slow", "peer"}
         How many surfaces it gets: all, some, few.
     note : str
-        What the reader must know: what it is told, what it minimises.
+        Note for the reader: its inputs, the energy that it minimises.
     needs : tuple of str
-        Packages that must be installed, beside the package's own.
+        Packages that must be installed, in addition to those that gso needs.
     net : str
         Net that it uses.
     candidates : tuple of dict
-        Parameters of which the best are taken, for each level of the noise, on surfaces that
-        nothing is reported of.
+        Parameters from which the best are chosen, for each level of the noise, on surfaces that
+        are not part of the report.
     files : tuple of Path
-        Files that a peer is written in.
+        Source files of the method.
     solver : bool
-        It is a peer, but its results depend on the package's solver all the same.
+        Whether the results of a peer depend on the package's solver.
     refused : str
-        Why there is no such thing.
+        Why the method does not exist for its task, or "".
     """
 
     name: str
@@ -91,7 +91,7 @@ class Method:
         return self.run(case, **self.parameters(case.sigma))
 
     def parameters(self, sigma: float) -> dict[str, Any]:
-        """The parameters that were found best, and the net."""
+        """Return the tuned parameters, and the net."""
         found = {"model": self.net} if self.net else {}
         if self.candidates:
             found |= self._tuned()[level_name(sigma)] or {}
@@ -101,7 +101,7 @@ class Method:
         return tuned().get(self.task, {}).get(self.name, {})
 
     def absent(self) -> str:
-        """Why it cannot run, or nothing."""
+        """Return why it cannot run, or ""."""
         if self.refused or self.missing():
             return self.refused or f"not installed: pip install {' '.join(self.missing())}"
         if self.net and self.net not in shipped():
@@ -113,11 +113,11 @@ class Method:
         return ""
 
     def missing(self) -> list[str]:
-        """Packages that it needs and that are not installed."""
+        """Return the packages that it needs and that are not installed."""
         return [name for name, found in store.installed(self.needs).items() if not found]
 
     def key(self, sigma: float) -> dict[str, Any]:
-        """What its results depend on."""
+        """Return everything that its results depend on."""
         key = {
             "method": self.name,
             "sigma": sigma,
@@ -133,7 +133,7 @@ class Method:
 
 
 def level_name(sigma: float) -> str:
-    """A level of the noise, as keys of JSON name it.
+    """Format a level of the noise as a key of JSON.
 
     >>> level_name(0.005), level_name(0.0)
     ('0.005', '')
@@ -143,16 +143,16 @@ def level_name(sigma: float) -> str:
 
 @lru_cache(maxsize=1)
 def tuned() -> dict[str, Any]:
-    """The parameters that were found best; none where the input was better."""
+    """Return the tuned parameters; None where no setting was better than the input."""
     return json.loads(TUNED.read_text())["values"] if TUNED.exists() else {}
 
 
 def shipped() -> list[str]:
-    """Nets that come with the package; none where torch is not installed."""
+    """Return the nets that come with the package; none where torch is not installed."""
     return catalogue.available() if all(store.installed(("torch", "safetensors")).values()) else []
 
 
 def _weights(name: str) -> list[str]:
-    """Checksums of a net's files."""
+    """Return the checksums of a net's files."""
     parts = catalogue.CHAINS.get(name, (name,))
     return [catalogue.read_card(catalogue.located(part))["sha256"] for part in parts]

@@ -1,4 +1,4 @@
-"""The package's own methods, and those of the bench by task and name."""
+"""The package's own methods, and the registry of all methods by task and name."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def _own() -> list[Method]:
 
 @cache
 def methods() -> dict[tuple[str, str], Method]:
-    """Every method by task and name."""
+    """Return every method by task and name."""
     every = _own()
     for module in _PEERS:
         every += importlib.import_module(f"report.{module}").METHODS
@@ -98,5 +98,5 @@ def methods() -> dict[tuple[str, str], Method]:
 
 
 def of(task: str, name: str) -> Method:
-    """A method."""
+    """Return a method."""
     return methods()[task, name]

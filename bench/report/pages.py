@@ -1,4 +1,4 @@
-"""The report as Markdown and as one HTML file that needs nothing else."""
+"""The report as Markdown and as one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SOURCES = {"paper": "paper", "package": "gso", "peer": "peer"}
 
 @dataclass
 class Table:
-    """Cells as text; `kinds` says of each row whose figures it has."""
+    """Cells as text; `kinds` gives the source of each row: paper, package or peer."""
 
     head: list[str]
     rows: list[list[str]]
@@ -28,7 +28,7 @@ class Table:
 
 @dataclass
 class Chapter:
-    """A part of the report."""
+    """A chapter of the report."""
 
     title: str
     text: list[str] = field(default_factory=list)
@@ -43,7 +43,7 @@ def number(value: float | None) -> str:
 
 
 def duration(seconds: float | None) -> str:
-    """A time in milliseconds or seconds.
+    """Format a time in milliseconds or seconds.
 
     >>> duration(0.0132), duration(38.256)
     ('13.2 ms', '38.3 s')
@@ -54,11 +54,11 @@ def duration(seconds: float | None) -> str:
 
 
 def quality_table(columns: Sequence[str], rows: Sequence[Row]) -> Table:
-    """A table of quality and time."""
+    """Return a table of quality and time."""
     head = ["", "method", *(HEADINGS[c] for c in columns), "time", "10 to 90 %", "iterations"]
     cells = []
     for row in rows:
-        # The paper does not give everything, and says so nowhere.
+        # The paper does not publish all figures.
         blank = "not given" if row.source == "paper" else ""
         figures = [number(row.figures.get(c)) or blank for c in columns]
         time = duration(row.seconds.get("median")) or blank
@@ -77,7 +77,7 @@ def quality_table(columns: Sequence[str], rows: Sequence[Row]) -> Table:
 
 
 def timing_table(timings: Sequence[Timing]) -> Table:
-    """A table of time against size."""
+    """Return a table of time against size."""
     head = ["task", "method", "grid", "median", "fastest", "slowest", "solves", "iterations"]
     head += ["peak MB", *(f"{p} %" for p in PHASES), "limit", "time / limit", "backend"]
     rows = []
@@ -95,7 +95,7 @@ def timing_table(timings: Sequence[Timing]) -> Table:
 
 
 def exponents(timings: Sequence[Timing]) -> list[str]:
-    """Fitted exponents as sentences."""
+    """Return the fitted exponents as sentences."""
     groups: dict[tuple[str, str], list[Timing]] = {}
     for t in timings:
         groups.setdefault((t.task, t.method), []).append(t)
@@ -107,13 +107,13 @@ def exponents(timings: Sequence[Timing]) -> list[str]:
 
 
 def loss_items(losses: Sequence[Loss]) -> list[str]:
-    """Losses as sentences."""
+    """Return the losses as sentences."""
     titles = {section.name: section.title for section in SECTIONS}
     return [f"{titles[loss.section]}. {loss}" for loss in losses]
 
 
 def markdown(title: str, chapters: Sequence[Chapter], folder: Path) -> str:
-    """The report with pictures beside it; paths are relative to the folder."""
+    """Return the report as Markdown; paths of pictures are relative to the folder."""
     parts = [f"# {title}"]
     for chapter in chapters:
         parts.append(f"## {chapter.title}")
@@ -136,7 +136,7 @@ def _markdown_table(table: Table) -> str:
 
 
 def html(title: str, chapters: Sequence[Chapter]) -> str:
-    """The report in one file, pictures within."""
+    """Return the report as one HTML file with embedded pictures."""
     from jinja2 import Environment
 
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)

@@ -1,7 +1,7 @@
 """Smoothers of SciPy, trimesh, MeshLab and VTK on the inputs of the denoise task.
 
-Each has the parameters that were best for the level of the noise, on surfaces that nothing
-is reported of: they know how much noise there is, the package's method does not.
+The parameters of each were tuned for each level of noise, on surfaces that are not part of the
+report. Peers are therefore given the level of noise; the package's method is not.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def _savgol(case: Case, window: int, order: int) -> Solved:
 
     points = case.given
     for axis in (0, 1):
-        # At most the grid, and odd.
+        # The window must be odd and not longer than the grid.
         length = min(window, (points.shape[axis] - 1) | 1)
         points = savgol_filter(points, length, min(order, length - 1), axis=axis)
     return Solved(points)
@@ -89,7 +89,7 @@ def _vtk(case: Case, iterations: int, band: float) -> Solved:
 
 
 def _grid(fixed: dict[str, Any] | None = None, **ranges: Any) -> tuple[dict[str, Any], ...]:
-    """Every combination of parameters."""
+    """Return every combination of parameters."""
     names = list(ranges)
     combinations = product(*ranges.values())
     return tuple({**(fixed or {}), **dict(zip(names, values))} for values in combinations)
@@ -129,7 +129,7 @@ METHODS = [
         _trimesh,
         "trimesh",
         _grid(
-            # Its volume has no meaning for a surface with a boundary.
+            # The volume is not defined for a surface with a boundary.
             {"filter": "filter_laplacian", "volume_constraint": False},
             lamb=(0.2, 0.5, 0.9),
             iterations=_STEPS,

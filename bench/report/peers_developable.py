@@ -1,8 +1,8 @@
 """Other solvers on the package's objective, and MeshLab's filter, on the developable task.
 
-The objective is that of the preset ``balanced`` on the design's own grid, over offsets along
-the design's normals, from the design itself, without the coarser grids that ``balanced``
-begins with. The package's own iteration on that very problem is a row, too.
+The objective is that of the preset ``balanced`` on the design's own grid. The unknowns are offsets
+along the design's normals, and the start is the design itself, without the coarser grids that
+``balanced`` begins with. One row is the package's own iteration on the same problem.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from report import energy
 from report.method import Array, Method, Solved
 from report.surfaces import Case
 
-#: Relative fall of the objective at which each solver stops, and when it gives up.
+#: Relative decrease of the objective at which each solver stops, and most iterations of each.
 TOLERANCE, ITERATIONS = 1e-5, 50
 #: Names of the rows that compare the solvers.
 SAME_ENERGY = ("balanced, all of it", "Levenberg-Marquardt of gso", "least_squares", "IPOPT")
@@ -89,7 +89,7 @@ def _ipopt(points: Array, problem: Problem, x: Array) -> tuple[Array, int, float
 
 
 def _placed(points: Array, problem: Problem, x: Array) -> Array:
-    """Unknowns as a grid in the frame of the design."""
+    """Convert unknowns to a grid in the frame of the design."""
     frame = Canonical(Mesh.from_grid(points, weld=False))
     at = frame.back("surface", problem.variables.points(x).reshape(-1, 3))
     return frame.frame.to_user(at).reshape(points.shape)

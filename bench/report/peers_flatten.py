@@ -1,7 +1,7 @@
-"""libigl's parameterisations on the inputs of the flatten task.
+"""libigl's parametrizations on the inputs of the flatten task.
 
-None has parameters to tune but a number of iterations, which is one from which on more of
-them change nothing that the tables show.
+Their only parameter is a number of iterations. It is so large that more iterations do not change
+the figures of the tables.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ ARAP_ITERATIONS, SLIM_ITERATIONS = 100, 20
 
 
 def harmonic(mesh: Mesh) -> tuple[Array, np.ndarray, Array]:
-    """Vertices, triangles, and their harmonic map to a circle, scaled to the surface's area."""
+    """Return vertices, triangles, and their harmonic map to a circle, scaled to equal area."""
     import igl
 
     v, f = np.asarray(mesh.vertices), np.ascontiguousarray(mesh.triangles)
@@ -28,7 +28,7 @@ def harmonic(mesh: Mesh) -> tuple[Array, np.ndarray, Array]:
 
 
 def scaled(vertices: Array, triangles: np.ndarray, flat: Array) -> Array:
-    """A flat image (n, 2) with the area of the surface."""
+    """Scale a flat image (n, 2) to the area of the surface."""
     e, g = (vertices[triangles[:, k]] - vertices[triangles[:, 0]] for k in (1, 2))
     a, b = (flat[triangles[:, k]] - flat[triangles[:, 0]] for k in (1, 2))
     area = np.linalg.norm(np.cross(e, g), axis=1).sum()
@@ -36,13 +36,16 @@ def scaled(vertices: Array, triangles: np.ndarray, flat: Array) -> Array:
 
 
 def arap(mesh: Mesh, iterations: int = ARAP_ITERATIONS) -> Array:
-    """As-rigid-as-possible parameterisation (Liu et al. 2008) from a harmonic map, (n, 2)."""
+    """Compute an as-rigid-as-possible parametrization (Liu et al. 2008), (n, 2).
+
+    It starts from a harmonic map.
+    """
     import igl
 
     v, f, start = harmonic(mesh)
     solver = igl.ARAPData()
     solver.max_iter = iterations
-    # One vertex is held, so that the pattern cannot drift.
+    # One vertex is fixed, so that the pattern cannot drift.
     held = np.array([len(v) // 2], np.int32)
     start = np.ascontiguousarray(start)
     igl.arap_precomputation(v, f, 2, held, solver)
@@ -51,7 +54,7 @@ def arap(mesh: Mesh, iterations: int = ARAP_ITERATIONS) -> Array:
 
 
 def slim(mesh: Mesh, iterations: int = SLIM_ITERATIONS) -> Array:
-    """Scalable locally injective map of symmetric Dirichlet energy (Rabinovich et al. 2017)."""
+    """Minimise the symmetric Dirichlet energy by SLIM (Rabinovich et al. 2017), (n, 2)."""
     import igl
 
     v, f, start = harmonic(mesh)
@@ -70,7 +73,10 @@ def slim(mesh: Mesh, iterations: int = SLIM_ITERATIONS) -> Array:
 
 
 def lscm(mesh: Mesh) -> Array:
-    """Least-squares conformal map (Levy et al. 2002), held at two vertices far apart, (n, 2)."""
+    """Compute a least-squares conformal map (Levy et al. 2002), (n, 2).
+
+    Two boundary vertices that are far apart are fixed.
+    """
     import igl
 
     loop = mesh.boundary_loops[0]

@@ -1,7 +1,7 @@
 """The published figures: Wang et al. 2024, Tables 1 to 3.
 
-Times of the nets were measured on an NVIDIA 3080; the processor of the optimiser's is not
-given, nor are fairness, strain and flipped cells.
+The times of the nets were measured on an NVIDIA 3080. The processor of the optimiser's times is
+not given; neither are fairness, strain and flipped cells.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from gso.dataset.noise import LEVELS
 from gso.dataset.summary import PUBLISHED, PUBLISHED_FLAT
 
-#: Mean loss_gc of the surfaces before.
+#: Mean loss_gc of the input surfaces.
 INPUT = PUBLISHED["loss_gc_before"]
 
 #: Developable surfaces.
@@ -40,7 +40,7 @@ TABLE_3: dict[float, dict[str, float]] = {
     )
 }
 
-#: The row that each net of the package stands beside.
+#: The published row that each net of the package is compared with.
 NETS: dict[str, dict[str, float]] = {
     "net-s": TABLE_1["Net-S"],
     "net-c": TABLE_1["Net-C"],
@@ -49,5 +49,5 @@ NETS: dict[str, dict[str, float]] = {
     "flatten": TABLE_2["Net"],
     "flatten-w": TABLE_2["Net-W"],
 }
-#: Figure 5: parameters of the net that was taken, and what it is called there.
+#: Figure 5: blocks, channels and number of parameters of the net that the paper chose.
 CHOSEN = {"blocks": 4, "channels": 16, "parameters": 2.82e6}

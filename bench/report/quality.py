@@ -1,4 +1,4 @@
-"""Quality and time of every method, surface by surface, in pieces that are kept."""
+"""Quality and time of every method, surface by surface, in stored blocks."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from report.store import Store
 from report.surfaces import Case, Surfaces
 
 Array = NDArray[np.float64]
-#: What is known of a method on a surface: figures, seconds, iterations, or an error.
+#: The record of a method on a surface: figures, seconds, iterations, or an error.
 Record = dict[str, Any]
 #: Records in the order of the surfaces, by task, level of the noise, and method.
 Records = dict[tuple[str, float, str], list[Record]]
-#: Told of a method's surfaces that are done.
+#: Callback with a method's name and the number of surfaces that are done.
 Tick = Callable[[str, int], None]
 
-#: Surfaces of a piece by the method's pace; those that are not timed.
+#: Surfaces of a timed block by the method's pace, and of a block that is not timed.
 _BLOCKS, _UNTIMED = {"fast": 16, "slow": 4, "peer": 2}, 64
 
 
@@ -56,24 +56,24 @@ class Block:
 
     @property
     def place(self) -> str:
-        """Name of its piece."""
+        """Name of its file in the store."""
         name = f"{self.name} {level_name(self.sigma)}".strip().replace(" ", "-").replace(",", "")
         return f"quality/{self.task}/{name}/{self.start:04d}-{self.stop:04d}"
 
     @property
     def key(self) -> dict[str, Any]:
-        """What its records depend on."""
+        """Everything that its records depend on."""
         known = self.method.key(self.sigma) | {"surfaces": self.surfaces.key}
         return known | {"processor": store.processor() if self.timed else ""}
 
 
 def levels(task: str) -> tuple[float, ...]:
-    """Levels of the noise of a task: one without noise, but for denoising."""
+    """Return the levels of the noise of a task: (0.0,), except for denoising."""
     return LEVELS if task == "denoise" else (0.0,)
 
 
 def blocks(settings: Settings, surfaces: Surfaces) -> Iterator[Block]:
-    """Everything that is to be measured."""
+    """Yield everything that is to be measured."""
     for task in TASKS:
         for sigma in levels(task):
             for method in (m for m in methods().values() if m.task == task):
@@ -90,9 +90,9 @@ def blocks(settings: Settings, surfaces: Surfaces) -> Iterator[Block]:
 
 
 def measured(settings: Settings, surfaces: Surfaces, kept: Store, tick: Tick) -> Records:
-    """Records of every method; what is there already is not made again.
+    """Measure every method; records that are already stored are not measured again.
 
-    What is timed runs first, in one process with nothing beside it; the rest over all
+    Timed blocks run first, in one process with no other work; the rest runs in all worker
     processes.
     """
     every = list(blocks(settings, surfaces))
@@ -123,12 +123,12 @@ _warm: set[tuple[str, str]] = set()
 
 
 def measure(block: Block) -> list[Record]:
-    """Records of the surfaces of a block."""
+    """Measure the surfaces of a block."""
     method = block.method
     with warnings.catch_warnings(), blas_threads(1):
         warnings.simplefilter("ignore", ConvergenceWarning)
         if block.timed and (block.task, block.name) not in _warm:
-            # What is made at first use only: imports, kernels, plans, a net's weights.
+            # An untimed solve for the work of the first use: imports, kernels, a net's weights.
             case = block.surfaces.case(block.start, block.sigma)
             _record(method, case if method.pace == "fast" else case.small)
             _warm.add((block.task, block.name))
@@ -145,7 +145,7 @@ def _record(method: Method, case: Case) -> Record:
     clock = time.perf_counter()
     try:
         solved = method(case)
-    except Exception as error:  # a peer may raise anything, and the others go on
+    except Exception as error:  # a peer may raise anything; the others still run
         return {"error": f"{type(error).__name__}: {error}"}
     seconds = time.perf_counter() - clock
     if not np.isfinite(solved.points).all():
@@ -158,11 +158,11 @@ def _record(method: Method, case: Case) -> Record:
 
 
 def figures(task: str, case: Case, result: Array) -> dict[str, float]:
-    """Metrics of a result: those of its task, as :data:`gso.metrics.INFO` names them.
+    """Return the metrics of a result: those of its task, as named in :data:`gso.metrics.INFO`.
 
-    "unflipped" is 1 where no cell is flipped; "rate" the percentage by which the angle of
-    the normals fell, from "theta_noisy"; "off" the root mean square distance of the vertices
-    from where they are without noise, percent of the diagonal.
+    Further ones: "unflipped" is 1 where no cell is flipped; "rate" is the decrease of the angle of
+    the normals in percent of "theta_noisy"; "off" is the root mean square distance of the vertices
+    from those without noise, in percent of the diagonal.
     """
     if task == "denoise":
         return _denoised(case, result)
@@ -175,7 +175,7 @@ def figures(task: str, case: Case, result: Array) -> dict[str, float]:
 
 
 def _denoised(case: Case, result: Array) -> dict[str, float]:
-    """Against the surface without noise, which the task's own metrics do not know."""
+    """Compare with the surface without noise, which the task's own metrics do not have."""
     noisy, theta = (metrics.normal_angle(case.surface, x) for x in (case.given, result))
     return {
         "theta": theta,

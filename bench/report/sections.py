@@ -39,7 +39,7 @@ HEADINGS = {
 }
 #: Columns that describe the input.
 GIVEN = ("theta_noisy",)
-#: Metrics that are no part of the package's, or have another name there: is lower better?
+#: Whether lower is better, for metrics that are not in :data:`gso.metrics.INFO`.
 _LOWER = {"unflipped": False, "rate": False, "off": True, "objective_ratio": True}
 
 
@@ -52,19 +52,19 @@ class Row:
     name : str
         The method.
     source : {"paper", "package", "peer"}
-        Whose figures they are.
+        Origin of the figures.
     count : int
-        Surfaces; 0 where the paper does not say.
+        Number of surfaces; 0 where the paper does not give it.
     figures : dict of str to float
         Means by metric.
     seconds : dict of str to float
-        Median, 10th and 90th percentile, and of how many surfaces.
+        Median, 10th and 90th percentile, and the number of timed surfaces.
     iterations : float or None
-        Mean.
+        Mean number of iterations.
     note : str
-        What the reader must know.
+        Note for the reader.
     absent : str
-        Why there are no figures, or nothing.
+        Why there are no figures, or "".
     """
 
     name: str
@@ -86,13 +86,13 @@ class Section:
     name, title : str
         Key and heading.
     task, sigma : str, float
-        What it is about.
+        Task and level of the noise.
     columns : tuple of str
         Metrics.
     published : dict
         The paper's rows.
     only : tuple of str
-        Methods, if not all of the task.
+        Names of its methods; empty for all methods of the task that are in no other section.
     default : str
         The method that the others are compared with.
     """
@@ -108,24 +108,27 @@ class Section:
 
     @property
     def main(self) -> str:
-        """The metric that the task is about; never one that a method can lower unseen."""
+        """The main metric of the task; ``loss_gc_worst`` in place of ``loss_gc``.
+
+        The latter sees one triangulation only, so that a method can lower it by crumpling.
+        """
         first = next(m for m in self.columns if m not in GIVEN)
         return "loss_gc_worst" if first == "loss_gc" else first
 
     @property
     def methods(self) -> list[Method]:
-        """The methods that it has rows of."""
+        """The methods that have rows in it."""
         every = [m for m in methods().values() if m.task == self.task]
         if self.only:
             return [m for m in every if m.name in self.only]
         return [m for m in every if m.name not in SAME_ENERGY]
 
     def of(self, records: Records, method: Method) -> list[Record]:
-        """Records of a method."""
+        """Return the records of a method."""
         return records.get((self.task, self.sigma, method.name), [])
 
 
-#: The published figures see one triangulation of the quads; the others are honest.
+#: The published metrics use one triangulation of the quads, the others both.
 _DEVELOPABLE = (
     "loss_gc",
     "loss_gc_worst",
@@ -185,15 +188,15 @@ SECTIONS = (
 
 
 def lower_is_better(metric: str) -> bool:
-    """Which way a metric is better."""
+    """Return whether lower values of a metric are better."""
     return _LOWER[metric] if metric in _LOWER else INFO[metric].lower_is_better
 
 
 def rows(section: Section, records: Records) -> list[Row]:
-    """The rows of a section.
+    """Return the rows of a section.
 
-    Where a method was given fewer surfaces than the default, a row has the default's
-    figures on those.
+    Where a method has fewer surfaces than the default, an additional row has the default's
+    figures on the same surfaces.
     """
     found = []
     for name, figures in section.published.items():
@@ -237,7 +240,7 @@ def _row(section: Section, method: Method, given: list[Record]) -> Row:
 
 
 def spread(seconds: list[float]) -> dict[str, Any]:
-    """Median and 10th and 90th percentile of some times; nothing of none."""
+    """Return the median, 10th and 90th percentile and number of times; {} for no times."""
     if not seconds:
         return {}
     low, middle, high = np.percentile(seconds, (10, 50, 90))

@@ -1,4 +1,4 @@
-"""How much is run."""
+"""Numbers of surfaces and sizes of grids in a run."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ class Settings:
     Attributes
     ----------
     name : str
-        What the run is called.
+        Name of the run.
     counts : dict of str to int
-        Most surfaces of a method by its pace.
+        Largest number of surfaces of a method, by its pace.
     timed : int
-        Surfaces that are timed, one after the other with nothing beside them.
+        Number of surfaces that are timed, one after the other with no other work.
     sizes : tuple of int
         Sides of the grids in the comparison of times.
     repeats : int
-        Solves of each size.
+        Largest number of solves of each size.
     examples : tuple of float
-        Mean curvature of the surfaces that are drawn: those nearest to these.
+        Mean curvatures; the figures show the surfaces nearest to these.
     workers : int
-        Processes for what is not timed; 0 for this one only.
+        Worker processes for what is not timed; 0 for this process only.
     """
 
     name: str

@@ -1,7 +1,7 @@
-"""What has been measured already, in files: a run that was killed goes on where it was.
+"""Stored results, so that an interrupted run can resume.
 
-A piece is a file whose name ends in a digest of what its content depends on. Whatever of
-that changes, the piece is not found and is made anew.
+A piece is a file whose name ends in a digest of everything that its content depends on. When
+any of that changes, the piece is not found and is measured again.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ import gso
 from gso.io import replacing
 
 PACKAGE = Path(gso.__file__).parent
-#: Parts of the package that no figure of the optimiser depends on.
+#: Parts of the package that do not affect the optimiser's figures.
 _ASIDE = ("cli", "dataset", "hybrid", "io", "net", "plot", "rulings")
-#: Parts that the measures of a peer's result depend on.
+#: Parts that the metrics of a peer's result depend on.
 _MEASURES = ("geometry", "mesh.py", "metrics.py", "nearest.py", "tasks", "topology.py")
 
 
@@ -47,21 +47,21 @@ class Store:
         self.folder = Path(folder)
 
     def find(self, name: str, key: dict[str, Any]) -> Any:
-        """A piece that is there, or None."""
+        """Return a stored piece, or None."""
         try:
             return json.loads(self._path(name, key, ".json").read_bytes())["value"]
         except (OSError, ValueError, KeyError):
             return None
 
     def keep(self, name: str, key: dict[str, Any], value: Any) -> None:
-        """Write a piece, whole or not at all."""
+        """Write a piece atomically."""
         path = self._path(name, key, ".json")
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as file:
             file.write(json.dumps({"key": key, "value": value}).encode())
 
     def value(self, name: str, key: dict[str, Any], make: Callable[[], Any]) -> Any:
-        """A piece, made if it is not there."""
+        """Return a piece; compute and store it if it is missing."""
         found = self.find(name, key)
         if found is None:
             found = make()
@@ -71,7 +71,7 @@ class Store:
     def arrays(
         self, name: str, key: dict[str, Any], make: Callable[[], dict[str, np.ndarray]]
     ) -> dict[str, np.ndarray]:
-        """Arrays, made if they are not there."""
+        """Return arrays; compute and store them if they are missing."""
         path = self._path(name, key, ".npz")
         try:
             with np.load(path, allow_pickle=False) as data:
@@ -90,14 +90,14 @@ class Store:
 
 
 def digest(key: Any) -> str:
-    """Twelve signs for anything that JSON can say."""
+    """Return a digest of twelve characters of an object that JSON can represent."""
     text = json.dumps(key, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 @lru_cache(maxsize=1)
 def solver() -> str:
-    """Digest of the code that the optimiser's results and all measures depend on."""
+    """Digest of the code that the optimiser's results and all metrics depend on."""
     aside = set(_present(_ASIDE))
     return _content(
         path
@@ -108,7 +108,7 @@ def solver() -> str:
 
 @lru_cache(maxsize=1)
 def measures() -> str:
-    """Digest of the code that all measures depend on."""
+    """Digest of the code that all metrics depend on."""
     return _content(
         path
         for place in _present(_MEASURES)
@@ -118,7 +118,7 @@ def measures() -> str:
 
 @lru_cache(maxsize=1)
 def nets() -> str:
-    """Digest of the code that nets and warm starts depend on, beside the optimiser's."""
+    """Digest of the code of nets and warm starts, without the optimiser's."""
     return _content(path for place in _present(("net", "hybrid")) for path in place.rglob("*.py"))
 
 
@@ -129,7 +129,7 @@ def source(*paths: Path) -> str:
 
 
 def _present(names: Iterable[str]) -> list[Path]:
-    """Files and folders of the package; one that was renamed must not drop out of a digest."""
+    """Return paths of the package; raise if one is missing, or it would drop out of a digest."""
     places = [PACKAGE / name for name in names]
     for place in places:
         if not place.exists():
@@ -145,7 +145,7 @@ def _content(paths: Iterable[Path]) -> str:
 
 
 def installed(names: Iterable[str]) -> dict[str, str]:
-    """Versions of packages; "" for one that is not installed."""
+    """Return the versions of packages; "" for one that is not installed."""
     return {name: _version(name) for name in names}
 
 
@@ -159,7 +159,7 @@ def _version(name: str) -> str:
 
 @lru_cache(maxsize=1)
 def processor() -> str:
-    """Name of the processor, and how many cores there are."""
+    """Return the name of the processor and the number of cores."""
     name = platform.processor() or platform.machine()
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()

@@ -1,7 +1,7 @@
-"""Surfaces to compare on, and where they come from.
+"""The surfaces on which methods are compared.
 
-The test split of the published size follows from its seed, without its labels; it is
-screened once, in a minute or two, and kept in a folder.
+The test split of the published size is drawn again from its seed, without its labels. It is
+selected once, in a minute or two, and stored in a folder.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ BENCH = Path(__file__).resolve().parents[1]
 
 @dataclass(frozen=True)
 class Case:
-    """What a method gets, and what its result is measured by.
+    """The input of a method, and the surface that its result is compared with.
 
     Attributes
     ----------
     surface : ndarray, (H, W, 3)
-        The surface.
+        The surface without noise.
     given : ndarray, (H, W, 3)
-        What the method sees of it: itself, or with noise.
+        The method's input: the surface, with noise for denoising.
     sigma : float
         Standard deviation of that noise.
     """
@@ -58,15 +58,17 @@ class Case:
 
     @cached_property
     def mesh(self) -> Mesh:
-        """What the method sees of it, with its triangles: peers need them, and are not the
-        ones to make them."""
+        """The method's input as a mesh with its triangles, which peers need.
+
+        They are computed here, so that peers are not charged with their time.
+        """
         mesh = Mesh.from_grid(self.given, weld=False)
-        mesh.triangles  # noqa: B018 - kept by the mesh
+        mesh.triangles  # noqa: B018 - cached by the mesh
         return mesh
 
     @property
     def small(self) -> Case:
-        """Every fourth vertex of it."""
+        """The case with every fourth vertex only."""
         return Case(self.surface[::4, ::4], self.given[::4, ::4], self.sigma)
 
 
@@ -77,9 +79,9 @@ class Surfaces:
     Attributes
     ----------
     name : str
-        What they are, for people.
+        Description for the reader.
     folder : Path
-        Where ``surface.npy`` (n, H, W, 3) and ``noise.npy`` lie.
+        Folder with ``surface.npy`` (n, H, W, 3) and ``noise.npy``.
     """
 
     name: str
@@ -87,7 +89,7 @@ class Surfaces:
 
     @property
     def key(self) -> str:
-        """Digest of what they are."""
+        """Digest that identifies them."""
         return self.folder.name
 
     def __len__(self) -> int:
@@ -97,7 +99,7 @@ class Surfaces:
         return np.array(_mapped(self.folder / "surface.npy")[k], float)
 
     def case(self, k: int, sigma: float = 0.0) -> Case:
-        """Surface k, with noise if `sigma` is positive."""
+        """Return surface k, with noise if `sigma` is positive."""
         surface = self[k]
         if not sigma:
             return Case(surface, surface)
@@ -125,9 +127,9 @@ def written(folder: Path, name: str, points: Any, unit_noise: Any) -> Surfaces:
 
 
 def reference(folder: Path, count: int | None = None, size: int = 64) -> Surfaces:
-    """The 24 reference surfaces that are in the repository, or the first of them.
+    """Return the 24 reference surfaces of the repository, or the first `count` of them.
 
-    Other sizes than 64 are resampled.
+    Surfaces are resampled if `size` is not 64.
     """
     with np.load(BENCH / "data" / "bench24.npz") as data:
         points, unit = (data[k][:count].astype(float) for k in ("surfaces", "unit_noise"))
@@ -138,7 +140,7 @@ def reference(folder: Path, count: int | None = None, size: int = 64) -> Surface
 
 
 def screened(folder: Path, split: str, store: Store, tick: Tick | None = None) -> Surfaces:
-    """A split of the set of the published size and seed 0."""
+    """Draw a split of the set of the published size and seed 0."""
     recipe = Recipe()
     key = {"recipe": recipe.as_dict() | {"options": None, "labels": None}, "split": split}
 
@@ -162,7 +164,7 @@ def screened(folder: Path, split: str, store: Store, tick: Tick | None = None) -
 
 
 def opened(folder: Path, path: Path, name: str = "test") -> Surfaces:
-    """A split of a set that is built; the test split with its noise, others without any."""
+    """Read a split of an existing set: the test split with its noise, others without noise."""
     whole = dataset.open(path)
     split = whole[name]
     points = split["surface"][:]

@@ -23,11 +23,11 @@ from report.store import Store
 _SCRIPT = Path(__file__).with_name("measure.py")
 #: Seconds for the repeated solves of one size.
 _BUDGET = 20.0
-#: Smallest side that counts for the exponent: below, the time hardly depends on the size.
+#: Smallest side used for the exponent; below it the time hardly depends on the size.
 _LEAST = 32
 #: Phases, in the order in which they are shown.
 PHASES = ("net", "setup", "evaluation", "assembly", "factor", "solve")
-#: Methods that are compared, by what they are called in each task.
+#: Methods that are compared; :func:`_named` maps them to the methods of each task.
 METHODS = ("TNO", "Net", "hybrid")
 
 
@@ -38,21 +38,21 @@ class Timing:
     Attributes
     ----------
     task, method, size : str, str, int
-        What was solved.
+        Task, method and side of the grid.
     seconds : list of float
-        Of every solve.
+        Seconds of every solve.
     iterations, factorisations : int
-        Of one solve.
+        Numbers in one solve.
     peak_mb : float
-        Largest memory of the process, Python and its packages included.
+        Peak memory of the process, including Python and its packages, MB.
     shares : dict of str to float
         Shares of the time by :data:`PHASES`.
     limit : float or None
         Seconds of one numeric factorisation per iteration, by the fastest backend.
     backend, fastest : str
-        Which was used in the last stage, and which is the fastest for it.
+        Backend of the last stage, and the fastest backend for it.
     absent : str
-        Why there are no figures, or nothing.
+        Why there are no figures, or "".
     """
 
     task: str
@@ -75,12 +75,12 @@ class Timing:
 
 
 def pieces(settings: Settings) -> list[tuple[str, str, int]]:
-    """Task, method and size of everything that is timed."""
+    """Return task, method and size of everything that is timed."""
     return [(task, m, size) for task in TASKS for m in METHODS for size in settings.sizes]
 
 
 def timings(settings: Settings, kept: Store, tick: Callable[..., None]) -> list[Timing]:
-    """Measure what is not there yet."""
+    """Measure what is not stored yet, and return all timings."""
     found = []
     for task, name, size in pieces(settings):
         method = of(task, _named(task, name))
@@ -104,7 +104,7 @@ def timings(settings: Settings, kept: Store, tick: Callable[..., None]) -> list[
 
 
 def _named(task: str, name: str) -> str:
-    """Name of a method in the tables of its task."""
+    """Return the name of a method in the tables of its task."""
     if name == "Net":
         nets = [m.name for m in methods().values() if (m.task, m.net) == (task, DEFAULTS[task])]
         return next(n for n in nets if n != "hybrid")
@@ -126,7 +126,7 @@ def _limits(repeats: int) -> dict[str, float]:
 
 
 def exponent(some: Iterable[Timing]) -> float | None:
-    """Power of the number of vertices that the time grows with, by least squares.
+    """Fit the exponent of the time as a power of the number of vertices, by least squares.
 
     Examples
     --------

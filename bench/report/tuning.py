@@ -1,4 +1,4 @@
-"""The peers' best parameters, on surfaces that nothing is reported of."""
+"""The choice of the peers' parameters, on surfaces that are not part of the report."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from report.quality import levels
 from report.store import Store
 from report.surfaces import Case, Surfaces
 
-#: What the parameters are chosen by; lower is better.
+#: Metric by which the parameters are chosen; lower is better.
 _SCORE: dict[str, Callable[[Case, Array], float]] = {
     "developable": lambda case, points: metrics.loss_gc_worst(points),
     "denoise": lambda case, points: metrics.normal_angle(case.surface, points),
 }
-#: Share of the input's score that a result must be below, not to count as nothing done.
+#: Share of the input's score below which a result counts as an improvement.
 _LESS = 0.999
-#: Surfaces that they are chosen on.
+#: Number of surfaces for the choice.
 COUNT = 8
 
 
 def tuned(
     surfaces: Surfaces, kept: Store, command: str, tick: Callable[..., None]
 ) -> dict[str, Any]:
-    """Parameters by task, method and level of the noise, for ``tuned.json``."""
+    """Choose parameters by task, method and level of the noise, for ``tuned.json``."""
     values: dict[str, Any] = copy.deepcopy(before())
     count = min(COUNT, len(surfaces))
     for method in (m for m in methods().values() if m.candidates and not m.missing()):
@@ -54,12 +54,12 @@ def tuned(
 
 
 def write(found: dict[str, Any]) -> None:
-    """Replace the parameters that are in the repository."""
+    """Replace the parameters in the repository."""
     TUNED.write_text(json.dumps(found, indent=1) + "\n")
 
 
 def _best(method: Method, surfaces: Surfaces, count: int, sigma: float) -> dict[str, Any] | None:
-    """The best parameters; None if with none of them the results are better than the input."""
+    """Return the best parameters, or None if no result is better than the input."""
     cases = [surfaces.case(k, sigma) for k in range(count)]
     untouched = np.mean([_SCORE[method.task](case, case.given) for case in cases])
     scores = []
@@ -67,7 +67,7 @@ def _best(method: Method, surfaces: Surfaces, count: int, sigma: float) -> dict[
         found = []
         for case in cases:
             with warnings.catch_warnings():
-                # SciPy's splines say where they could not smooth as much as they were asked to.
+                # SciPy's splines warn where they could not smooth as much as requested.
                 warnings.simplefilter("ignore")
                 points = method.run(case, **parameters).points
             if not np.isfinite(points).all():

@@ -1,4 +1,4 @@
-"""Where the package loses: computed from the rows, for every metric."""
+"""Figures of peers and of the paper that are better than the package's, for every metric."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from report.quality import Record, Records
 from report.sections import GIVEN, HEADINGS, SECTIONS, Section, lower_is_better
 from report.timing import Timing
 
-#: What is compared beside the metrics of a table.
+#: Name of the time, which is compared in addition to the metrics of a table.
 TIME = "seconds"
-#: Rows that are no results but what results begin with.
+#: Rows that are not results, but the starting points of results.
 _STARTS = ("Init",)
 
 
 @dataclass(frozen=True)
 class Winner:
-    """Who is better than the package's default at something.
+    """A peer or a published row that is better than the package's default in a metric.
 
     Attributes
     ----------
@@ -30,9 +30,9 @@ class Winner:
     best_name : str
         That method.
     count : int
-        Surfaces that these are means over; 0 for the paper, whose surfaces are others.
+        Number of surfaces of these means; 0 for the paper, whose surfaces are others.
     but : str
-        What it is worse at: the figure that the task is about.
+        The section's main metric of both, if the winner is worse in it.
     """
 
     name: str
@@ -51,16 +51,16 @@ class Winner:
 
 @dataclass(frozen=True)
 class Loss:
-    """What the package's default is beaten at.
+    """A metric in which the package's default is not the best.
 
     Attributes
     ----------
     section, metric : str
-        At what.
+        Section and metric.
     default : str
         The default's name.
     winners : list of Winner
-        By whom, those that no method of the package is as good as first.
+        Peers and published rows that are better than the default.
     """
 
     section: str
@@ -70,7 +70,7 @@ class Loss:
 
     @property
     def lost(self) -> list[Winner]:
-        """Those that no method of the package is as good as."""
+        """The winners that are better than all methods of the package."""
         return [w for w in self.winners if _better(self.metric, w.theirs, w.best)]
 
     def __str__(self) -> str:
@@ -86,7 +86,7 @@ class Loss:
 
 
 def losses(records: Records) -> list[Loss]:
-    """Everything that the default is beaten at, what is lost to all of the package first."""
+    """Find all losses; first those with a winner that is better than the whole package."""
     found = [
         Loss(section.name, metric, section.default, winners)
         for section in SECTIONS
@@ -126,7 +126,10 @@ def _against(
     own: dict[str, list[Record]],
     where: list[int] | None = None,
 ) -> Iterator[Winner]:
-    """A winner, if it is one: on some surfaces, or without any, each on all that it has."""
+    """Yield a winner if `theirs` is better than the default.
+
+    The package's means are over the surfaces `where`, or over all that each method has.
+    """
 
     def mean(given: list[Record]) -> float | None:
         return _mean(given, list(range(len(given))) if where is None else where, metric)
@@ -147,7 +150,7 @@ def _better(metric: str, theirs: float, ours: float) -> bool:
 
 
 def _mean(records: list[Record], where: list[int], metric: str) -> float | None:
-    """Mean over some surfaces, the median of times; None if one of them has no figure."""
+    """Return the mean over some surfaces (of times the median); None if a figure is missing."""
     if not records or (metric != TIME and max(where) >= len(records)):
         return None
     some = [records[k] for k in where if k < len(records) and "error" not in records[k]]
@@ -159,7 +162,7 @@ def _mean(records: list[Record], where: list[int], metric: str) -> float | None:
 
 
 def against_limit(timings: Sequence[Timing]) -> list[str]:
-    """How many times as long as its factorisations alone a solve takes."""
+    """Compare the time of each solve with that of its factorisations alone."""
     return [
         f"{t.task} {t.method}, {t.size} x {t.size}: {t.median:.3g} s, "
         f"{t.median / t.limit:.1f} times one numeric factorisation per iteration ({t.fastest})"
@@ -169,7 +172,7 @@ def against_limit(timings: Sequence[Timing]) -> list[str]:
 
 
 def unmeasured(records: Records) -> list[str]:
-    """Methods without figures, why, and in which sections."""
+    """Return methods without figures, the reasons, and the sections."""
     found: dict[tuple[str, str], list[str]] = {}
     for section in SECTIONS:
         for method in section.methods:
