@@ -199,7 +199,7 @@ def reach(run: Solve, request: Request, demand: Demand) -> tuple[Any, bool]:
         if last.status is Status.CANCELLED:
             break
         value = demand.value(last.points)
-        last.details = {**last.details, "demand": weight}
+        last.details = {**last.details, "weight factor": weight}
         far = found.add(last, value)
         if demand.near(value) and not far:
             break
