@@ -196,9 +196,9 @@ class Session:
         """Iterate until the task's tolerance is met and all constraints hold.
 
         The energy has many local minima, and dragging may have led into a bad one. The task is
-        therefore also solved from its first start, as by :func:`gso.tno.optimize`. That result
-        replaces the dragged surface if only it is usable, or if both or neither are usable and
-        its energy is lower.
+        therefore also solved anew from the design (or `x0`), as by :func:`gso.tno.optimize`.
+        That result replaces the dragged surface if only it is usable, or if both or neither
+        are usable and its energy is lower.
 
         Returns
         -------

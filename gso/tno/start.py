@@ -25,8 +25,8 @@ class Start:
         optimiser's own start, or if it has inverted cells in a flat image. The result is then
         the same as without it.
     iterations : int, optional
-        Largest number of iterations over all stages. With `points`, the last stage is served
-        first.
+        Largest number of iterations over all stages. With `points`, they are reserved for the
+        last stage first.
     tolerance : float
         With `points`, stages stop when an iteration lowers the energy by less than this share
         of it, or than the options' tolerance where that is larger.
