@@ -17,7 +17,7 @@ Ints = NDArray[np.int64]
 
 #: Largest number of control points along each side of the spline fitted to a mesh.
 _CONTROLS = 24
-#: Weight of the control net's second differences, which only matter where there are no vertices.
+#: Weight of the control net's second differences; it has effect only where vertices are missing.
 _SMOOTH = 1e-6
 #: Largest distance of a vertex from the spline, in the unit ball, for a net to be used.
 _FAR = 0.05
