@@ -79,8 +79,8 @@ class Run:
     Attributes
     ----------
     guarded : bool
-        Whether the start of the first request is dropped, there and in later requests, if its
-        energy is above that of a cold start.
+        Whether the start of the first request is dropped, there and in later requests, if the
+        plan refuses it or its energy is above that of a cold start.
     budget : int or None
         Largest number of iterations of all solves together.
     tolerance : float
