@@ -1,4 +1,4 @@
-"""What a result must keep: one kind of constraint per class, and all of them checked together."""
+"""Constraints on a result: one class per kind, all of them checked against each other."""
 
 from gso.constraints.base import Constraint
 from gso.constraints.compiled import TIGHT, Compiled, compile_constraints, listed

@@ -1,4 +1,4 @@
-"""What kinds of constraints have in common: the mesh they are checked against."""
+"""The base class of all constraints, and the checks that they share."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ Ints = NDArray[np.int64]
 
 
 class Constraint(KnownFields):
-    """Something that a result must keep. Kinds of it say what, in :meth:`parts`."""
+    """A condition on the result; subclasses give its equations in :meth:`parts`."""
 
     def parts(self, subject: Subject) -> list[Part]:
-        """Equations of the constraint on a mesh; raises `OptionError` when they make no sense."""
+        """Return the equations on a mesh; raise `OptionError` if the constraint is invalid."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class Subject:
-    """The mesh that a constraint is for, and the checks that all kinds need.
+    """The mesh that a constraint applies to, with the checks that all kinds need.
 
     Attributes
     ----------
     mesh : Mesh
         The design, in the user's frame and numbering.
     flat : bool
-        Positions are those of a flat image, which does not exist yet: two components.
+        Whether positions are those of the flat image (2D), which does not exist yet.
     number : int
         Place of the constraint in the user's list.
     name : str
-        What messages call it.
+        Name of the constraint in messages.
     """
 
     mesh: Mesh
@@ -50,15 +50,15 @@ class Subject:
 
     @property
     def dim(self) -> int:
-        """Components of a position."""
+        """Number of components of a position."""
         return 2 if self.flat else 3
 
     def refuse(self, why: str) -> OptionError:
-        """An error about this constraint."""
+        """Return an error about this constraint."""
         return OptionError(f"{self.name} {why}")
 
     def in_space(self, instead: str) -> None:
-        """Refuse what needs the design's own positions when a flat image is made."""
+        """Refuse a constraint on positions of the design if the result is a flat image."""
         if self.flat:
             raise self.refuse(
                 f"refers to positions of the design, not of its flat image; {instead}"
@@ -139,7 +139,7 @@ class Subject:
 
 
 def _array(given: Any) -> Any:
-    """The argument as an array; a single number when it is ragged."""
+    """Return the argument as an array; an array of one zero if it is ragged."""
     try:
         return np.asarray(given)
     except ValueError:
@@ -147,7 +147,7 @@ def _array(given: Any) -> Any:
 
 
 def numbers(given: Any) -> Array:
-    """The argument as numbers; NaN when it is none."""
+    """Return the argument as an array of numbers; one NaN if it is not numeric."""
     try:
         return np.array(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):

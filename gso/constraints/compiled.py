@@ -1,4 +1,4 @@
-"""Constraints of a mesh in one place, checked against it and against each other."""
+"""All constraints of a mesh, checked against it and against each other."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Kind = TypeVar("Kind", bound=Part)
 
-#: Largest share of the size by which a hard constraint may be missed.
+#: Largest violation of a hard constraint, in the unit ball, that counts as satisfied.
 TIGHT = 1e-6
 
 
 class Miss(NamedTuple):
-    """The equation of a constraint that is missed most: by what length, and its vertices."""
+    """The most violated equation of a constraint: its violation (a length) and its vertices."""
 
     length: float
     vertices: Ints
@@ -35,16 +35,16 @@ class Miss(NamedTuple):
 
 @dataclass(frozen=True)
 class Compiled:
-    """What a result must keep, in the frame and numbering of one mesh.
+    """The equations of all constraints, in the frame and numbering of one mesh.
 
     Attributes
     ----------
     parts : tuple of Part
         Equations.
     names : tuple of str
-        What messages call the constraints, by number.
+        Names of the constraints in messages, by number.
     flat : bool
-        The vertices meant are those of the flat image.
+        Whether the constraints apply to the flat image.
     """
 
     parts: tuple[Part, ...] = ()
@@ -53,36 +53,36 @@ class Compiled:
 
     @property
     def empty(self) -> bool:
-        """Nothing is constrained."""
+        """Whether there are no equations."""
         return not self.parts
 
     @property
     def block(self) -> str:
-        """Whose coordinates are meant."""
+        """Name of the coordinate block that is constrained."""
         return "flat" if self.flat else "surface"
 
     def of(self, kind: type[Kind], *, hard: bool) -> list[Kind]:
-        """Parts of one kind."""
+        """Return the hard or the soft parts of one kind."""
         return [p for p in self.parts if isinstance(p, kind) and p.hard is hard]
 
     @cached_property
     def reduction(self) -> Reduction | None:
-        """The hard linear part, solved; None when there is none."""
+        """Elimination of the hard linear parts; None when there are none."""
         return reduce(self.parts)
 
     @property
     def hard_ids(self) -> Ints:
-        """Vertices with a place of their own, each once."""
+        """Vertices with a hard position, each once."""
         return self._pins(True)[0]
 
     @property
     def hard_positions(self) -> Array:
-        """Where they are, (k, dim)."""
+        """Positions (k, dim) of :attr:`hard_ids`."""
         return self._pins(True)[1]
 
     @property
     def places(self) -> tuple[Ints, Array]:
-        """Vertices with a place, be they only drawn there, each once; and where, (k, dim)."""
+        """Vertices with a hard or soft position, each once, and the positions (k, dim)."""
         return self._pins(True, False)
 
     def _pins(self, *hard: bool) -> tuple[Ints, Array]:
@@ -94,23 +94,23 @@ class Compiled:
 
     @property
     def anchored(self) -> tuple[Part, ...]:
-        """Parts that say where vertices are: all but glue, planarity and lengths."""
+        """Parts that refer to absolute positions: all but glue, planarity and lengths."""
         loose = Lengths | Planar
         return tuple(p for p in self.parts if not (isinstance(p, loose) or is_glue(p)))
 
     def mapped(self, frame: Frame, order: Ints) -> Compiled:
-        """In the unit of a frame, with vertex i numbered ``order[i]``."""
+        """Return the constraints in the unit of a frame, with vertex i numbered ``order[i]``."""
         return replace(self, parts=tuple(p.mapped(frame, order) for p in self.parts))
 
     @property
     def links(self) -> Ints:
-        """Pairs of vertices (k, 2) that an equation ties to each other."""
+        """Pairs of vertices (k, 2) that an equation couples."""
         rows = [p.vertices for p in self.parts]
         pairs = [np.stack([v[:, 0], v[:, k]], axis=1) for v in rows for k in range(1, v.shape[1])]
         return np.concatenate(pairs) if pairs else np.zeros((0, 2), np.int64)
 
     def within(self, ids: Ints, count: int) -> Compiled:
-        """The equations on some of `count` vertices, which get the numbers of their places."""
+        """Return the equations on vertices `ids` of `count`, numbered by their place in `ids`."""
         number = np.full(count, -1)
         number[ids] = np.arange(len(ids))
         frame = Frame(np.zeros(2 if self.flat else 3), 1.0)
@@ -118,7 +118,7 @@ class Compiled:
         return replace(self, parts=tuple(p.mapped(frame, number) for p in kept if p.count))
 
     def misses(self, points: Array) -> dict[str, Miss]:
-        """How far vertices (n, dim) are from keeping each constraint, by its name."""
+        """Return the most violated equation of each constraint, by name, at vertices (n, dim)."""
         out = {name: Miss(0.0, np.zeros(0, np.int64), False) for name in self.names}
         for p in self.parts:
             violation = p.violation(points)
@@ -129,17 +129,17 @@ class Compiled:
 
 
 def is_glue(part: Part) -> bool:
-    """Whether a part says that vertices coincide."""
+    """Return whether a part makes vertices coincide."""
     return isinstance(part, Relations) and bool((part.matrix == np.eye(len(part.matrix))).all())
 
 
 def listed(constraints: Iterable[Constraint] | Constraint) -> list[Constraint]:
-    """The constraints that a user gave, be it a single one, as a list.
+    """Return the user's constraints, or a single one, as a list.
 
     Raises
     ------
     OptionError
-        They are no list, or one of them is no constraint.
+        The argument is not iterable, or an entry is not a constraint.
     """
     if isinstance(constraints, Constraint):
         return [constraints]
@@ -161,22 +161,22 @@ def _name(number: int, constraint: object) -> str:
 def compile_constraints(
     constraints: Iterable[Constraint] | Constraint | Compiled, mesh: Mesh, *, flat: bool = False
 ) -> Compiled:
-    """Check constraints against a mesh and against each other, and gather them.
+    """Check constraints against a mesh and against each other, and compile them.
 
     Parameters
     ----------
     constraints : iterable of Constraint, or one, or Compiled
-        As the user gave them; those that were gathered for this mesh already are returned.
+        The user's constraints; a `Compiled` is returned unchanged.
     mesh : Mesh
         The design.
     flat : bool
-        They are about its flat image.
+        Whether the constraints apply to its flat image.
 
     Raises
     ------
     OptionError
-        An index or a shape is wrong, a constraint means nothing for this task, or hard
-        linear ones contradict each other; the message names them and a vertex.
+        An index or a shape is wrong, a constraint does not apply to this task, or hard linear
+        constraints contradict each other; the message names them and a vertex.
     """
     if isinstance(constraints, Compiled):
         return constraints

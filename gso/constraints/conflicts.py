@@ -1,4 +1,4 @@
-"""Hard linear constraints that contradict each other are found and named."""
+"""Detection of hard linear constraints that contradict each other."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from gso.status import OptionError
 
 Ints = NDArray[np.int64]
 
-#: Contradictions smaller than this share of the mesh, or of its coordinates, are rounding.
+#: Residuals below these shares of the mesh diagonal, or of the largest coordinate, are rounding.
 _ROUNDING = 1e-9
 _DIGITS = 1e-13
 
 
 def check(parts: Sequence[Part], names: Sequence[str], mesh: Mesh) -> None:
-    """Refuse parts that cannot hold together.
+    """Refuse parts that contradict each other.
 
     Raises
     ------
     OptionError
-        Names a smallest set of constraints that contradict each other, and a vertex.
+        Parts contradict each other; the message names a minimal set of constraints and a vertex.
     """
     reach = float(np.abs(mesh.vertices[mesh.used]).max())
     tolerance = max(_ROUNDING * mesh.diagonal, _DIGITS * reach)
@@ -48,7 +48,7 @@ def check(parts: Sequence[Part], names: Sequence[str], mesh: Mesh) -> None:
 
 
 def _worst(parts: Sequence[Part], tolerance: float) -> tuple[float, int, Ints] | None:
-    """The equation missed most: by how much, its vertex, and all vertices tied to that one."""
+    """Find the most violated equation: residual, vertex, and all vertices coupled to that one."""
     reduction = reduce(parts)
     if reduction is None:
         return None
@@ -62,7 +62,7 @@ def _worst(parts: Sequence[Part], tolerance: float) -> tuple[float, int, Ints] |
 
 
 def _within(parts: Sequence[Part], ids: Ints) -> list[Part]:
-    """The linear parts on some vertices."""
+    """Return the linear parts on some vertices."""
     linear = (p for p in parts if isinstance(p, OnPlane | Relations) or _pinned(p))
     out = [p.kept(np.isin(p.vertices[:, 0], ids)) for p in linear]
     return [p for p in out if p.count]

@@ -1,4 +1,4 @@
-"""Vertices that slide along a curve; the boundary along its own."""
+"""Constraints by which vertices slide along a given curve, or along the boundary."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class OnCurve(Constraint):
     points : array_like, (m, 3)
         The polyline, in the unit of the mesh; (m, 2) for a flat image.
     closed : bool
-        Its last point is joined to the first.
+        Whether its last point is joined to the first.
     weight : float, optional
-        Strength of a soft constraint, of the order of 1; a hard one when not given.
+        Weight of a soft constraint, of the order of 1; the constraint is hard when not given.
 
     Examples
     --------
@@ -70,17 +70,17 @@ class OnCurve(Constraint):
 
 @dataclass(frozen=True)
 class SlidingBoundary(Constraint):
-    """The boundary slides along its own curve; not for flat images.
+    """Boundary vertices that slide along the boundary curve; not for flat images.
 
-    Corners, where the boundary turns by more than `corner`, stay where they are: those of
-    a grid over a rectangle, none on a round hole.
+    Corners, where the boundary turns by more than `corner`, stay fixed: the four corners of a
+    grid over a rectangle, none on a round hole.
 
     Parameters
     ----------
     corner : float
-        Degrees, between 0 and 180.
+        Turning angle above which a vertex is a corner, in degrees between 0 and 180.
     weight : float, optional
-        Strength of a soft constraint, of the order of 1; a hard one when not given.
+        Weight of a soft constraint, of the order of 1; the constraint is hard when not given.
     """
 
     corner: float = CORNER
@@ -93,7 +93,7 @@ class SlidingBoundary(Constraint):
             raise subject.refuse(f"has corner {self.corner!r}; it is at most 180 degrees")
         mesh = subject.mesh
         found: list[Part] = []
-        # A boundary slides along that of its own component.
+        # Vertices slide only along the boundary of their own component.
         for number in dict.fromkeys(int(mesh.components[loop[0]]) for loop in mesh.boundary_loops):
             loops = [loop for loop in mesh.boundary_loops if mesh.components[loop[0]] == number]
             found += _along(subject.number, mesh.vertices, loops, corner, weight)
@@ -103,13 +103,13 @@ class SlidingBoundary(Constraint):
 def _along(
     owner: int, vertices: Array, loops: list[Ints], corner: float, weight: float | None
 ) -> list[Part]:
-    """Vertices of loops on the curves that these are; their corners stay."""
+    """Constrain the vertices of boundary loops to the loops' curves, and fix the corners."""
     lines, held, sliding = [], [], []
     for loop in loops:
         points = vertices[loop]
         way = np.roll(points, -1, axis=0) - points
         length = np.linalg.norm(way, axis=1, keepdims=True)
-        # A vertex on top of the one before it stays: it has no direction.
+        # A vertex with an edge of zero length has no direction, so it is fixed.
         sharp = turns(way / np.maximum(length, 1e-300)) > corner
         sharp |= (np.minimum(length, np.roll(length, 1, axis=0)) == 0)[:, 0]
         held.append(loop[sharp])

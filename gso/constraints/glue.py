@@ -15,10 +15,10 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Glue(Constraint):
-    """Pairs of vertices that are at the same place: ``v_i = v_j``, exactly.
+    """Pairs of vertices that coincide exactly: ``v_i = v_j``.
 
-    Both ends move. Chains of pairs bring several vertices together. Two corners of a face
-    cannot be glued: it would have no area.
+    Both vertices may move. Chains of pairs glue several vertices together. Two corners of a
+    face cannot be glued, because the face would lose its area.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Glue(Constraint):
 
 
 def _check_faces(subject: Subject, pairs: Ints) -> None:
-    """Refuse glue that brings two corners of a face together, be it through other vertices."""
+    """Refuse glue that joins two corners of a face, directly or through other vertices."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

@@ -1,9 +1,9 @@
-"""Hard linear constraints solved once: every vertex by the free ones.
+"""Elimination of the hard linear constraints: constrained vertices as functions of free ones.
 
-Glue and symmetry say that a vertex is the image of another under a motion; pins and
-planes say where a vertex may be. The first make trees of vertices that follow a root, the
-second become equations of the roots alone: at most three unknowns each, however large the
-mesh and however long the chains.
+Glue and symmetry make a vertex the image of another under a rigid motion or reflection; pins
+and planes restrict its position. The images form a spanning forest, in which every vertex is
+the image of a root. All constraints then become equations on the roots alone, with at most
+three unknowns each, whatever the size of the mesh and the length of the chains.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _FREE = 1e-8
 
 
 class _Equations(NamedTuple):
-    """Rows ``a . p[root] = b``, and whose they are."""
+    """Rows ``a . p[root] = b``, with the constraint and the vertex that they come from."""
 
     root: Ints
     a: Array
@@ -46,15 +46,15 @@ class Reduction:
     Attributes
     ----------
     ids, root : ndarray of int, (k,)
-        Vertices, and for each the place in `ids` of the one that it follows.
+        Constrained vertices, and for each the place of its root in `ids`.
     turn, shift : ndarray, (k, d, d) and (k, d)
-        The motion from there.
+        The motion that maps the root to the vertex.
     point : ndarray, (k, d)
-        Where a root is for y = 0.
+        Position of a root for y = 0.
     axes : ndarray, (k, d, d)
-        Orthonormal columns, zero where there is no freedom.
+        Free directions of a root as orthonormal columns, the others zero.
     equations : _Equations
-        What the roots have to satisfy.
+        Equations on the roots.
     """
 
     ids: Ints
@@ -66,24 +66,24 @@ class Reduction:
     equations: _Equations
 
     def residuals(self) -> Array:
-        """By how much each equation is missed: zero but for rounding, unless they contradict."""
+        """Return the residual of each equation: zero up to rounding, unless some contradict."""
         e = self.equations
         return np.abs((e.a * self.point[e.root]).sum(axis=1) - e.b)
 
     def maps(self, start: int, size: int) -> tuple[csr_matrix, csr_matrix, Array]:
-        """The constraints as maps of a coordinate vector.
+        """Return the constraints as affine maps of a coordinate vector.
 
         Parameters
         ----------
         start, size : int
-            Where the vertices' coordinates begin, and how many coordinates there are.
+            Index of the vertices' first coordinate, and total number of coordinates.
 
         Returns
         -------
         projection : csr_matrix, (size, size)
-            From any coordinates to ones that satisfy the constraints, less `offset`.
+            ``projection @ x + offset`` satisfies the constraints, for any coordinates x.
         basis : csr_matrix, (size, size)
-            From unknowns, of which only those with a column count.
+            ``basis @ y + offset`` does for any y; only non-zero columns are unknowns.
         offset : ndarray, (size,)
         """
         axes = self.axes[self.root]
@@ -99,7 +99,7 @@ class Reduction:
         return ids[:, None] * dim + np.arange(dim)
 
     def _matrix(self, blocks: Array, start: int, size: int) -> csr_matrix:
-        """Identity, but for the blocks (k, d, d) from the roots to the vertices."""
+        """Return the identity with the rows of `ids` replaced by blocks on their roots."""
         from scipy.sparse import coo_matrix
 
         here, there = start + self._rows(self.ids), start + self._rows(self.ids[self.root])
@@ -119,9 +119,9 @@ class Reduction:
 
 
 def reduce(parts: Sequence[Part]) -> Reduction | None:
-    """Solve the hard linear parts; None when there are none.
+    """Eliminate the hard linear parts; return None when there are none.
 
-    Where they contradict each other, the solution is that of least squares.
+    Contradicting equations are solved in the least-squares sense.
     """
     relations = [p for p in parts if isinstance(p, Relations) and len(p.first)]
     places = [p for p in parts if isinstance(p, Pins | OnPlane) and p.hard and len(p.ids)]
@@ -138,12 +138,12 @@ def reduce(parts: Sequence[Part]) -> Reduction | None:
 
 
 def _dim(part: Part) -> int:
-    """Components of a position."""
+    """Return the number of components of a position."""
     return part.positions.shape[1] if isinstance(part, Pins) else len(part.anchor)  # type: ignore[attr-defined]
 
 
 class _Joints(NamedTuple):
-    """``p[second] = shift + turn p[first]``, vertices by their place among the ids."""
+    """Relations ``p[second] = shift + turn p[first]``; vertices by their place in `ids`."""
 
     first: Ints
     second: Ints
@@ -167,7 +167,7 @@ def _joints(relations: list[Relations], ids: Ints, dim: int) -> _Joints:
 
 
 def _follow(count: int, joints: _Joints, dim: int) -> tuple[Ints, Array, Array]:
-    """Root of every vertex, and the motion from there."""
+    """Return the root of every vertex, and the motion that maps the root to the vertex."""
     parent = np.arange(count)
     turn = np.broadcast_to(np.eye(dim), (count, dim, dim)).copy()
     shift = np.zeros((count, dim))
@@ -181,7 +181,7 @@ def _follow(count: int, joints: _Joints, dim: int) -> tuple[Ints, Array, Array]:
     turn[child] = np.where(forward[:, None, None], there, back)
     away = np.einsum("kab,kb->ka", back, joints.shift[which])
     shift[child] = np.where(forward[:, None], joints.shift[which], -away)
-    # Every pass doubles the distance that the motions reach.
+    # Pointer jumping: every pass doubles the number of tree edges that a motion spans.
     while (parent != parent[parent]).any():
         shift = shift + np.einsum("kab,kb->ka", turn, shift[parent])
         turn = turn @ turn[parent]
@@ -190,7 +190,7 @@ def _follow(count: int, joints: _Joints, dim: int) -> tuple[Ints, Array, Array]:
 
 
 def _forest(count: int, joints: _Joints) -> tuple[Ints, Ints, Ints]:
-    """Children, parents and joints of a spanning forest."""
+    """Return the children, parents and joints of a spanning forest."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 
@@ -198,7 +198,7 @@ def _forest(count: int, joints: _Joints) -> tuple[Ints, Ints, Ints]:
     links = coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
     label = connected_components(links, directed=False)[1]
     roots = np.unique(label, return_index=True)[1]
-    # One more vertex, joined to one of every component, makes it one tree.
+    # An extra vertex, linked to one vertex of every component, makes the forest a tree.
     tied = coo_matrix(
         (np.ones(len(a) + len(roots)), (np.r_[a, np.full(len(roots), count)], np.r_[b, roots])),
         shape=(count + 1, count + 1),
@@ -219,7 +219,7 @@ def _equations(
     motion: tuple[Ints, Array, Array],
     dim: int,
 ) -> _Equations:
-    """Every constraint as equations of the roots."""
+    """Express every constraint as equations on the roots."""
     root, turn, shift = motion
     rows = []
     for p in places:
@@ -248,7 +248,7 @@ def _equations(
 
 
 def _solve(equations: _Equations, count: int, dim: int) -> tuple[Array, Array]:
-    """Point of least squares and free axes of every root."""
+    """Return the least-squares position and the free axes of every root."""
     normal = np.zeros((count, dim, dim))
     right = np.zeros((count, dim))
     np.add.at(normal, equations.root, equations.a[:, :, None] * equations.a[:, None, :])

@@ -1,6 +1,6 @@
-"""What constraints come down to: a few kinds of equations on vertices.
+"""The few kinds of equations on vertices that all constraints consist of.
 
-`Pins`, `Relations` and `OnPlane` are linear and hard: the unknowns leave them out (see
+Hard `Pins`, `Relations` and `OnPlane` are linear, and are eliminated from the unknowns (see
 :mod:`gso.constraints.linear`). The others become terms.
 """
 
@@ -32,20 +32,20 @@ class Part:
     owner: int
 
     def mapped(self, frame: Frame, order: Ints) -> Part:
-        """In the unit of a frame and with vertex i numbered ``order[i]``."""
+        """Return the part in the unit of a frame, with vertex i numbered ``order[i]``."""
         raise NotImplementedError
 
     def kept(self, rows: NDArray[np.bool_]) -> Part:
-        """Those of the equations (k,) alone."""
+        """Return the part with only those equations that a mask (k,) selects."""
         raise NotImplementedError
 
     def violation(self, points: Array) -> Array:
-        """By what length each equation is missed by vertices (n, dim)."""
+        """Return the violation of each equation (a length) by vertices (n, dim)."""
         raise NotImplementedError
 
     @property
     def hard(self) -> bool:
-        """Holds exactly."""
+        """Whether the equations must hold exactly."""
         return getattr(self, "weight", None) is None
 
     @property
@@ -61,7 +61,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Pins(Part):
-    """Vertices `ids` (k,) are at `positions` (k, dim); with a weight, they are drawn there."""
+    """Vertices `ids` (k,) are at `positions` (k, dim); the part is soft if it has a weight."""
 
     ids: Ints
     positions: Array

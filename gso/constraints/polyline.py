@@ -15,15 +15,15 @@ Ints = NDArray[np.int64]
 
 #: Vertices do not slide round corners of more than this many degrees.
 CORNER = 45.0
-#: Pairs of a point and a segment that are looked at together.
+#: Number of pairs of a point and a segment that are processed together.
 _BLOCK = 1_000_000
 
 
 class Feet(NamedTuple):
-    """Nearest points (k, dim) of polylines, and where they are.
+    """Nearest points (k, dim) of polylines, with their segments.
 
-    `along` is the position along the line of segment `segment`, in units of its length,
-    not clipped to it.
+    `along` is the position along the line through segment `segment`, in units of its length
+    and not clipped to it.
     """
 
     points: Array
@@ -53,7 +53,7 @@ class Polylines:
 
     @classmethod
     def of(cls, points: Array, *, closed: bool, corner: float = CORNER) -> Polylines:
-        """One polyline through points (m, dim), no two consecutive ones the same."""
+        """Make one polyline through points (m, dim), no two consecutive ones the same."""
         start = points if closed else points[:-1]
         end = np.roll(points, -1, axis=0) if closed else points[1:]
         way = _unit(end - start)
@@ -70,12 +70,12 @@ class Polylines:
 
     @classmethod
     def join(cls, several: list[Polylines]) -> Polylines:
-        """All segments together."""
+        """Join the segments of several polylines."""
         parts = zip(*((s.start, s.end, s.stop, s.tangent) for s in several), strict=True)
         return cls(*(np.concatenate(p) for p in parts))
 
     def mapped(self, frame: Frame) -> Polylines:
-        """In the unit of a frame."""
+        """Return the polylines in the unit of a frame."""
         return replace(self, start=frame.to_unit(self.start), end=frame.to_unit(self.end))
 
     @property
@@ -84,12 +84,12 @@ class Polylines:
         return _unit(self.end - self.start)
 
     def directions(self, segment: Ints, along: Array) -> Array:
-        """Unit tangents (k, dim) at places on segments, between those of the joints."""
+        """Interpolate unit tangents (k, dim) at positions along segments."""
         t = np.clip(along, 0.0, 1.0)[:, None]
         return _unit((1.0 - t) * self.tangent[segment, 0] + t * self.tangent[segment, 1])
 
     def nearest(self, points: Array) -> Feet:
-        """Nearest points of the lines to points (k, dim)."""
+        """Find the points of the polylines nearest to points (k, dim)."""
         edge = self.end - self.start
         square = (edge**2).sum(axis=1)
         segment = np.empty(len(points), np.int64)

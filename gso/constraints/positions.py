@@ -1,4 +1,4 @@
-"""Vertices that stay, or go where they are told."""
+"""Constraints on vertex positions: fixed vertices and handles."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from gso.constraints.parts import Part, Pins
 
 @dataclass(frozen=True, eq=False)
 class Fixed(Constraint):
-    """Vertices that stay where they are.
+    """Vertices fixed at their positions in the design.
 
-    Not for flat images, whose vertices are nowhere yet: use :class:`Handle` there.
+    Not for flat images, whose vertices have no positions yet: use :class:`Handle` there.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Fixed(Constraint):
 
 @dataclass(frozen=True)
 class FixedBoundary(Constraint):
-    """Every vertex on the boundary stays where it is; not for flat images."""
+    """All boundary vertices, fixed at their positions in the design; not for flat images."""
 
     def parts(self, subject: Subject) -> list[Part]:
         subject.in_space("give a Handle with positions (k, 2)")
@@ -59,9 +59,9 @@ class Handle(Constraint):
     ids : array_like of int, (k,)
         Vertex indices.
     positions : array_like, (k, 3)
-        Where they go, in the unit of the mesh; (k, 2) for a flat image.
+        Their target positions, in the unit of the mesh; (k, 2) for a flat image.
     weight : float, optional
-        Strength of a soft handle, of the order of 1; a hard one when not given.
+        Weight of a soft handle, of the order of 1; the handle is hard when not given.
     """
 
     ids: ArrayLike

@@ -60,7 +60,7 @@ def read_constraints(path: str | PathLike[str]) -> list[Constraint]:
 
 def _constraint(entry: Any, where: str) -> Constraint:
     if not isinstance(entry, dict) or not isinstance(entry.get("type"), str):
-        # A misspelt "type" is a field that there is not.
+        # Name a field that looks like a misspelt "type".
         wrong = [repr(k) for k in entry if nearest(k, ["type"])] if isinstance(entry, dict) else []
         instead = f", not {wrong[0]}" if wrong else ""
         raise OptionError(f'{where} needs a "type"{instead}: {", ".join(KINDS)}')

@@ -1,4 +1,4 @@
-"""Faces that are planar, edges that keep their lengths."""
+"""Constraints on shape: planar faces and fixed edge lengths."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from gso.constraints.parts import Lengths, Part, Planar
 
 @dataclass(frozen=True, eq=False)
 class PlanarFaces(Constraint):
-    """Faces that are planar, each in a plane of its own; not for flat images, which are.
+    """Faces that are planar, each in a plane of its own; not for flat images.
 
-    A quad is planar when its diagonals meet. Triangles are.
+    A quad is planar when its diagonals meet. Triangles are always planar.
 
     Parameters
     ----------
     faces : array_like of int, optional
         Face indices, or a mask over all faces; all faces when not given.
     weight : float, optional
-        Strength of a soft constraint, of the order of 1; a hard one when not given.
+        Weight of a soft constraint, of the order of 1; the constraint is hard when not given.
     """
 
     faces: ArrayLike | None = None
@@ -41,17 +41,17 @@ class PlanarFaces(Constraint):
 
 @dataclass(frozen=True, eq=False)
 class FixedLengths(Constraint):
-    """Edges that keep their lengths, or get given ones.
+    """Edges that keep their lengths in the design, or have given ones.
 
     Parameters
     ----------
     edges : array_like of int, (k, 2), optional
         Pairs of vertices; they need not share a face. All edges of the mesh when not given.
     lengths : array_like, (k,), optional
-        Lengths in the unit of the mesh; those of the design when not given. For a flat
-        image, too, they are the lengths in space.
+        Lengths in the unit of the mesh; those of the design when not given, for a flat image
+        as well.
     weight : float, optional
-        Strength of a soft constraint, of the order of 1; a hard one when not given.
+        Weight of a soft constraint, of the order of 1; the constraint is hard when not given.
     """
 
     edges: ArrayLike | None = None

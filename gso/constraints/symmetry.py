@@ -19,7 +19,7 @@ _TOLERANCE = 0.25
 
 @dataclass(frozen=True, eq=False)
 class SymmetryPlane(Constraint):
-    """The result is its own mirror image; vertices on the plane stay on it.
+    """Mirror symmetry of the result about a plane; vertices on the plane stay on it.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class SymmetryPlane(Constraint):
 
 
 def _checked(subject: Subject, given: ArrayLike) -> Ints:
-    """Pairs of the user, each vertex in one of them."""
+    """Check the user's pairs: no vertex may be in more than one."""
     pairs = subject.pairs(given, "mirror images")
     on = pairs[:, 0] == pairs[:, 1]
     ids, count = np.unique(np.r_[pairs[on, 0], pairs[~on].ravel()], return_counts=True)
@@ -84,7 +84,7 @@ def _checked(subject: Subject, given: ArrayLike) -> Ints:
 
 
 def _found(subject: Subject, point: Array, normal: Array, tolerance: float | None) -> Ints:
-    """Pairs found by mirroring the design's vertices; those of no face are left out."""
+    """Find pairs by mirroring the design's vertices; vertices without a face are ignored."""
     from scipy.spatial import cKDTree
 
     mesh = subject.mesh

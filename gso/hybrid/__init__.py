@@ -1,4 +1,4 @@
-"""The net starts the optimiser, the optimiser finishes the net."""
+"""Hybrid solves: a net predicts a warm start, and the optimiser refines it."""
 
 from gso.hybrid.solving import solve, solve_many
 

@@ -1,4 +1,4 @@
-"""A disk-like mesh as a grid, which is all that a net knows, and the way back."""
+"""Resampling of a disk-like mesh to a grid, the only input of nets, and back."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from gso.status import MeshError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Most control points along each side of the spline through a mesh.
+#: Largest number of control points along each side of the spline fitted to a mesh.
 _CONTROLS = 24
-#: Weight of the control net's second differences: it only decides where there are no vertices.
+#: Weight of the control net's second differences; it has effect only where vertices are missing.
 _SMOOTH = 1e-6
-#: Largest distance of the mesh from the grid, in radii of the unit ball, for a net to see it.
+#: Largest distance of a vertex from the spline, in the unit ball, for a net to be used.
 _FAR = 0.05
-#: Least distance of two corners, as a share of the boundary's length.
+#: Smallest distance of two corners along the boundary, as a share of its length.
 _APART = 0.1
 
 
 @dataclass(frozen=True)
 class Patch:
-    """A mesh as a grid.
+    """A mesh resampled to a grid.
 
     Attributes
     ----------
     grid : ndarray, (size, size, 3)
-        Samples of a bicubic spline through the mesh, in its unit and place.
+        Samples of a bicubic spline fitted to the mesh, in the mesh's frame.
     vertices : ndarray of int, (n,)
         Vertices of the mesh that belong to a face.
     parameters : ndarray, (n, 2)
-        Where they are on the grid, in [0, 1]^2.
+        Their parameters on the grid, in [0, 1]^2.
     """
 
     grid: Array
@@ -44,7 +44,7 @@ class Patch:
     parameters: Array
 
     def at_vertices(self, values: Array) -> Array:
-        """Values (size, size, d) on the grid, at those vertices (n, d)."""
+        """Interpolate values (size, size, d) on the grid at those vertices, (n, d)."""
         from scipy.interpolate import RectBivariateSpline
 
         sides = (np.linspace(0.0, 1.0, n) for n in values.shape[:2])
@@ -57,11 +57,11 @@ class Patch:
 
 
 def as_patch(mesh: Mesh, size: int) -> Patch:
-    """Resample a mesh of one piece on a grid.
+    """Resample a mesh of one component to a grid.
 
-    Its outer boundary becomes that of a rectangle, the sharpest corners of the one the
-    corners of the other, and a harmonic map the inside; a spline through the vertices
-    bridges holes.
+    A harmonic map takes the mesh to a rectangle, whose corners are the sharpest corners of
+    the outer boundary. A spline fitted to the vertices over the rectangle is sampled on the
+    grid; it also covers holes.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def as_patch(mesh: Mesh, size: int) -> Patch:
     Raises
     ------
     MeshError
-        The mesh is something else, or far from any spline that a grid can carry.
+        The mesh is not of this kind, or is too far from the fitted spline.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def as_patch(mesh: Mesh, size: int) -> Patch:
 
 
 def _unit(mesh: Mesh, ids: Ints) -> Mesh:
-    """The mesh in its unit ball, with those of its vertices that belong to a face."""
+    """Return the mesh in its unit ball, without vertices that belong to no face."""
     points = mesh.frame.to_unit(mesh.vertices)
     if len(ids) == len(points):
         return mesh.replaced(points)
@@ -108,7 +108,7 @@ def _unit(mesh: Mesh, ids: Ints) -> Mesh:
 
 
 def _filled(mesh: Mesh, outer: Ints) -> Mesh:
-    """The mesh as triangles, its holes filled with fans round a vertex in their middle."""
+    """Return the mesh as triangles, each hole filled with a fan round a vertex in its middle."""
     points, triangles = [mesh.vertices], [mesh.triangles]
     for loop in mesh.boundary_loops:
         if outer[0] in loop:
@@ -123,12 +123,12 @@ def _filled(mesh: Mesh, outer: Ints) -> Mesh:
     try:
         return Mesh(np.concatenate(points), np.concatenate(triangles))
     except MeshError:
-        # A slit has no middle; maps go round it as it is.
+        # A slit has no middle, and stays open.
         return mesh
 
 
 def _boundary(mesh: Mesh) -> tuple[Ints, Array, Array]:
-    """The outer boundary from a corner on, its places on a rectangle, and the sides of that."""
+    """Return the outer boundary loop from a corner on, its image, and the rectangle's sides."""
     loop = max(mesh.boundary_loops, key=lambda ids: _lengths(mesh.vertices[ids]).sum())
     if not _surface_on_left(mesh, loop):
         loop = loop[::-1]
@@ -145,7 +145,7 @@ def _boundary(mesh: Mesh) -> tuple[Ints, Array, Array]:
 
 
 def _lengths(points: Array) -> Array:
-    """Lengths of a closed polygon's edges, each from its vertex on."""
+    """Return the edge lengths of a closed polygon; edge k starts at vertex k."""
     return np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
 
 
@@ -169,7 +169,7 @@ def _angles(mesh: Mesh) -> Array:
 
 
 def _corners(turning: Array, lengths: Array) -> list[int]:
-    """Places of four vertices of a closed polygon, in order: sharp, and not near each other."""
+    """Choose four vertices of a closed polygon as corners: sharp, and not near each other."""
     whole = lengths.sum()
     along = np.cumsum(lengths) - lengths
     chosen: list[int] = []
@@ -194,7 +194,7 @@ def _corners(turning: Array, lengths: Array) -> list[int]:
 
 
 def _spline(points: Array, parameters: Array, size: int) -> tuple[Array, Array]:
-    """A smooth bicubic spline through scattered points: at their parameters, and on a grid."""
+    """Fit a smooth bicubic spline to points; evaluate it at their parameters and on a grid."""
     from scipy.interpolate import BSpline
     from scipy.sparse import diags, identity, kron
     from scipy.sparse.linalg import splu

@@ -1,4 +1,4 @@
-"""What a net makes of a design, as a start for the optimiser, or why there is nothing."""
+"""Predictions of nets as warm starts for the optimiser, or the reasons why there are none."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from gso.status import MeshError
 
 Array = NDArray[np.float64]
 
-#: Tasks whose solver starts anywhere; what nets are for besides has a closed form.
+#: Tasks whose solver can start anywhere; the other task of nets has a closed form.
 STARTED = ("developable", "flatten")
 #: Vertices along each side of the grid that a mesh is resampled to.
 _SIZE = 64
-#: Shortest side of a grid for which a net is asked; other meshes have as many vertices.
+#: Least side of a grid for which a net is used; other meshes need the square of it in vertices.
 _SMALLEST = 8
 
 
@@ -36,13 +36,13 @@ class Prediction:
     Attributes
     ----------
     points : ndarray or None
-        Vertices (n, 3) or their flat image (n, 2), in the design's numbering, unit and place.
+        Vertices (n, 3) or their flat image (n, 2), in the design's numbering, unit and frame.
     seconds : float
-        What it took, points or none; of a batch each design's share.
+        Time spent, with or without points; in a batch, each design's share.
     net : str
-        Which net.
+        Name of the net.
     refused : str
-        Why there are no points; empty, too, where no net was asked.
+        Why there are no points; also empty where no net was to be used.
     """
 
     points: Array | None = None
@@ -59,7 +59,7 @@ def predictions(
     *,
     alone: bool = False,
 ) -> list[Prediction]:
-    """Apply a net to designs, those of one size together.
+    """Apply a net to designs, in one batch for each size of grid.
 
     Parameters
     ----------
@@ -69,9 +69,9 @@ def predictions(
     net : str, path or Net, optional
         As `model` in :func:`gso.net.predict`.
     passes : int, optional
-        As there.
+        As in :func:`gso.net.predict`.
     alone : bool
-        Whether the results are wanted for themselves, and not to start from.
+        Whether the predictions are the final results, not warm starts.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def predictions(
 
 
 def _missing(task: str, net: Any, alone: bool) -> str:
-    """Why no net can be asked, whatever the design."""
+    """Say why no net can be used, whatever the design; empty if one can."""
     if task not in (NETS if alone else STARTED):
         return f"no net makes a start for task {task!r}"
     if find_spec("torch") is None or find_spec("safetensors") is None:
@@ -130,12 +130,12 @@ def _name(task: str, net: Any) -> str:
 
 
 def _seen(design: Mesh, task: str) -> tuple[Array, Patch | None]:
-    """The grid that a net sees of a design.
+    """Return the net's input for a design: its grid, or that of a resampled patch.
 
     Raises
     ------
     MeshError
-        There is none.
+        The design is too small for a net, or cannot be resampled.
     """
     if design.grid is not None:
         if min(design.grid.shape[:2]) < _SMALLEST:
@@ -152,7 +152,7 @@ def _seen(design: Mesh, task: str) -> tuple[Array, Patch | None]:
 
 
 def _check_curvature(design: Mesh, grid: Array) -> None:
-    """Refuse surfaces far from all that nets are taught: what they make of those is a lottery."""
+    """Refuse surfaces far more curved than the training data, where nets are unreliable."""
     curved = metrics.loss_gc(grid)
     if curved <= CURVED:
         return
@@ -168,7 +168,7 @@ def _check_curvature(design: Mesh, grid: Array) -> None:
 
 
 def _predicted(grids: Array, task: str, net: Any, passes: int | None) -> Sequence[Any]:
-    """Results (H, W, d) for grids, or what is wrong with each of them."""
+    """Return the result (H, W, d), or the error message, for each grid."""
     from gso.net import predict
 
     try:
@@ -180,7 +180,10 @@ def _predicted(grids: Array, task: str, net: Any, passes: int | None) -> Sequenc
 
 
 def _back(design: Mesh, grid: Array, patch: Patch | None, values: Array) -> Array:
-    """A net's result at the vertices of the design; those of no face stay, or are at the origin."""
+    """Return a net's result at the design's vertices.
+
+    Vertices without a face keep their positions, or are at the origin of a flat image.
+    """
     surface = values.shape[-1] == 3
     points = design.vertices.copy() if surface else np.zeros((len(design.vertices), 2))
     if patch is None:

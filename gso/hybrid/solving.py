@@ -1,4 +1,4 @@
-"""One call: the net predicts, the optimiser checks and finishes."""
+"""Hybrid solves in one call: the net predicts, the optimiser checks and refines."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ from gso.tno.pool import spread
 
 Array = NDArray[np.float64]
 
-#: Surfaces that go through a net together.
+#: Surfaces that are read and predicted together.
 _BATCH = 64
-#: Passes of a net whose result is solved from: what more of them change at large, a solve on a
-#: coarser grid does as well in less time.
+#: Passes of a net for a warm start. A solve on a coarser grid makes the large-scale changes of
+#: further passes as well, in less time.
 _PASSES = 1
-#: Relative fall of the energy at which a solve from a net's result stops: most of the time
-#: that is left after it gains some per mille.
+#: Relative energy decrease of an iteration at which a solve from a net's result stops: most of
+#: the remaining time would gain only a few per mille.
 _NEARLY = 2e-3
 
 
@@ -52,35 +52,38 @@ def solve(
     sparing: bool = False,
     **keywords: Any,
 ) -> Result:
-    """Let a net make a start, and the optimiser finish it.
+    """Solve from a warm start that a net predicts.
 
-    The start is dropped, and the solve is that of :func:`gso.tno.optimize`, where there is
-    no net (none for the task, PyTorch is not installed), where the design is small, is no
-    grid and cannot be resampled to one, or has far more curvature than what nets are taught,
-    and where the net's result turns cells of a flat image over, is not finite, or has more of
-    the energy than the start without it. The result's `notes` then say so, and its
-    `warm_start` is "cold".
+    The solve is a cold start, the same as :func:`gso.tno.optimize`, in these cases:
+
+    - No net is available: none for the task, or PyTorch is not installed.
+    - The design is small, cannot be resampled to a grid, or has far more curvature than the
+      training data.
+    - The net's result is not finite, has inverted cells in a flat image, or has a higher
+      energy than the cold start.
+
+    The result's `notes` then say so, and its `warm_start` is "cold".
 
     Parameters
     ----------
     mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, or path
-        The design. Grids of any size, and meshes of one piece with a boundary and without
-        handles: those are resampled to a grid, and the displacement is carried back.
+        The design. Nets take grids, and components with a boundary and without handles:
+        these are resampled to a grid, and the displacement is interpolated back.
     task : str
-        As for :func:`gso.tno.optimize`; nets make starts for "developable" and "flatten". There
-        is nothing to start for "denoise", whose net is asked with ``polish=False`` only.
+        As for :func:`gso.tno.optimize`; nets make starts for "developable" and "flatten". The
+        net for "denoise" makes no start, and is used only with ``polish=False``.
     net : str, path or net, optional
         As `model` of :func:`gso.net.predict`; the task's default when not given.
     polish : bool or int
-        True: solve from there, until an iteration gains less than 0.2 % of the energy (or the
-        options' tolerance, where that is more). A number: at most so many iterations, also
-        without a net.
-        False: the net's result as it is, whatever its energy, measured; hard constraints
-        and `max_deviation` are kept. With `target_curvature` or `max_strain`, which take many
-        solves, only True.
+        True: solve from the net's result, until an iteration lowers the energy by less than
+        0.2 % (or the options' tolerance, where that is larger). A number: at most so many
+        iterations, with or without a net.
+        False: the net's result without iterations, whatever its energy; it is still measured,
+        and hard constraints and `max_deviation` are enforced. `target_curvature` and
+        `max_strain` take many solves, and need True.
     sparing : bool
-        Ask the net only where that has been found to save time: on large grids, and by
-        curvature. Elsewhere the result is that of :func:`gso.tno.optimize`.
+        Use the net only where it was found to save time: on large grids, by the formulation
+        "curvature". Elsewhere the result is that of :func:`gso.tno.optimize`.
     **keywords
         Passed to :func:`gso.tno.optimize`: `formulation`, `options`, `constraints`,
         `max_deviation`, `max_strain`, `target_curvature`, `callback`, `verdict`.
@@ -139,16 +142,16 @@ def solve_many(
     workers: int | None = None,
     **keywords: Any,
 ) -> Iterator[Item]:
-    """:func:`solve` for many surfaces: one forward pass for many, then parallel processes.
+    """Solve many surfaces: predictions in batches, then :func:`solve` in parallel processes.
 
     Parameters
     ----------
     meshes : iterable
         Anything :func:`solve` takes; read in blocks, so that a generator of any length fits.
     task, net, polish, sparing, **keywords
-        As for :func:`solve`; a `callback` is left out.
+        As for :func:`solve`; a `callback` is ignored.
     workers : int, optional
-        Processes; the number of cores when not given, 0 for none (in this process).
+        Number of worker processes; the number of cores when not given, 0 to solve in this one.
 
     Yields
     ------
@@ -174,7 +177,7 @@ def solve_many(
 
 
 def _pieces(design: Mesh, task: str, sparing: bool, keywords: dict[str, Any]) -> list[Component]:
-    """The components of a design for each of which a net is asked; none where it is not."""
+    """Return the components that are predicted one by one; none for the design as a whole."""
     if not several(design):
         return []
     flat = getattr(tasks.get(task), "BLOCK", "surface") == "flat"
@@ -187,7 +190,7 @@ def _pieces(design: Mesh, task: str, sparing: bool, keywords: dict[str, Any]) ->
 
 
 def _each(design: Mesh, pieces: list[Component], task: str, keywords: dict[str, Any]) -> Result:
-    """Solve every component from a net's result of its own, where there is one."""
+    """Solve every component from its own prediction, where there is one."""
     callback, compiled = keywords.pop("callback", None), keywords.pop("constraints")
 
     def one(job: Job, told: Any) -> Result:
@@ -205,7 +208,7 @@ def _each(design: Mesh, pieces: list[Component], task: str, keywords: dict[str, 
 
 @dataclass(frozen=True)
 class _Started:
-    """A design, or why it is none, with its prediction."""
+    """A design, or the error on reading it, with its prediction."""
 
     design: Mesh | GSOError
     prediction: Prediction
@@ -216,7 +219,7 @@ def _started(
     worth: Callable[[Mesh], bool] | None,
     ask: Callable[[list[Mesh]], list[Prediction]],
 ) -> Iterator[_Started]:
-    """Designs with their predictions where they are worth it, a block at a time."""
+    """Read designs block by block, and predict those for which `worth` is true."""
     source = iter(meshes)
     while block := list(islice(source, _BATCH)):
         read = [_read(mesh) for mesh in block]
@@ -228,7 +231,7 @@ def _started(
 
 
 def _passes(polish: bool | int) -> int | None:
-    """How many passes of a net are asked for: all where few or no iterations follow."""
+    """Return the number of net passes; None (all) where few or no iterations follow."""
     return _PASSES if polish is True else None
 
 
@@ -245,12 +248,12 @@ def _one(task: str, polish: bool | int, keywords: dict[str, Any], started: _Star
     if isinstance(started.design, GSOError):
         raise started.design
     result = _finished(started.design, started.prediction, task, polish, keywords)
-    result.metrics  # noqa: B018 - computed here, where there is a processor for it
+    result.metrics  # noqa: B018 - computed here, in the worker process
     return result
 
 
 def _checked(task: str, polish: Any, keywords: dict[str, Any]) -> bool | int:
-    """Check what needs no mesh; the polish as what it is, the constraints as a list."""
+    """Check the arguments that need no mesh, make the constraints a list, return `polish`."""
     if not isinstance(polish, bool | np.bool_ | int | np.integer) or polish < 0:
         raise OptionError(f"polish is {polish!r}; take True, False, or a number of iterations")
     if "x0" in keywords:
@@ -276,7 +279,7 @@ def _finished(
     polish: bool | int,
     keywords: dict[str, Any],
 ) -> Result:
-    """Solve from a prediction, if there is a sound one."""
+    """Solve from a prediction if it is valid, else from a cold start."""
     refused, result = prediction.refused, None
     if prediction.points is not None:
         try:
@@ -284,7 +287,7 @@ def _finished(
             if not refused:
                 result = _polished(design, prediction.points, task, polish, keywords)
         except MeshError as error:
-            # A start may have no area. What is wrong with the design comes again.
+            # The start may have no area. An error in the design is raised again below.
             refused = str(error)
     if result is None:
         most = None if isinstance(polish, bool) else polish
@@ -299,7 +302,7 @@ def _finished(
 
 
 def _unsound(design: Mesh, points: Array) -> str:
-    """Why nothing can start from a net's result."""
+    """Say why a net's result cannot be a start; empty if it can."""
     if not np.isfinite(points).all():
         return "its result is not finite"
     turned = flat_start.flips(design, points) if points.shape[1] == 2 else 0
@@ -314,7 +317,7 @@ def _polished(
     keywords: dict[str, Any],
 ) -> Result:
     """Solve from a net's result."""
-    # One that is not polished is what was asked for, whatever it is like.
+    # Without iterations the net's result itself is wanted, whatever its energy.
     start = Start(
         points,
         source="net",
@@ -329,7 +332,7 @@ def _polished(
 
 
 def _place(result: Result) -> None:
-    """Put a flat image, which is where the net's was, where the optimiser puts its own."""
+    """Move a flat image from the net's position to where the optimiser places its own."""
     frame, flat = Canonical(result.design), np.asarray(result.flat)
     result.flat = frame.back("flat", flat_start.place(frame.mesh, flat[frame.order]))
     result.pattern = Pattern.whole(result.design, result.flat)

@@ -1,4 +1,4 @@
-"""Where a net's start saves more time than it costs."""
+"""Criterion for whether a net's warm start saves more time than it costs."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ from typing import Any
 from gso.mesh import Mesh
 from gso.tno import check
 
-#: Vertices from which on a net pays, by the unknowns of the last stage: for one design, where
-#: loading PyTorch counts, and for many. ``python bench/hybrid.py sizes`` prints the times.
+#: Number of vertices from which a net saves time, by the unknowns of the last stage: for one
+#: design, including the time to load PyTorch, and for one of many.
+#: ``python bench/hybrid.py sizes`` prints the times.
 _FREE = (10_000, 2_500)
 _OFFSETS = (40_000, 10_000)
 
 
 def pays(design: Mesh, task: str, keywords: dict[str, Any], *, many: bool = False) -> bool:
-    """Whether a solve with the task's own net is expected to end sooner, as good as without.
+    """Return whether the task's net is expected to save time, at the same quality.
 
-    Only developable solves of grids by curvature have been found to; what bounds or
-    constraints make of it was not measured.
+    It was found to only for developable solves of grids by curvature. Solves with bounds or
+    constraints were not measured, and return False.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How far to go: backtracking until the energy falls enough."""
+"""The line search: backtracking until the energy falls enough."""
 
 from __future__ import annotations
 
@@ -27,21 +27,22 @@ def armijo(
     With bounds, trial points are projected onto them (Bertsekas 1982) and the slope is
     that of the projected step.
 
-    Steps shrink by the minimum of the parabola through the two known values and the
-    slope, kept between a tenth and a half.
+    The next step is the minimum of the parabola through the two known values and the slope,
+    clipped to between a tenth and a half of the last step.
 
     Parameters
     ----------
     energy : callable
         The objective.
     x, direction : ndarray
-        Where we are and where we go.
+        Current point and search direction.
     start, gradient : float, ndarray
         Energy and its gradient at x.
     project : callable, optional
-        Onto the bounds of the unknowns.
+        Projection onto the bounds of the unknowns.
     longest, decrease, shortest : float
-        First step tried, share of the linear decrease asked for, step at which to give up.
+        First step tried, required share of the linear decrease, smallest step tried (relative
+        to `longest` where that is below 1).
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Results of the components of a mesh, put together into one."""
+"""The results of a mesh's components, merged into one."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from gso.tno.job import Job
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Gap beside what is held in place, as a share of its width.
+#: Gap beside the flat images whose position is prescribed, as a share of their width.
 _GAP = 0.05
 
-#: Components that a note names.
+#: Largest number of components that a note names.
 _NAMED = 8
 
-#: What a result of several components is called, the worst of theirs; others are worse still.
+#: Statuses from the best to the worst; those not listed are worse still.
 _WORST_LAST = (
     Status.ALREADY_GOOD,
     Status.TARGET_REACHED,
@@ -40,7 +40,10 @@ _WORST_LAST = (
 
 
 def renumbered(progress: Progress, place: int, count: int) -> Progress:
-    """Progress of one component of several, each of which has so many stages."""
+    """Number the stages in the progress of component `place` over all `count` components.
+
+    All components are taken to have the same number of stages.
+    """
     return replace(
         progress,
         stage=place * progress.stages + progress.stage,
@@ -56,7 +59,7 @@ def together(
     results: Sequence[Result],
     chosen: Sequence[int],
 ) -> Result:
-    """One result in the numbering of the whole mesh."""
+    """Merge the results of components into one, in the numbering of the whole mesh."""
     design = whole.design
     for piece, result in zip(pieces, results, strict=True):
         result.names = piece.vertices
@@ -106,7 +109,7 @@ def together(
 def _side_by_side(
     design: Mesh, pieces: Sequence[Component], results: Sequence[Result]
 ) -> Pattern | None:
-    """Patterns of the components beside each other; None where one has none."""
+    """Place the components' patterns side by side; return None if one has none."""
     patterns = [r.pattern for r in results if r.pattern is not None]
     if len(patterns) < len(results):
         return None
@@ -127,7 +130,7 @@ def _side_by_side(
 
 
 def worst(several: Iterable[Status]) -> Status:
-    """The status of a whole: the worst of those of its parts, a cancelled one above all.
+    """Return the worst of several statuses; `CANCELLED` is worse than all others.
 
     >>> worst([Status.CONVERGED, Status.STALLED, Status.ALREADY_GOOD]).name
     'STALLED'
@@ -143,7 +146,7 @@ def worst(several: Iterable[Status]) -> Status:
 def _laid_out(
     count: int, pieces: Sequence[Component], jobs: Sequence[Job], results: Sequence[Result]
 ) -> Array | None:
-    """Flat images side by side; those that are held in a place stay there."""
+    """Place flat images side by side; those positioned by constraints or a start stay there."""
     if any(r.flat is None for r in results):
         return None
     out = np.zeros((count, 2))
@@ -168,7 +171,7 @@ def _laid_out(
 def _gathered(
     count: int, pieces: Sequence[Component], values: Sequence[Array | None]
 ) -> Array | None:
-    """Values of the faces of all components, in the order of the whole mesh's faces."""
+    """Gather face values of all components, in the order of the whole mesh's faces."""
     out = np.zeros(count)
     for piece, own in zip(pieces, values, strict=True):
         if own is None:
@@ -182,7 +185,7 @@ def _names(results: Sequence[Result]) -> dict[str, None]:
 
 
 def _energy(results: Sequence[Result], areas: Sequence[float]) -> dict[str, float]:
-    """Mean of the components' energies, weighted by area, by term."""
+    """Average the components' energies by term, weighted by area."""
     names = dict.fromkeys(name for result in results for name in result.energy)
     terms = [name for name in names if name != "objective"] or list(names)
     share = np.array(areas) / sum(areas)
@@ -192,7 +195,7 @@ def _energy(results: Sequence[Result], areas: Sequence[float]) -> dict[str, floa
 
 
 def _notes(design: Mesh, results: Sequence[Result]) -> tuple[str, ...]:
-    """What the components' results say: once where all say the same."""
+    """Merge the components' notes; a note that all of them have appears once."""
     out = []
     if results[0].flat is not None:
         out.append(f"the {len(results)} components are laid out side by side")
@@ -218,7 +221,7 @@ def _notes(design: Mesh, results: Sequence[Result]) -> tuple[str, ...]:
 
 
 def _details(results: Sequence[Result], areas: Sequence[float]) -> dict[str, Any]:
-    """Numbers that all share, means of those that differ, the largest miss of a constraint."""
+    """Merge details: means of floats, equal other values, each constraint's largest violation."""
     out: dict[str, Any] = {}
     for name in dict.fromkeys(name for result in results for name in result.details):
         have = [k for k, result in enumerate(results) if name in result.details]

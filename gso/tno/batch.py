@@ -1,4 +1,4 @@
-"""Many surfaces, over processes."""
+"""Optimisation of many surfaces in parallel processes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Item:
 
 def _one(keywords: dict[str, Any], mesh: Any) -> Result:
     result = optimize(mesh, **keywords)
-    result.metrics  # noqa: B018 - computed here, where there is a processor for it
+    result.metrics  # noqa: B018 - computed here, in the worker process
     return result
 
 
@@ -38,7 +38,7 @@ def _one(keywords: dict[str, Any], mesh: Any) -> Result:
 def optimize_many(
     meshes: Iterable[Any], *, workers: int | None = None, **keywords: Any
 ) -> Iterator[Item]:
-    """Optimise many surfaces in parallel processes, results as they finish.
+    """Optimise many surfaces in parallel processes, and yield results as they finish.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ def optimize_many(
         Anything :func:`gso.tno.optimize` takes; read as workers become free, so a
         generator of any length fits in memory.
     workers : int, optional
-        Processes; the number of cores when not given, 0 for none (in this process).
+        Number of worker processes; the number of cores when not given, 0 to solve in this one.
     **keywords
-        Passed to :func:`gso.tno.optimize`; a `callback` is left out.
+        Passed to :func:`gso.tno.optimize`; a `callback` is ignored.
 
     Yields
     ------
@@ -65,7 +65,7 @@ def optimize_many(
     """
     keywords.pop("callback", None)
     if isinstance(keywords.get("constraints"), Iterator):
-        # Every surface needs all of them.
+        # The first surface would exhaust the iterator.
         keywords["constraints"] = list(keywords["constraints"])
     with closing(spread(partial(_one, keywords), meshes, workers=workers)) as results:
         for done in results:

@@ -1,4 +1,4 @@
-"""A mesh as the solver wants it: in the unit ball, grids numbered row by row."""
+"""The solver's form of a mesh: in the unit ball, grids numbered row by row."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ Array = NDArray[np.float64]
 
 
 class Canonical:
-    """A mesh in the unit ball, grids numbered row by row, and the way back.
+    """A mesh in the unit ball, grids numbered row by row, with the maps back to the user's.
 
     Parameters
     ----------
     design : Mesh
     names : ndarray of int, (n,), optional
-        What messages call its vertices, where it is a part of the user's mesh.
+        Vertex indices for messages, where the design is a part of the user's mesh.
     """
 
     def __init__(self, design: Mesh, names: NDArray[np.int64] | None = None):
@@ -40,11 +40,11 @@ class Canonical:
             self.mesh = Mesh.from_grid(self.frame.to_unit(design.grid), weld=False)  # type: ignore[arg-type]
         self.new_index = np.empty(n, np.int64)
         self.new_index[self.order] = np.arange(n)
-        #: What messages call the vertices of this numbering.
+        #: Indices for messages of the vertices in this numbering.
         self.names = self.order if names is None else names[self.order]
 
     def start(self, x0: Any, *, flat: bool) -> Array | None:
-        """Coordinates of a warm start in this numbering and frame."""
+        """Convert the coordinates of a warm start to this numbering and frame."""
         if x0 is None:
             return None
         points, ordered = given_points(x0, len(self.order), self.mesh.grid_shape, flat=flat)
@@ -55,17 +55,17 @@ class Canonical:
         return points[:, :2] / self.frame.scale if flat else self.frame.to_unit(points)
 
     def constraints(self, given: Iterable[Constraint] | Compiled, *, flat: bool) -> Compiled:
-        """Constraints checked against the design, in this numbering and frame."""
+        """Check constraints against the design, and convert them to this numbering and frame."""
         frame = Frame(np.zeros(2), self.frame.scale) if flat else self.frame
         return compile_constraints(given, self.design, flat=flat).mapped(frame, self.new_index)
 
     def back(self, block: str, values: Array) -> Array:
-        """Rows of a block in this numbering, put in the user's."""
+        """Reorder the rows of a block from this numbering to the user's."""
         return values[self._new_face if block == "scale" else self.new_index]
 
     @cached_property
     def _new_face(self) -> NDArray[np.int64]:
-        """Index in this numbering of every face."""
+        """Index in this numbering of every face of the design."""
         here, there = self.mesh.faces, self.design.faces
         if self.design.grid_index is None:
             return np.arange(len(there))
@@ -79,14 +79,14 @@ class Canonical:
 def given_points(
     x0: Any, count: int, shape: tuple[int, int] | None, *, flat: bool
 ) -> tuple[Array, bool]:
-    """Points (count, 3), or (count, 2) of a flat image, that a user gave as a mesh or array.
+    """Read points (count, 3), or (count, 2) of a flat image, that a user gave as mesh or array.
 
-    With whether they are in the order of a grid, row by row, not of the vertices.
+    Also returns whether they are in grid order, row by row, rather than in vertex order.
 
     Raises
     ------
     MeshError
-        They are no finite numbers, or not as many as the vertices.
+        The points are not finite numbers, or not as many as the vertices.
     """
     try:
         points = np.asarray(getattr(x0, "vertices", x0), dtype=np.float64)

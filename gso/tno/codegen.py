@@ -1,6 +1,6 @@
-"""Kernels: the residual of one element, differentiated by CasADi, printed as NumPy.
+"""Kernels: the residual of one element, differentiated by CasADi, printed as NumPy code.
 
-CasADi evaluates mapped functions slowly across its NumPy border. Its expression graph,
+CasADi evaluates mapped functions slowly when called with NumPy arrays. Its expression graph,
 printed as straight-line array code and run on blocks of elements that stay in the
 processor's cache, gives identical values ten times faster.
 """
@@ -44,7 +44,7 @@ def _casadi() -> Any:
 
 @lru_cache(maxsize=128)
 def casadi_function(residual: Residual, shape: tuple[int, ...], constants: int, jacobian: bool):
-    """CasADi function of one element: (coordinates, constants) -> residuals (and Jacobian).
+    """Make the CasADi function of one element: (coordinates, constants) -> residuals, Jacobian.
 
     Parameters
     ----------
@@ -70,10 +70,10 @@ def casadi_function(residual: Residual, shape: tuple[int, ...], constants: int, 
 
 @lru_cache(maxsize=32)
 def casadi_turning(vectors: Residual, shape: tuple[int, ...], constants: int):
-    """CasADi function of one element: lengths of its plane vectors, and rows h.
+    """Make the CasADi function of one element: lengths of its plane vectors, and rows h.
 
-    The second derivative of the length of a vector (u, v) that is linear in the
-    coordinates is the rank-one matrix ``h h^T``, ``h = (u dv - v du) / length^(3/2)``.
+    The second derivative (geometric stiffness) of the length of a vector (u, v) that is linear
+    in the coordinates is the rank-one matrix ``h h^T``, ``h = (u dv - v du) / length^(3/2)``.
     """
     ca: Any = _casadi()
 
@@ -94,7 +94,7 @@ class Kernel:
 
     Made from a function of :func:`casadi_function` or :func:`casadi_turning`. Call with
     coordinates (k, e) and constants (c, e); returns residuals (r, e) and Jacobian
-    (r, k, e), empty when it was not printed.
+    (r, k, e), which is empty without `jacobian`.
     """
 
     def __init__(self, function: Any, shape: tuple[int, ...], *, jacobian: bool):
@@ -121,19 +121,19 @@ class Kernel:
 
 @lru_cache(maxsize=128)
 def kernel(residual: Residual, shape: tuple[int, ...], constants: int, jacobian: bool) -> Kernel:
-    """Kernel of a residual, printed at first use and kept."""
+    """Return the kernel of a residual, printed at first use and cached."""
     function = casadi_function(residual, shape, constants, jacobian)
     return Kernel(function, shape, jacobian=jacobian)
 
 
 @lru_cache(maxsize=32)
 def turning(vectors: Residual, shape: tuple[int, ...], constants: int) -> Kernel:
-    """Kernel of the stiffness against turning, see :attr:`gso.terms.Term.vectors`."""
+    """Return the kernel of the geometric stiffness, see :attr:`gso.terms.Term.vectors`."""
     return Kernel(casadi_turning(vectors, shape, constants), shape, jacobian=True)
 
 
 def _print(function: Any) -> tuple[str, int]:
-    """Python source of ``kernel(x, c, r, J, w)`` and the number of work arrays."""
+    """Print Python source of ``kernel(x, c, r, J, w)``; also return the number of work arrays."""
     import casadi as ca
 
     ufuncs = {
@@ -209,7 +209,7 @@ def _is_number(text: str) -> bool:
 def evaluate_with_casadi(
     residual: Residual, shape: Sequence[int], x: Array, c: Array
 ) -> tuple[Array, Array]:
-    """Residuals and Jacobian by CasADi's own ``map``: the slow reference for tests."""
+    """Evaluate residuals and Jacobian by CasADi's own ``map``: the slow reference for tests."""
     function = casadi_function(residual, tuple(shape), len(c), True)
     value, slope = function.map(x.shape[1])(x, c)
     value, slope = np.array(value), np.array(slope)

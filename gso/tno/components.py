@@ -1,4 +1,4 @@
-"""A mesh of several components: each is solved by itself, and put into one result."""
+"""Solves of a mesh of several components, one by one, merged into one result."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from gso.tno.job import Job
 from gso.tno.pool import processors, spread
 from gso.tno.solver import Callback
 
-#: Vertices beside those of the largest component from which on processes save time.
+#: Number of vertices outside the largest component from which worker processes save time.
 _WORTH = 20_000
-#: Difference of two components in their unit balls up to which they are copies.
+#: Largest coordinate difference, in the unit ball, of components that count as copies.
 _ALIKE = 1e-12
 
 #: Solves one job; a partial of a function that is importable by name.
@@ -31,7 +31,7 @@ Solve = Callable[[Job, Callback | None], Result]
 
 
 def parts(design: Mesh, constraints: Compiled) -> list[Component]:
-    """What can be solved by itself; nothing where that is the whole mesh."""
+    """Return the parts that can be solved separately; none if that is only the whole mesh."""
     if design.grid_index is not None:
         return []
     label = labels(design, constraints.links)
@@ -45,29 +45,29 @@ def solve(
     callback: Callback | None = None,
     workers: int | None = None,
 ) -> Result:
-    """Solve the components of a mesh, each in its own frame, and put the results together.
+    """Solve the components of a mesh, each in its own frame, and merge the results.
 
-    Components that are copies of each other, at whatever places, are solved once, unless
-    constraints or a start tell them apart. Processes are used where they save time.
+    Translated copies of a component are solved once, unless they have constraints or a start.
+    Worker processes are used where they save time.
 
     Parameters
     ----------
     one : callable
         Solves a job.
     whole : Job
-        The user's mesh, what it keeps, and where it starts.
+        The user's mesh, with its constraints and its start.
     pieces : sequence of Component
         Its :func:`parts`.
     callback : callable, optional
-        Is told of all iterations in turn, or, of processes, of each component's last one.
-        Where it returns False, the components that are left come back as they start.
+        Called after every iteration, or, with worker processes, with the last iteration of
+        each component. Once it returns False, the remaining components are not iterated.
     workers : int, optional
-        Processes: as many as pay when not given, 0 for none.
+        Number of worker processes; as many as save time when not given, 0 for none.
 
     Raises
     ------
     GSOError
-        Of the first component that cannot be solved; the message says which.
+        A component cannot be solved; the message says which.
     """
     jobs = _jobs(whole, pieces)
     origin = _origins(jobs)
@@ -105,7 +105,7 @@ def _jobs(whole: Job, pieces: Sequence[Component]) -> list[Job]:
 
 
 def _origins(jobs: Sequence[Job]) -> list[int]:
-    """For each job the first one with the same shape and wishes, itself where there is none."""
+    """Return for each job the index of the job that it copies, or its own if there is none."""
     first: dict[bytes, list[int]] = {}
     out = []
     for k, job in enumerate(jobs):
@@ -122,7 +122,7 @@ def _origins(jobs: Sequence[Job]) -> list[int]:
 
 
 def _alike(a: Mesh, b: Mesh) -> bool:
-    """Whether two meshes of the same faces have the same shape and size."""
+    """Return whether two meshes of the same faces differ by a translation only."""
     if a.vertices.shape != b.vertices.shape or a.faces.shape != b.faces.shape:
         return False
     here, there = (m.frame.to_unit(m.vertices) for m in (a, b))
@@ -131,7 +131,7 @@ def _alike(a: Mesh, b: Mesh) -> bool:
 
 
 def _moved(result: Result, here: Mesh, there: Mesh) -> Result:
-    """The result of a mesh as that of a copy of it at another place."""
+    """Transfer the result of a mesh to a translated copy of it."""
     if np.array_equal(here.vertices, there.vertices):
         mesh = result.mesh
     elif result.mesh is result.design:
@@ -147,7 +147,7 @@ def _moved(result: Result, here: Mesh, there: Mesh) -> Result:
 
 
 class _Watch:
-    """Tells a callback of the progress of one component after the other."""
+    """Callback that passes on the progress of one component after the other."""
 
     def __init__(self, callback: Callback, count: int):
         self.callback, self.count = callback, count
@@ -160,7 +160,7 @@ class _Watch:
 
 
 def _named(one: Solve, k: int, count: int, job: Job, callback: Callback | None) -> Result:
-    """Solve one component; errors say which it is."""
+    """Solve one component, and name it in error messages."""
     try:
         return one(job, callback)
     except GSOError as error:
@@ -172,7 +172,10 @@ def _named(one: Solve, k: int, count: int, job: Job, callback: Callback | None) 
 
 
 def _paying(sizes: Sequence[int]) -> int:
-    """Processes that save time for components of so many vertices; none in a worker."""
+    """Return the number of worker processes that saves time for components of these sizes.
+
+    It is 0 inside a worker process.
+    """
     if parent_process() is not None or sum(sizes) - max(sizes) < _WORTH:
         return 0
     workers = min(processors(), len(sizes))
@@ -180,7 +183,7 @@ def _paying(sizes: Sequence[int]) -> int:
 
 
 def _piece(one: Solve, count: int, numbered: tuple[int, Job]) -> Result | GSOError:
-    """Solve one component in a worker; errors travel as what they are."""
+    """Solve one component in a worker process; return errors, so that they keep their type."""
     try:
         return _named(one, numbered[0], count, numbered[1], None)
     except GSOError as error:
@@ -190,8 +193,8 @@ def _piece(one: Solve, count: int, numbered: tuple[int, Job]) -> Result | GSOErr
 def _spread(
     one: Solve, jobs: Sequence[Job], chosen: Sequence[int], watch: _Watch | None, workers: int
 ) -> dict[int, Result]:
-    """Solve in processes; what a worker dies of, or a callback stops, is left out."""
-    # The largest first, so that none is alone at the end.
+    """Solve in worker processes; omit components whose worker died or that were not reached."""
+    # The largest first, so that no large one runs alone at the end.
     order = sorted(chosen, key=lambda k: -len(jobs[k].design.vertices))
     work = spread(
         partial(_piece, one, len(jobs)),

@@ -1,4 +1,4 @@
-"""Where to go: Gauss-Newton and Levenberg-Marquardt directions."""
+"""Search directions: Gauss-Newton and Levenberg-Marquardt."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from gso.tno.linear import SingularError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Relative damping at which a matrix that is still indefinite is given up.
+#: Relative damping above which an indefinite matrix is given up for the gradient direction.
 _HOPELESS = 1e3
 
 
 class GaussNewton:
-    """Plain steps; a trace of damping, raised only while the matrix is singular."""
+    """Gauss-Newton steps with minimal damping, raised only while the factorisation fails."""
 
     def __init__(self, damping: float = 1e-9):
         self.damping = damping
@@ -25,8 +25,8 @@ class GaussNewton:
     def step(self, solver: Any, values: Array, diagonal: Ints, gradient: Array) -> Array:
         """Solve ``(H + damping mean(diag H) I) d = -gradient``.
 
-        The mean of the diagonal is the trace, which does not change when the surface is
-        turned: neither do the steps.
+        The mean of the diagonal is proportional to the trace, which is invariant to rotations
+        of the surface. The steps therefore rotate with it.
 
         Parameters
         ----------
@@ -38,7 +38,7 @@ class GaussNewton:
             Gradient of the objective.
         """
         damping = self.damping
-        # Unknowns of vertices that belong to no face count in nothing.
+        # Vertices without a face have zero diagonal entries: leave them out of the mean.
         own = values[diagonal]
         own = own[own > 0]
         typical = max(float(own.mean()), 1e-300) if own.size else 1e-300
@@ -58,17 +58,17 @@ class GaussNewton:
                 return -gradient / float(values[diagonal].max())
 
     def accepted(self, step: float) -> None:
-        """Take note of how much of the step was used."""
+        """Receive the accepted step length, which is not used here."""
 
 
 class LevenbergMarquardt(GaussNewton):
-    """Damping that falls after full steps and rises after short ones."""
+    """Levenberg-Marquardt steps: damping falls after full steps and rises after short ones."""
 
     def __init__(self, damping: float = 1e-6):
         super().__init__(damping)
 
     def accepted(self, step: float) -> None:
-        """Adapt the damping to how much of the step was used."""
+        """Adapt the damping to the accepted step length."""
         if step >= 1.0:
             self.damping = max(self.damping / 5.0, 1e-12)
         elif step < 0.3:

@@ -1,4 +1,4 @@
-"""Handles of a session: however they are given, as arrays; and moved."""
+"""Handles of a session: their arrays, and their new positions."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from gso.status import OptionError
 
 
 def pinned(handle: Handle, mesh: Mesh, name: str) -> Pins:
-    """Indices (k,) and positions (k, 3) of a handle, in the user's numbering and unit.
+    """Return indices (k,) and positions (k, 3) of a handle, in the user's numbering and unit.
 
     Raises
     ------
     OptionError
-        They make no sense; the message begins with the name.
+        The handle is invalid; the message begins with `name`.
     """
     parts = handle.parts(Subject(mesh, False, 0, name))
     check(parts, [name], mesh)
@@ -28,7 +28,7 @@ def pinned(handle: Handle, mesh: Mesh, name: str) -> Pins:
 
 
 def moved(constraints: list[Constraint], mesh: Mesh, asked: Pins) -> list[Constraint]:
-    """Constraints whose handles are at the places that are asked for.
+    """Return the constraints with their handles moved to given positions.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What one solve is for."""
+"""The input of one solve."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from gso.tno.start import Start
 
 @dataclass(frozen=True)
 class Job:
-    """What is solved for by itself: a mesh or the part of one that nothing ties to the rest.
+    """Input of one solve: a mesh, or a part of one that no constraint joins to the rest.
 
     Attributes
     ----------
     design : Mesh
         The input.
     constraints : Compiled
-        What its vertices must keep, in the user's frame.
+        Constraints on its vertices, in the user's frame.
     start : Start
-        Where to start.
+        The warm start, if any.
     names : ndarray of int, (n,), optional
-        What messages call its vertices, where it is a part.
+        Vertex indices for messages, where the design is a part of the user's mesh.
     """
 
     design: Mesh

@@ -13,27 +13,30 @@ from gso.tasks.base import Request
 from gso.tno.layout import lay_out
 from gso.verdict import Asked, judge
 
-#: Gap of the diagonals over the mean edge up to which quads are planar, and above which they
-#: visibly are not.
+#: Distance of a quad's diagonals over the mean edge length: up to the first value quads count
+#: as planar, above the second they are visibly not.
 _PLANAR, _BENT = 1e-6, 1e-3
 
 
 def asked_of(request: Request, scale: float, **limits: float | None) -> Asked:
-    """What was asked for, from a request in the unit ball and limits in the user's unit."""
+    """Gather what the user asked for, in the user's unit, from a request in the unit ball.
+
+    `moved` is the design's largest violation of the constraints.
+    """
     compiled, mesh = request.constraints, request.mesh
     moved = 0.0
     if not compiled.empty and not compiled.flat:
         misses = compiled.misses(mesh.vertices).values()
-        # What is missed by less than rounding is kept.
+        # Violations below rounding errors do not count.
         moved = max((miss.length for miss in misses if miss.length > 1e-9), default=0.0)
     return Asked(**limits, moved=scale * moved)
 
 
 def judged(result: Result, asked: Asked) -> Result:
-    """The result with the pattern of its surface, the reasons against it, and its status.
+    """Add to a result the pattern of its surface, the reasons against it, and its final status.
 
-    `seconds` gets entries "pattern" and "verdict". A status by which all is well becomes
-    ``Status.UNUSABLE`` where there are reasons against the result, and each of them is a note.
+    `seconds` gets entries "pattern" and "verdict". If there are reasons against the result, a
+    status that does not refuse it becomes ``Status.UNUSABLE``. Each reason becomes a note.
     """
     if result.task == "developable" and np.isfinite(result.mesh.vertices).all():
         clock = time.perf_counter()
@@ -51,7 +54,7 @@ def judged(result: Result, asked: Asked) -> Result:
 
 
 def _planarity(result: Result) -> tuple[str, ...]:
-    """That planar quads are planar no more."""
+    """Make a note if the design's quads are planar and the result's are not."""
     if result.design.is_triangles:
         return ()
     before, after = (float(nonplanarity(m).max()) for m in (result.design, result.mesh))
@@ -64,7 +67,7 @@ def _planarity(result: Result) -> tuple[str, ...]:
 
 
 def warning(result: Result) -> str:
-    """What to warn of: why the solve ended, and the first reason against the result; or nothing."""
+    """Return what to warn of: the status or the first reason against the result; else empty."""
     if result.status.converged or result.status is Status.MAX_ITERATIONS:
         return ""
     if result.status is not Status.UNUSABLE:

@@ -1,4 +1,4 @@
-"""The pattern of a surface: how much it must be strained to lie in the plane."""
+"""The flat pattern of a surface, and the strain that flattening takes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gso.tno.run import Run
 def lay_out(
     surface: Mesh, given: Pattern | None = None, *, options: str = "fast"
 ) -> Pattern | None:
-    """Flat pattern of a surface with little strain, by the flatten task's ``strain``.
+    """Flatten a surface with little strain, by the flatten task's formulation ``strain``.
 
     A surface that closes around itself is cut open.
 
@@ -24,15 +24,16 @@ def lay_out(
     surface : Mesh
         In any frame.
     given : Pattern, optional
-        One of it that is there already: the better one by the largest strain is returned.
+        An existing pattern of the surface; the one with the smaller maximal strain is returned.
     options : str
         Preset of the flatten task.
 
     Returns
     -------
     Pattern or None
-        In the unit of the surface, components side by side; None where a component is closed or
-        has handles, and would have to be cut open first.
+        In the unit of the surface, components side by side. Where the surface cannot be
+        flattened, `given` or None: components that are closed or have handles would have to
+        be cut open first.
 
     Examples
     --------
@@ -43,7 +44,7 @@ def lay_out(
     >>> largest_strain(mesh, lay_out(mesh)) < 1e-3
     True
     """
-    # Scipy comes with it.
+    # Imported here because it imports SciPy.
     from gso.tasks import flatten
 
     if not flat_start.flattens(surface):
@@ -67,12 +68,12 @@ def lay_out(
 
 
 def largest_strain(surface: Mesh, pattern: Pattern) -> float:
-    """Largest principal strain max |s - 1| of a surface in its pattern."""
+    """Return the largest principal strain max |s - 1| of a surface in its pattern."""
     values = metrics.principal_strains(pattern.surface(surface), pattern.flat).values
     return float(values.max())
 
 
 def strains_of(surface: Mesh) -> dict[str, float]:
-    """Mean, 99th percentile and largest strain of a surface's pattern; empty without one."""
+    """Return mean, 99th percentile and largest strain of a surface's pattern; empty without."""
     pattern = lay_out(surface)
     return {} if pattern is None else metrics.strains(pattern.surface(surface), pattern.flat)

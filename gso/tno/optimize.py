@@ -1,4 +1,4 @@
-"""From a mesh to a result: normalise, plan, solve the stages, give back in the user's frame."""
+"""The solve of a mesh: normalise, plan, solve the stages, return to the user's frame."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ def optimize(
 ) -> Result:
     """Make a surface developable, flatten it, denoise it, bend it, or map it to the plane.
 
-    Of a mesh of several components each is solved by itself, as if it were alone: in its own
-    frame, with its own weights. Constraints that join components (glue, lengths, symmetry)
-    keep those in one solve, in which each has the weights of its own size.
+    Each component of a mesh is solved on its own, in its own frame and with its own weights.
+    Components that constraints join (glue, lengths, symmetry) are solved together, each with
+    weights by its own size.
 
     Parameters
     ----------
@@ -68,33 +68,33 @@ def optimize(
         "fast", "balanced" (default), "accurate", or an options dataclass of the task.
         "jiang2020" (`developable`, `flatten`) is the classical reference, by isometry.
     constraints : sequence of Constraint
-        What the result must keep: `Fixed`, `FixedBoundary`, `Handle`, `OnCurve`,
+        Constraints on the result: `Fixed`, `FixedBoundary`, `Handle`, `OnCurve`,
         `SlidingBoundary`, `Glue`, `SymmetryPlane`, `PlanarFaces`, `FixedLengths`. For
-        `flatten` and `conformal` they are about the flat image.
+        `flatten` and `conformal` they apply to the flat image.
     max_deviation : float, optional
-        `developable`: the result and the design are nowhere farther apart than this, both
-        ways, in the mesh's unit; as developable as that allows.
+        `developable`: the largest distance between result and design, in both directions, in
+        the mesh's unit. The result is as developable as this bound allows.
     max_strain : float, optional
-        `developable`: the largest strain, max ``|s - 1|``, that the flat pattern of the result may
-        have, such as 0.005; with the smallest displacement that does, or within
-        `max_deviation`.
+        `developable`: the largest principal strain, max ``|s - 1|``, of the result's flat
+        pattern, such as 0.005. The displacement is the smallest that reaches it, or stays
+        within `max_deviation` where that is given.
     target_curvature : float, optional
         `developable` by "curvature" only: the mean absolute curvature ``loss_gc_worst`` to
-        reach within 5 %, in 1/size^2 as the metrics have it (size: the largest distance from
-        the centroid), with the smallest displacement that does. Of several components each
+        reach within 5 %, with the smallest displacement. Its unit is 1/size^2, as in the
+        metrics (size: the largest distance from the centroid). Each of several components
         reaches it by its own size.
     x0 : Mesh, array or Start, optional
-        Where to start: vertices (n, 3) or a grid; (n, 2) or (H, W, 2) for a flat image.
-        Proximity and lengths stay those of `mesh`. On grids what is wrong with a surface
-        at large is put right on a coarser grid first. For `denoise` it takes the place of the
-        smoothed surface. A :class:`gso.tno.Start` says more about it.
+        Warm start: vertices (n, 3) or a grid; (n, 2) or (H, W, 2) for a flat image.
+        Proximity and lengths still refer to `mesh`. On grids, large-scale errors of the start
+        are corrected on a coarser grid first. For `denoise` it replaces the smoothed surface.
+        A :class:`gso.tno.Start` adds settings to it.
     callback : callable, optional
         Called with a :class:`gso.Progress` after each iteration; returning False stops
         the solve, and the best iterate so far is returned. Large meshes of several components
-        are solved in processes: it is then called when a component is done.
+        are solved in worker processes: it is then called once for each finished component.
     verdict : bool
-        Judge the result (:mod:`gso.verdict`) and, where it is a developable surface, lay it out
-        to measure its strain. Without it neither is done, which saves their time.
+        Judge the result (:mod:`gso.verdict`) and, for `developable`, flatten it to measure its
+        strain. False skips both, to save time.
 
     Returns
     -------
@@ -165,7 +165,7 @@ def _solved(
     job: Job,
     callback: Callback | None,
 ) -> Result:
-    """Solve what nothing can be taken from: one component, or several that are joined."""
+    """Solve one job: a single component, or several that constraints join."""
     module, given = tasks.get(task), job.start
     frame = Canonical(job.design, job.names)
     flat = job.constraints.flat
@@ -215,9 +215,9 @@ def _searched(
     *,
     others: Sequence[Request],
 ) -> tuple[Outcome, Request]:
-    """Solve as often as what is asked for takes, and the request that the outcome is of.
+    """Solve once, or search for the given bounds; return the outcome and its request.
 
-    Where a bound on distance or strain is missed, the other formulations are asked too.
+    If a bound on distance or strain is missed, the other formulations are tried too.
     """
     if target_curvature is not None:
         return reach(run, request, of_curvature(request, target_curvature))[0], request
@@ -241,7 +241,11 @@ def _searched(
 
 
 def others(request: Request, formulation: str | None) -> list[Request]:
-    """Requests by the formulation "isometry", where the user named none and it can be asked."""
+    """Return a request for "isometry", if the user named no formulation and it is applicable.
+
+    It is for meshes that can be flattened, without hard constraints, B-splines or options of
+    another formulation than "curvature".
+    """
     kind = tasks.get("developable").OPTIONS
     usual = type(request.options) is kind["curvature"] and request.options.variables != "surface"
     hard = any(part.hard for part in request.constraints.parts)
@@ -258,7 +262,7 @@ def check(
     target_curvature: float | None = None,
     max_strain: float | None = None,
 ) -> tuple[ModuleType, str, Options]:
-    """Check what can be checked before there is a mesh; arguments as for :func:`optimize`.
+    """Check the arguments of :func:`optimize` that do not depend on the mesh.
 
     Returns
     -------
@@ -270,7 +274,7 @@ def check(
     OptionError
         Something is unknown or contradictory.
     BackendError
-        The backend that is asked for is not installed.
+        The requested backend is not installed.
     """
     module = tasks.get(task)
     formulation, kind = tasks.choose(module, formulation, options)
@@ -299,7 +303,7 @@ def check(
 
 
 def judge(request: Request, frame: Canonical, outcome: Outcome) -> None:
-    """Say how well the constraints are kept, in the user's unit, and which are not."""
+    """Record the violation of each constraint, in the user's unit; note missed hard ones."""
     compiled = request.constraints
     if not compiled.names:
         return
@@ -323,7 +327,7 @@ def packed(
     outcome: Outcome,
     run: Run,
 ) -> Result:
-    """An outcome in the user's frame and numbering."""
+    """Convert an outcome to a result in the user's frame and numbering."""
     # The numbering of a cut mesh begins with the user's.
     own = {"flat"} if outcome.cut is not None else set()
     blocks = {k: x if k in own else frame.back(k, x) for k, x in outcome.blocks.items()}

@@ -1,4 +1,4 @@
-"""Work spread over processes that may die."""
+"""Work spread over worker processes, which may die."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gso.status import ConvergenceWarning, GSOError
 
 @dataclass(frozen=True)
 class Done:
-    """What became of one piece of work: its place in the input, and its value or its error."""
+    """The result of one piece of work: its place in the input, and its value or its error."""
 
     index: int
     value: Any = None
@@ -31,7 +31,7 @@ def spread(
     workers: int | None = None,
     caller: bool = True,
 ) -> Generator[Done, None, None]:
-    """Apply a function to many pieces of work in parallel processes, results as they finish.
+    """Apply a function to many pieces in parallel processes, and yield results as they finish.
 
     Parameters
     ----------
@@ -40,10 +40,10 @@ def spread(
     pieces : iterable
         Read as workers become free, so a generator of any length fits in memory.
     workers : int, optional
-        Processes; :func:`processors` when not given, 0 for none (in this process).
+        Number of worker processes; :func:`processors` when not given, 0 to work in this one.
     caller : bool
-        Workers import the caller's script, as `function` may be in it. Without, a script
-        whose calls are not guarded by ``if __name__ == "__main__"`` can be run.
+        Whether workers import the caller's script, which may define `function`. If not, the
+        script needs no guard ``if __name__ == "__main__"``.
 
     Yields
     ------
@@ -78,14 +78,14 @@ def spread(
 
 
 def processors() -> int:
-    """Number of processors that this process may use: batch systems and taskset give it some."""
+    """Return the number of processors that this process may use (its CPU affinity)."""
     allowed = getattr(os, "sched_getaffinity", None)
     return len(allowed(0)) if allowed else os.cpu_count() or 1
 
 
 @contextmanager
 def _nameless() -> Iterator[None]:
-    """Processes that start meanwhile find no script to import."""
+    """Hide the main script, so that processes started meanwhile do not import it."""
     main = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
     try:
@@ -116,7 +116,7 @@ def _prepare_worker() -> None:
     parent = parent_process()
 
     def follow() -> None:
-        # A parent that is killed cannot say so: its workers would wait for work for ever.
+        # A killed parent cannot stop its workers: they would wait for work for ever.
         if parent is not None:
             wait_for([parent.sentinel])
             os._exit(1)
@@ -127,8 +127,8 @@ def _prepare_worker() -> None:
 class _Pool:
     """Worker processes that are replaced when one dies.
 
-    A death breaks all that was under way. Those pieces are then worked on one at a time,
-    so that the one that kills its worker is found and the others get their results.
+    The death of one worker loses all pieces in progress. They are repeated one at a time, so
+    that the piece that kills its worker is found and the others get their results.
     """
 
     def __init__(self, workers: int, function: Callable[[Any], Any], caller: bool):
@@ -155,7 +155,7 @@ class _Pool:
 
     def add(self, index: int, piece: Any, *, alone: bool = False) -> None:
         try:
-            # A worker starts when there is something for it to do.
+            # The executor starts workers on submission.
             with nullcontext() if self.caller else _nameless():
                 future = self.executor.submit(_attempt, self.function, index, piece)
         except BrokenProcessPool:
@@ -181,18 +181,18 @@ class _Pool:
                 else:
                     self.suspects.append((index, piece))
                 self._replace()
-            except Exception as error:  # what cannot travel between processes
+            except Exception as error:  # such as a value that cannot be pickled
                 yield Done(index, error=f"{type(error).__name__}: {error}")
 
     def _replace(self) -> None:
-        """Start anew; what was under way is under suspicion."""
+        """Start new workers; the pieces in progress become suspects."""
         self.suspects += [(index, piece) for index, piece, _ in self.running.values()]
         self.running.clear()
         self.executor.shutdown(wait=False, cancel_futures=True)
         self._start()
 
     def close(self) -> None:
-        """End; what still runs when it is left early, by Ctrl-C or a satisfied caller, too."""
+        """Shut down, and terminate workers still running after Ctrl-C or an early exit."""
         if self.running:
             for process in list(self.executor._processes.values()):
                 process.terminate()

@@ -1,6 +1,6 @@
 """The sum of weighted terms over given unknowns: energy, gradient, Gauss-Newton matrix.
 
-The sparsity of the matrix is worked out once; an evaluation only writes numbers into it.
+The sparsity pattern of the matrix is computed once; an evaluation only fills in its values.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class _Values:
         self.weights = term.weights
 
     def refresh(self, coordinates: Array) -> None:
-        """Renew the constants of a term that asks for it."""
+        """Update the constants of a term that depend on the coordinates."""
         if self.item.term.refresh is not None:
             self.constants = self.item.term.refresh(coordinates)
 
@@ -59,20 +59,20 @@ class _Values:
 
 
 class _Elements(_Values):
-    """One weighted term on given unknowns: with the Jacobian, pulled back to them."""
+    """One weighted term on given unknowns, with the Jacobian by the unknowns (chain rule)."""
 
     def __init__(self, item: Weighted, variables: Variables):
         super().__init__(item, variables.layout)
         self._pull, self.columns = _pull_back(self.gather, variables)
 
     def linearise(self, coordinates: Array) -> tuple[Array, Array]:
-        """Residuals (r, e) and Jacobian by the element's unknowns (r, q, e)."""
+        """Return residuals (r, e) and their Jacobian by the element's unknowns (r, q, e)."""
         run = kernel(self.item.term.residual, self.shape, len(self.constants), True)
         value, slope = run(coordinates[self.gather], self.constants)
         return value, self._pulled(slope)
 
     def turning(self, coordinates: Array) -> Array | None:
-        """Rows (t, q, e) whose squares are the second derivatives of the first residuals."""
+        """Return rows h (t, q, e): ``h h^T`` is the geometric stiffness of the first residuals."""
         vectors = self.item.term.vectors
         if vectors is None:
             return None
@@ -87,9 +87,10 @@ class _Elements(_Values):
 
 
 def _pull_back(gather: Ints, variables: Variables):
-    """Matrix from an element's coordinates to its unknowns, and those unknowns (q, e).
+    """Return the map from derivatives by coordinates to those by unknowns, and the unknowns.
 
-    Rows of unknowns are padded with `variables.size` where an element has fewer.
+    The map is None where every coordinate is a single unknown or fixed. The unknowns (q, e)
+    of each element are padded with `variables.size`.
     """
     if variables.basis is None:
         return None, gather
@@ -116,9 +117,9 @@ def _pull_back(gather: Ints, variables: Variables):
 
 
 def _repeated(columns: Ints) -> Ints:
-    """Pairs a < b of an element that are one unknown, in the order of :func:`_products`.
+    """Find pairs a < b of an element that are the same unknown, as ordered by :func:`_products`.
 
-    They stand for two entries of the matrix, both on its diagonal.
+    Such a pair contributes to the diagonal of the matrix twice.
     """
     a, b = np.triu_indices(columns.shape[0])
     apart = np.flatnonzero(a != b)
@@ -128,7 +129,7 @@ def _repeated(columns: Ints) -> Ints:
 
 
 def _chosen(variables: Variables) -> Ints | None:
-    """The unknown that every coordinate is, where each is one itself or fixed."""
+    """Return the unknown that each coordinate equals; None unless each is one, or fixed."""
     basis = variables.basis
     if basis is None:
         return np.arange(variables.size)
@@ -142,7 +143,7 @@ def _chosen(variables: Variables) -> Ints | None:
 
 @dataclass
 class _Assembly:
-    """Where the entries of the elements' matrices go, and which count twice."""
+    """Positions of the element matrices' entries in the whole matrix, and which count twice."""
 
     pattern: Pattern
     scatter: list[Ints]
@@ -168,7 +169,7 @@ class Problem:
     limits : sequence of callables
         Bounds on a step, see :data:`Limit`.
     like : Problem, optional
-        One that may have the same sparsity, which is then taken over.
+        A problem whose sparsity pattern is reused if it is the same.
     """
 
     def __init__(
@@ -189,7 +190,7 @@ class Problem:
             self._assembly = like._assembly
 
     def _sparsity_of(self, other: Problem) -> bool:
-        """Whether the Gauss-Newton matrices have the same sparsity."""
+        """Return whether the Gauss-Newton matrices have the same sparsity pattern."""
         if self.variables.size != other.variables.size:
             return False
         here, there = ([e.columns for e in p._elements] for p in (self, other))
@@ -211,7 +212,7 @@ class Problem:
 
     @property
     def pattern(self) -> Pattern:
-        """Pattern of the Gauss-Newton matrix."""
+        """Sparsity pattern of the Gauss-Newton matrix."""
         return self._assembly.pattern
 
     @property
@@ -220,26 +221,26 @@ class Problem:
         return self._assembly.diagonal
 
     def with_loss(self, name: str, loss: Loss) -> None:
-        """Change the loss of the terms of one name that are not quadratic."""
+        """Set the loss of the non-quadratic terms of one name."""
         for element in self._elements:
             if element.item.term.name == name:
                 element.item = replace(element.item, loss=loss)
 
     def refresh(self, x: Array) -> None:
-        """Renew the constants that follow the unknowns: closest points, moved targets."""
+        """Update the constants that depend on the unknowns: closest points, shifted targets."""
         coordinates = self.variables.points(x)
         for element in self._elements:
             element.refresh(coordinates)
 
     def by_term(self, x: Array) -> dict[str, float]:
-        """Energy by term name, constants renewed; the values sum to :meth:`energy`."""
+        """Return the energy by term name, with updated constants; it sums to :meth:`energy`."""
         out = _by_term(self._elements, self.variables.points(x))
         for name, value in self._quadratic.by_term(x).items():
             out[name] = out.get(name, 0.0) + value
         return out
 
     def energy(self, x: Array) -> float:
-        """The objective; infinite where it is not finite."""
+        """Return the objective; infinity where it is not finite."""
         coordinates = self.variables.points(x)
         total = self._quadratic.energy(x)
         for element in self._elements:
@@ -247,7 +248,7 @@ class Problem:
         return total if np.isfinite(total) else np.inf
 
     def linearise(self, x: Array) -> tuple[float, Array, Array]:
-        """Energy, gradient (n,) and values of the Gauss-Newton matrix's lower triangle."""
+        """Return energy, gradient (n,) and values of the Gauss-Newton matrix's lower triangle."""
         coordinates = self.variables.points(x)
         n = self.variables.size
         total, gradient = self._quadratic.energy_and_gradient(x)
@@ -269,7 +270,7 @@ class Problem:
         return total if np.isfinite(total) else np.inf, gradient, values
 
     def largest_step(self, x: Array, dx: Array) -> float:
-        """Largest step along dx, at most 1, that crosses no limit."""
+        """Return the largest step along dx, at most 1, that crosses no limit."""
         if not self.limits:
             return 1.0
         coordinates, direction = self.variables.points(x), self.variables.direction(dx)
@@ -277,7 +278,7 @@ class Problem:
 
 
 class _Quadratic:
-    """The quadratic terms together: ``|A x - b|^2 / 2`` with everything constant."""
+    """The sum of the quadratic terms: ``|A x - b|^2 / 2`` with constant A and b."""
 
     def __init__(self, elements: list[_Elements], variables: Variables):
         from scipy.sparse import csr_matrix
@@ -336,7 +337,7 @@ class _Quadratic:
 
 
 def energies(items: Sequence[Weighted], layout: Layout, coordinates: Array) -> dict[str, float]:
-    """Energy by term name at coordinates, constants renewed, without unknowns to solve for."""
+    """Return the energy by term name at given coordinates, with updated constants."""
     return _by_term([_Values(item, layout) for item in _counted(items)], coordinates)
 
 
@@ -350,12 +351,12 @@ def _by_term(terms: Sequence[_Values], coordinates: Array) -> dict[str, float]:
 
 
 def _counted(items: Sequence[Weighted]) -> list[Weighted]:
-    """Those that have a say."""
+    """Return the active terms: those with a positive weight and at least one element."""
     return [i for i in items if i.weight > 0 and i.term.count]
 
 
 def _products(slope: Array, weight: Array) -> Array:
-    """Sum over residuals of weight * J_a * J_b for all pairs a <= b, (pairs, e)."""
+    """Sum weight * J_a * J_b over the residuals, for all pairs a <= b, (pairs, e)."""
     r, q, count = slope.shape
     out = np.empty((q * (q + 1) // 2, count))
     weighted = slope * weight[:, None, :]
@@ -370,7 +371,7 @@ def _products(slope: Array, weight: Array) -> Array:
 
 
 def _assemble(n: int, columns: list[Ints], quadratic) -> _Assembly:
-    """Pattern of the sum of element matrices, a constant matrix and a diagonal; cached."""
+    """Return the pattern of element matrices, a constant matrix and a diagonal; cached."""
     pairs = sum(c.shape[0] * (c.shape[0] + 1) // 2 * c.shape[1] for c in columns)
     digest = hashlib.blake2b(str(n).encode())
     for c in (*columns, quadratic.indptr, quadratic.indices):
@@ -389,7 +390,7 @@ def _assemble(n: int, columns: list[Ints], quadratic) -> _Assembly:
 
 
 def _analyse(n: int, columns: list[Ints], quadratic: Any) -> _Assembly:
-    """Work out where every product of two unknowns of an element goes."""
+    """Compute the position in the matrix of every product of two unknowns of an element."""
     lows, highs = [], []
     for c in columns:
         a, b = np.triu_indices(c.shape[0])
@@ -410,14 +411,14 @@ def _analyse(n: int, columns: list[Ints], quadratic: Any) -> _Assembly:
     return _Assembly(pattern, scatter, [_repeated(c) for c in columns], fixed, diagonal)
 
 
-#: Largest table of columns times diagonals that is worked out without sorting.
+#: Largest table, columns times diagonals, for which :func:`_places` does not sort.
 _LARGEST_TABLE = 200_000_000
 
 
 def _places(column: Ints, row: Ints, n: int) -> tuple[Ints, Ints, Ints]:
-    """Rank of every (column, row) among the distinct ones, and those, by column then row.
+    """Rank every (column, row) among the distinct pairs, sorted by column then row; return both.
 
-    Where the matrix has few diagonals (grids), by marking them in a table; else by sorting.
+    Matrices with few diagonals (grids) are marked in a table; the pairs of others are sorted.
     """
     distance = row - column
     used = np.bincount(distance) > 0

@@ -1,4 +1,4 @@
-"""Carry out a task's plan: stage after stage, with history and time kept."""
+"""The solve of a task's plan, stage by stage, with history and timings."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Outcome:
-    """Coordinates that a run ended with, and how.
+    """Final coordinates of a run, with status and energy.
 
-    Where the surface is a B-spline: with how many control points, and the coordinates that
-    it was fitted to before its own stage. Where the flat image is that of the design cut open:
-    how it was cut. `stage` is the one that was solved last.
+    Where the surface is a B-spline, `spline` is the number of control points along both sides,
+    and `fitted` the coordinates before the spline's own stage. Where the design was cut open
+    to flatten it, `cut` says how. `stage` is the stage that was solved last.
     """
 
     blocks: dict[str, Array]
@@ -42,22 +42,23 @@ class Outcome:
     stage: Stage | None = None
 
     def move(self, blocks: dict[str, Array]) -> None:
-        """Take other coordinates, with their own energy."""
+        """Replace the coordinates, and recompute the energy."""
         self.blocks = blocks
         if self.stage is not None:
             self.energy = objective(self.stage, self.stage.layout.pack(blocks))
 
     @property
     def points(self) -> Array:
-        """Its surface (n, 3), or its flat image (n, 2) where that is all there is."""
+        """Its surface (n, 3), or its flat image (n, 2) where it has no surface."""
         return self.blocks["surface"] if "surface" in self.blocks else self.blocks["flat"]
 
 
 class End(NamedTuple):
-    """Where the stages of a plan ended.
+    """Final state of the stages of a plan.
 
-    The coordinates are those of `stage`, which was solved last, or is the plan's last where
-    the solve was cancelled; `given` are those before the plan's last stage, where it was solved.
+    `coordinates` belong to `stage`: the stage solved last, or the plan's last stage where the
+    solve was cancelled. `given` are the coordinates before the plan's last stage, or None where
+    that was not solved.
     """
 
     coordinates: Array
@@ -67,23 +68,23 @@ class End(NamedTuple):
 
 
 def objective(stage: Stage, coordinates: Array) -> dict[str, float]:
-    """What a stage minimises, by term, at coordinates; what must hold is no part of it."""
+    """Return the objective of a stage by term, without terms that enforce hard constraints."""
     items = [item for item in stage.items if item.term.multipliers is None]
     return energies(items, stage.layout, coordinates)
 
 
 class Run:
-    """Solves requests of one task, keeping history and time across several of them.
+    """Solver of requests of one task, with history and timings over all of them.
 
     Attributes
     ----------
     guarded : bool
-        The start of the first request is dropped, there and from then on, where it is worse
-        than none.
+        Whether the start of the first request is dropped, there and in later requests, if the
+        plan refuses it or its energy is above that of a cold start.
     budget : int or None
-        Most iterations of all its solves together.
+        Largest number of iterations of all solves together.
     tolerance : float
-        Least tolerance of stages that begin from a start that was given.
+        Lower limit of the stages' tolerance where a start was given.
     refused : str
         Why that start was not used.
     """
@@ -139,11 +140,11 @@ class Run:
         return outcome
 
     def _plan(self, request: Request) -> Plan:
-        """The task's plan, from the start that was given unless there is a better one."""
+        """Return the task's plan, from the given start unless that is dropped."""
         if request.start is not None and request.start is self._dropped:
             request = replace(request, start=None)
         plan: Plan = self.module.plan(request)
-        # Later on, searches bring starts of their own.
+        # Later requests have starts that a search chose.
         first, self._judged = not self._judged, True
         if not first or request.start is None:
             return plan
@@ -151,7 +152,7 @@ class Run:
         if self.guarded and not self.refused:
             self.refused = self._worse(plan)
             if not self.refused and request.max_deviation is not None:
-                # The same search solves without a bound, too.
+                # `stay_within` also solves without the bound.
                 free = self.module.plan(replace(request, max_deviation=None))
                 self.refused = self._worse(free)
         if not (self.guarded and self.refused):
@@ -161,12 +162,12 @@ class Run:
 
     @staticmethod
     def _worse(plan: Plan) -> str:
-        """Why to begin without the start: it has more of the energy."""
+        """Say that the start has more energy than a cold start; empty if it has not."""
         if plan.unstarted is None or not plan.stages:
             return ""
-        # A spline is fitted to what the stage before its own ends with.
+        # The spline is fitted to the result of the stage before its own: compare there.
         stages = plan.stages if plan.spline is None else plan.stages[:-1]
-        # What that costs is paid once, for the comparison and for the solve.
+        # Enter the first stage only once, for both the comparison and the solve.
         plan.start, stages[0].enter = stages[0].enter(plan.start), same
         warm, cold = (
             sum(objective(stages[-1], coordinates).values())
@@ -177,7 +178,7 @@ class Run:
         return f"its energy, {warm:.3g}, is above that of the start without it, {cold:.3g}"
 
     def through(self, plan: Plan, options: Options) -> End:
-        """Solve the stages of a plan that has some, the last one until its constraints hold."""
+        """Solve the stages of a plan with at least one, the last one until hard terms hold."""
         coordinates, given = plan.start, None
         least = 0.0 if plan.unstarted is None else self.tolerance
         for number, stage in enumerate(plan.stages):
@@ -186,7 +187,7 @@ class Run:
             given, coordinates = coordinates, stage.enter(coordinates)
             self.timings.setup += time.perf_counter() - clock
             last = stage is plan.stages[-1]
-            # A start is near the end already: there is where few iterations do most.
+            # A warm start is close to the solution: reserve iterations for the last stage.
             kept = 0 if last or plan.unstarted is None else plan.stages[-1].iterations
             solve = partial(self.solve, options, (number, len(plan.stages)), kept=kept)
             coordinates, solution = solve(stage, coordinates)
@@ -196,7 +197,7 @@ class Run:
                 break
         after = plan.stages[number + 1 :]
         if solution.status is Status.CANCELLED:
-            # They are carried to the last stage.
+            # Transfer the coordinates to the last stage without solving.
             for stage in after:
                 coordinates = stage.enter(coordinates)
         else:
@@ -212,7 +213,7 @@ class Run:
         *,
         kept: int = 0,
     ) -> tuple[Array, Solution]:
-        """Solve one stage from coordinates, and leave so many iterations of the budget."""
+        """Solve one stage from coordinates, leaving `kept` iterations of the budget."""
         clock = time.perf_counter()
         variables = stage.variables(coordinates)
         problem = Problem(stage.items, variables, stage.limits)
@@ -246,7 +247,7 @@ class Run:
 
     @staticmethod
     def guard(plan: Plan, stage: Stage, coordinates: Array) -> tuple[Array, dict[str, float]]:
-        """The result, unless what it must not be worse than has less of the objective."""
+        """Return the coordinates and their energy, or the fallback's if that has less."""
         energy = objective(stage, coordinates)
         if plan.fallback is not None:
             other = objective(stage, plan.fallback)

@@ -1,7 +1,7 @@
-"""The questions of the developable task: how close, how developable, how much strain.
+"""Searches of the developable task: bounds on distance, on curvature and on strain.
 
-Each is a search over the weight of what makes a surface developable. The smallest weight that
-meets the demand has the smallest displacement.
+Each searches over the weight of the terms that make a surface developable. The smallest weight
+that meets the demand gives the smallest displacement.
 """
 
 from __future__ import annotations
@@ -26,37 +26,37 @@ from gso.verdict.asked import DEVELOPABLE
 Array = NDArray[np.float64]
 Solve = Callable[[Request], Any]
 
-#: Curvature that every design is below.
+#: Curvature threshold above the curvature of every design.
 _ANY = 1e300
-#: Solves of one search, and steps of the interpolation between two of its results.
+#: Largest numbers of solves in one search, and of bisection steps between two of its results.
 _SOLVES = 10
 _BLENDS = 25
-#: Weights beyond which no search goes: fairness counts nothing there, and surfaces crumple.
+#: Range of weights in a search. Beyond it fairness has no effect, and surfaces crumple.
 _RANGE = (1e-2, 1e3)
-#: A larger weight that leaves more than this share of a value has come to an obstacle; a search
-#: gives up after so many of them.
+#: A solve that leaves more than this share of the value makes no progress. A search in which no
+#: result meets the demand stops after `_OBSTACLES` such solves in a row.
 _PROGRESS = 0.98
 _OBSTACLES = 3
-#: Weights of the solves within a bound, while the strain is too large.
+#: Weights tried in turn within a bound, until the strain is small enough.
 _HARDER = (1.0, 6.0, 36.0)
 _ITERATIONS = 25
 _COARSE_ITERATIONS = 15
-#: No result of a search moves a vertex farther than this, in unit balls.
+#: Largest displacement of a vertex, in the unit ball, that a search accepts.
 FARTHEST = 0.25
 
 
 @dataclass
 class Demand:
-    """A value of a surface that must fall to a target.
+    """An upper bound on a measure of the surface.
 
     Attributes
     ----------
     value : callable
-        Of the surface (n, 3), in the frame of the request.
+        Measure of a surface (n, 3), in the frame of the request.
     target : float
-        What it must not pass.
+        Its upper bound.
     close : float
-        Share of the target that a result may stay below it.
+        Relative distance below the target within which a value counts as close to it.
     """
 
     value: Callable[[Array], float]
@@ -65,20 +65,20 @@ class Demand:
 
     @property
     def aim(self) -> float:
-        """What the next weight is chosen for."""
+        """Value that the next weight is chosen to reach."""
         return (1.0 - 0.5 * self.close) * self.target
 
     def met(self, value: float) -> bool:
-        """Whether a value does not pass the target."""
+        """Return whether a value is at most the target."""
         return value <= self.target
 
     def near(self, value: float) -> bool:
-        """Whether a value meets the target and is close to it."""
+        """Return whether a value meets the target and is close to it."""
         return (1.0 - self.close) * self.target <= value <= self.target
 
 
 def of_curvature(request: Request, target: float) -> Demand:
-    """``loss_gc_worst`` of at most `target`, reached within 5 %."""
+    """Demand a ``loss_gc_worst`` of at most `target`, reached within 5 %."""
 
     def value(points: Array) -> float:
         return curved(request.mesh, points)
@@ -87,7 +87,10 @@ def of_curvature(request: Request, target: float) -> Demand:
 
 
 def curved(mesh: Mesh, points: Array) -> float:
-    """``loss_gc_worst`` of a surface (n, 3) in the unit ball; of components by their own sizes."""
+    """Return ``loss_gc_worst`` of a surface (n, 3) in the unit ball.
+
+    Several components are averaged by area, each measured by its own size.
+    """
     after = mesh.replaced(points)
     if not several(mesh):
         return metrics.loss_gc_worst(after, scale=1.0)
@@ -95,12 +98,12 @@ def curved(mesh: Mesh, points: Array) -> float:
 
 
 def of_strain(request: Request, target: float) -> Demand:
-    """Largest strain of the flat pattern of at most `target`, reached within 10 %."""
+    """Demand a largest strain of the flat pattern of at most `target`, reached within 10 %."""
     return Demand(partial(_strain, request), target, 0.1)
 
 
 def _pattern(request: Request, points: Array) -> Pattern:
-    """Flat pattern of a surface (n, 3) on the faces of the design."""
+    """Return the flat pattern of a surface (n, 3) on the faces of the design."""
     found = lay_out(request.mesh.replaced(points))
     if found is None:
         raise MeshError(
@@ -115,7 +118,7 @@ def _strain(request: Request, points: Array) -> float:
 
 
 def strain_left(request: Request, outcome: Any) -> float:
-    """Largest strain of the flat pattern of an outcome; infinite where there is no pattern."""
+    """Return the largest strain of an outcome's flat pattern; infinity if it has no pattern."""
     if not flat_start.flattens(request.mesh):
         return np.inf
     return _strain(request, outcome.points)
@@ -124,15 +127,17 @@ def strain_left(request: Request, outcome: Any) -> float:
 def stay_within(
     run: Solve, request: Request, bound: float, strain: float | None
 ) -> tuple[Any, bool]:
-    """The most developable of several solves with a bound, and one without that meets it.
+    """Return the most developable result within a bound on the distance to the design.
 
-    They end when the largest strain is at most `strain`, or `DEVELOPABLE` where it is None;
-    surfaces without a flat pattern are compared by their curvature.
+    Solves with the bound use growing weights, until the largest strain is at most `strain`, or
+    `DEVELOPABLE` where it is None. A solve without the bound is tried too, and counts if it
+    stays within the bound. Surfaces that cannot be flattened are compared by curvature.
 
     Returns
     -------
     outcome, met
-        Whether nothing is left to ask for.
+        Whether the search is complete: the limit is met, the design was developable already,
+        or the search was cancelled.
     """
     limit = of_strain(request, DEVELOPABLE if strain is None else strain)
     if strain is None and not flat_start.flattens(request.mesh):
@@ -163,18 +168,19 @@ def _cancelled(best: Any, last: Any) -> Any:
 
 
 def _distance(request: Request, outcome: Any) -> float:
-    """Largest distance between the design and an outcome, both ways."""
+    """Return the largest distance between the design and an outcome, in both directions."""
     found = metrics.surface_distance(request.mesh, request.mesh.replaced(outcome.points))
     return max(found.there_max, found.back_max)
 
 
 def reach(run: Solve, request: Request, demand: Demand) -> tuple[Any, bool]:
-    """Solve with growing or falling weight until the demand is met, and hardly more than met.
+    """Search for the weight that just meets a demand.
 
-    Values fall with the weight, but not steadily: after a search by regula falsi on logarithms,
-    every solve started from the last one that missed, the surface is interpolated between the
-    best one that meets the demand and the last one that does not (or the design), where none is
-    close enough. No result is farther than `FARTHEST` from the design.
+    The value falls with the weight, but not monotonically. The search is a regula falsi on
+    logarithms; each solve starts from the last one that missed, unless that made no progress.
+    If no result is close enough to the target, the surface is interpolated between the best
+    result that meets the demand and the one with the least value that misses it (or the
+    design). Results farther than `FARTHEST` from the design are not accepted.
 
     Returns
     -------
@@ -208,8 +214,8 @@ def reach(run: Solve, request: Request, demand: Demand) -> tuple[Any, bool]:
         else:
             stuck = value > _PROGRESS * value_low
             low, value_low = weight, value
-            # What is gone comes back slowly: go on from the side that has more of it.
-            # Where more weight changes nothing, a new start gets round the obstacle.
+            # Lost curvature or strain returns slowly: continue from a result that has more.
+            # Where more weight changes nothing, begin again from the request's start.
             weighed = replace(weighed, start=request.start if stuck else last.points)
         obstacles = 0 if value < _PROGRESS * least else obstacles + 1
         least = min(least, value)
@@ -224,7 +230,11 @@ def reach(run: Solve, request: Request, demand: Demand) -> tuple[Any, bool]:
 
 @dataclass
 class _Found:
-    """The best results of a search so far."""
+    """The best results of a search so far.
+
+    `best` meets the demand with the least mean displacement, `missed` is the surface with the
+    least value that misses it (the design at first), `closest` the outcome with that value.
+    """
 
     request: Request
     demand: Demand
@@ -235,7 +245,7 @@ class _Found:
     closest: tuple[Any, float] = field(default=(None, np.inf))
 
     def add(self, outcome: Any, value: float) -> bool:
-        """Take up a result; whether it is too far from the design."""
+        """Record a result; return whether it is too far from the design."""
         u = outcome.points - self.request.mesh.vertices
         moved = float(np.sqrt((u * u).sum(axis=1)).max(initial=0.0))
         if not (np.isfinite(moved) and moved <= FARTHEST):
@@ -252,7 +262,7 @@ class _Found:
         return False
 
     def chosen(self, last: Any) -> Any:
-        """The result, with its status."""
+        """Return the best result, with its status."""
         best = self.best
         if best is None:
             best = self.closest[0] or last
@@ -265,7 +275,7 @@ class _Found:
         return best
 
     def _blend(self, outcome: Any) -> None:
-        """Move an outcome towards the surface that missed, as far as the demand stays met."""
+        """Move an outcome towards the surface that missed, as far as the demand allows."""
         linear = not any(part.hard for part in self.request.constraints.parts)
         if self.missed is None or outcome.spline is not None or not linear:
             return
@@ -289,7 +299,7 @@ class _Found:
 
 
 def _patient(options: Any) -> Any:
-    """Options with free vertices and iterations enough, but for B-splines."""
+    """Return options with enough iterations and, except for B-splines, free vertices."""
     if not hasattr(options, "coarse_iterations"):
         return options
     changes: dict[str, Any] = {
@@ -310,7 +320,7 @@ def _next(
     value_low: float,
     value_high: float,
 ) -> float:
-    """Next weight: regula falsi in logarithms inside a bracket, a power law outside."""
+    """Choose the next weight: regula falsi in logarithms in a bracket, a power law outside."""
     if low > 0 and np.isfinite(high):
         a, b = np.log(low), np.log(high)
         share = (np.log(value_low) - np.log(aim)) / max(

@@ -1,4 +1,4 @@
-"""Drag the handles of a surface: one or two iterations of the solver a frame."""
+"""Interactive editing: handles of a surface move, at one or two solver iterations a frame."""
 
 from __future__ import annotations
 
@@ -32,20 +32,21 @@ from gso.tno.tighten import tighten
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Most iterations of :meth:`Session.settle`.
+#: Iteration limit of the solve in :meth:`Session.settle`.
 _SETTLED = 100
-#: Energies this close, as a share, are those of one minimum.
+#: Relative difference up to which two energies count as the same minimum.
 _SAME = 1e-3
 
 
 class Session:
-    """A task that is solved again and again while its handles move.
+    """A task that is solved repeatedly, from warm starts, while its handles move.
 
-    The first solve is that of :func:`gso.tno.optimize`. From then on the last stage of the
-    task goes on from where it is: the pattern of its equations, their symbolic analysis and
-    the shape are kept, so that a frame costs one or two iterations. Hard handles are at
-    their positions after every :meth:`move`, to rounding; the surface catches up with them.
-    A mesh of several components is kept in one solve, with weights by each one's own size.
+    The first solve is that of :func:`gso.tno.optimize`. After it only the last stage of the
+    task is iterated, from the current surface. The session keeps the sparsity pattern of its
+    equations and their symbolic factorisation, so a frame costs one or two iterations. Hard
+    handles are at their positions after every :meth:`move`, up to rounding; the iterations
+    then adapt the rest of the surface. The components of a mesh are solved together, each
+    with weights by its own size.
 
     Parameters
     ----------
@@ -54,13 +55,13 @@ class Session:
     task, formulation, options, x0
         As for :func:`gso.tno.optimize`; a task whose result is a surface.
     constraints : sequence of Constraint
-        What the surface keeps, and the handles that can be moved.
+        Constraints on the surface, among them the handles that can be moved.
 
     Attributes
     ----------
     analyses : int
-        How many symbolic analyses the frames took: one, and one more for each
-        :meth:`constrain` that changes which vertices are held.
+        Number of symbolic factorisations so far: one, and one more for each
+        :meth:`constrain` that changes the sparsity pattern, such as by fixing other vertices.
 
     Raises
     ------
@@ -117,20 +118,20 @@ class Session:
 
     @property
     def vertices(self) -> Array:
-        """Where the surface is, (n, 3), in the user's frame and numbering."""
+        """Current vertices (n, 3), in the user's frame and numbering."""
         return self._frame.frame.to_user(self._frame.back("surface", self._surface))
 
     def move(self, ids: ArrayLike, positions: ArrayLike) -> None:
         """Move vertices that have a :class:`gso.Handle`.
 
-        The surface follows them smoothly, before any iteration.
+        Their displacement is spread smoothly over the surface, before any iteration.
 
         Parameters
         ----------
         ids : array_like of int, (k,)
             Vertex indices.
         positions : array_like, (k, 3)
-            Where they go, in the unit of the mesh.
+            Their new positions, in the unit of the mesh.
 
         Raises
         ------
@@ -148,12 +149,15 @@ class Session:
         self._left_to_do()
 
     def constrain(self, constraints: Sequence[Constraint]) -> None:
-        """Take other constraints, handles among them; the surface stays where it is.
+        """Replace the constraints, including the handles.
+
+        The session goes on from the current surface. Vertices with a hard position move
+        there, and their displacement is spread over the surface, as by :meth:`move`.
 
         Raises
         ------
         OptionError
-            They contradict each other, or something in them is wrong.
+            Constraints contradict each other, or one is invalid.
         """
         self._plan = self._planned(constraints, self._surface)
         c = self._request.constraints
@@ -162,12 +166,12 @@ class Session:
         self._left_to_do()
 
     def step(self, iterations: int = 1) -> Array:
-        """Go on with the solve.
+        """Iterate from the current surface.
 
         Parameters
         ----------
         iterations : int
-            Most iterations, 1 or more; fewer when nothing is left to gain.
+            Largest number of iterations, 1 or more; fewer once the energy no longer falls.
 
         Returns
         -------
@@ -177,7 +181,7 @@ class Session:
         Raises
         ------
         OptionError
-            `iterations` is no such number.
+            `iterations` is not a whole number of 1 or more.
         """
         if not isinstance(iterations, int | np.integer) or iterations < 1:
             raise OptionError(f"iterations is {iterations!r}; it must be 1 or more")
@@ -191,16 +195,16 @@ class Session:
     def settle(self) -> Result:
         """Iterate until the task's tolerance is met and all constraints hold.
 
-        An energy has many minima, and the one that handles were dragged into may be a bad one.
-        So the solve of :func:`gso.tno.optimize`, from the design, is made as well. Its result
-        is taken where only that one is usable, or where it has less energy.
+        The energy has many local minima, and dragging may have led into a bad one. The task is
+        therefore also solved anew from the design (or `x0`), as by :func:`gso.tno.optimize`.
+        That result replaces the dragged surface if only it is usable, or if both or neither
+        are usable and its energy is lower.
 
         Returns
         -------
         Result
-            The :meth:`result`; with a `ConvergenceWarning` where the tolerance was not reached.
-            A note says that the solve from the design was taken, and how far from the dragged
-            surface it is.
+            The :meth:`result`, with a `ConvergenceWarning` if it has not converged. If the solve
+            from the design was taken, a note says how far it is from the dragged surface.
         """
         result = self._settled()
         if self._stage is not None:
@@ -220,7 +224,7 @@ class Session:
         return result
 
     def _settled(self) -> Result:
-        """The result of iterating from where the surface is."""
+        """Iterate from the current surface until the stage converges."""
         stage = self._stage
         if stage is not None:
             solution = self._iterate(stage, _SETTLED, stage.tolerance)
@@ -233,7 +237,7 @@ class Session:
         return self.result()
 
     def result(self) -> Result:
-        """The surface as it is, as a result of :func:`gso.tno.optimize`."""
+        """Return the current surface as a result, like that of :func:`gso.tno.optimize`."""
         plan, stage = self._plan, self._stage
         finished = plan.finish(self._coordinates)
         outcome = Outcome(
@@ -254,7 +258,7 @@ class Session:
 
     @property
     def _surface(self) -> Array:
-        """Vertices (n, 3) in the solver's frame and numbering."""
+        """Current vertices (n, 3), in the solver's frame and numbering."""
         return self._plan.layout.split(self._coordinates)["surface"]
 
     @property
@@ -262,7 +266,7 @@ class Session:
         return self._plan.stages[-1] if self._plan.stages else None
 
     def _solved(self, plan: Plan) -> Array:
-        """Coordinates after all stages."""
+        """Solve all stages of a plan, and return the final coordinates."""
         if not plan.stages:
             return plan.start
         end = self._run.through(plan, self._options)
@@ -270,12 +274,12 @@ class Session:
         return end.coordinates
 
     def _left_to_do(self) -> None:
-        """The surface has not been solved for since what it keeps was changed."""
+        """Mark the surface as not converged, because its constraints have changed."""
         if self._stage is not None:
             self._status = Status.MAX_ITERATIONS
 
     def _planned(self, constraints: Sequence[Constraint], start: Array | None) -> Plan:
-        """What the task makes of constraints; they are checked first."""
+        """Check constraints, and return the task's plan with them."""
         given = listed(constraints)
         compiled = self._frame.constraints(given, flat=False)
         request = Request(self._frame.mesh, self._options, self._formulation, compiled, start)
@@ -286,7 +290,7 @@ class Session:
         return plan
 
     def _follow(self, ids: Ints, displacement: Array) -> None:
-        """Take the surface along with vertices (k,) that are displaced (k, 3)."""
+        """Displace vertices (k,) by (k, 3), and spread the displacement over the surface."""
         if self._stage is None or not len(ids):
             return
         if self._spread is None or not np.array_equal(self._spread.ids, ids):
@@ -297,7 +301,7 @@ class Session:
         surface += self._spread(displacement)
 
     def _pose(self) -> None:
-        """Make the problem of the constraints and coordinates at hand."""
+        """Rebuild the problem for the current constraints and coordinates."""
         stage = self._stage
         if stage is None:
             self._problem = None
@@ -313,7 +317,7 @@ class Session:
         self._bounds = None if stage.bounds is None else stage.bounds(self._coordinates)
 
     def _aimed(self, stage: Stage) -> list[Weighted]:
-        """Terms of a stage, those of soft handles with their targets of now."""
+        """Return the terms of a stage, with the current targets of soft handles."""
         pins = iter(self._request.constraints.of(Pins, hard=False))
         items = []
         for item in stage.items:
@@ -324,7 +328,7 @@ class Session:
         return items
 
     def _iterate(self, stage: Stage, iterations: int, tolerance: float) -> Solution:
-        """Go on with a stage, the one that the problem at hand is of."""
+        """Iterate a stage from the current unknowns; the current problem must be its own."""
         problem: Any = self._problem
         solution = minimise(
             problem,
@@ -348,14 +352,14 @@ class Session:
 
 
 def _better(one: Result, other: Result) -> bool:
-    """Whether a result is usable where the other is not, or has less energy."""
+    """Return whether a result alone is usable, or has less energy at equal usability."""
     if one.usable != other.usable:
         return one.usable
     return sum(one.energy.values()) < (1.0 - _SAME) * sum(other.energy.values())
 
 
 def _jumped(dragged: Result, taken: Result) -> str:
-    """How the result taken differs from the dragged one."""
+    """Describe how the result that was taken differs from the dragged one."""
     apart = np.linalg.norm(taken.mesh.vertices - dragged.mesh.vertices, axis=1)
     k = int(apart.argmax())
     why = (

@@ -1,4 +1,4 @@
-"""Iterate: linearise, factor, step, until the energy no longer falls."""
+"""The iteration: linearise, factorise, line search, until the energy no longer falls."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Timings:
 
 @dataclass
 class Solution:
-    """What a stage returns."""
+    """The result of solving a stage."""
 
     x: Array
     energy: float
@@ -71,7 +71,7 @@ def minimise(
     name: str = "",
     timings: Timings | None = None,
 ) -> Solution:
-    """Minimise a problem from x; never returns a worse energy than it was given.
+    """Minimise a problem from x; the energy returned is never above that of x.
 
     Parameters
     ----------
@@ -85,8 +85,8 @@ def minimise(
         Stop when an iteration at the last `eps` lowers the energy by less than this
         share of it.
     eps : sequence of float
-        Smoothing of the absolute value by iteration, for the terms named `robust`; the
-        last one counts from then on, and in the energy that is returned.
+        Continuation: smoothing of the absolute value by iteration, for the terms named
+        `robust`. The last value holds for all later iterations and for the energy returned.
     robust : str
         Name of the term whose loss follows `eps`.
     bounds : (ndarray, ndarray), optional
@@ -96,9 +96,9 @@ def minimise(
     backend : str, optional
         Linear backend; the fastest installed one when not given.
     solver : backend solver, optional
-        One that has analysed the problem's pattern already.
+        A solver that has already analysed the problem's sparsity pattern.
     direction : GaussNewton, optional
-        One that goes on with its damping; `method` then means nothing.
+        A direction that continues with its damping; `method` is then ignored.
     threads : int
         BLAS threads around factorisations; 0 leaves them alone.
     callback : callable, optional
@@ -106,7 +106,7 @@ def minimise(
     stage : (int, int)
         Index and number of stages, for the callback.
     name : str
-        Name of the stage, likewise.
+        Name of the stage, for the callback.
     timings : Timings, optional
         Where to add the seconds spent.
     """
@@ -127,7 +127,7 @@ def minimise(
             raise Cancelled
 
     def smooth(iteration: int) -> bool:
-        """Set the loss of this iteration; whether it is the last one of the schedule."""
+        """Set the loss of this iteration; return whether it is the schedule's last one."""
         if schedule:
             problem.with_loss(robust, Absolute(schedule[min(iteration, len(schedule) - 1)]))
         return iteration >= len(schedule) - 1
@@ -143,7 +143,7 @@ def minimise(
     timings.search += time.perf_counter() - clock
     status = Status.MAX_ITERATIONS
     if not len(x):
-        # Constraints hold every vertex.
+        # Constraints fix every vertex: there are no unknowns.
         status, iterations = Status.CONVERGED, 0
     done = 0
     try:
@@ -174,7 +174,7 @@ def minimise(
                 timings.search += time.perf_counter() - t2
                 report(done, value, step)
                 if settled and energy - value <= tolerance * abs(energy):
-                    # Nothing is left to gain when rounding errors are all there is.
+                    # A rejected step is no failure if the predicted decrease is negligible.
                     expected = -0.5 * float(gradient @ d)
                     done_well = step > 0 or expected <= max(tolerance * abs(energy), _NOTHING)
                     status = Status.CONVERGED if done_well else Status.STALLED
@@ -189,10 +189,10 @@ def minimise(
     return Solution(best, best_energy, status, done, solver.name, history)
 
 
-#: Energy (dimensionless) that is as good as zero.
+#: Energy (dimensionless) that counts as zero.
 _NOTHING = 1e-20
 
-#: Stiffness, relative to the matrix, that keeps an unknown at its bound.
+#: Diagonal entry, relative to the largest one, that keeps an unknown at its bound.
 _STIFF = 1e6
 
 
@@ -201,7 +201,7 @@ def _says_no(answer: object) -> bool:
 
 
 def _held(x: Array, gradient: Array, bounds: tuple[Array, Array]) -> NDArray[np.bool_]:
-    """Unknowns at a bound that the gradient pushes against."""
+    """Return the mask of unknowns at a bound beyond which the energy would fall."""
     low, high = bounds
     width = high - low
     margin = 1e-6 * np.where(np.isfinite(width), width, 0.0)

@@ -1,4 +1,4 @@
-"""Starts that somebody else made."""
+"""Warm starts with settings of their own."""
 
 from __future__ import annotations
 
@@ -12,28 +12,29 @@ from gso.status import OptionError
 
 @dataclass(frozen=True)
 class Start:
-    """A start for :func:`gso.tno.optimize`, and what is to be thought of it.
+    """A warm start for :func:`gso.tno.optimize`, with settings on how it is used.
 
     Attributes
     ----------
     points : Mesh, array or None
-        As `x0`; None leaves it to the optimiser.
+        As `x0`; None for the optimiser's own start.
     source : str
-        Where it is from, for the result's `warm_start`.
+        Origin of the start, reported as the result's `warm_start`.
     guarded : bool
-        "developable", "flatten": it is dropped where its energy is above that of the start
-        without it, or where it turns cells of a flat image over; the result is then the
-        same as without it.
+        "developable", "flatten": drop the start if its energy is above that of the
+        optimiser's own start, or if it has inverted cells in a flat image. The result is then
+        the same as without it.
     iterations : int, optional
-        Most iterations, over all stages; those of `points` go to the last stage first.
+        Largest number of iterations over all stages. With `points`, they are reserved for the
+        last stage first.
     tolerance : float
-        Stop the stages that begin from `points` when an iteration lowers the energy by less
-        than this share of it, where the options' own is smaller.
+        With `points`, stages stop when an iteration lowers the energy by less than this share
+        of it, or than the options' tolerance where that is larger.
 
     Raises
     ------
     OptionError
-        `iterations` is no number of iterations, or `tolerance` is negative or no number.
+        `iterations` is not a whole number of 0 or more, or `tolerance` is negative or no number.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Constraints that are terms are made to hold: the method of multipliers."""
+"""Enforcement of hard constraints that are terms, by the method of multipliers."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from gso.tno.solver import Solution
 
 Array = NDArray[np.float64]
 
-#: Residual, in the unit ball, that is small enough.
+#: Stopping threshold of the residual, in the unit ball.
 ENOUGH = 1e-7
-#: Most solves.
+#: Largest number of solves.
 ROUNDS = 14
-#: Share of the residual that a solve should leave; else the other terms weigh less from then
-#: on, by the second number each time, down to the last.
+#: Share of the residual that a solve may leave. If more is left, the weights of the other terms
+#: are multiplied by the second number, until their common factor is at most the third.
 _FAST, _SOFTER, _SOFTEST = 0.3, 0.2, 1e-6
 
 #: ``solve(stage, coordinates) -> (coordinates, solution)``
@@ -29,22 +29,22 @@ Solve = Callable[[Stage, Array], tuple[Array, Solution]]
 def tighten(
     stage: Stage, coordinates: Array, solution: Solution, solve: Solve
 ) -> tuple[Array, Solution]:
-    """Repeat a stage, its targets moved by what is left, until its hard terms hold.
+    """Repeat a stage, with targets shifted by the residuals, until its hard terms hold.
 
     Parameters
     ----------
     stage : Stage
-        The one just solved.
+        The stage just solved.
     coordinates, solution : ndarray, Solution
-        Where it ended, and how.
+        Its final coordinates and its solution.
     solve : callable
         Solves a stage.
 
     Returns
     -------
     ndarray, Solution
-        Where the solve ends now; the solution that of the stage itself, unless a later one
-        was stopped.
+        The final coordinates; the solution of the stage itself, or of a later solve that was
+        cancelled.
     """
     hard = [i.term.multipliers for i in stage.items if i.term.multipliers is not None]
     if not hard:
@@ -67,13 +67,13 @@ def tighten(
             end = solution
             break
     for m in hard:
-        # The stage itself may go on from here, with its own weights.
+        # The stage may continue from here, with its own weights.
         m.scale(1.0 / share)
     return coordinates, end
 
 
 def _softer(stage: Stage, share: float) -> Stage:
-    """The stage with less weight on all terms but the hard ones."""
+    """Return the stage with the weights of all but the hard terms multiplied by `share`."""
     items = [
         i if i.term.multipliers is not None else replace(i, weight=share * i.weight)
         for i in stage.items
