@@ -117,7 +117,7 @@ class Result:
             self.pattern = Pattern.whole(self.design, self.flat)
 
     def __repr__(self) -> str:
-        from gso.verdict.wording import summary
+        from gso.wording import summary
 
         return summary(self)
 

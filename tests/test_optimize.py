@@ -40,12 +40,14 @@ def test_damaged_results_are_refused_by_name(tmp_path):
         gso.Result.load(path)
 
 
-def test_results_write_meshes_and_only_flat_ones_patterns(tmp_path):
+def test_results_write_meshes_and_those_with_one_patterns(tmp_path):
     result = gso.tno.optimize(saddle(8))
     result.save(tmp_path / "out.obj")
     np.testing.assert_array_equal(gso.load(tmp_path / "out.obj").vertices, result.mesh.vertices)
-    with pytest.raises(gso.MeshError, match="flatten"):
-        result.save(tmp_path / "out.svg")
+    result.save(tmp_path / "out.svg")  # its flat pattern
+    smooth = gso.tno.optimize(saddle(8), task="denoise")
+    with pytest.raises(gso.MeshError, match="no flat pattern"):
+        smooth.save(tmp_path / "none.svg")
 
 
 def test_seconds_and_backend_are_reported():

@@ -2,6 +2,6 @@
 
 from gso.verdict.asked import Asked, asked_curvature
 from gso.verdict.judge import judge
-from gso.verdict.wording import headline
+from gso.wording import headline
 
 __all__ = ["Asked", "asked_curvature", "headline", "judge"]

@@ -12,7 +12,7 @@ from gso.status import Status
 from gso.verdict.asked import Asked
 from gso.verdict.shape import against_pattern, against_surface
 from gso.verdict.tasks import TASKS
-from gso.verdict.wording import places
+from gso.wording import places
 
 if TYPE_CHECKING:
     from gso.result import Result

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gso import faults, metrics
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.verdict.wording import places
+from gso.wording import places
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -9,7 +9,7 @@ import numpy as np
 
 from gso import metrics
 from gso.verdict.asked import DEVELOPABLE, TARGET, TIGHT, Asked, asked_curvature
-from gso.verdict.wording import length, percent, places, sentence
+from gso.wording import length, percent, places, sentence
 
 if TYPE_CHECKING:
     from gso.result import Result
