@@ -11,10 +11,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: OBJ keywords that label the faces listed after them, and the kind of each label.
 LABELS = {"o": "objects", "g": "groups", "s": "smoothing groups", "usemtl": "materials"}

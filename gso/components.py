@@ -8,15 +8,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.metrics import INFO, Info
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
+from gso.typing import Array, Ints
 
 _JOINED: dict[str, Any] = {"sum": np.sum, "max": np.max, "min": np.min}
 

@@ -11,14 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso.mesh import Mesh
 from gso.status import MeshError
 from gso.topology import edge_keys
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Ints
 
 #: Relative difference below which two path lengths count as equal.
 _EVEN = 1e-9

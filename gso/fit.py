@@ -6,15 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import metrics
 from gso.mesh import Mesh
 from gso.spelling import known_keywords
 from gso.spline import BSplineSurface, Gap, basis, clamped_knots
 from gso.status import MeshError, OptionError
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Samples of the spline per grid edge when the two are compared. Grids with _LARGE coordinates
 #: or more get two.

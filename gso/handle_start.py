@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 from gso.components import Component, several, split
 from gso.mesh import Mesh
 from gso.terms import fairness
+from gso.typing import Array, Ints
 from gso.variables import vertex_normals
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Weights of a field's slope and of its size, relative to its bending. They only select a
 #: solution where the handles leave the thin plate free.

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.terms import Limit
+from gso.typing import Array, Ints
 from gso.variables import Layout
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Largest step, as a fraction of the step at which a triangle degenerates.
 SAFETY = 0.9

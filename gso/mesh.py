@@ -12,10 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from gso import geometry, topology
 from gso.attributes import Attributes
 from gso.status import MeshError
+from gso.typing import Array, Ints
 from gso.welding import collapse, seams
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 
 from gso import geometry, topology
 from gso.status import MeshError
+from gso.typing import Array
 
 if TYPE_CHECKING:
     from gso.mesh import Mesh
 from gso.nearest import Nearest
-
-Array = NDArray[np.float64]
 
 
 class Info(NamedTuple):

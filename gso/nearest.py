@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.mesh import Mesh
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 
 class Feet(NamedTuple):

@@ -6,12 +6,10 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.mesh import Mesh
 from gso.status import MeshError
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Smallest number of vertices along a side of a coarser grid.
 SMALLEST = 20

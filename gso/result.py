@@ -18,8 +18,7 @@ from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.spline import BSplineSurface
 from gso.status import MeshError, Progress, Status
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 _FORMAT = 1
 _PATTERN = ("flat", "faces", "vertex", "seams")

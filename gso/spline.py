@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso import geometry
 from gso.status import MeshError, OptionError
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Default degree of the splines, in both directions.
 DEGREE = 3

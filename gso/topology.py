@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.status import MeshError
-
-Ints = NDArray[np.int64]
+from gso.typing import Ints
 
 # Rings are padded to one of these lengths, so that few distinct kernels are needed.
 RING_SIZES = (3, 4, 5, 6, 7, 8, 10, 12, 16, 24, 32, 64, 128, 256, 512, 1024, 4096)

@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.status import MeshError
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 # With more pairs per vertex than this the tolerance is larger than the edges.
 _MOST_PAIRS = 50

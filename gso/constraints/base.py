@@ -6,17 +6,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso.mesh import Mesh
 from gso.spelling import KnownFields
 from gso.status import OptionError
+from gso.typing import Array, Ints
 
 if TYPE_CHECKING:
     from gso.constraints.parts import Part
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Constraint(KnownFields):

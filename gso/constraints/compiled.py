@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.conflicts import check
@@ -16,9 +15,8 @@ from gso.constraints.linear import Reduction, reduce
 from gso.constraints.parts import Lengths, Part, Pins, Planar, Relations
 from gso.mesh import Frame, Mesh
 from gso.status import OptionError
+from gso.typing import Array, Ints
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Kind = TypeVar("Kind", bound=Part)
 
 #: Largest violation of a hard constraint, in the unit ball, that counts as satisfied.

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.constraints.linear import reduce
 from gso.constraints.parts import OnPlane, Part, Pins, Relations
 from gso.mesh import Mesh
 from gso.status import OptionError
-
-Ints = NDArray[np.int64]
+from gso.typing import Ints
 
 #: Residuals below these shares of the mesh diagonal, or of the largest coordinate, are rounding.
 _ROUNDING = 1e-9

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.parts import OnLines, Part, Pins
 from gso.constraints.polyline import CORNER, Polylines, turns
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 
 @dataclass(frozen=True, eq=False)

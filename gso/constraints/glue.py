@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.parts import Part, Relations
-
-Ints = NDArray[np.int64]
+from gso.typing import Ints
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,15 +13,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.constraints.parts import OnPlane, Part, Pins, Relations
+from gso.typing import Array, Ints
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Squared singular value of the equations of a root below which a direction is free.
 _FREE = 1e-8

@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 from gso import geometry
 from gso.constraints.polyline import Polylines
 from gso.mesh import Frame
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 
 @dataclass(frozen=True)

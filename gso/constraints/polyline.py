@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.mesh import Frame
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Vertices do not slide round corners of more than this many degrees.
 CORNER = 45.0

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.parts import OnPlane, Part, Relations
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: How far a mirrored vertex may be from its partner, relative to the mean edge length.
 _TOLERANCE = 0.25

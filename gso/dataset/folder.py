@@ -7,16 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.dataset.bezier import normalise
 from gso.io import replacing
 from gso.status import DatasetError, MeshError
+from gso.typing import Array
 
 if TYPE_CHECKING:
     from gso.dataset.store import Dataset
-
-Array = NDArray[np.float64]
 
 
 def splits(path: Path) -> dict[str, list[Path]]:

@@ -9,17 +9,15 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import tasks, tno
 from gso.mesh import Mesh
 from gso.metrics import unit
 from gso.result import Result
 from gso.status import ConvergenceWarning, GSOError, MeshError
+from gso.typing import Array
 from gso.variables import vertex_normals
 from gso.variables.spline import spline_matrix
-
-Array = NDArray[np.float64]
 
 #: Control points along each side of the spline fitted to the normal offsets.
 CONTROLS = 16

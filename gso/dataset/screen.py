@@ -19,9 +19,7 @@ from gso import geometry, metrics
 from gso.dataset.bezier import BezierSurface, boundary_length_variance, draw, sample_many
 from gso.dataset.seeds import Stream, generator
 from gso.status import DatasetError
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 FEATURES = ("K_P", "K_N", "K_A", "sigma2")
 #: Samples along a side for the features, independent of the size of the set's grids.

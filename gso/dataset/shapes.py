@@ -14,13 +14,11 @@ from io import BytesIO
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.dataset.bezier import BezierSurface, normalise
 from gso.dataset.seeds import Stream, generator
 from gso.resample import resample
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Surfaces of each split.
 COUNT = 8

@@ -10,15 +10,13 @@ import threading
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.dataset import bezier, labels, noise, screen, shapes
 from gso.dataset.hdf import pack
 from gso.dataset.recipe import Recipe, versions
 from gso.status import DatasetError
 from gso.tno.linear import blas_threads
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Number of surfaces in a file: a few seconds of work.
 LENGTH = 32

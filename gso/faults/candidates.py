@@ -7,9 +7,7 @@ from numpy.typing import NDArray
 
 from gso.faults.boxes import overlapping
 from gso.topology import four_corners
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Smallest penetration depth of an intersection, relative to the width of the smaller face; less
 #: counts as touching.

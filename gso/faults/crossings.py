@@ -7,9 +7,7 @@ from numpy.typing import NDArray
 
 from gso.faults.candidates import DEPTH, by_triangles, candidates, split
 from gso.mesh import Mesh
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 
 def crossings(mesh: Mesh) -> Ints:

@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 from gso.geometry import cross, dot, norm, norm2, sub
 from gso.mesh import Mesh
 from gso.topology import are_quads, four_corners
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Cosine of the angle between neighbouring normals below which a face is folded onto the next:
 #: the angle is more than 120 degrees. Valid results almost always stay above 0.

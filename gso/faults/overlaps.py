@@ -9,9 +9,7 @@ from gso import geometry
 from gso.faults.candidates import DEPTH, by_triangles, candidates, split
 from gso.mesh import Mesh
 from gso.topology import are_quads
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Sum of the angles around a vertex above which its faces overlap: 2 pi and a tolerance.
 _TURN = 2.0 * np.pi + 1e-2

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.components import labels
 from gso.constraints import Compiled, OnLines, Part, Pins, Relations
@@ -14,9 +13,7 @@ from gso.constraints.linear import reduce
 from gso.flat_start.embed import parts
 from gso.flat_start.place import beside, upright
 from gso.mesh import Mesh
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Number of initial rotations, as alignment to a curve has several local minima, and of steps.
 _TURNS, _STEPS = 8, 60

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.flat_start.embed import embeddings
@@ -16,9 +15,7 @@ from gso.resample import coarser, resample
 from gso.status import MeshError
 from gso.terms.stretch import cells, pieces
 from gso.topology import corner_triangles
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Largest side of a grid whose image starts from a rectangle.
 _COARSE = 40

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.flat_start.relax import strain_level
 from gso.mesh import Mesh
 from gso.status import MeshError
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 
 def embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.cutting import Cut, cut, joining
@@ -13,9 +12,7 @@ from gso.faults import overlaps
 from gso.flat_start.begin import DOUBTFUL, begin
 from gso.flat_start.embed import parts
 from gso.mesh import Mesh
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Root-mean-square strain up to which a surface is not cut.
 _SMALL = 1e-3

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.flat_start.embed import parts
 from gso.flat_start.grid import rectangle
 from gso.mesh import Mesh
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Ratio of the principal variances above which an image has a long axis.
 _OBLONG = 1.1

@@ -5,14 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.limits import orientation
+from gso.typing import Array, Ints
 from gso.variables import Layout
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Relaxed(NamedTuple):

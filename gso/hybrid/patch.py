@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import flat_start
 from gso.mesh import Mesh
 from gso.spline import clamped_knots
 from gso.status import MeshError
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Largest number of control points along each side of the spline fitted to a mesh.
 _CONTROLS = 24

@@ -9,7 +9,6 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import metrics
 from gso.dataset.screen import CURVED
@@ -18,8 +17,7 @@ from gso.mesh import Mesh
 from gso.net.catalogue import DEFAULTS, available, chain
 from gso.net.catalogue import TASKS as NETS
 from gso.status import MeshError
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Tasks whose solver can start anywhere; the other task of nets has a closed form.
 STARTED = ("developable", "flatten")

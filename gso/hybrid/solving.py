@@ -12,7 +12,6 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import flat_start, tasks
 from gso.components import Component, several
@@ -29,8 +28,7 @@ from gso.tno.batch import Item
 from gso.tno.canonical import Canonical
 from gso.tno.job import Job
 from gso.tno.pool import spread
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Surfaces that are read and predicted together.
 _BATCH = 64

@@ -6,12 +6,9 @@ import os
 from os import PathLike
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.status import MeshError
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 # Largest number of fan apexes tried per polygon, because the work is quadratic.
 _MOST_APEXES = 64

@@ -6,15 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.attributes import Attributes
 from gso.mesh import Mesh
 from gso.status import MeshError, OptionError
+from gso.typing import Array, Ints
 from gso.welding import collapse, equal, near
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,11 @@ varies from vertex to vertex.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.fit import interpolated
 from gso.net.base import SIZE
 from gso.resample import resample
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Smallest side that is extended to the size of the nets.
 SMALLEST = 16

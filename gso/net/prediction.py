@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from gso.net import denoising
 from gso.net.base import SIZE, Net, exact
@@ -17,8 +16,7 @@ from gso.net.weights import cached
 from gso.resample import resample
 from gso.spelling import known_keywords
 from gso.status import MeshError, OptionError
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Smallest side of a grid that is resampled to the size of the nets.
 SMALLEST = 4

@@ -6,12 +6,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from gso import metrics
 from gso.mesh import Mesh
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: The main validation metric of each task; lower is better.
 SCORE = {"developable": "score", "flatten": "strain_mean", "denoise": "theta"}

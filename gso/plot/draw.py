@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from gso import topology
 from gso.io import check_writable, replacing
 from gso.plot.heat import Heat, Scale
+from gso.typing import Array
 
 if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 SUFFIXES = (".png", ".pdf", ".svg")
 """Suffixes of the pictures that are written."""

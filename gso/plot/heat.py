@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import metrics, topology
 from gso.components import average, several, sizes, split
 from gso.mesh import Mesh
 from gso.status import OptionError
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Percentile at which scales of curvature and strain end: a scale up to spikes would hide the rest.
 _TOP = 98.0

@@ -7,14 +7,13 @@ from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.plot.draw import write
+from gso.typing import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _BARS = 40
 _WIDTH, _HEIGHT = 3.4, 2.6

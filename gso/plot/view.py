@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.mesh import Frame, Mesh
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Angles about the vertical axis and above the horizon, degrees.
 _TURN, _TILT = 25.0, 48.0

@@ -15,9 +15,7 @@ from gso.rulings.shape import FLAT, checked_flat
 from gso.rulings.spread import chosen, region_areas, spread
 from gso.rulings.walk import Field, walk
 from gso.status import MeshError, OptionError
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Candidate lines per line wanted; their largest total number; their smallest number per line.
 _TRIES, _ENOUGH, _FEWEST = 20, 600, 4

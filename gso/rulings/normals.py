@@ -20,9 +20,7 @@ from gso import geometry, topology
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.metrics import components
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Rings of vertices in a fit, inside and on the boundary, where they lie on one side only.
 RINGS, RIM_RINGS = 2, 3

@@ -14,9 +14,7 @@ from gso.mesh import Mesh
 from gso.metrics import components
 from gso.rulings.normals import gauss_image
 from gso.status import OptionError
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Curvature times size below which a face counts as flat.
 FLAT = 0.01

@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.mesh import Mesh
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Largest number of k-medoids iterations.
 _ROUNDS = 10

@@ -17,9 +17,7 @@ from gso import geometry, topology
 from gso.mesh import Mesh
 from gso.rulings.normals import gauss_image
 from gso.rulings.shape import face_matrices
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Cosine of the largest turn between two triangles, 60 degrees; at larger turns a line ends.
 _SHARP = 0.5

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso.spelling import choices
 from gso.status import MeshError, OptionError
+from gso.typing import Array
 
-Array = NDArray[np.float64]
 NORMS = ("l2", "l1")
 
 

@@ -18,12 +18,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.smoothing.base import Smoothed, checked_options, to_unit
 from gso.smoothing.grid import estimate
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 ORDERS = (2, 3)
 DEFAULT_WEIGHT = 3.0

@@ -5,12 +5,11 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso.smoothing.base import Smoothed, checked_grid, checked_options, to_unit
 from gso.smoothing.spectrum import Law, Spectrum, bins, shrinkage
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 ORDERS = (2, 3, 4, 5, 6, 7, 8)
 TRIED = (8, 4, 2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso.smoothing.base import Smoothed, checked_options, checked_points, to_unit
 from gso.smoothing.patches import (
@@ -20,8 +20,7 @@ from gso.smoothing.patches import (
     used_only,
 )
 from gso.smoothing.select import Choice, best_weight, factor, gcv, largest_weight, unbiased_risk
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 ORDERS = (2, 3, 4)
 # Cost of degrees of freedom in the cross-validation that chooses the first, coarse smoothing.

@@ -17,9 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.status import MeshError
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 # Largest number of vertices in a fit; more, as around a pole with hundreds of faces, are sampled.
 LARGEST = 64

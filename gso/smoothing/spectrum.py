@@ -23,7 +23,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 # Parameters are (a, log m, log n, log q, log p). A weak Gaussian prior regularises the fit on
 # tiny grids; on larger ones it has little effect.

@@ -6,9 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gso import flat_start
 from gso.constraints import Compiled
 from gso.cutting import Cut
@@ -16,9 +13,8 @@ from gso.mesh import Mesh
 from gso.status import Status
 from gso.tasks.options import Options
 from gso.terms import Limit, Weighted
+from gso.typing import Array
 from gso.variables import Layout, Variables
-
-Array = NDArray[np.float64]
 
 
 def same(coordinates: Array) -> Array:

@@ -22,7 +22,6 @@ from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import metrics as measure
 from gso.handle_start import Spread, follow
@@ -32,9 +31,8 @@ from gso.tasks import held, joined
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, bending, congruence
+from gso.typing import Array
 from gso.variables import Layout
-
-Array = NDArray[np.float64]
 
 FORMULATIONS = ("isometry",)
 

@@ -19,7 +19,6 @@ from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import flat_start, limits
 from gso import metrics as measure
@@ -29,9 +28,8 @@ from gso.tasks import held, joined
 from gso.tasks.base import Plan, Request, Stage, open_up
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, congruence, scale, shear
+from gso.typing import Array
 from gso.variables import Layout, free
-
-Array = NDArray[np.float64]
 
 FORMULATIONS = ("isometry",)
 BLOCK = "flat"

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import metrics as measure
 from gso.mesh import Mesh
@@ -20,13 +19,12 @@ from gso.status import Status
 from gso.tasks import held
 from gso.tasks.base import Plan, Request
 from gso.tasks.options import Options as BaseOptions
+from gso.typing import Array
 from gso.variables import Layout
 
 FORMULATIONS = ("smooth", "crease")
 #: Entries of a result's `details` that are lengths.
 LENGTHS = ("sigma",)
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,6 @@ from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import metrics as measure
 from gso.constraints import Compiled, Pins
@@ -33,6 +32,7 @@ from gso.tasks.measured import parted
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, curvature, elongation, fairness, proximity
 from gso.terms.losses import Absolute, Distance
+from gso.typing import Array
 from gso.variables import (
     ALONG,
     Layout,
@@ -42,8 +42,6 @@ from gso.variables import (
     spline_offsets,
     vertex_normals,
 )
-
-Array = NDArray[np.float64]
 
 FORMULATIONS = ("curvature", "isometry")
 #: The formulation that a preset belongs to.

@@ -16,7 +16,6 @@ from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import flat_start, limits
 from gso import metrics as measure
@@ -40,9 +39,8 @@ from gso.terms import (
     stretch,
 )
 from gso.terms.losses import Absolute
+from gso.typing import Array
 from gso.variables import Layout, Variables, free
-
-Array = NDArray[np.float64]
 
 FORMULATIONS = ("strain", "lengths", "isometry")
 #: The formulation that a preset belongs to.

@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.constraints import Lengths, OnLines, OnPlane, Pins, Planar, Relations
 from gso.mesh import Mesh
@@ -14,9 +13,8 @@ from gso.tasks import joined
 from gso.tasks.base import Request, Stage
 from gso.terms import Weighted, curve, equation, fairness, length, planarity, position, proximity
 from gso.terms.multipliers import STIFF, hardened
+from gso.typing import Array
 from gso.variables import Layout, Variables, free
-
-Array = NDArray[np.float64]
 
 #: Radius around a moved vertex within which others move along, in the unit ball.
 _REACH = 0.3

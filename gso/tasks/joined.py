@@ -6,15 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gso.mesh import Mesh
 from gso.tasks.measured import parted
 from gso.terms import Weighted
 from gso.terms.placed import placed
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 
 def objective(mesh: Mesh, make: Callable[..., list[Weighted]], *positions: Array) -> list[Weighted]:

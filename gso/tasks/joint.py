@@ -25,7 +25,6 @@ from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import flat_start, limits
 from gso import metrics as measure
@@ -37,6 +36,7 @@ from gso.tasks import held, joined, splined
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.terms import Weighted, christoffel, congruence, elongation, fairness, proximity
+from gso.typing import Array
 from gso.variables import (
     Layout,
     Variables,
@@ -45,8 +45,6 @@ from gso.variables import (
     free,
     vertex_normals,
 )
-
-Array = NDArray[np.float64]
 
 #: Factor by which the fairness weight falls from stage to stage.
 _FALL = 10.0

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import metrics as measure
 from gso import tasks
 from gso.components import Component, combined, several, split
 from gso.mesh import Mesh
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 
 def parted(design: Mesh) -> list[Component]:

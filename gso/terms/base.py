@@ -7,12 +7,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.terms.losses import Loss, Squared
+from gso.typing import Array, Ints
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Residual = Callable[[Sequence[tuple[Any, ...]], Sequence[Any]], tuple[Any, ...]]
 
 #: ``limit(coordinates, direction) -> largest step``: a step limit for the line search.

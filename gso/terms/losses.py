@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.geometry import ops
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 
 class Loss(Protocol):

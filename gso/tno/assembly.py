@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.components import Component, mean
 from gso.flat_start import beside
@@ -16,9 +15,7 @@ from gso.pattern import Pattern
 from gso.result import Result
 from gso.status import Progress, Status
 from gso.tno.job import Job
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Gap beside the flat images whose position is prescribed, as a share of their width.
 _GAP = 0.05

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from gso.constraints import Compiled, Constraint, compile_constraints
 from gso.mesh import Frame, Mesh
 from gso.status import MeshError
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 
 class Canonical:

@@ -12,13 +12,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.geometry.ops import TINY
 from gso.status import BackendError
 from gso.terms.base import Residual
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Elements per block: a kernel's work arrays then fit the second-level cache.
 BLOCK = 1024

@@ -11,7 +11,6 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import flat_start, tasks
 from gso.components import several
@@ -31,8 +30,6 @@ from gso.tno.run import Outcome, Run
 from gso.tno.search import of_curvature, of_strain, reach, stay_within, strain_left
 from gso.tno.solver import Callback
 from gso.tno.start import Start
-
-Array = NDArray[np.float64]
 
 
 @known_keywords()

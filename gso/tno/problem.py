@@ -13,16 +13,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.terms.base import Limit, Weighted
 from gso.terms.losses import Loss
 from gso.tno.codegen import kernel, turning
 from gso.tno.linear.base import Pattern
+from gso.typing import Array, Ints
 from gso.variables import Layout, Variables
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class _Values:

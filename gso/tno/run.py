@@ -9,7 +9,6 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.cutting import Cut
 from gso.status import Progress, Status
@@ -17,8 +16,7 @@ from gso.tasks.base import Options, Plan, Request, Stage, same
 from gso.tno.problem import Problem, energies
 from gso.tno.solver import Callback, Solution, Timings, minimise
 from gso.tno.tighten import tighten
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 
 @dataclass

@@ -12,7 +12,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import flat_start, metrics
 from gso.components import average, several
@@ -21,9 +20,9 @@ from gso.pattern import Pattern
 from gso.status import MeshError, Status
 from gso.tasks.base import Request
 from gso.tno.layout import largest_strain, lay_out
+from gso.typing import Array
 from gso.verdict.asked import DEVELOPABLE
 
-Array = NDArray[np.float64]
 Solve = Callable[[Request], Any]
 
 #: Curvature threshold above the curvature of every design.

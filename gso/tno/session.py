@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso.constraints import Constraint, Handle, Pins, listed
 from gso.handle_start import Spread
@@ -28,9 +28,7 @@ from gso.tno.problem import Problem
 from gso.tno.run import Outcome, Run, objective
 from gso.tno.solver import Solution, minimise
 from gso.tno.tighten import tighten
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Ints
 
 #: Iteration limit of the solve in :meth:`Session.settle`.
 _SETTLED = 100

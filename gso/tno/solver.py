@@ -17,8 +17,8 @@ from gso.tno import linear
 from gso.tno.acceptance import armijo
 from gso.tno.direction import DIRECTIONS
 from gso.tno.problem import Problem
+from gso.typing import Array
 
-Array = NDArray[np.float64]
 Callback = Callable[[Progress], object]
 
 

@@ -6,13 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.status import Status
 from gso.tasks.base import Stage
 from gso.tno.solver import Solution
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 #: Stopping threshold of the residual, in the unit ball.
 ENOUGH = 1e-7

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 from gso import faults, metrics
 from gso.mesh import Mesh
 from gso.pattern import Pattern
+from gso.typing import Array, Ints
 from gso.wording import places
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def against_surface(design: Mesh, surface: Mesh) -> Iterator[str]:

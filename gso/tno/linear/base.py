@@ -8,9 +8,8 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Ints = NDArray[np.int64]
+from gso.typing import Ints
 
 
 class SingularError(ArithmeticError):
