@@ -5,7 +5,8 @@
     python bench/hybrid.py --plot FILE        the curve of the section "anytime"
 
 Sections: "speed", cold and hybrid solves of the same surfaces, one after the other; "sizes", the
-same on finer and coarser grids, from which the thresholds of ``gso.hybrid.worth`` were chosen;
+same on finer and coarser grids, from which the thresholds of
+``gso.hybrid.time_model`` were chosen;
 "guard", the energy relative to the cold solve's on the whole splits test and hard; "general", the
 same on triangulated patches in random order, some with a hole; "anytime", quality against time.
 The surfaces are those of the test split, which no net was trained on. They are drawn again from
@@ -34,12 +35,12 @@ from tno import progress as watched
 
 import gso
 from gso import hybrid
+from gso.hierarchy import resample
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.net.catalogue import DEFAULTS, available
-from gso.resample import resample
+from gso.parallel import spread
 from gso.tno import Start, optimize
-from gso.tno.pool import spread
 
 #: Cases that are compared: task and keywords.
 CASES = {

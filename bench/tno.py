@@ -66,9 +66,9 @@ class without_extras:
     """A context in which the optional linear backends are hidden."""
 
     def __enter__(self) -> None:
-        from gso.tno import linear
+        from gso import linalg
 
-        self.hidden = [linear.backends()[k] for k in ("cholmod", "pardiso")]
+        self.hidden = [linalg.backends()[k] for k in ("cholmod", "pardiso")]
         self.known = [m.available for m in self.hidden]
         for module in self.hidden:
             module.available = lambda: False
@@ -253,8 +253,8 @@ def last_problem(points: np.ndarray, task: str, options: str) -> tuple[Any, np.n
     from gso import tasks
     from gso.constraints import Compiled
     from gso.tasks.base import Request
-    from gso.tno.canonical import Canonical
-    from gso.tno.problem import Problem
+    from gso.tno.normalise import Canonical
+    from gso.tno.solver.problem import Problem
 
     module = tasks.get(task)
     frame = Canonical(gso.Mesh.from_grid(points))
@@ -271,7 +271,7 @@ def last_problem(points: np.ndarray, task: str, options: str) -> tuple[Any, np.n
 
 def breakdown() -> dict[str, Any]:
     """Time one iteration at 64 x 64: evaluation with assembly, and factorisation."""
-    from gso.tno import linear
+    from gso import linalg
 
     surfaces, _ = reference()
     rows, out = [], {}
@@ -284,13 +284,13 @@ def breakdown() -> dict[str, Any]:
         problem.linearise(x)
         spent = [timed(lambda p=problem, y=x: p.linearise(y))[1] for _ in range(15)]
         times = {}
-        for backend, module in linear.backends().items():
+        for backend, module in linalg.backends().items():
             if not module.available():
                 continue
-            solver = linear.choose(problem.pattern, backend)
+            solver = linalg.choose(problem.pattern, backend)
             values = problem.linearise(x)[2]
             values[problem.diagonal] += 1e-9 * values[problem.diagonal].max()
-            with linear.blas_threads(1):
+            with linalg.blas_threads(1):
                 solver.factor(values)
                 repeats = 3 if backend == "superlu" else 7
                 times[backend] = np.median(
@@ -298,12 +298,12 @@ def breakdown() -> dict[str, Any]:
                 )
         rows.append(
             [name, str(problem.variables.size), 1e3 * np.median(spent)]
-            + [1e3 * times.get(k, np.nan) for k in sorted(linear.backends())]
+            + [1e3 * times.get(k, np.nan) for k in sorted(linalg.backends())]
         )
         out[name] = rows[-1][2:]
     table(
         "One iteration at 64 x 64, milliseconds",
-        ["unknowns", "count", "evaluate", *(f"factor {k}" for k in sorted(linear.backends()))],
+        ["unknowns", "count", "evaluate", *(f"factor {k}" for k in sorted(linalg.backends()))],
         rows,
     )
     return out

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     # The same names for type checkers and editors; they are imported at first use.
-    from gso import constraints, dataset, hybrid, io, metrics, net, plot, rulings, tno, topology
+    from gso import constraints, dataset, hybrid, io, metrics, net, plot, rulings, tno
     from gso import verdict as verdict
     from gso.constraints import (
         Fixed,
@@ -26,28 +26,27 @@ if TYPE_CHECKING:
         SlidingBoundary,
         SymmetryPlane,
     )
-    from gso.fit import fit_spline
-    from gso.io import as_mesh, load, save, save_spline
-    from gso.mesh import Mesh
-    from gso.result import Result
-    from gso.spline import BSplineSurface
-    from gso.status import (
+    from gso.errors import (
         BackendError,
         ConvergenceWarning,
         DatasetError,
         GSOError,
         MeshError,
         OptionError,
-        Progress,
-        Status,
         WeightsError,
     )
+    from gso.io import as_mesh, load, save, save_spline
+    from gso.mesh import Mesh, topology
+    from gso.result import Result
+    from gso.spline import BSplineSurface
+    from gso.spline.fit import fit_spline
+    from gso.status import Progress, Status
     from gso.tasks.bend import Options as BendOptions
     from gso.tasks.conformal import Options as ConformalOptions
     from gso.tasks.denoise import Options as DenoiseOptions
     from gso.tasks.developable import Options as DevelopableOptions
+    from gso.tasks.developable.isometry import Options as IsometryOptions
     from gso.tasks.flatten import Options as FlattenOptions
-    from gso.tasks.joint import Options as IsometryOptions
     from gso.tasks.options import Options
 
     __version__: str
@@ -105,19 +104,19 @@ _NAMES = {
     "load": "gso.io",
     "save": "gso.io",
     "save_spline": "gso.io",
-    "fit_spline": "gso.fit",
+    "fit_spline": "gso.spline.fit",
     "BSplineSurface": "gso.spline",
     "as_mesh": "gso.io",
     "Result": "gso.result",
     "Status": "gso.status",
     "Progress": "gso.status",
-    "GSOError": "gso.status",
-    "MeshError": "gso.status",
-    "OptionError": "gso.status",
-    "BackendError": "gso.status",
-    "WeightsError": "gso.status",
-    "DatasetError": "gso.status",
-    "ConvergenceWarning": "gso.status",
+    "GSOError": "gso.errors",
+    "MeshError": "gso.errors",
+    "OptionError": "gso.errors",
+    "BackendError": "gso.errors",
+    "WeightsError": "gso.errors",
+    "DatasetError": "gso.errors",
+    "ConvergenceWarning": "gso.errors",
     "Options": "gso.tasks.options",
     "Fixed": "gso.constraints",
     "FixedBoundary": "gso.constraints",
@@ -131,7 +130,7 @@ _NAMES = {
 }
 _OPTIONS = {
     "DevelopableOptions": "gso.tasks.developable",
-    "IsometryOptions": "gso.tasks.joint",
+    "IsometryOptions": "gso.tasks.developable.isometry",
     "FlattenOptions": "gso.tasks.flatten",
     "DenoiseOptions": "gso.tasks.denoise",
     "BendOptions": "gso.tasks.bend",
@@ -152,6 +151,10 @@ _MODULES = (
 )
 
 
+#: Modules whose public name differs from their place.
+_MOVED = {"topology": "gso.mesh.topology"}
+
+
 def __getattr__(name: str) -> Any:
     if name in _NAMES:
         value = getattr(importlib.import_module(_NAMES[name]), name)
@@ -162,7 +165,7 @@ def __getattr__(name: str) -> Any:
 
         value = version("gso")
     elif name in _MODULES:
-        value = importlib.import_module(f"gso.{name}")
+        value = importlib.import_module(_MOVED.get(name, f"gso.{name}"))
     else:
         raise AttributeError(f"module 'gso' has no attribute {name!r}")
     globals()[name] = value

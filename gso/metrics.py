@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gso import geometry, topology
-from gso.status import MeshError
+from gso import geometry
+from gso.errors import MeshError
+from gso.mesh import topology
 from gso.typing import Array
 
 if TYPE_CHECKING:
     from gso.mesh import Mesh
-from gso.nearest import Nearest
+from gso.mesh.closest_point import Nearest
 
 
 class Info(NamedTuple):
@@ -557,7 +558,7 @@ def strains(surface: Any, flat: Any) -> dict[str, float]:
 def corner_strains(surface: Any, flat: Any) -> Array:
     """Return the larger principal strain max |s - 1| (4 q + t,) of every corner triangle.
 
-    In the order of :func:`gso.topology.corner_triangles`; NaN for triangles without area.
+    In the order of :func:`gso.mesh.topology.corner_triangles`; NaN for triangles without area.
     """
     tri = topology.corner_triangles(_faces(surface))
     p, q = _in_range(_points(surface), _flat(surface, flat))

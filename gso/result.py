@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.attributes import Attributes
+from gso.errors import MeshError
 from gso.mesh import Mesh
+from gso.mesh.attributes import Attributes
 from gso.pattern import Pattern
 from gso.spline import BSplineSurface
-from gso.status import MeshError, Progress, Status
+from gso.status import Progress, Status
 from gso.typing import Array
 
 _FORMAT = 1
@@ -73,7 +74,7 @@ class Result:
         estimated standard deviation of the noise, in the input's unit; "dof", the effective
         degrees of freedom of each coordinate after smoothing; "order" and "weight". With
         constraints, "constraints": the largest violation of each, in the input's unit. With a
-        spline, "spline": its curvature and distances, see :func:`gso.fit.describe_spline`.
+        spline, "spline": its curvature and distances, see :func:`gso.spline.fit.describe_spline`.
         For `developable`, "verdict": largest strain and deviation, and the given limits.
     spline : BSplineSurface or None
         The spline that `mesh` samples, with the option ``variables="surface"``; with several
@@ -159,7 +160,7 @@ class Result:
         from gso import tasks
         from gso.components import combined
         from gso.metrics import area, strains
-        from gso.tasks.measured import measured
+        from gso.tasks.evaluation import measured
 
         if self.components:
             areas = [area(part.design) for part in self.components]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from functools import wraps
 from typing import Any, TypeVar, cast
 
-from gso.status import OptionError
+from gso.errors import OptionError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -54,7 +54,7 @@ def check_keywords(where: str, given: Iterable[str], known: Iterable[str]) -> No
     --------
     >>> check_keywords("optimize", ["max_deviatoin"], ["task", "max_deviation"])
     Traceback (most recent call last):
-    gso.status.OptionError: optimize takes no 'max_deviatoin'; did you mean 'max_deviation'?
+    gso.errors.OptionError: optimize takes no 'max_deviatoin'; did you mean 'max_deviation'?
     There are task, max_deviation
     """
     names = list(known)
@@ -82,7 +82,7 @@ def known_keywords(*others: Callable[..., Any]) -> Callable[[F], F]:
     ...     return depth
     >>> cut("panel", dept=2.0)
     Traceback (most recent call last):
-    gso.status.OptionError: cut takes no 'dept'; did you mean 'depth'? There are mesh, depth
+    gso.errors.OptionError: cut takes no 'dept'; did you mean 'depth'? There are mesh, depth
     """
 
     def decorate(function: F) -> F:
@@ -119,7 +119,7 @@ class KnownFields:
     ...     width: float = 1.0
     >>> Blade(widht=2.0)
     Traceback (most recent call last):
-    gso.status.OptionError: Blade takes no 'widht'; did you mean 'width'? There are width
+    gso.errors.OptionError: Blade takes no 'widht'; did you mean 'width'? There are width
     """
 
     __signature__ = _Signature()

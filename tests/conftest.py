@@ -7,7 +7,7 @@ import pytest
 
 from gso.dataset import bezier
 from gso.mesh import Mesh
-from gso.topology import reverse
+from gso.mesh.topology import reverse
 
 
 def saddle(height: int = 9, width: int | None = None, strength: float = 0.4) -> np.ndarray:

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import gso
-from gso import handle_start
+from gso import deformation
 from gso.mesh import Mesh
 from tests.conftest import saddle, shuffled
 
@@ -41,7 +41,7 @@ def star(arms: int, n: int = 6) -> Mesh:
     points, faces = [], []
     for k in range(arms):
         a, b = (np.exp(2j * np.pi * (k + s) / arms) for s in (0, 1))
-        faces.append(gso.topology.grid_faces(n, n) + k * n * n)
+        faces.append(gso.mesh.topology.grid_faces(n, n) + k * n * n)
         points.append((u * a + v * b).ravel())
     z = np.concatenate(points)
     _, first, new = np.unique(z.round(9), return_index=True, return_inverse=True)
@@ -210,7 +210,7 @@ def test_results_are_drawn_and_saved(tmp_path):
 def test_spread_is_affine_where_it_can_be():
     mesh = Mesh.from_grid(sheet(9))
     ids = ends(9)
-    field = handle_start.Spread(mesh, ids)(mesh.vertices[ids] @ MOTION.as_matrix() + 1.0)
+    field = deformation.Spread(mesh, ids)(mesh.vertices[ids] @ MOTION.as_matrix() + 1.0)
     np.testing.assert_allclose(field, mesh.vertices @ MOTION.as_matrix() + 1.0, atol=1e-3)
 
 

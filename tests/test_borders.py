@@ -11,8 +11,8 @@ import pytest
 
 import gso
 from gso import metrics
-from gso.terms import elongation
-from gso.variables import vertex_normals
+from gso.energy import elongation
+from gso.unknowns import vertex_normals
 from tests.conftest import meshes, rotation
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))

@@ -15,9 +15,9 @@ from gso import Mesh, metrics
 from gso.components import average, combined, labels, split
 from gso.status import Status
 from gso.tasks.developable import Options
-from gso.tasks.measured import measured
+from gso.tasks.evaluation import measured
 from gso.tno import components as solving
-from gso.tno.canonical import Canonical
+from gso.tno.normalise import Canonical
 
 #: Tasks and formulations, with options.
 ASKED = [

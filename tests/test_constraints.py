@@ -15,7 +15,7 @@ from gso.constraints.linear import reduce
 from gso.constraints.parts import Pins, Relations
 from gso.constraints.polyline import Polylines
 from gso.mesh import Frame, Mesh
-from gso.variables import Layout, free, normal_offsets, vertex_normals
+from gso.unknowns import Layout, free, normal_offsets, vertex_normals
 from tests.conftest import saddle, shuffled, sphere_cap
 
 TIGHT = 1e-6

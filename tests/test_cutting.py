@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import gso
-from gso import flat_start, metrics
+from gso import metrics, parametrization
 from gso.cli import main
-from gso.cutting import cut, joining
 from gso.mesh import Mesh
+from gso.mesh.cutting import cut, joining
 from gso.pattern import Pattern
 from gso.result import Result
 from tests.conftest import saddle, shuffled
@@ -273,9 +273,9 @@ class TestFiles:
 
 def test_turning_tells_ends_from_holes():
     mesh = tube(CYLINDER)
-    assert np.allclose([flat_start.turning(mesh, loop) for loop in mesh.boundary_loops], 0.0)
+    assert np.allclose([parametrization.turning(mesh, loop) for loop in mesh.boundary_loops], 0.0)
     flat = tube(ring(1.0, 0.0))
-    turns = sorted(flat_start.turning(flat, loop) for loop in flat.boundary_loops)
+    turns = sorted(parametrization.turning(flat, loop) for loop in flat.boundary_loops)
     assert np.allclose(turns, [-2 * np.pi, 2 * np.pi])
 
 

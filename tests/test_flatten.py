@@ -7,13 +7,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import gso
-from gso import flat_start, limits, metrics
+from gso import metrics, parametrization
 from gso.dataset import bezier
+from gso.energy import stretch
 from gso.mesh import Mesh
+from gso.mesh.topology import corner_triangles
+from gso.parametrization import orientation
 from gso.tasks import flatten
-from gso.terms import stretch
-from gso.topology import corner_triangles
-from gso.variables import Layout
+from gso.unknowns import Layout
 from tests.conftest import cylinder, saddle, shuffled, sphere_cap
 
 Options = flatten.Options
@@ -55,7 +56,7 @@ def disk_mesh(n: int = 15) -> Mesh:
     for k in range(3):
         a, b = (np.exp(2j * np.pi * (k + d) / 3) for d in (0, 1))
         z = (u * a + v * b).ravel() * (1 + 0.2 * (u * v).ravel())
-        faces.append(gso.topology.grid_faces(n, n) + k * n * n)
+        faces.append(gso.mesh.topology.grid_faces(n, n) + k * n * n)
         points.append(np.stack([z.real, z.imag, 0.3 * np.cos(2 * z.real) - 0.2 * z.imag**2], 1))
     v, f = np.concatenate(points), np.concatenate(faces)
     _, first, number = np.unique(v.round(9), axis=0, return_index=True, return_inverse=True)
@@ -207,7 +208,7 @@ def test_resolution_does_not_change_the_pattern():
 def test_grids_lie_like_their_rectangle():
     points = saddle(21, 15)
     flat = solve(points).flat_grid
-    start = flat_start.rectangle(points)
+    start = parametrization.rectangle(points)
     assert flat.reshape(-1, 2).min(axis=0) == pytest.approx([0.0, 0.0], abs=1e-12)
     centred = flat - flat.mean(axis=(0, 1)), start - start.mean(axis=(0, 1))
     assert np.abs(centred[0] - centred[1]).max() < 0.2
@@ -262,7 +263,7 @@ def test_components_lie_side_by_side_and_loose_vertices_at_the_origin():
 def test_arrow_shaped_quads_keep_their_shape():
     plane = saddle(7, strength=0.0)
     plane[3, 3] += [0.25, 0.25, 0.0]
-    mesh = Mesh(plane.reshape(-1, 3), gso.topology.grid_faces(7, 7)[1:])
+    mesh = Mesh(plane.reshape(-1, 3), gso.mesh.topology.grid_faces(7, 7)[1:])
     assert stretch.corner_shares(mesh.vertices, mesh.faces).min() < 0
     result = solve(mesh, options="accurate")
     assert result.metrics["flipped_cells"] == 0
@@ -309,14 +310,14 @@ def test_backends_agree(backend, surfaces):
 def test_orientation_limit_is_the_first_collapse():
     flat = np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])
     triangles = np.array([[0, 1, 2], [1, 3, 2]])
-    limit = limits.orientation(triangles, Layout((("flat", 4, 2),)))
+    limit = orientation.orientation(triangles, Layout((("flat", 4, 2),)))
     move = np.zeros((4, 2))
     assert limit(flat.ravel(), move.ravel()) == 1.0
     move[2] = [0.0, -2.0]
-    assert limit(flat.ravel(), move.ravel()) == pytest.approx(limits.SAFETY * 0.5)
+    assert limit(flat.ravel(), move.ravel()) == pytest.approx(orientation.SAFETY * 0.5)
     rng = np.random.default_rng(0)
-    cells = corner_triangles(gso.topology.grid_faces(6, 6))
-    limit = limits.orientation(cells, Layout((("flat", 36, 2),)))
+    cells = corner_triangles(gso.mesh.topology.grid_faces(6, 6))
+    limit = orientation.orientation(cells, Layout((("flat", 36, 2),)))
     flat = np.stack(np.meshgrid(np.arange(6.0), np.arange(6.0), indexing="ij"), -1).reshape(-1, 2)
     for _ in range(20):
         move = rng.standard_normal(flat.shape) * rng.choice([0.2, 1.0, 30.0])
@@ -342,26 +343,26 @@ def test_spread_has_the_derivative_it_says(loss):
 def test_starts_are_valid_and_relaxing_lowers_their_strain():
     mesh = with_hole(disk_mesh(11))
     triangles = corner_triangles(mesh.faces)
-    start = flat_start.embed(mesh, triangles, triangles)
+    start = parametrization.embed(mesh, triangles, triangles)
     assert metrics.corner_areas(start, triangles).min() > 0
-    before = flat_start.strain_level(mesh.vertices, triangles, start)
-    relaxed = flat_start.relax(mesh.vertices, triangles, start)
+    before = parametrization.strain_level(mesh.vertices, triangles, start)
+    relaxed = parametrization.relax(mesh.vertices, triangles, start)
     assert metrics.corner_areas(relaxed.flat, triangles).min() > 0
     assert relaxed.level < before
     assert relaxed.level == pytest.approx(
-        flat_start.strain_level(mesh.vertices, triangles, relaxed.flat)
+        parametrization.strain_level(mesh.vertices, triangles, relaxed.flat)
     )
 
 
 def test_tutte_image_always_exists():
-    from gso.flat_start.embed import _circle, _tutte
+    from gso.parametrization.embedding import _circle, _tutte
 
     mesh = with_hole(disk_mesh(9))
     rng = np.random.default_rng(4)
     rough = mesh.replaced(mesh.vertices + 0.05 * rng.standard_normal(mesh.vertices.shape))
     outer = max(rough.boundary_loops, key=len)
     circle = _circle(rough.vertices[outer])
-    for image in (_tutte(rough, outer, circle), flat_start.spanned(rough, outer, circle)):
+    for image in (_tutte(rough, outer, circle), parametrization.spanned(rough, outer, circle)):
         assert metrics.corner_areas(image, rough.faces).min() > 0
 
 

@@ -9,15 +9,15 @@ import pytest
 
 import gso
 from gso import hybrid
+from gso.errors import MeshError, OptionError, WeightsError
 from gso.hybrid import prediction, solving
 from gso.hybrid.patch import as_patch
-from gso.hybrid.worth import pays
+from gso.hybrid.time_model import pays
 from gso.mesh import Mesh
-from gso.status import MeshError, OptionError, WeightsError
-from gso.tasks.joint import Options as JointOptions
+from gso.mesh.topology import reverse
+from gso.tasks.developable.isometry import Options as JointOptions
 from gso.tno import Start, optimize
 from gso.tno.run import Run
-from gso.topology import reverse
 from tests.conftest import cylinder, saddle, shuffled, sphere_cap
 
 try:

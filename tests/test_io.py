@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import gso.io
-from gso import Mesh, MeshError, topology
+from gso import Mesh, MeshError
+from gso.mesh import topology
 
 trimesh = pytest.importorskip("trimesh")
 EXACT = (".obj", ".ply", ".off", ".npz")

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 import gso
 from gso import metrics
 from gso.dataset import bezier
-from gso.nearest import Nearest
-from gso.terms import proximity
-from gso.variables import vertex_normals
+from gso.energy import proximity
+from gso.mesh.closest_point import Nearest
+from gso.unknowns import vertex_normals
 
 JOINT = {"formulation": "isometry"}
 FLAT = {"task": "flatten", "formulation": "isometry"}

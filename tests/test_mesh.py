@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gso import Mesh, MeshError, topology
+from gso import Mesh, MeshError
+from gso.mesh import topology
 
 
 def points(height, width):

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gso import MeshError, metrics, topology
-from gso.mesh import Mesh
+from gso import MeshError, metrics
+from gso.mesh import Mesh, topology
 from tests.conftest import saddle, shuffled, sphere_cap
 
 BENCH = Path(__file__).resolve().parent.parent / "bench" / "data" / "bench24.npz"

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import gso
-from gso import GSOError, Mesh, tasks, topology
+from gso import GSOError, Mesh, tasks
+from gso.mesh import topology
 from tests.conftest import saddle
 
 #: Words that files should not have.

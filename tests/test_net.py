@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gso
-from gso.flat_start import rectangle
-from gso.status import MeshError, OptionError, WeightsError
+from gso.errors import MeshError, OptionError, WeightsError
+from gso.parametrization import rectangle
 from tests.conftest import cylinder, rotation, saddle
 
 torch = pytest.importorskip("torch")
@@ -379,7 +379,7 @@ def test_noise_that_averages_keep_is_told():
     u, v = np.meshgrid(*(np.linspace(-1, 1, 64),) * 2, indexing="ij")
     clean = np.stack([u, v, 0.4 * u * v], axis=-1)
     noisy = clean + 0.01 * np.random.default_rng(0).standard_normal(clean.shape)
-    clean, noisy = (gso.resample.resample(x, 150, 150) for x in (clean, noisy))
+    clean, noisy = (gso.hierarchy.resample(x, 150, 150) for x in (clean, noisy))
     result = predict(noisy, task="denoise")
     assert gso.metrics.normal_angle(clean, result) < 2.0
 

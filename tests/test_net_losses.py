@@ -7,11 +7,11 @@ import pytest
 
 from gso import metrics, tasks
 from gso.constraints.compiled import compile_constraints
-from gso.flat_start import rectangle
 from gso.mesh import Mesh
+from gso.parametrization import rectangle
 from gso.tasks import developable, flatten
 from gso.tasks.base import Request
-from gso.variables import vertex_normals
+from gso.unknowns import vertex_normals
 from tests.conftest import cylinder, saddle
 
 torch = pytest.importorskip("torch")

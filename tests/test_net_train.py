@@ -19,7 +19,7 @@ from click.testing import CliRunner
 
 from gso.cli import main
 from gso.dataset import bezier
-from gso.status import DatasetError, OptionError, WeightsError
+from gso.errors import DatasetError, OptionError, WeightsError
 from tests.conftest import saddle, sphere_cap
 
 torch = pytest.importorskip("torch")

@@ -53,7 +53,7 @@ def test_results_write_meshes_and_those_with_one_patterns(tmp_path):
 def test_seconds_and_backend_are_reported():
     result = gso.tno.optimize(saddle(12))
     assert result.seconds["total"] >= result.seconds["factor"] > 0
-    assert result.backend in gso.tno.linear.backends()
+    assert result.backend in gso.linalg.backends()
     assert result.history[0].iteration == 0
 
 
@@ -86,7 +86,7 @@ def test_a_batch_outlives_its_workers():
 
 
 def test_strips_of_quads_are_meshes_like_any_other():
-    strip = Mesh(saddle(9, 3)[:, :2].reshape(-1, 3), gso.topology.grid_faces(9, 2))
+    strip = Mesh(saddle(9, 3)[:, :2].reshape(-1, 3), gso.mesh.topology.grid_faces(9, 2))
     assert np.isfinite(gso.tno.optimize(strip, task="flatten").flat).all()
     assert np.isfinite(gso.tno.optimize(strip, task="denoise").mesh.vertices).all()
     with pytest.raises(gso.MeshError, match="interior"):

@@ -14,9 +14,9 @@ from gso import tasks
 from gso.constraints import Compiled
 from gso.mesh import Mesh
 from gso.tasks.base import Request
-from gso.tno.canonical import Canonical
-from gso.tno.problem import Problem
-from gso.variables import free
+from gso.tno.normalise import Canonical
+from gso.tno.solver.problem import Problem
+from gso.unknowns import free
 from tests.conftest import saddle
 
 TASKS = tasks.names()
@@ -49,7 +49,7 @@ def anything(draw) -> Mesh | np.ndarray | tuple:
         points[:] = points[0, 0]
     if draw(st.booleans()):
         return points
-    faces = gso.topology.grid_faces(height, width)
+    faces = gso.mesh.topology.grid_faces(height, width)
     faces = faces[rng.random(len(faces)) < draw(st.sampled_from([1.0, 0.8, 0.4]))]
     if draw(st.booleans()):
         faces = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])

@@ -11,8 +11,9 @@ from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
 import gso
-from gso import geometry, metrics, topology
+from gso import geometry, metrics
 from gso.cli import main
+from gso.mesh import topology
 from gso.rulings import gauss_image, shape_operator, trace
 from gso.rulings.spread import chosen, spread
 from gso.rulings.walk import Field, walk

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+from gso.errors import MeshError, OptionError
 from gso.smoothing import Smoothed, estimate_sigma, smooth_grid, smooth_mesh
 from gso.smoothing.grid import modes
 from gso.smoothing.patches import boundary_edges, neighbours, residuals, rings, umbrella
 from gso.smoothing.select import best_weight, factor, gcv
 from gso.smoothing.spectrum import CENTRE, Spectrum
-from gso.status import MeshError, OptionError
 
 from .conftest import rotation
 

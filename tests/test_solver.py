@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 
 import gso
-from gso import Progress, Status
+from gso import Progress, Status, linalg
 from gso.constraints import compile_constraints
+from gso.energy import Weighted, curvature, fairness, position, proximity
+from gso.energy.losses import Absolute, Distance
 from gso.mesh import Mesh
-from gso.terms import Weighted, curvature, fairness, position, proximity
-from gso.terms.losses import Absolute, Distance
-from gso.tno import linear
-from gso.tno.direction import DIRECTIONS
-from gso.tno.problem import Problem
 from gso.tno.solver import minimise
-from gso.variables import (
+from gso.tno.solver.directions import DIRECTIONS
+from gso.tno.solver.problem import Problem
+from gso.unknowns import (
     Layout,
     Variables,
     free,
@@ -117,7 +116,7 @@ def test_energy_falls_monotonically_and_the_best_comes_back(kind, method):
     assert energies[0] == pytest.approx(before)
 
 
-@pytest.mark.parametrize("backend", [k for k, m in linear.backends().items() if m.available()])
+@pytest.mark.parametrize("backend", [k for k, m in linalg.backends().items() if m.available()])
 def test_backends_give_the_same_result(backend):
     variables = unknowns()["normal"]
     x = np.zeros(variables.size)
@@ -179,7 +178,7 @@ def test_held_coordinates_stay():
 
 
 def test_the_sorting_and_the_table_analysis_agree(monkeypatch):
-    from gso.tno import problem as module
+    from gso.tno.solver import problem as module
 
     rng = np.random.default_rng(3)
     column = rng.integers(0, 40, 500)
@@ -210,7 +209,7 @@ def test_an_element_may_name_a_vertex_twice(held_ids):
 
 
 def test_a_problem_takes_over_the_sparsity_of_one_like_it(monkeypatch):
-    from gso.tno import problem as module
+    from gso.tno.solver import problem as module
 
     variables = unknowns()["normal"]
     first = Problem(items(), variables)

@@ -15,15 +15,15 @@ from scipy.interpolate import NdBSpline
 import gso
 from gso import metrics
 from gso.cli import main
-from gso.fit import fitting_controls, gap
+from gso.energy import Weighted, congruence, fairness
 from gso.io.svg import MILLIMETRES
 from gso.mesh import Mesh
 from gso.spline import BSplineSurface, clamped_knots
+from gso.spline.fit import fitting_controls, gap
 from gso.tasks.developable import Options
-from gso.terms import Weighted, congruence, fairness
-from gso.tno.problem import Problem
 from gso.tno.solver import minimise
-from gso.variables import Layout, spline_surface
+from gso.tno.solver.problem import Problem
+from gso.unknowns import Layout, spline_surface
 
 from .conftest import cylinder, rotation, saddle, shuffled, sphere_cap
 
@@ -450,7 +450,7 @@ def test_a_missing_package_is_named(spline, tmp_path, monkeypatch, suffix, packa
 
 
 def test_importing_gso_io_loads_no_cad_package():
-    code = "import sys, gso.io.cad, gso.fit\nprint({'OCP', 'rhino3dm'} & set(sys.modules))"
+    code = "import sys, gso.io.cad, gso.spline.fit\nprint({'OCP', 'rhino3dm'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
 

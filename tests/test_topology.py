@@ -7,7 +7,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from gso import MeshError, geometry, topology
+from gso import MeshError, geometry
+from gso.mesh import topology
 
 
 def half_edges(faces, count=None):

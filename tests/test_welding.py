@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import gso
-from gso import Mesh, MeshError, OptionError, topology
-from gso.welding import collapse, equal, near
+from gso import Mesh, MeshError, OptionError
+from gso.mesh import topology
+from gso.mesh.welding import collapse, equal, near
 from tests.conftest import meshes, saddle
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import gso
-from gso import topology
+from gso.mesh import topology
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -1,7 +1,8 @@
 """The package's objective in the form of other solvers: residuals with Jacobian, or expressions.
 
-All are built from the terms of a :class:`gso.tno.problem.Problem`, so that the derivatives are
-the same to the last bit. Each loss is expressed by residuals, half of whose squared norm it is.
+All are built from the terms of a :class:`gso.tno.solver.problem.Problem`, so that the
+derivatives are the same to the last bit. Each loss is expressed by residuals, half of whose
+squared norm it is.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.terms.losses import Absolute, Distance, Loss, Squared
-from gso.tno.codegen import casadi_function
-from gso.tno.problem import Problem
+from gso.energy.losses import Absolute, Distance, Loss, Squared
+from gso.tno.solver.kernels import casadi_function
+from gso.tno.solver.problem import Problem
 
 Array = NDArray[np.float64]
 

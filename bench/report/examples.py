@@ -9,9 +9,9 @@ from functools import partial
 
 import numpy as np
 
+from gso.errors import ConvergenceWarning
+from gso.linalg import blas_threads
 from gso.metrics import loss_gc
-from gso.status import ConvergenceWarning
-from gso.tno.linear import blas_threads
 from report.method import TASKS, Array, Method, level_name
 from report.methods import of
 from report.quality import levels

@@ -21,8 +21,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import gso
+from gso import linalg
 from gso.dataset import bezier
-from gso.tno import codegen, linear, problem
+from gso.tno.solver import kernels, problem
 
 #: Noise of the denoising task.
 SIGMA = 0.005
@@ -58,7 +59,7 @@ class Clock:
 class Factored:
     """A backend's solver that keeps the last matrix and counts factorisations."""
 
-    def __init__(self, pattern: linear.Pattern, solver: Any, clock: Clock):
+    def __init__(self, pattern: linalg.Pattern, solver: Any, clock: Clock):
         self.pattern, self.name, self.count = pattern, solver.name, 0
         self.values = np.empty(0)
         self._factor = clock.timed("factor", solver.factor)
@@ -106,14 +107,14 @@ def shares(run: Callable[[], Any]) -> dict[str, Any]:
     """Measure the share of each phase of a solve, and the time of its factorisations alone."""
     clock, stages = Clock(), list[Factored]()
 
-    def chosen(pattern: linear.Pattern, name: str | None = None) -> Factored:
+    def chosen(pattern: linalg.Pattern, name: str | None = None) -> Factored:
         stages.append(Factored(pattern, analysed(pattern, name), clock))
         return stages[-1]
 
-    analysed = clock.timed("setup", linear.choose)
+    analysed = clock.timed("setup", linalg.choose)
     places: list[tuple[Any, str, Callable[..., Any]]] = [
-        (linear, "choose", chosen),
-        (codegen.Kernel, "__call__", clock.timed("evaluation", codegen.Kernel.__call__)),
+        (linalg, "choose", chosen),
+        (kernels.Kernel, "__call__", clock.timed("evaluation", kernels.Kernel.__call__)),
         (problem.Problem, "energy", clock.timed("evaluation", problem.Problem.energy)),
         (problem.Problem, "linearise", clock.timed("assembly", problem.Problem.linearise)),
     ]
@@ -158,14 +159,14 @@ def limit(result: Any, stages: list[Factored]) -> dict[str, Any]:
 
 def _fastest(stage: Factored) -> tuple[float, str]:
     """Return the seconds of one factorisation of a stage's last matrix, and the backend."""
-    usable = {k: m for k, m in linear.backends().items() if m.available()}
+    usable = {k: m for k, m in linalg.backends().items() if m.available()}
     least = min(m.cost(stage.pattern) for m in usable.values())
     found = []
     for name, module in usable.items():
         if module.cost(stage.pattern) > _HOPEFUL * least:
             continue
         solver = module.Solver(stage.pattern)
-        with linear.blas_threads(1):
+        with linalg.blas_threads(1):
             solver.factor(stage.values)
             spent: list[float] = []
             while len(spent) < 5 and sum(spent) < 2.0:

@@ -10,9 +10,9 @@ from typing import Any
 
 import gso
 from gso import hybrid
-from gso.flat_start import rectangle
 from gso.hybrid.prediction import STARTED
 from gso.net.catalogue import DEFAULTS
+from gso.parametrization import rectangle
 from report.method import TASKS, Method, Solved
 from report.surfaces import Case
 

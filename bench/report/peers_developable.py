@@ -17,9 +17,9 @@ from tno import last_problem
 
 import gso
 from gso.mesh import Mesh
-from gso.tno.canonical import Canonical
-from gso.tno.problem import Problem
+from gso.tno.normalise import Canonical
 from gso.tno.solver import minimise
+from gso.tno.solver.problem import Problem
 from report import energy
 from report.method import Array, Method, Solved
 from report.surfaces import Case

@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso import metrics, tasks
+from gso import metrics, parallel, tasks
 from gso.dataset.noise import LEVELS
+from gso.errors import ConvergenceWarning
+from gso.linalg import blas_threads
 from gso.mesh import Mesh
-from gso.status import ConvergenceWarning
-from gso.tno import pool
-from gso.tno.linear import blas_threads
 from report import store
 from report.method import TASKS, Method, level_name
 from report.methods import methods, of
@@ -104,7 +103,7 @@ def measured(settings: Settings, surfaces: Surfaces, kept: Store, tick: Tick) ->
             tick(block.name, len(there))
     for timed, workers in ((True, min(settings.workers, 1)), (False, settings.workers)):
         missing = [b for b in every if b not in found and b.timed is timed]
-        with closing(pool.spread(measure, missing, workers=workers)) as results:
+        with closing(parallel.spread(measure, missing, workers=workers)) as results:
             for done in results:
                 block = missing[done.index]
                 if done.error is None:

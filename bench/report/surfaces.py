@@ -22,11 +22,11 @@ from gso.dataset.builder import tasks
 from gso.dataset.recipe import Recipe
 from gso.dataset.screen import select
 from gso.dataset.shard import surfaces as sampled
+from gso.errors import DatasetError
+from gso.hierarchy import resample
 from gso.io import replacing
+from gso.linalg import blas_threads
 from gso.mesh import Mesh
-from gso.resample import resample
-from gso.status import DatasetError
-from gso.tno.linear import blas_threads
 from report.store import Store, digest
 
 Array = NDArray[np.float64]

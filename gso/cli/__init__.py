@@ -10,7 +10,7 @@ from gso.cli.dataset import dataset
 from gso.cli.inspect import info, metrics, plot
 from gso.cli.optimize import optimize
 from gso.cli.train import train
-from gso.status import GSOError
+from gso.errors import GSOError
 
 __all__ = ["main"]
 

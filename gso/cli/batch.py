@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gso.cli import progress, report
-from gso.status import GSOError, MeshError, OptionError
+from gso.errors import GSOError, MeshError, OptionError
 
 if TYPE_CHECKING:
     from gso.cli.optimize import Job
@@ -36,7 +36,7 @@ def many(
     for out, picture in zip(outs, pictures, strict=True):
         job.check(out, picture)
     if workers is None:
-        from gso.tno.pool import processors
+        from gso.parallel import processors
 
         workers = min(processors(), len(files))
         workers = workers if workers > 1 else 0  # with one worker, use this process

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gso.status import DatasetError, OptionError
+from gso.errors import DatasetError, OptionError
 
 if TYPE_CHECKING:
     from gso.dataset import Dataset

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gso.status import OptionError
+from gso.errors import OptionError
 
 if TYPE_CHECKING:
     from gso.mesh import Mesh

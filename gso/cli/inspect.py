@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gso.cli import files
-from gso.status import GSOError, OptionError
+from gso.errors import GSOError, OptionError
 
 if TYPE_CHECKING:
     from gso.mesh import Mesh
@@ -47,7 +47,7 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
 
     from gso import metrics as measure
     from gso.components import average
-    from gso.tasks.measured import measured
+    from gso.tasks.evaluation import measured
     from gso.tno.layout import strains_of
 
     flat = np.ptp(after.vertices[:, 2]) <= 1e-9 * after.diagonal

@@ -11,7 +11,7 @@ import click
 from gso import tasks
 from gso.cli import files
 from gso.cli.files import source, spare
-from gso.status import MeshError, OptionError
+from gso.errors import MeshError, OptionError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -120,7 +120,7 @@ class Job:
     def write(self, result: Result, out: str, plot: str | None = None) -> None:
         """Write a result and its picture."""
         if _is_cad(out) and result.spline is None:
-            from gso.fit import fit_spline
+            from gso.spline.fit import fit_spline
 
             result.spline = fit_spline(result.mesh)
             far = max(result.spline.gap or (0.0,))

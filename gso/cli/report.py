@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gso.errors import ConvergenceWarning
 from gso.metrics import INFO
-from gso.status import ConvergenceWarning
 
 if TYPE_CHECKING:
     from gso.result import Result

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.spelling import KnownFields
-from gso.status import OptionError
 from gso.typing import Array, Ints
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from gso.constraints.base import Constraint, Subject
 from gso.constraints.conflicts import check
 from gso.constraints.linear import Reduction, reduce
 from gso.constraints.parts import Lengths, Part, Pins, Planar, Relations
+from gso.errors import OptionError
 from gso.mesh import Frame, Mesh
-from gso.status import OptionError
 from gso.typing import Array, Ints
 
 Kind = TypeVar("Kind", bound=Part)

@@ -8,8 +8,8 @@ import numpy as np
 
 from gso.constraints.linear import reduce
 from gso.constraints.parts import OnPlane, Part, Pins, Relations
+from gso.errors import OptionError
 from gso.mesh import Mesh
-from gso.status import OptionError
 from gso.typing import Ints
 
 #: Residuals below these shares of the mesh diagonal, or of the largest coordinate, are rounding.

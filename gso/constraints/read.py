@@ -13,8 +13,8 @@ from gso.constraints.glue import Glue
 from gso.constraints.positions import Fixed, FixedBoundary, Handle
 from gso.constraints.shape import FixedLengths, PlanarFaces
 from gso.constraints.symmetry import SymmetryPlane
+from gso.errors import OptionError
 from gso.spelling import check_keywords, choices, nearest
-from gso.status import OptionError
 
 KINDS: dict[str, type[Constraint]] = {
     kind.__name__: kind

@@ -18,6 +18,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from gso import parallel
 from gso.dataset import cluster, hdf, manifest, shard
 from gso.dataset.claim import claimed
 from gso.dataset.labels import KINDS, REFERENCES
@@ -25,11 +26,10 @@ from gso.dataset.recipe import Recipe, versions
 from gso.dataset.screen import Selection, select
 from gso.dataset.store import Dataset
 from gso.dataset.summary import summarise
+from gso.errors import DatasetError, MeshError, OptionError
 from gso.io import replacing
+from gso.linalg import blas_threads
 from gso.spelling import choices, known_keywords
-from gso.status import DatasetError, MeshError, OptionError
-from gso.tno import pool
-from gso.tno.linear import blas_threads
 
 _OTHER_RECIPE = "give its own options, or another folder"
 _OTHER_VERSIONS = "install what it was begun with, or build in another folder"
@@ -219,7 +219,7 @@ def _make(
     if scheduler is not None:
         results = cluster.spread(work, missing, scheduler=scheduler)
     else:
-        results = pool.spread(work, missing, workers=workers)
+        results = parallel.spread(work, missing, workers=workers)
     with closing(results):
         for result in results:
             task = missing[result.index]

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from gso.dataset import manifest
-from gso.status import DatasetError
+from gso.errors import DatasetError
 
 
 @contextmanager

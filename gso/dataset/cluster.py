@@ -6,8 +6,8 @@ from collections.abc import Callable, Generator, Iterable
 from importlib.util import find_spec
 from typing import Any
 
-from gso.status import DatasetError, GSOError
-from gso.tno.pool import Done
+from gso.errors import DatasetError, GSOError
+from gso.parallel import Done
 
 #: Seconds within which a scheduler must answer.
 PATIENCE = 20

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.dataset import bezier
-from gso.status import DatasetError
+from gso.errors import DatasetError
 
 #: Smallest number of surfaces for which starting worker processes pays off.
 _MANY = 4096
@@ -42,15 +42,15 @@ def draw_many(
     >>> draw_many([(2, 7), (1, 8)], 16).shape
     (3, 16, 16, 3)
     """
-    from gso.tno import pool
+    from gso import parallel
 
     counts = [count for count, _ in pieces]
     ends = np.cumsum(counts, dtype=int)
     drawn = np.empty((sum(counts), size, size, 3), np.float32)
-    workers = 0 if len(drawn) < _MANY else pool.processors()
+    workers = 0 if len(drawn) < _MANY else parallel.processors()
     ready = 0
     work = partial(_sampled, size=size)
-    with closing(pool.spread(work, pieces, workers=workers)) as results:
+    with closing(parallel.spread(work, pieces, workers=workers)) as results:
         for done in results:
             if done.error is not None:
                 raise DatasetError(f"surfaces of seed {pieces[done.index][1]}: {done.error}")

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gso.dataset.bezier import normalise
+from gso.errors import DatasetError, MeshError
 from gso.io import replacing
-from gso.status import DatasetError, MeshError
 from gso.typing import Array
 
 if TYPE_CHECKING:

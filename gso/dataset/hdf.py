@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.status import DatasetError
+from gso.errors import DatasetError
 
 Rows = slice | NDArray[np.int64]
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from gso import tasks, tno
+from gso.errors import ConvergenceWarning, GSOError, MeshError
 from gso.mesh import Mesh
 from gso.metrics import unit
 from gso.result import Result
-from gso.status import ConvergenceWarning, GSOError, MeshError
 from gso.typing import Array
-from gso.variables import vertex_normals
-from gso.variables.spline import spline_matrix
+from gso.unknowns import vertex_normals
+from gso.unknowns.spline import spline_matrix
 
 #: Control points along each side of the spline fitted to the normal offsets.
 CONTROLS = 16
@@ -150,7 +150,7 @@ def fit_spline(offsets: Array, controls: int = CONTROLS) -> tuple[Array, float]:
     Returns
     -------
     coefficients : ndarray, (controls, controls)
-        Coefficients in the basis of :func:`gso.variables.spline.tensor_matrix`.
+        Coefficients in the basis of :func:`gso.unknowns.spline.tensor_matrix`.
     misfit : float
         Root mean square residual, in the unit of the field.
 

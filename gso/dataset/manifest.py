@@ -7,8 +7,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from gso.errors import DatasetError
 from gso.io import replacing
-from gso.status import DatasetError
 
 NAME = "manifest.json"
 FORMAT = 1

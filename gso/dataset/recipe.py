@@ -9,7 +9,7 @@ from typing import Any
 
 from gso.dataset import shapes
 from gso.dataset.labels import KINDS, LABELS
-from gso.status import OptionError
+from gso.errors import OptionError
 
 #: Incremented whenever the same recipe would give other surfaces or labels.
 VERSION = 2

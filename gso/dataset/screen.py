@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gso import geometry, metrics
 from gso.dataset.bezier import BezierSurface, boundary_length_variance, draw, sample_many
 from gso.dataset.seeds import Stream, generator
-from gso.status import DatasetError
+from gso.errors import DatasetError
 from gso.typing import Array, Ints
 
 FEATURES = ("K_P", "K_N", "K_A", "sigma2")

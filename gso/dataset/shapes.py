@@ -17,7 +17,7 @@ import numpy as np
 
 from gso.dataset.bezier import BezierSurface, normalise
 from gso.dataset.seeds import Stream, generator
-from gso.resample import resample
+from gso.hierarchy import resample
 from gso.typing import Array
 
 #: Surfaces of each split.

@@ -14,8 +14,8 @@ import numpy as np
 from gso.dataset import bezier, labels, noise, screen, shapes
 from gso.dataset.hdf import pack
 from gso.dataset.recipe import Recipe, versions
-from gso.status import DatasetError
-from gso.tno.linear import blas_threads
+from gso.errors import DatasetError
+from gso.linalg import blas_threads
 from gso.typing import Array
 
 #: Number of surfaces in a file: a few seconds of work.

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from gso.dataset import folder, hdf, manifest, noise
 from gso.dataset.lazy import LazyArray, Part
 from gso.dataset.screen import FEATURES, features
+from gso.errors import DatasetError
 from gso.spelling import choices
-from gso.status import DatasetError
 
 if TYPE_CHECKING:
     from gso.dataset.torch_data import TorchData

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.faults.boxes import overlapping
-from gso.topology import four_corners
+from gso.mesh.topology import four_corners
 from gso.typing import Array, Ints
 
 #: Smallest penetration depth of an intersection, relative to the width of the smaller face; less

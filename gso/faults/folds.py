@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gso.geometry import cross, dot, norm, norm2, sub
 from gso.mesh import Mesh
-from gso.topology import are_quads, four_corners
+from gso.mesh.topology import are_quads, four_corners
 from gso.typing import Array, Ints
 
 #: Cosine of the angle between neighbouring normals below which a face is folded onto the next:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from gso import geometry
 from gso.faults.candidates import DEPTH, by_triangles, candidates, split
 from gso.mesh import Mesh
-from gso.topology import are_quads
+from gso.mesh.topology import are_quads
 from gso.typing import Array, Ints
 
 #: Sum of the angles around a vertex above which its faces overlap: 2 pi and a tolerance.

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gso import flat_start
+from gso import parametrization
+from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.spline import clamped_knots
-from gso.status import MeshError
 from gso.typing import Array, Ints
 
 #: Largest number of control points along each side of the spline fitted to a mesh.
@@ -80,12 +80,12 @@ def as_patch(mesh: Mesh, size: int) -> Patch:
     >>> bool(np.allclose(patch.at_vertices(patch.grid), mesh.vertices))
     True
     """
-    loops, parts = mesh.boundary_loops, flat_start.parts(mesh)
+    loops, parts = mesh.boundary_loops, parametrization.parts(mesh)
     if not loops or mesh.euler_characteristic != 2 - len(loops) or len(parts) > 1:
         raise MeshError("it is not one piece with a boundary and without handles")
     piece = _unit(mesh, parts[0])
     loop, at, sides = _boundary(piece)
-    image = flat_start.spanned(_filled(piece, loop), loop, at)[: len(piece.vertices)]
+    image = parametrization.spanned(_filled(piece, loop), loop, at)[: len(piece.vertices)]
     parameters = (image / sides).clip(0.0, 1.0)
     fitted, grid = _spline(piece.vertices, parameters, size)
     far = float(np.linalg.norm(fitted - piece.vertices, axis=1).max())

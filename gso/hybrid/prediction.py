@@ -12,11 +12,11 @@ import numpy as np
 
 from gso import metrics
 from gso.dataset.screen import CURVED
+from gso.errors import MeshError
 from gso.hybrid.patch import Patch, as_patch
 from gso.mesh import Mesh
 from gso.net.catalogue import DEFAULTS, available, chain
 from gso.net.catalogue import TASKS as NETS
-from gso.status import MeshError
 from gso.typing import Array
 
 #: Tasks whose solver can start anywhere; the other task of nets has a closed form.

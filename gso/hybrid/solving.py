@@ -13,21 +13,22 @@ from typing import Any
 
 import numpy as np
 
-from gso import flat_start, tasks
+from gso import parametrization, tasks
 from gso.components import Component, several
 from gso.constraints import Compiled, compile_constraints, listed
+from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.hybrid.prediction import Prediction, predictions
-from gso.hybrid.worth import pays
+from gso.hybrid.time_model import pays
 from gso.mesh import Mesh
+from gso.parallel import spread
 from gso.pattern import Pattern
 from gso.result import Result
 from gso.spelling import known_keywords
-from gso.status import ConvergenceWarning, GSOError, MeshError, OptionError, Status
+from gso.status import Status
 from gso.tno import Start, check, components, optimize
 from gso.tno.batch import Item
-from gso.tno.canonical import Canonical
 from gso.tno.job import Job
-from gso.tno.pool import spread
+from gso.tno.normalise import Canonical
 from gso.typing import Array
 
 #: Surfaces that are read and predicted together.
@@ -303,7 +304,7 @@ def _unsound(design: Mesh, points: Array) -> str:
     """Say why a net's result cannot be a start; empty if it can."""
     if not np.isfinite(points).all():
         return "its result is not finite"
-    turned = flat_start.flips(design, points) if points.shape[1] == 2 else 0
+    turned = parametrization.flips(design, points) if points.shape[1] == 2 else 0
     return f"its result turns {turned} corner triangles over" if turned else ""
 
 
@@ -332,6 +333,6 @@ def _polished(
 def _place(result: Result) -> None:
     """Move a flat image from the net's position to where the optimiser places its own."""
     frame, flat = Canonical(result.design), np.asarray(result.flat)
-    result.flat = frame.back("flat", flat_start.place(frame.mesh, flat[frame.order]))
+    result.flat = frame.back("flat", parametrization.place(frame.mesh, flat[frame.order]))
     result.pattern = Pattern.whole(result.design, result.flat)
     result.mesh = result.mesh.replaced(np.pad(result.flat, ((0, 0), (0, 1))))

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from os import PathLike
 from typing import Any, NamedTuple
 
+from gso.errors import MeshError
 from gso.io.atomic import check_writable, replacing
 from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_spline
 from gso.io.convert import Unwelded, as_mesh
@@ -28,7 +29,6 @@ from gso.io.surface import welded
 from gso.io.svg import save_flat
 from gso.mesh import Mesh
 from gso.spelling import known_keywords
-from gso.status import MeshError
 
 __all__ = [
     "SPLINE_SUFFIXES",

@@ -12,10 +12,10 @@ from typing import IO, Any, BinaryIO
 
 import numpy as np
 
-from gso.attributes import Attributes
+from gso.errors import MeshError
 from gso.io.surface import Surface
 from gso.mesh import Mesh
-from gso.status import MeshError
+from gso.mesh.attributes import Attributes
 
 # Largest expansion factor of a deflate stream.
 _DEFLATE_RATIO = 1032

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from os import PathLike
 from typing import BinaryIO
 
-from gso.status import MeshError
+from gso.errors import MeshError
 
 
 def check_writable(path: str | PathLike[str], suffixes: Collection[str] | None = None) -> None:
@@ -32,7 +32,7 @@ def check_writable(path: str | PathLike[str], suffixes: Collection[str] | None =
     --------
     >>> check_writable("panel.doc", suffixes=[".obj", ".ply"])
     Traceback (most recent call last):
-    gso.status.MeshError: panel.doc: cannot write a '.doc' file; use .obj, .ply
+    gso.errors.MeshError: panel.doc: cannot write a '.doc' file; use .obj, .ply
     """
     name = os.fsdecode(path)
     suffix = os.path.splitext(name)[1].lower()

@@ -7,11 +7,11 @@ import os
 from os import PathLike
 from typing import Any, NamedTuple
 
+from gso.errors import GSOError, MeshError, OptionError
 from gso.io.atomic import check_writable, replacing
 from gso.io.svg import MILLIMETRES
 from gso.spelling import choices
 from gso.spline import BSplineSurface
-from gso.status import GSOError, MeshError, OptionError
 
 
 class _Format(NamedTuple):

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from gso.errors import MeshError
 from gso.io.surface import Surface, welded
 from gso.mesh import Mesh
-from gso.status import MeshError
 
 
 @dataclass(frozen=True)

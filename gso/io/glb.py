@@ -8,10 +8,10 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from gso.errors import MeshError
 from gso.io.source import doubles
 from gso.io.surface import Surface, merged
 from gso.mesh import Mesh
-from gso.status import MeshError
 
 _HEAD = 20
 # Instances of a mesh take no space in the file; this bounds the vertices after expansion.

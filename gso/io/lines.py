@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from gso.errors import MeshError
 from gso.io.atomic import check_writable, replacing
 from gso.io.source import Array
 from gso.io.text import write_rows
-from gso.status import MeshError
 
 
 def save_lines(lines: Sequence[Any], path: str | PathLike[str]) -> None:

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from gso.errors import MeshError
 from gso.io.svg import MILLIMETRES
 from gso.spline import BSplineSurface
-from gso.status import MeshError
 
 #: OpenCASCADE's names of the units that both formats know; IGES has another one for inches.
 _UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}

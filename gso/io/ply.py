@@ -8,11 +8,11 @@ from typing import BinaryIO
 
 import numpy as np
 
+from gso.errors import MeshError
 from gso.io.source import Array, Ints, doubles, face_table, ranges
 from gso.io.surface import Surface
 from gso.io.text import Words
 from gso.mesh import Mesh
-from gso.status import MeshError
 
 _KINDS = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import base64
 from typing import Any
 
+from gso.errors import MeshError
 from gso.spline import BSplineSurface
-from gso.status import MeshError
 
 _UNITS = {
     "um": "Microns",

@@ -7,7 +7,7 @@ from os import PathLike
 
 import numpy as np
 
-from gso.status import MeshError
+from gso.errors import MeshError
 from gso.typing import Array, Ints
 
 # Largest number of fan apexes tried per polygon, because the work is quadratic.

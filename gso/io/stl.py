@@ -6,11 +6,11 @@ from typing import BinaryIO
 
 import numpy as np
 
+from gso.errors import MeshError
 from gso.io.source import doubles
 from gso.io.surface import Surface, merged
 from gso.io.text import Words
 from gso.mesh import Mesh
-from gso.status import MeshError
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEAD = 84

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from gso.attributes import Attributes
+from gso.errors import MeshError, OptionError
 from gso.mesh import Mesh
-from gso.status import MeshError, OptionError
+from gso.mesh.attributes import Attributes
+from gso.mesh.welding import collapse, equal, near
 from gso.typing import Array, Ints
-from gso.welding import collapse, equal, near
 
 
 @dataclass(frozen=True)

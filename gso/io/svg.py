@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gso.errors import MeshError, OptionError
 from gso.io.atomic import check_writable, replacing
 from gso.io.lines import polyline
 from gso.io.source import Array, Ints
 from gso.mesh import Mesh
 from gso.spelling import choices, known_keywords
-from gso.status import MeshError, OptionError
 
 MILLIMETRES = {
     "um": 1e-3,

@@ -7,8 +7,8 @@ from typing import BinaryIO, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.errors import MeshError
 from gso.io.source import Array, Ints
-from gso.status import MeshError
 
 # Integers with more digits may overflow 64 bits, and are no valid vertex indices.
 _DIGITS = 18

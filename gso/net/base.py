@@ -9,10 +9,10 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from gso.errors import OptionError
 from gso.net.catalogue import TASKS
 from gso.net.grids import planes, rectangle
 from gso.spelling import choices
-from gso.status import OptionError
 
 #: Samples along each side at which nets are trained.
 SIZE = 64

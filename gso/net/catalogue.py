@@ -10,8 +10,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from gso.errors import OptionError, WeightsError
 from gso.spelling import choices
-from gso.status import OptionError, WeightsError
 
 #: Nets that come with the package: NAME.safetensors and NAME.json.
 FOLDER = Path(__file__).parent / "weights"

@@ -10,9 +10,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from gso.errors import WeightsError
 from gso.io import replacing
 from gso.net.base import Net
-from gso.status import WeightsError
 
 _DAMAGED = "{} is no checkpoint of this run ({}); remove it to begin anew"
 Optimisers = Sequence[torch.optim.Optimizer]

@@ -6,13 +6,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import interpolate
 
+from gso.errors import OptionError
 from gso.net import inputs
 from gso.net.base import Net
 from gso.net.blocks import Convolution, Residual
 from gso.net.catalogue import TASKS
 from gso.net.grids import Frame, planes
 from gso.net.resampling import spline_field
-from gso.status import OptionError
 
 #: Unit of the coefficients, in radii of the unit ball: a typical displacement.
 _UNIT = {"developable": 0.01, "flatten": 0.03, "denoise": 0.01}

@@ -10,9 +10,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from gso.errors import OptionError
 from gso.net.catalogue import TASKS
 from gso.spelling import check_keywords, choices
-from gso.status import OptionError
 
 #: Configurations that come with the package.
 FOLDER = Path(__file__).parent / "configs"

@@ -13,11 +13,11 @@ from torch import Tensor
 
 from gso import dataset
 from gso.dataset.drawing import draw_many
+from gso.errors import DatasetError
 from gso.io import replacing
 from gso.net import augment
 from gso.net.config import Config, Phase
 from gso.net.grids import ball, normalise
-from gso.status import DatasetError
 
 #: Keys of the run's random streams.
 _ORDER, _CHANGES, _FRESH = 0, 1, 2

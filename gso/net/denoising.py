@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.fit import interpolated
+from gso.hierarchy import resample
 from gso.net.base import SIZE
-from gso.resample import resample
+from gso.spline.fit import interpolated
 from gso.typing import Array
 
 #: Smallest side that is extended to the size of the nets.

@@ -14,11 +14,12 @@ import torch
 from torch import Tensor
 
 from gso import geometry
+from gso.energy import curvature, edges, elongation, fairness, proximity, stretch
+from gso.energy.losses import Absolute, Distance, Squared
 from gso.net import grids
 from gso.net.grids import Planes, planes
-from gso.tasks import developable, flatten
-from gso.terms import curvature, edges, elongation, fairness, proximity, stretch
-from gso.terms.losses import Absolute, Distance, Squared
+from gso.tasks import flatten
+from gso.tasks.developable import curvature as developable
 
 #: Lower bound on the mean |K| of a design in the unit ball, where weights depend on it.
 LEAST_CURVATURE = 1e-3
@@ -179,7 +180,7 @@ class Strain:
         self.lengths = [1.0 / geometry.norm(d).clamp_min(1e-9) for d in _edges(p)]
 
     def residuals(self, flat: Tensor) -> Tensor:
-        """Compute strain residuals (12, B, H-1, W-1); see :func:`gso.terms.stretch.residual`."""
+        """Compute strain residuals (12, B, H-1, W-1); see :func:`gso.energy.stretch.residual`."""
         r = torch.stack(stretch.residual(grids.corners(planes(flat)), self.rest))
         good = torch.stack(self.sound)
         return torch.where(good.repeat(3, 1, 1, 1), r, torch.zeros_like(r))

@@ -118,7 +118,7 @@ def corners(p: Planes) -> tuple[Planes, Planes, Planes, Planes]:
 
 
 def normals(p: Planes) -> Planes:
-    """Compute area-weighted unit vertex normals as :func:`gso.variables.vertex_normals` does."""
+    """Compute area-weighted unit vertex normals as :func:`gso.unknowns.vertex_normals` does."""
     v0, v1, v2, v3 = corners(p)
     whole = geometry.cross(geometry.sub(v2, v0), geometry.sub(v3, v1))
     at = [
@@ -212,7 +212,7 @@ def side_lengths(p: Planes) -> tuple[Tensor, Tensor]:
 def rectangle(p: Planes) -> Tensor:
     """Compute Flatten-init (B, H, W, 2): regular rectangles with the grids' mean side lengths.
 
-    As :func:`gso.flat_start.rectangle`, but centred at the origin.
+    As :func:`gso.parametrization.rectangle`, but centred at the origin.
     """
     along, across = side_lengths(p)
     count, height, width = p[0].shape

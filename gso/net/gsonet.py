@@ -7,12 +7,12 @@ from itertools import pairwise
 import torch
 from torch import Tensor, nn
 
+from gso.errors import OptionError
 from gso.net.base import Net
 from gso.net.blocks import IMDB, Convolution, Stencils
 from gso.net.catalogue import TASKS
 from gso.net.grids import axes
 from gso.net.resampling import resampled
-from gso.status import OptionError
 
 _LEVELS = 3
 

@@ -15,7 +15,8 @@ from gso.net.base import Net
 from gso.net.config import Phase
 from gso.net.data import Batch
 from gso.net.grids import planes
-from gso.tasks import developable, flatten
+from gso.tasks import flatten
+from gso.tasks.developable import curvature as developable
 
 #: Lower bound on the size of a label's displacement, by which the misfit is divided.
 _LEAST = 3e-3

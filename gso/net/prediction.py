@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import torch
 
+from gso.errors import MeshError, OptionError
+from gso.hierarchy import resample
 from gso.net import denoising
 from gso.net.base import SIZE, Net, exact
 from gso.net.catalogue import chain
 from gso.net.weights import cached
-from gso.resample import resample
 from gso.spelling import known_keywords
-from gso.status import MeshError, OptionError
 from gso.typing import Array
 
 #: Smallest side of a grid that is resampled to the size of the nets.

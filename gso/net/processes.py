@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import torch
 from torch import distributed
 
-from gso.status import OptionError
+from gso.errors import OptionError
 
 
 @dataclass(frozen=True)

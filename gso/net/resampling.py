@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from gso.resample import resample
-from gso.variables.spline import spline_matrix
+from gso.hierarchy import resample
+from gso.unknowns.spline import spline_matrix
 
 
 @lru_cache(maxsize=64)
@@ -23,7 +23,7 @@ def _basis(samples: int, controls: int, dtype: torch.dtype, device: torch.device
 def spline_field(coefficients: Tensor, height: int, width: int) -> Tensor:
     """Evaluate clamped bicubic splines, coefficients (B, c, n, m), as (B, c, height, width).
 
-    The basis is that of :func:`gso.variables.spline.tensor_matrix`.
+    The basis is that of :func:`gso.unknowns.spline.tensor_matrix`.
 
     >>> bool((spline_field(torch.ones(1, 1, 4, 5), 7, 9) - 1.0).abs().max() < 1e-6)
     True

@@ -15,6 +15,7 @@ import torch
 from torch import Tensor
 
 from gso import dataset
+from gso.errors import OptionError
 from gso.net import checkpoint, muon, weights
 from gso.net.base import Net
 from gso.net.catalogue import TASKS, located, read_card
@@ -24,7 +25,6 @@ from gso.net.data import Source, noisy, open_source
 from gso.net.grids import normalise, normalise_with
 from gso.net.processes import Processes
 from gso.net.validate import SCORE, applied, mean_figures
-from gso.status import OptionError
 
 #: Files of a run.
 CHECKPOINT, MODEL = "checkpoint.safetensors", "model.safetensors"

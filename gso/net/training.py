@@ -12,13 +12,13 @@ import torch
 from torch import Tensor
 from torch.nn.parallel import DistributedDataParallel
 
+from gso.errors import OptionError
 from gso.net.base import exact
 from gso.net.config import Config
 from gso.net.objective import Objective
 from gso.net.processes import interruption, processes
 from gso.net.run import MODEL, Run, Tick, begin
 from gso.net.schedule import place
-from gso.status import OptionError
 
 __all__ = ["MODEL", "Report", "train"]
 

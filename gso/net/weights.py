@@ -11,13 +11,13 @@ from typing import Any
 
 import torch
 
+from gso.errors import GSOError, OptionError, WeightsError
 from gso.io import replacing
 from gso.net.base import Net
 from gso.net.catalogue import FORMAT, located, read_card
 from gso.net.coarse import CoarseNet
 from gso.net.gsonet import GSONet
 from gso.spelling import choices
-from gso.status import GSOError, OptionError, WeightsError
 
 #: Kinds of nets, as cards and configurations name them.
 KINDS: dict[str, type[Net]] = {"coarse": CoarseNet, "gsonet": GSONet}

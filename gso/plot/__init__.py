@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from gso import metrics
 from gso.components import average
+from gso.errors import GSOError, OptionError
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pattern import Pattern
@@ -28,7 +29,6 @@ from gso.plot.rulings import gauss, ruled
 from gso.plot.view import View
 from gso.result import Result
 from gso.spelling import choices, known_keywords
-from gso.status import GSOError, OptionError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso import topology
 from gso.io import check_writable, replacing
+from gso.mesh import topology
 from gso.plot.heat import Heat, Scale
 from gso.typing import Array
 

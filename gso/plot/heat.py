@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gso import metrics, topology
+from gso import metrics
 from gso.components import average, several, sizes, split
-from gso.mesh import Mesh
-from gso.status import OptionError
+from gso.errors import OptionError
+from gso.mesh import Mesh, topology
 from gso.typing import Array
 
 #: Percentile at which scales of curvature and strain end: a scale up to spikes would hide the rest.

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gso.errors import MeshError, OptionError
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.rulings.shape import FLAT, checked_flat
 from gso.rulings.spread import chosen, region_areas, spread
 from gso.rulings.walk import Field, walk
-from gso.status import MeshError, OptionError
 from gso.typing import Array, Ints
 
 #: Candidate lines per line wanted; their largest total number; their smallest number per line.

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso import geometry, topology
+from gso import geometry
 from gso.io import as_mesh
-from gso.mesh import Mesh
+from gso.mesh import Mesh, topology
 from gso.metrics import components
 from gso.typing import Array, Ints
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso import geometry, topology
+from gso import geometry
+from gso.errors import OptionError
 from gso.io import as_mesh
-from gso.mesh import Mesh
+from gso.mesh import Mesh, topology
 from gso.metrics import components
 from gso.rulings.normals import gauss_image
-from gso.status import OptionError
 from gso.typing import Array, Ints
 
 #: Curvature times size below which a face counts as flat.

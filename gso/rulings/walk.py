@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gso import geometry, topology
-from gso.mesh import Mesh
+from gso import geometry
+from gso.mesh import Mesh, topology
 from gso.rulings.normals import gauss_image
 from gso.rulings.shape import face_matrices
 from gso.typing import Array, Ints

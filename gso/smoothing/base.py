@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gso.errors import MeshError, OptionError
 from gso.spelling import choices
-from gso.status import MeshError, OptionError
 from gso.typing import Array
 
 NORMS = ("l2", "l1")

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.status import MeshError
+from gso.errors import MeshError
 from gso.typing import Array, Ints
 
 # Largest number of vertices in a fit; more, as around a pole with hundreds of faces, are sampled.

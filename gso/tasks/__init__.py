@@ -11,13 +11,13 @@ import pkgutil
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from gso.errors import OptionError
 from gso.spelling import choices
-from gso.status import OptionError
 
 if TYPE_CHECKING:
     from gso.tasks.options import Options
 
-_SUPPORT = ("base", "held", "joined", "joint", "measured", "options", "splined")
+_SUPPORT = ("base", "constrained", "evaluation", "options", "per_component")
 
 
 def names() -> list[str]:

@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from gso import flat_start
+from gso import parametrization
 from gso.constraints import Compiled
-from gso.cutting import Cut
+from gso.energy import Limit, Weighted
 from gso.mesh import Mesh
+from gso.mesh.cutting import Cut
 from gso.status import Status
 from gso.tasks.options import Options
-from gso.terms import Limit, Weighted
 from gso.typing import Array
-from gso.variables import Layout, Variables
+from gso.unknowns import Layout, Variables
 
 
 def same(coordinates: Array) -> Array:
@@ -165,15 +165,15 @@ class Plan:
         return coordinates
 
 
-def open_up(request: Request) -> flat_start.Opened:
+def open_up(request: Request) -> parametrization.Opened:
     """Cut the design open where it closes around itself, ready to be flattened.
 
     Constraints and warm starts refer to the vertices of the uncut design: with them it is not
     cut.
     """
     if request.start is not None or not request.constraints.empty:
-        return flat_start.Opened(request.mesh)
-    return flat_start.opened(request.mesh)
+        return parametrization.Opened(request.mesh)
+    return parametrization.opened(request.mesh)
 
 
 __all__ = ["Options", "Plan", "Request", "Stage", "open_up", "same"]

@@ -24,15 +24,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gso import metrics as measure
-from gso.handle_start import Spread, follow
+from gso.deformation import Spread, follow
+from gso.energy import Weighted, bending, congruence
+from gso.errors import OptionError
 from gso.mesh import Mesh
-from gso.status import OptionError, Status
-from gso.tasks import held, joined
+from gso.status import Status
+from gso.tasks import constrained, per_component
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
-from gso.terms import Weighted, bending, congruence
 from gso.typing import Array
-from gso.variables import Layout
+from gso.unknowns import Layout
 
 FORMULATIONS = ("isometry",)
 
@@ -88,15 +89,15 @@ def plan(request: Request) -> Plan:
     weights = [options.w_bending]
     while request.start is None and weights[-1] < 0.3 * options.stiff:
         weights.append(10.0 * weights[-1])
-    lengths = joined.objective(mesh, partial(_lengths, options))
-    change = joined.objective(mesh, _change)
-    pulls = held.pulls(request)
+    lengths = per_component.objective(mesh, partial(_lengths, options))
+    change = per_component.objective(mesh, _change)
+    pulls = constrained.pulls(request)
     stages = [
         Stage(
             f"bending {weight:.0e}",
             layout,
             [*lengths, *(replace(item, weight=weight) for item in change), *pulls],
-            partial(held.unknowns, request, layout),
+            partial(constrained.unknowns, request, layout),
             iterations=options.iterations,
             tolerance=_NEARLY,
         )

@@ -20,16 +20,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gso import flat_start, limits
 from gso import metrics as measure
+from gso import parametrization
+from gso.energy import Weighted, congruence, scale, shear
+from gso.errors import OptionError
 from gso.mesh import Mesh
-from gso.status import OptionError
-from gso.tasks import held, joined
+from gso.parametrization import orientation
+from gso.tasks import constrained, per_component
 from gso.tasks.base import Plan, Request, Stage, open_up
 from gso.tasks.options import Options as BaseOptions
-from gso.terms import Weighted, congruence, scale, shear
 from gso.typing import Array
-from gso.variables import Layout, free
+from gso.unknowns import Layout, free
 
 FORMULATIONS = ("isometry",)
 BLOCK = "flat"
@@ -85,25 +86,25 @@ def plan(request: Request) -> Plan:
     request = replace(request, mesh=opened.mesh)
     mesh = request.mesh
     layout = Layout((("flat", len(mesh.vertices), 2), ("scale", len(mesh.faces), 1)))
-    given, refused = flat_start.given(mesh, request.start)
+    given, refused = parametrization.given(mesh, request.start)
     flat = given
     if flat is None:
-        flat = flat_start.begin(
+        flat = parametrization.begin(
             mesh, iterations=options.relax_iterations, doubtful=opened.doubtful
         ).flat
     stage = Stage(
         "conformal",
         layout,
-        joined.objective(mesh, partial(_terms, options)),
+        per_component.objective(mesh, partial(_terms, options)),
         lambda _: free(layout),
         iterations=options.iterations,
         tolerance=options.tolerance,
-        limits=[limits.orientation(flat_start.upward(mesh), layout)],
+        limits=[orientation.orientation(parametrization.upward(mesh), layout)],
     )
     stages = [stage]
     if not request.constraints.empty:
-        flat = flat_start.align(mesh, flat, request.constraints)
-        stages = [*held.drawing(request, stage), held.keeping(request, stage)]
+        flat = parametrization.align(mesh, flat, request.constraints)
+        stages = [*constrained.drawing(request, stage), constrained.keeping(request, stage)]
     return Plan(
         layout,
         layout.pack({"flat": flat, "scale": _area_ratios(mesh, flat)}),
@@ -129,7 +130,7 @@ def _area_ratios(mesh: Mesh, flat: Array) -> Array:
 
 def _finish(
     request: Request,
-    opened: flat_start.Opened,
+    opened: parametrization.Opened,
     layout: Layout,
     given: Array | None,
     coordinates: Array,
@@ -143,10 +144,10 @@ def _finish(
     blocks = layout.split(coordinates)
     flat, ratio = blocks["flat"], blocks["scale"]
     if not request.constraints.empty:
-        flat = flat_start.settle(request.mesh, flat, request.constraints)
+        flat = parametrization.settle(request.mesh, flat, request.constraints)
     else:
         factor = measure.area(request.mesh) / measure.area(request.mesh, flat)
-        flat = flat_start.place(request.mesh, flat * np.sqrt(factor), given)
+        flat = parametrization.place(request.mesh, flat * np.sqrt(factor), given)
         ratio = ratio * factor
     lengths = np.sqrt(np.maximum(ratio, 0.0))
     return layout.pack({"flat": opened.back(flat), "scale": opened.faces_back(lengths)})

@@ -16,11 +16,11 @@ from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.smoothing import smooth_grid, smooth_mesh
 from gso.status import Status
-from gso.tasks import held
+from gso.tasks import constrained
 from gso.tasks.base import Plan, Request
 from gso.tasks.options import Options as BaseOptions
 from gso.typing import Array
-from gso.variables import Layout
+from gso.unknowns import Layout
 
 FORMULATIONS = ("smooth", "crease")
 #: Entries of a result's `details` that are lengths.
@@ -57,7 +57,7 @@ def plan(request: Request) -> Plan:
         points, details = request.start, {}
     points = np.where(mesh.used[:, None], points, mesh.vertices)
     bound = not request.constraints.empty
-    stages = [held.approach(request, points, iterations=options.iterations)] if bound else []
+    stages = [constrained.approach(request, points, iterations=options.iterations)] if bound else []
     return Plan(
         Layout.of(len(points), "surface"),
         points.ravel(),

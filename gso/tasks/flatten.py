@@ -17,17 +17,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gso import flat_start, limits
 from gso import metrics as measure
-from gso.mesh import Mesh
-from gso.resample import coarser
-from gso.status import OptionError
-from gso.tasks import held, joined
-from gso.tasks.base import Plan, Request, Stage, open_up, same
-from gso.tasks.joint import lengths_remark
-from gso.tasks.measured import parted
-from gso.tasks.options import Options as BaseOptions
-from gso.terms import (
+from gso import parametrization
+from gso.energy import (
     Weighted,
     christoffel,
     collapse,
@@ -38,9 +30,18 @@ from gso.terms import (
     shear,
     stretch,
 )
-from gso.terms.losses import Absolute
+from gso.energy.losses import Absolute
+from gso.errors import OptionError
+from gso.hierarchy import coarser
+from gso.mesh import Mesh
+from gso.parametrization import orientation
+from gso.tasks import constrained, per_component
+from gso.tasks.base import Plan, Request, Stage, open_up, same
+from gso.tasks.developable.isometry import lengths_remark
+from gso.tasks.evaluation import parted
+from gso.tasks.options import Options as BaseOptions
 from gso.typing import Array
-from gso.variables import Layout, Variables, free
+from gso.unknowns import Layout, Variables, free
 
 FORMULATIONS = ("strain", "lengths", "isometry")
 #: The formulation that a preset belongs to.
@@ -141,12 +142,12 @@ def plan(request: Request) -> Plan:
     mesh = request.mesh
     grid = mesh.grid_index is not None and request.constraints.empty
     levels = [*(coarser(mesh, options.coarse_size) if grid else []), mesh]
-    start = flat_start.begin(
+    start = parametrization.begin(
         levels[0], iterations=options.relax_iterations, doubtful=opened.doubtful
     )
     notes = [*opened.notes, *_remarks(mesh, start.level)]
-    given, refused = flat_start.given(mesh, request.start)
-    strained = given is not None and flat_start.strain(mesh, given) > _STRAINED * start.level
+    given, refused = parametrization.given(mesh, request.start)
+    strained = given is not None and parametrization.strain(mesh, given) > _STRAINED * start.level
     below = levels
     if given is not None:
         levels = [mesh]
@@ -158,7 +159,7 @@ def plan(request: Request) -> Plan:
     first = start.flat if given is None else given
     finish = partial(_finish, opened, given)
     if not request.constraints.empty:
-        first = flat_start.align(mesh, first, request.constraints)
+        first = parametrization.align(mesh, first, request.constraints)
         stages = _bound(request, stages)
         finish = partial(_settle, request)
     return Plan(
@@ -175,12 +176,12 @@ def plan(request: Request) -> Plan:
     )
 
 
-def _finish(opened: flat_start.Opened, given: Array | None, coordinates: Array) -> Array:
+def _finish(opened: parametrization.Opened, given: Array | None, coordinates: Array) -> Array:
     """Place the image; if the surface was cut, return it in the numbering of the cut mesh."""
     return opened.back(_place(opened.mesh, given, coordinates).reshape(-1, 2)).ravel()
 
 
-def _remark(opened: flat_start.Opened, coordinates: Array) -> list[str]:
+def _remark(opened: parametrization.Opened, coordinates: Array) -> list[str]:
     surface = opened.mesh if opened.cut is None else opened.cut.mesh
     return lengths_remark(surface, coordinates.reshape(-1, 2))
 
@@ -188,21 +189,21 @@ def _remark(opened: flat_start.Opened, coordinates: Array) -> list[str]:
 def _bound(request: Request, stages: list[Stage]) -> list[Stage]:
     """Plan stages under constraints: first soft with growing weight, then as they are given."""
     even = _strain_stage(replace(request.options, norm="l2"), request.mesh, 1.0)
-    steps = held.drawing(request, replace(even, iterations=30))
-    return [*steps, *(held.keeping(request, stage) for stage in (even, *stages))]
+    steps = constrained.drawing(request, replace(even, iterations=30))
+    return [*steps, *(constrained.keeping(request, stage) for stage in (even, *stages))]
 
 
 def _settle(request: Request, coordinates: Array) -> Array:
     """Place the parts of a constrained image that no constraint anchors; keep the others."""
     mesh, flat = request.mesh, coordinates.reshape(-1, 2)
-    if not request.constraints.anchored and len(flat_start.parts(mesh)) == 1:
+    if not request.constraints.anchored and len(parametrization.parts(mesh)) == 1:
         return _place(mesh, None, coordinates)
-    return flat_start.settle(mesh, flat, request.constraints).ravel()
+    return parametrization.settle(mesh, flat, request.constraints).ravel()
 
 
 def _remarks(mesh: Mesh, level: float) -> list[str]:
     notes = []
-    parts = flat_start.parts(mesh)
+    parts = parametrization.parts(mesh)
     if len(parts) > 1:
         notes.append(f"the {len(parts)} components are laid out side by side")
     if sum(map(len, parts)) < len(mesh.vertices):
@@ -264,7 +265,7 @@ def _strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
     return _stage(
         "strain",
         mesh,
-        joined.objective(
+        per_component.objective(
             mesh, lambda own: _strain_terms(options, own, level if alone else _level(own))
         ),
     )
@@ -272,7 +273,7 @@ def _strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
 
 def _level(mesh: Mesh) -> float:
     """Compute the typical strain of one of several components."""
-    return max(flat_start.begin(mesh).level, _SMALLEST_LEVEL)
+    return max(parametrization.begin(mesh).level, _SMALLEST_LEVEL)
 
 
 def _strain_terms(options: Options, mesh: Mesh, level: float) -> list[Weighted]:
@@ -300,7 +301,7 @@ def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:
     sizes = [isometry.typical_length(p.mesh) / p.mesh.frame.scale for p in parted(mesh)]
     size = float(np.mean(sizes)) if sizes else isometry.typical_length(mesh)
     eps = options.eps * size
-    items = joined.objective(mesh, partial(_length_terms, options, level, eps))
+    items = per_component.objective(mesh, partial(_length_terms, options, level, eps))
     stage = _stage("lengths", mesh, items)
     if options.norm == "l2":
         return stage
@@ -320,7 +321,9 @@ def _length_terms(options: Options, level: float, eps: float, mesh: Mesh) -> lis
 
 
 def _isometry_stage(options: Options, mesh: Mesh) -> Stage:
-    return _stage("isometry", mesh, joined.objective(mesh, partial(_isometry_terms, options)))
+    return _stage(
+        "isometry", mesh, per_component.objective(mesh, partial(_isometry_terms, options))
+    )
 
 
 def _isometry_terms(options: Options, mesh: Mesh) -> list[Weighted]:
@@ -341,7 +344,7 @@ def _stage(name: str, mesh: Mesh, items: list[Weighted]) -> Stage:
         items,
         partial(_unknowns, layout),
         tolerance=_NEARLY,
-        limits=[limits.orientation(flat_start.upward(mesh), layout)],
+        limits=[orientation.orientation(parametrization.upward(mesh), layout)],
     )
 
 
@@ -352,18 +355,18 @@ def _unknowns(layout: Layout, coordinates: Array) -> Variables:
 def _unstarted(request: Request, levels: list[Mesh], flat: Array) -> Array:
     """Interpolate the image of the coarsest grid to the finest and align it to constraints."""
     for coarse, fine in pairwise(levels):
-        flat = flat_start.refine(coarse, fine, flat)
+        flat = parametrization.refine(coarse, fine, flat)
     if not request.constraints.empty:
-        flat = flat_start.align(levels[-1], flat, request.constraints)
+        flat = parametrization.align(levels[-1], flat, request.constraints)
     return flat.ravel()
 
 
 def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
-    return flat_start.refine(coarse, fine, coordinates.reshape(-1, 2)).ravel()
+    return parametrization.refine(coarse, fine, coordinates.reshape(-1, 2)).ravel()
 
 
 def _place(mesh: Mesh, given: Array | None, coordinates: Array) -> Array:
-    return flat_start.place(mesh, coordinates.reshape(-1, 2), given).ravel()
+    return parametrization.place(mesh, coordinates.reshape(-1, 2), given).ravel()
 
 
 def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[str, float]:

@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from gso.errors import OptionError
 from gso.spelling import KnownFields, choices
-from gso.status import OptionError
 
 
 @dataclass(frozen=True)

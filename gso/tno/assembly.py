@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from gso.components import Component, mean
-from gso.flat_start import beside
 from gso.mesh import Mesh
+from gso.parametrization import beside
 from gso.pattern import Pattern
 from gso.result import Result
 from gso.status import Progress, Status

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from gso.parallel import spread
 from gso.result import Result
 from gso.spelling import known_keywords
 from gso.tno.optimize import optimize
-from gso.tno.pool import spread
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,14 @@ import numpy as np
 
 from gso.components import Component, labels, split
 from gso.constraints import Compiled
+from gso.errors import GSOError
 from gso.mesh import Mesh
+from gso.parallel import processors, spread
 from gso.result import Result
-from gso.status import GSOError, Progress
+from gso.status import Progress
 from gso.tno.assembly import renumbered, together
-from gso.tno.canonical import given_points
 from gso.tno.job import Job
-from gso.tno.pool import processors, spread
+from gso.tno.normalise import given_points
 from gso.tno.solver import Callback
 
 #: Number of vertices outside the largest component from which worker processes save time.

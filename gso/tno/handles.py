@@ -9,8 +9,8 @@ import numpy as np
 from gso.constraints import Constraint, Handle, Pins
 from gso.constraints.base import Subject
 from gso.constraints.conflicts import check
+from gso.errors import OptionError
 from gso.mesh import Mesh
-from gso.status import OptionError
 
 
 def pinned(handle: Handle, mesh: Mesh, name: str) -> Pins:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from gso import flat_start, metrics
+from gso import metrics, parametrization
 from gso.constraints import Compiled
+from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.status import MeshError
 from gso.tasks.base import Request
-from gso.tno.canonical import Canonical
+from gso.tno.normalise import Canonical
 from gso.tno.run import Run
 
 
@@ -47,7 +47,7 @@ def lay_out(
     # Imported here because it imports SciPy.
     from gso.tasks import flatten
 
-    if not flat_start.flattens(surface):
+    if not parametrization.flattens(surface):
         return given
     frame = Canonical(surface)
     request = Request(frame.mesh, flatten.Options.preset(options), "strain", Compiled(flat=True))

@@ -12,20 +12,21 @@ from typing import Any
 
 import numpy as np
 
-from gso import flat_start, tasks
+from gso import linalg, parametrization, tasks
 from gso.components import several
 from gso.constraints import TIGHT, Constraint, compile_constraints
-from gso.fit import describe_spline
+from gso.errors import ConvergenceWarning, OptionError
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.result import Result
 from gso.spelling import known_keywords
-from gso.status import ConvergenceWarning, OptionError, Status
+from gso.spline.fit import describe_spline
+from gso.status import Status
 from gso.tasks.base import Options, Request
-from gso.tno import components, linear
-from gso.tno.canonical import Canonical
+from gso.tno import components
 from gso.tno.job import Job
 from gso.tno.judged import asked_of, judged, warning
+from gso.tno.normalise import Canonical
 from gso.tno.run import Outcome, Run
 from gso.tno.search import of_curvature, of_strain, reach, stay_within, strain_left
 from gso.tno.solver import Callback
@@ -246,7 +247,7 @@ def others(request: Request, formulation: str | None) -> list[Request]:
     kind = tasks.get("developable").OPTIONS
     usual = type(request.options) is kind["curvature"] and request.options.variables != "surface"
     hard = any(part.hard for part in request.constraints.parts)
-    if formulation is not None or not usual or hard or not flat_start.flattens(request.mesh):
+    if formulation is not None or not usual or hard or not parametrization.flattens(request.mesh):
         return []
     return [replace(request, formulation="isometry", options=kind["isometry"](), start=None)]
 
@@ -277,7 +278,7 @@ def check(
     formulation, kind = tasks.choose(module, formulation, options)
     settings = kind.coerce(options)
     if settings.backend is not None:
-        linear.find(settings.backend)
+        linalg.find(settings.backend)
     bounds = {
         "max_deviation": max_deviation,
         "max_strain": max_strain,

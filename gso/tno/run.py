@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gso.cutting import Cut
+from gso.mesh.cutting import Cut
 from gso.status import Progress, Status
 from gso.tasks.base import Options, Plan, Request, Stage, same
-from gso.tno.problem import Problem, energies
 from gso.tno.solver import Callback, Solution, Timings, minimise
-from gso.tno.tighten import tighten
+from gso.tno.solver.augmented_lagrangian import tighten
+from gso.tno.solver.problem import Problem, energies
 from gso.typing import Array
 
 
@@ -199,7 +199,13 @@ class Run:
             for stage in after:
                 coordinates = stage.enter(coordinates)
         else:
-            coordinates, solution = tighten(stage, coordinates, solution, solve)
+            again = replace(stage, eps=stage.eps[-1:])
+            coordinates, solution = tighten(
+                stage.items,
+                coordinates,
+                solution,
+                lambda items, at: solve(replace(again, items=list(items)), at),
+            )
         return End(coordinates, None if after else given, stage, solution)
 
     def solve(

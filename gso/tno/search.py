@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from gso import flat_start, metrics
+from gso import metrics, parametrization
 from gso.components import average, several
+from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.status import MeshError, Status
+from gso.status import Status
 from gso.tasks.base import Request
 from gso.tno.layout import largest_strain, lay_out
 from gso.typing import Array
@@ -118,7 +119,7 @@ def _strain(request: Request, points: Array) -> float:
 
 def strain_left(request: Request, outcome: Any) -> float:
     """Return the largest strain of an outcome's flat pattern; infinity if it has no pattern."""
-    if not flat_start.flattens(request.mesh):
+    if not parametrization.flattens(request.mesh):
         return np.inf
     return _strain(request, outcome.points)
 
@@ -139,7 +140,7 @@ def stay_within(
         or the search was cancelled.
     """
     limit = of_strain(request, DEVELOPABLE if strain is None else strain)
-    if strain is None and not flat_start.flattens(request.mesh):
+    if strain is None and not parametrization.flattens(request.mesh):
         limit = of_curvature(request, 0.0)
     best, least = None, np.inf
     for weight in _HARDER:

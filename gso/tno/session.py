@@ -11,23 +11,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gso import linalg
 from gso.constraints import Constraint, Handle, Pins, listed
-from gso.handle_start import Spread
+from gso.deformation import Spread
+from gso.energy import Weighted
+from gso.errors import ConvergenceWarning, OptionError
 from gso.result import Result
 from gso.spelling import known_keywords
-from gso.status import ConvergenceWarning, OptionError, Status
+from gso.status import Status
 from gso.tasks.base import Plan, Request, Stage
-from gso.terms import Weighted
-from gso.tno import linear
-from gso.tno.canonical import Canonical
-from gso.tno.direction import DIRECTIONS
 from gso.tno.handles import moved, pinned
 from gso.tno.judged import asked_of, judged, warning
+from gso.tno.normalise import Canonical
 from gso.tno.optimize import check, judge, packed
-from gso.tno.problem import Problem
 from gso.tno.run import Outcome, Run, objective
 from gso.tno.solver import Solution, minimise
-from gso.tno.tighten import tighten
+from gso.tno.solver.augmented_lagrangian import tighten
+from gso.tno.solver.directions import DIRECTIONS
+from gso.tno.solver.problem import Problem
 from gso.typing import Array, Ints
 
 #: Iteration limit of the solve in :meth:`Session.settle`.
@@ -187,7 +188,7 @@ class Session:
             self._iterate(self._stage, int(iterations), 0.0)
             for item in self._stage.items:
                 if item.term.multipliers is not None:
-                    item.term.multipliers.push(self._coordinates)
+                    item.term.multipliers.update(self._coordinates)
         return self.vertices
 
     def settle(self) -> Result:
@@ -227,9 +228,13 @@ class Session:
         if stage is not None:
             solution = self._iterate(stage, _SETTLED, stage.tolerance)
             solve = partial(self._run.solve, self._options, (0, 1))
-            aimed = replace(stage, items=self._aimed(stage))
-            before = self._coordinates
-            self._coordinates, _ = tighten(aimed, before, solution, solve)
+            again, before = replace(stage, eps=stage.eps[-1:]), self._coordinates
+            self._coordinates, _ = tighten(
+                self._aimed(stage),
+                before,
+                solution,
+                lambda items, at: solve(replace(again, items=list(items)), at),
+            )
             if self._coordinates is not before:
                 self._pose()
         return self.result()
@@ -308,7 +313,7 @@ class Session:
         variables = stage.variables(self._coordinates)
         self._problem = Problem(self._aimed(stage), variables, stage.limits, like=before)
         if before is None or self._problem.pattern is not before.pattern:
-            self._solver = linear.choose(self._problem.pattern, self._options.backend)
+            self._solver = linalg.choose(self._problem.pattern, self._options.backend)
             self.analyses += 1
         self._x = variables.project(self._coordinates)
         self._coordinates = variables.points(self._x)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gso.status import OptionError
+from gso.errors import OptionError
 
 
 @dataclass(frozen=True)

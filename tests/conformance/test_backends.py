@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_matrix, random_array, tril
 
-from gso import BackendError, OptionError
-from gso.tno import linear
-from gso.tno.linear.base import Pattern, SingularError
+from gso import BackendError, OptionError, linalg
+from gso.linalg.base import Pattern, SingularError
 
 
 def banded(n: int, width: int, seed: int = 0) -> csc_matrix:
@@ -23,7 +22,7 @@ def scattered(n: int, seed: int = 0) -> csc_matrix:
 
 
 MATRICES = {"banded": banded(60, 4), "scattered": scattered(80), "one": csc_matrix([[4.0]])}
-INSTALLED = [k for k, m in linear.backends().items() if m.available()]
+INSTALLED = [k for k, m in linalg.backends().items() if m.available()]
 
 
 def lower(matrix: csc_matrix) -> tuple[Pattern, np.ndarray]:
@@ -38,7 +37,7 @@ def lower(matrix: csc_matrix) -> tuple[Pattern, np.ndarray]:
 def test_solutions_match_dense_algebra(name, kind):
     matrix = MATRICES[kind]
     pattern, values = lower(matrix)
-    solver = linear.choose(pattern, name)
+    solver = linalg.choose(pattern, name)
     rng = np.random.default_rng(1)
     for factor in (1.0, 2.5):
         solver.factor(factor * values)
@@ -50,7 +49,7 @@ def test_solutions_match_dense_algebra(name, kind):
 @pytest.mark.parametrize("name", [k for k in INSTALLED if k != "superlu"])
 def test_indefinite_matrices_are_refused(name):
     pattern, values = lower(csc_matrix(np.array([[1.0, 2.0], [2.0, 1.0]])))
-    solver = linear.choose(pattern, name)
+    solver = linalg.choose(pattern, name)
     with pytest.raises(SingularError):
         solver.factor(values)
     solver.factor(np.array([3.0, 1.0, 3.0]))
@@ -59,14 +58,14 @@ def test_indefinite_matrices_are_refused(name):
 
 def test_the_cheapest_installed_one_is_chosen():
     pattern, _ = lower(MATRICES["banded"])
-    costs = {k: linear.backends()[k].cost(pattern) for k in INSTALLED}
-    assert linear.choose(pattern).name == min(costs, key=costs.get)
+    costs = {k: linalg.backends()[k].cost(pattern) for k in INSTALLED}
+    assert linalg.choose(pattern).name == min(costs, key=costs.get)
 
 
 def test_unknown_and_missing_backends_are_named(monkeypatch):
     pattern, _ = lower(MATRICES["one"])
     with pytest.raises(OptionError, match=r"nonsense.*cholmod"):
-        linear.choose(pattern, "nonsense")
-    monkeypatch.setattr(linear.backends()["cholmod"], "available", lambda: False)
+        linalg.choose(pattern, "nonsense")
+    monkeypatch.setattr(linalg.backends()["cholmod"], "available", lambda: False)
     with pytest.raises(BackendError, match="pip install cvxopt"):
-        linear.choose(pattern, "cholmod")
+        linalg.choose(pattern, "cholmod")

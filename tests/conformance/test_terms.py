@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gso.terms import Term, registry
-from gso.tno import codegen
-from gso.variables.base import DIMENSIONS
+from gso.energy import Term, registry
+from gso.tno.solver import kernels
+from gso.unknowns.base import DIMENSIONS
 from tests.conftest import meshes
 
 MESHES = meshes()
@@ -59,8 +59,8 @@ def test_numpy_torch_casadi_and_kernel_agree(module, term):
     torch = pytest.importorskip("torch")
     x, shape = coordinates(term)
     c = constants(term)
-    by_kernel, jacobian = codegen.kernel(term.residual, shape, len(c), True)(x, c)
-    by_casadi, casadi_jacobian = codegen.evaluate_with_casadi(term.residual, shape, x, c)
+    by_kernel, jacobian = kernels.kernel(term.residual, shape, len(c), True)(x, c)
+    by_casadi, casadi_jacobian = kernels.evaluate_with_casadi(term.residual, shape, x, c)
     by_numpy = np.stack([np.broadcast_to(r, term.count) for r in term.residual(split(x, shape), c)])
     xt, ct = torch.tensor(x, requires_grad=True), torch.tensor(c)
     by_torch = torch.stack(list(term.residual(split(xt, shape), ct)))
@@ -80,8 +80,8 @@ def test_numpy_torch_casadi_and_kernel_agree(module, term):
 def test_jacobian_is_that_of_central_differences(module, term):
     x, shape = coordinates(term, seed=1)
     c = constants(term)
-    _, jacobian = codegen.kernel(term.residual, shape, len(c), True)(x, c)
-    run = codegen.kernel(term.residual, shape, len(c), False)
+    _, jacobian = kernels.kernel(term.residual, shape, len(c), True)(x, c)
+    run = kernels.kernel(term.residual, shape, len(c), False)
     h = 1e-6
     for k in range(len(x)):
         step = np.zeros_like(x)
@@ -91,7 +91,7 @@ def test_jacobian_is_that_of_central_differences(module, term):
             jacobian[:, k], numeric, atol=1e-6 * (1 + np.abs(jacobian).max()), rtol=1e-5
         )
     if term.linear:
-        _, elsewhere = codegen.kernel(term.residual, shape, len(c), True)(x + 1.0, c)
+        _, elsewhere = kernels.kernel(term.residual, shape, len(c), True)(x + 1.0, c)
         np.testing.assert_allclose(jacobian, elsewhere, atol=1e-12)
 
 
@@ -99,7 +99,7 @@ def test_jacobian_is_that_of_central_differences(module, term):
 def test_declared_invariances_hold(module, term):
     x, shape = coordinates(term, seed=2)
     c = constants(term)
-    run = codegen.kernel(term.residual, shape, len(c), False)
+    run = kernels.kernel(term.residual, shape, len(c), False)
     here = run(x, c)[0]
     size = 1.0 + np.abs(here)
     if "translation" in module.INVARIANT:
@@ -125,7 +125,7 @@ def _points(x, shape):
 def test_degenerate_elements_stay_finite(module, term):
     x, shape = coordinates(term, collapse=True)
     c = constants(term)
-    value, jacobian = codegen.kernel(term.residual, shape, len(c), True)(x, c)
+    value, jacobian = kernels.kernel(term.residual, shape, len(c), True)(x, c)
     if getattr(module, "UNBOUNDED", False):
         assert not np.isnan(value).any()
         return
@@ -146,4 +146,4 @@ def test_kernels_refuse_what_they_cannot_print():
     from gso import BackendError
 
     with pytest.raises(BackendError, match="operation"):
-        codegen.kernel(lambda p, c: (casadi.erf(p[0][0]),), (3,), 0, False)
+        kernels.kernel(lambda p, c: (casadi.erf(p[0][0]),), (3,), 0, False)

@@ -1,0 +1,109 @@
+"""Vertices that slide along polylines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gso.constraints import OnLines
+from gso.constraints.polyline import Polylines
+from gso.energy.base import Array, Term
+from gso.geometry import dot, sub
+from gso.mesh import Mesh
+
+#: The curve does not move with the surface.
+INVARIANT = ()
+
+
+def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """Return the vector from a target to the point, without its part along a unit direction.
+
+    Constants: the target; then the direction, or zero where the vertex cannot slide.
+    """
+    dim = len(points[0])
+    away = sub(points[0], tuple(constants[:dim]))
+    tangent = tuple(constants[dim:])
+    along = dot(away, tangent)
+    return tuple(a - along * t for a, t in zip(away, tangent, strict=True))
+
+
+def build(part: OnLines, *, block: str = "surface") -> Term:
+    """Build the constraint of vertices to polylines, soft or hard.
+
+    The nearest point is recomputed before every linearisation, as in iterated closest points,
+    and the vertex is free to move along the tangent there. Tangents are interpolated along the
+    segments: with one tangent per segment, vertices would oscillate at joints. At an end of an
+    open line, or at a corner, a vertex can only slide back. The block must be the first of its
+    layout.
+    """
+    dim = part.lines.start.shape[1]
+    sliding = _Sliding(part)
+    term = Term(
+        "curve",
+        residual,
+        ((block, part.ids[:, None]),),
+        weights=np.full(len(part.ids), 1.0 if part.weight is None else part.weight),
+        constants=np.zeros((2 * dim, len(part.ids))),
+        refresh=sliding.constants,
+    )
+    return replace(term, multipliers=sliding) if part.hard else term
+
+
+class _Sliding:
+    """Targets and directions of vertices on polylines, and their multipliers."""
+
+    def __init__(self, part: OnLines):
+        self.lines = part.lines
+        self.dim = part.lines.start.shape[1]
+        self.rows = part.ids[:, None] * self.dim + np.arange(self.dim)
+        #: Multipliers over the weight, (k, dim): see :mod:`gso.energy.multipliers`.
+        self.shift = np.zeros(self.rows.shape)
+
+    def constants(self, coordinates: Array) -> Array:
+        """Return the targets and directions from the current nearest points."""
+        target, tangent = self._targets(coordinates)
+        shift = self.shift - (self.shift * tangent).sum(axis=1, keepdims=True) * tangent
+        return np.concatenate([(target - shift).T, tangent.T])
+
+    def update(self, coordinates: Array) -> float:
+        """Update the multipliers; return the largest distance from the lines."""
+        points = tuple(coordinates[self.rows].T)
+        value = np.stack(residual([points], list(self.constants(coordinates))), axis=1)
+        feet = self.lines.nearest(coordinates[self.rows])
+        left = np.linalg.norm(coordinates[self.rows] - feet.points, axis=1)
+        self.shift = value
+        return float(left.max(initial=0.0))
+
+    def scale(self, factor: float) -> None:
+        """Rescale the multipliers when the weights of all other terms are scaled."""
+        self.shift = factor * self.shift
+
+    def _targets(self, coordinates: Array) -> tuple[Array, Array]:
+        """Find the nearest points, and the directions of free sliding there, (k, dim) each."""
+        points, lines = coordinates[self.rows], self.lines
+        target, segment, along = lines.nearest(points)
+        way = lines.way[segment]
+        tangent = lines.directions(segment, along)
+        for end, ends, out in ((0, lines.start, -way), (1, lines.end, way)):
+            # The end is an active constraint where the vertex, shifted by its multiplier, is
+            # beyond it.
+            beyond = ((points - ends[segment] + self.shift) * out).sum(axis=1) > 0
+            held = lines.stop[segment, end] & beyond
+            target = np.where(held[:, None], ends[segment], target)
+            tangent = np.where(held[:, None], 0.0, tangent)
+        return target, tangent
+
+
+def examples(mesh: Mesh) -> list[Term]:
+    """Build terms for the conformance tests."""
+    ids = np.arange(4)
+    out = []
+    for block, dim in (("surface", 3), ("flat", 2)):
+        points = mesh.vertices[[0, 5, 11], :dim]
+        term = build(OnLines(0, ids, Polylines.of(points, closed=False), 1.0), block=block)
+        constants = term.refresh(mesh.vertices[:, :dim].ravel() + 0.01)  # type: ignore[misc]
+        out.append(replace(term, constants=constants, refresh=None))
+    return out

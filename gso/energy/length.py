@@ -1,0 +1,42 @@
+"""Prescribed distances between vertices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gso import geometry
+from gso.energy.base import Array, Ints, Term
+from gso.mesh import Mesh
+
+#: Rigid motions change no length.
+INVARIANT = ("translation", "rotation")
+
+
+def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """Return ``(l'^2 - l^2) / 2l``: about ``l' - l`` near zero, and smooth at ``l' = 0``.
+
+    Constants: the target length l, and a shift, 0 for a soft term.
+    """
+    length, shift = constants
+    square = geometry.norm2(geometry.sub(points[1], points[0]))
+    return ((square / length - length) * 0.5 + shift,)
+
+
+def build(pairs: Ints, lengths: Array, *, block: str = "surface", weight: float = 1.0) -> Term:
+    """Build target `lengths` (k,) between pairs (k, 2) of vertices of a block, equal weights."""
+    return Term(
+        "length",
+        residual,
+        ((block, pairs),),
+        weights=np.full(len(pairs), weight),
+        constants=np.stack([lengths, np.zeros(len(pairs))]),
+    )
+
+
+def examples(mesh: Mesh) -> list[Term]:
+    """Build terms for the conformance tests."""
+    lengths = np.full(len(mesh.edges), 0.3)
+    return [build(mesh.edges, lengths), build(mesh.edges, lengths, block="flat")]

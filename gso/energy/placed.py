@@ -1,0 +1,79 @@
+"""Terms of one component, built in its own unit ball, as terms of the whole mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from gso.energy.base import Array, Ints, Residual, Term
+from gso.mesh import Frame
+
+#: Number of constants of a component's frame: its centre, and one over its scale.
+_FRAME = 4
+
+
+def placed(
+    term: Term, frame: Frame, vertices: Ints, faces: Ints, *, count: int, share: float
+) -> Term:
+    """Convert a term of a component into a term of the whole mesh.
+
+    Parameters
+    ----------
+    term : Term
+        Built on the component in its own unit ball; without multipliers. With `refresh`, its
+        first block must be the first of the layout.
+    frame : Frame
+        Transform between that unit ball and the whole mesh's coordinates.
+    vertices, faces : ndarray of int
+        Indices of the component's vertices and faces in the whole mesh.
+    count : int
+        Number of vertices of the whole mesh.
+    share : float
+        Factor on the weights: the component's share of the whole.
+    """
+    kinds = tuple(block for block, index in term.stencil for _ in range(index.shape[1]))
+    own = np.append(frame.centre, 1.0 / frame.scale)[:, None]
+    own = np.repeat(own, term.count, axis=1)
+    numbers = {"surface": vertices, "flat": vertices, "scale": faces}
+    stencil = tuple((block, numbers[block][index]) for block, index in term.stencil)
+    refresh = None
+    if term.refresh is not None:
+        first, renew = term.stencil[0][0], term.refresh
+
+        def refresh(coordinates: Array) -> Array:
+            dim = 3 if first == "surface" else 2
+            points = coordinates[: dim * count].reshape(-1, dim)[vertices]
+            points = frame.to_unit(points) if dim == 3 else points / frame.scale
+            return np.concatenate([own, renew(points.ravel())])
+
+    constants = term.constants if term.constants.size else np.empty((0, term.count))
+    return replace(
+        term,
+        residual=_within(term.residual, kinds),
+        vectors=None if term.vectors is None else _within(term.vectors, kinds),
+        stencil=stencil,
+        weights=share * term.weights,
+        constants=np.concatenate([own, constants]),
+        refresh=refresh,
+    )
+
+
+@lru_cache(maxsize=256)
+def _within(residual: Residual, kinds: tuple[str, ...]) -> Residual:
+    """Wrap a residual so that it takes points in the coordinates of the whole mesh."""
+
+    def within(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+        centre, factor = constants[: _FRAME - 1], constants[_FRAME - 1]
+        own = []
+        for kind, point in zip(kinds, points, strict=True):
+            if kind == "surface":
+                own.append(tuple((x - c) * factor for x, c in zip(point, centre, strict=True)))
+            else:
+                own.append(tuple(x * factor for x in point) if kind == "flat" else point)
+        return residual(own, constants[_FRAME:])
+
+    return within

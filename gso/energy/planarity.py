@@ -1,0 +1,37 @@
+"""Planarity of quads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gso import geometry
+from gso.energy.base import Ints, Term
+from gso.mesh import Mesh, topology
+
+#: Rigid motions do not change planarity.
+INVARIANT = ("translation", "rotation")
+
+
+def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """Return the distance between the diagonals' lines. Constants: a shift, 0 for a soft term."""
+    return (geometry.diagonal_distance(*points) + constants[0],)
+
+
+def build(quads: Ints, *, weight: float = 1.0) -> Term:
+    """Build the planarity of quads (k, 4), each with the same weight."""
+    return Term(
+        "planarity",
+        residual,
+        (("surface", quads),),
+        weights=np.full(len(quads), weight),
+        constants=np.zeros((1, len(quads))),
+    )
+
+
+def examples(mesh: Mesh) -> list[Term]:
+    """Build terms for the conformance tests."""
+    quads = topology.by_size(mesh.faces)[0]
+    return [build(quads)] if len(quads) else []

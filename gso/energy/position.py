@@ -1,0 +1,38 @@
+"""Soft position constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gso.energy.base import Array, Ints, Term
+from gso.geometry import sub
+from gso.mesh import Mesh
+
+#: The targets do not move with the surface.
+INVARIANT = ()
+
+
+def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """Return the displacement from the target position."""
+    return sub(points[0], tuple(constants))
+
+
+def build(ids: Ints, positions: Array, weights: Array, *, block: str = "surface") -> Term:
+    """Build soft targets `positions` (k, dim) of vertices `ids` (k,), with `weights` (k,)."""
+    return Term(
+        "position",
+        residual,
+        ((block, np.asarray(ids)[:, None]),),
+        weights=np.asarray(weights, float),
+        constants=np.asarray(positions, float).T.copy(),
+        linear=True,
+    )
+
+
+def examples(mesh: Mesh) -> list[Term]:
+    """Build terms for the conformance tests."""
+    ids = np.arange(3)
+    return [build(ids, mesh.vertices[ids] + 0.1, np.ones(3))]

@@ -1,0 +1,32 @@
+"""Deviation of the faces' scale factors from one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gso.energy.base import Term, mean_weights
+from gso.mesh import Mesh
+
+#: Scale factors are not coordinates, so rigid motions do not apply to them.
+INVARIANT = ()
+
+
+def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+    """Return ``s - 1``, which selects one of the conformal maps (Jiang et al. 2020)."""
+    return (points[0][0] - 1.0,)
+
+
+def build(mesh: Mesh) -> Term:
+    """Build the deviation of the block "scale", one number per face, averaged over the faces."""
+    count = len(mesh.faces)
+    return Term(
+        "scale", residual, (("scale", np.arange(count)[:, None]),), mean_weights(count), linear=True
+    )
+
+
+def examples(mesh: Mesh) -> list[Term]:
+    """Build terms for the conformance tests."""
+    return [build(mesh)]

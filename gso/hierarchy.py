@@ -1,0 +1,77 @@
+"""Resampling of grids at other resolutions by cubic interpolation."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from gso.errors import MeshError
+from gso.mesh import Mesh
+from gso.typing import Array
+
+#: Smallest number of vertices along a side of a coarser grid.
+SMALLEST = 20
+
+
+@lru_cache(maxsize=64)
+def _matrix(source: int, target: int) -> Array:
+    """Return the not-a-knot cubic spline interpolation matrix of `source` to `target` samples."""
+    from scipy.interpolate import make_interp_spline
+
+    spline = make_interp_spline(np.linspace(0, 1, source), np.eye(source), k=min(3, source - 1))
+    return spline(np.linspace(0, 1, target))
+
+
+def resample(values: Array, height: int, width: int) -> Array:
+    """Interpolate values (H, W, d) on a grid to (height, width, d).
+
+    >>> resample(np.arange(16.0).reshape(4, 4, 1), 7, 4).shape
+    (7, 4, 1)
+    """
+    h, w = values.shape[:2]
+    return np.einsum("ia,jb,abk->ijk", _matrix(h, height), _matrix(w, width), values, optimize=True)
+
+
+def carry(coarse: Mesh, fine: Mesh, points: Array) -> Array:
+    """Move a finer grid by the interpolated displacement of a coarse one to points (m, 3)."""
+    shift = (points - coarse.vertices)[coarse.grid_index]
+    return fine.vertices + resample(shift, *fine.grid_shape).reshape(-1, 3)  # type: ignore[misc]
+
+
+def coarser(mesh: Mesh, largest: int) -> list[Mesh]:
+    """Resample a grid at a half, a quarter ... of its resolution, coarsest first.
+
+    Sides are halved until the longer one has at most `largest` vertices: at least once, and
+    never below :data:`SMALLEST`. The list is empty if no side is longer than `SMALLEST`. It
+    ends early where a coarser grid would have faces without area.
+    """
+    shape, grid = mesh.grid_shape, mesh.grid
+    levels: list[Mesh] = []
+    while shape is not None and grid is not None:
+        halved = tuple(max((side + 1) // 2, min(side, SMALLEST)) for side in shape)
+        if halved == shape or (levels and max(shape) <= largest):
+            break
+        shape = (halved[0], halved[1])
+        try:
+            levels.append(Mesh.from_grid(resample(grid, *shape), weld=False))
+        except MeshError:
+            # A pattern finer than the coarse grid can leave it without area.
+            break
+    return levels[::-1]
+
+
+def alike(levels: list[Mesh], mesh: Mesh) -> list[Mesh]:
+    """Resample another surface with the same grid at the resolutions of coarser levels.
+
+    >>> fine = Mesh.from_grid(np.dstack([*np.mgrid[:39.0, :39.0], np.zeros((39, 39))]))
+    >>> [m.grid_shape for m in alike(coarser(fine, 32), fine)]
+    [(20, 20)]
+    """
+    grid: Any = mesh.grid
+    shapes: list[Any] = [level.grid_shape for level in levels]
+    return [
+        level.replaced(resample(grid, *shape).reshape(-1, 3))
+        for level, shape in zip(levels, shapes, strict=True)
+    ]

@@ -1,0 +1,37 @@
+"""Initial plane images of a surface, and the placement of the final image."""
+
+from gso.parametrization.alignment import align, settle
+from gso.parametrization.arap import Relaxed, relax, strain_level
+from gso.parametrization.embedding import embed, embeddings, flattens, parts, spanned
+from gso.parametrization.grid import rectangle
+from gso.parametrization.initial import begin, flips, given, refine, strain, upward
+from gso.parametrization.opening import Opened, by_rows, opened, turning
+from gso.parametrization.packing import beside, closest_motion, place, upright
+
+__all__ = [
+    "Opened",
+    "Relaxed",
+    "align",
+    "begin",
+    "beside",
+    "by_rows",
+    "closest_motion",
+    "embed",
+    "embeddings",
+    "flattens",
+    "flips",
+    "given",
+    "opened",
+    "parts",
+    "place",
+    "rectangle",
+    "refine",
+    "relax",
+    "settle",
+    "spanned",
+    "strain",
+    "strain_level",
+    "turning",
+    "upright",
+    "upward",
+]

@@ -1,0 +1,421 @@
+"""Make a surface developable by isometry: solve for the surface and its flat image together.
+
+The objective, that of Jiang et al. 2020 with an added elongation term, is, on the design scaled
+to the unit ball,
+
+    w_isometry / 2 mean E_iso + w_mapping / 2 mean E_reg + w_fairness / 2 (mean E_fair
+    + w_flat mean E_fair') + w_closest / 2 mean d_n^2 + w_place / 2 mean |u|^2
+    + w_elongation / 2 mean (elongation)^2
+
+with E_iso the squared differences, between surface and plane, of the faces' squared diagonals
+and their product, relative to the mean one; E_reg the regulariser of the mapping; E_fair and
+E_fair' the squared second derivatives of surface and image; d_n the distance from the tangent
+plane at the closest point of the design; u the displacement of a vertex from the design, whose
+term keeps the mesh from sliding; and the elongation of an edge zero within a range of length
+ratios. The fairness weight starts large and falls tenfold from stage to stage until E_iso is
+small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gso import metrics as measure
+from gso import parametrization
+from gso.energy import Weighted, christoffel, congruence, elongation, fairness, proximity
+from gso.errors import OptionError
+from gso.hierarchy import alike, carry, coarser
+from gso.mesh import Mesh
+from gso.mesh.cutting import Cut
+from gso.parametrization import orientation
+from gso.status import Status
+from gso.tasks import constrained, per_component
+from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.developable import spline_stage
+from gso.tasks.options import Options as BaseOptions
+from gso.typing import Array
+from gso.unknowns import (
+    Layout,
+    Variables,
+    ball_bounds,
+    framed_displacements,
+    free,
+    vertex_normals,
+)
+
+#: Factor by which the fairness weight falls from stage to stage.
+_FALL = 10.0
+#: Tolerance (relative decrease of the energy) of all stages but the last.
+_NEARLY = 1e-3
+#: Relative error of lengths up to which a flat image counts as isometric.
+_KEPT = 2e-3
+#: A warm start whose isometry defect is below this multiple of `enough` needs no coarser grids.
+_ISOMETRIC = 100.0
+#: Smallest iteration limit where the design needs no change and only its image is solved for.
+_UNROLL = 100
+
+
+@dataclass(frozen=True)
+class Options(BaseOptions):
+    """Settings of the developable task's formulation "isometry"; lengths in the unit ball.
+
+    Attributes
+    ----------
+    w_isometry : float
+        Weight of the mean squared isometry defect of the faces.
+    w_mapping : float
+        Weight of the regulariser of the mapping: the mean squared difference, between surface
+        and flat image, of the inner products of second differences and edges.
+    w_fairness : float
+        Final weight of the mean squared second derivative.
+    stiff : float
+        Initial fairness weight, which falls tenfold from stage to stage. Not used with `x0`.
+    w_flat : float
+        Fairness weight of the flat image, relative to that of the surface.
+    w_closest : float
+        Weight of the squared distance from the tangent plane at the closest point of the
+        design.
+    w_place : float
+        Weight of the squared displacement of the vertices from the design.
+    w_elongation : float
+        Weight of edges of the surface much shorter or longer than in the design.
+    enough : float
+        Stopping threshold: the remaining stages of lower fairness are skipped when the mean
+        squared isometry defect is at most this.
+    begin : {"curvature", "design"}
+        Start from the result of the formulation "curvature", or from the design itself.
+        Ignored with `x0` or constraints, which determine their own start.
+    variables : {"free", "surface"}
+        Free vertices, or (on grids) a last stage in the control points of a bicubic B-spline
+        surface, returned as the result's `spline`.
+    controls : int
+        "surface": control points along each side; fewer on small grids.
+    coarse_size : int
+        With begin "design" or `x0`: largest side of the coarsest grid; 0 for no coarser grids.
+    coarse_iterations : int
+        With begin "design" or `x0`: iterations of each stage on coarser grids.
+    developable_below : float
+        A design whose mean |K| is below this is developable already: it is returned unchanged,
+        with its flat image, unless there are constraints, `x0` or variables "surface".
+    """
+
+    PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
+        "fast": {"iterations": 6},
+        "balanced": {},
+        "accurate": {"iterations": 40, "tolerance": 1e-5},
+        "jiang2020": {"begin": "design", "iterations": 15, "w_elongation": 0.0},
+    }
+
+    iterations: int = 15
+    tolerance: float = 1e-3
+    method: str = "levenberg-marquardt"
+    w_isometry: float = 100.0
+    w_mapping: float = 3.0
+    w_fairness: float = 1e-4
+    stiff: float = 1e-3
+    w_flat: float = 0.01
+    w_closest: float = 0.5
+    w_place: float = 0.5
+    w_elongation: float = 1.0
+    enough: float = 1e-8
+    begin: str = "curvature"
+    variables: str = "free"
+    controls: int = 16
+    coarse_size: int = 32
+    coarse_iterations: int = 12
+    developable_below: float = 1e-3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.begin not in ("curvature", "design"):
+            raise OptionError(f"begin is {self.begin!r}; take 'curvature' or 'design'")
+        if self.variables not in ("free", "surface"):
+            raise OptionError(f"variables is {self.variables!r}; take 'free' or 'surface'")
+        if self.controls < 4:
+            raise OptionError(f"controls is {self.controls}; it must be 4 or more")
+        for name in ("w_isometry", "w_fairness"):
+            if not getattr(self, name) > 0:
+                raise OptionError(f"{name} must be positive")
+        if not self.w_closest + self.w_place > 0:
+            raise OptionError("w_closest or w_place must be positive, or nothing stays in place")
+
+
+def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
+    """Plan the stages of the joint solve.
+
+    Parameters
+    ----------
+    request : Request
+        The problem, with the options of this formulation.
+    curvature : callable
+        Makes the plan of the formulation "curvature", for the start.
+
+    Raises
+    ------
+    MeshError
+        A component is closed or has handles: it has no flat image.
+    """
+    mesh, options = request.mesh, request.options
+    spline = spline_stage.controls(request)
+    _check_bound(request)
+    begun = mesh if request.start is None else mesh.replaced(request.start)
+    opened = parametrization.opened(begun)
+    cut = opened.cut
+    own = spline is None and request.start is None and request.constraints.empty
+    if own and measure.loss_gc_worst(mesh, scale=1.0) <= options.developable_below:
+        return _unrolling(request, opened)
+    levels = _levels(request, begun)
+    stages = _chain(request, [*levels, mesh], cut)
+    before, start = [], [*alike(levels, begun), begun][0].vertices
+    if not request.constraints.empty:
+        before = [constrained.approach(request, start)]
+    elif request.start is None and options.begin == "curvature":
+        first = curvature(request)
+        before, start = first.stages, first.start.reshape(-1, 3)
+    stages[0].enter = partial(_with_flat, levels[0] if levels else mesh, cut)
+    if spline is not None:
+        # The spline stage comes last, so no stage before it may end the solve.
+        stages = [replace(stage, enough=None) for stage in stages]
+        stages.append(spline_stage.stage(stages[-1], mesh, spline))
+    stages = [*before, *stages]
+    return Plan(
+        _layout(mesh, cut),
+        start.ravel(),
+        stages,
+        notes=list(opened.notes),
+        finish=partial(_place, mesh, cut),
+        remark=partial(_remark, mesh, cut),
+        spline=spline,
+        unstarted=None if request.start is None else partial(_unstarted, [*levels, mesh], cut),
+        cut=cut,
+    )
+
+
+def _check_bound(request: Request) -> None:
+    """Raise if constraints or options are incompatible with `max_deviation`."""
+    if request.max_deviation is None:
+        return
+    hard = [part for part in request.constraints.parts if part.hard]
+    if hard:
+        raise OptionError(
+            f"{request.constraints.names[hard[0].owner]} cannot be kept with max_deviation by the "
+            "formulation 'isometry'; leave one out, take 'curvature', or give it a weight"
+        )
+    if request.options.variables == "surface":
+        raise OptionError(
+            "max_deviation bounds the vertices of a mesh, not a B-spline; leave out "
+            "variables='surface'"
+        )
+
+
+def _layout(mesh: Mesh, cut: Cut | None = None) -> Layout:
+    """Return the layout of the surface and its flat image, which has the vertices of a cut mesh."""
+    count = len(mesh.vertices)
+    flat = count if cut is None else len(cut.vertex)
+    return Layout((("surface", count, 3), ("flat", flat, 2)))
+
+
+def _opened(mesh: Mesh, cut: Cut | None, points: Array) -> Mesh:
+    """Return the surface with vertices (n, 3), cut open if there is a cut."""
+    return mesh.replaced(points) if cut is None else cut.mesh.replaced(points[cut.vertex])
+
+
+def _begun(surface: Mesh) -> Array:
+    """Compute an initial flat image of an open surface, in its numbering."""
+    ready, order = parametrization.by_rows(surface)
+    flat = np.empty((len(order), 2))
+    flat[order] = parametrization.begin(ready).flat
+    return flat
+
+
+def _unrolling(request: Request, opened: parametrization.Opened) -> Plan:
+    """Plan to keep the design fixed and solve for its flat image."""
+    mesh, options, cut = request.mesh, request.options, opened.cut
+    flat = _begun(_opened(mesh, cut, mesh.vertices))
+    stage = _stage(request, mesh, 0.0, cut)
+    stage = replace(
+        stage,
+        name="unroll",
+        items=[item for item in stage.items if item.term.name in ("isometry", "mapping")],
+        variables=partial(_flat_only, stage.layout),
+        iterations=max(options.iterations, _UNROLL),
+        tolerance=min(options.tolerance, 1e-8),
+    )
+    start = stage.layout.pack({"surface": mesh.vertices, "flat": flat})
+    return Plan(
+        stage.layout,
+        start,
+        [stage],
+        status=Status.ALREADY_GOOD,
+        notes=list(opened.notes),
+        finish=partial(_place, mesh, cut),
+        cut=cut,
+    )
+
+
+def _flat_only(layout: Layout, coordinates: Array) -> Variables:
+    from scipy.sparse import identity
+
+    start, count, _ = layout.where("flat")
+    basis = identity(layout.size, format="csc")[:, start : start + 2 * count].tocsr()
+    offset = coordinates.copy()
+    offset[start : start + 2 * count] = 0.0
+    return Variables(layout, basis, offset)
+
+
+def _levels(request: Request, begun: Mesh) -> list[Mesh]:
+    """Return the coarser copies of the design on which to solve first, coarsest first.
+
+    There are none if the result of the formulation "curvature" is the start, or if a warm start
+    has a nearly isometric image already.
+    """
+    o = request.options
+    grid = request.mesh.grid_index is not None and request.constraints.empty
+    if not (grid and o.coarse_size):
+        return []
+    if request.start is None:
+        climb = o.begin == "design" and o.variables == "free"
+        return coarser(request.mesh, o.coarse_size) if climb else []
+    flat = parametrization.begin(begun).flat
+    done = measure.isometry_energy(begun, flat) <= _ISOMETRIC * o.enough
+    return [] if done else coarser(request.mesh, o.coarse_size)
+
+
+def _chain(request: Request, levels: list[Mesh], cut: Cut | None = None) -> list[Stage]:
+    """Plan the stages, coarse to fine, with falling fairness on each grid.
+
+    With a warm start there is one stage per grid, with the lowest fairness.
+    """
+    options = request.options
+    weights = [options.w_fairness]
+    while request.start is None and weights[0] < 0.999 * options.stiff:
+        weights.insert(0, _FALL * weights[0])
+    stages = []
+    for below, mesh in zip([None, *levels], levels, strict=False):
+        for k, weight in enumerate(weights):
+            stage = _stage(request, mesh, weight, cut)
+            if k == 0 and below is not None:
+                stage.enter = partial(_refine, below, mesh)
+            stage.iterations = options.coarse_iterations
+            if mesh is levels[-1]:
+                stage.iterations = options.iterations
+                stage.enough = partial(_isometric, mesh, cut, options.enough)
+            stages.append(stage)
+    stages[-1].tolerance = options.tolerance
+    return stages
+
+
+def _stage(request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None = None) -> Stage:
+    layout, reach = _layout(mesh, cut), request.reach
+    bounds = None if reach is None else partial(_bounds, layout, len(mesh.vertices), reach)
+    sheet = mesh if cut is None else cut.mesh
+    name = "x".join(map(str, mesh.grid_shape or ("isometry",)))
+    return Stage(
+        f"{name}, fairness {w_fairness:.0e}",
+        layout,
+        _objective(request, mesh, w_fairness, cut),
+        partial(_unknowns, request, mesh, layout),
+        tolerance=_NEARLY,
+        limits=[orientation.orientation(parametrization.upward(sheet), layout)],
+        bounds=bounds,
+    )
+
+
+def _bounds(layout: Layout, count: int, reach: float, coordinates: Array) -> tuple[Array, Array]:
+    return ball_bounds(layout, count, reach)
+
+
+def _objective(request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None) -> list[Weighted]:
+    make = partial(_terms, request.options, request.demand, w_fairness, cut)
+    # A cut refers to the whole mesh, so the components are not treated separately.
+    items = per_component.objective(mesh, make) if cut is None else make(mesh)
+    return items + (constrained.pulls(request) if mesh is request.mesh else [])
+
+
+def _terms(
+    o: Options, demand: float, w_fairness: float, cut: Cut | None, mesh: Mesh
+) -> list[Weighted]:
+    """Build the terms of one component."""
+    normals = vertex_normals(mesh)
+    sheet = mesh if cut is None else cut.mesh
+    both = {"counterpart": "flat"}
+    asked, mapped = demand * o.w_isometry, demand * o.w_mapping
+    items = [Weighted(t, asked) for t in congruence.build(sheet, "surface", **both)]
+    items += [Weighted(t, mapped) for t in christoffel.build(sheet, "surface", **both)]
+    if cut is not None:
+        items = [replace(i, term=i.term.renumbered("surface", cut.vertex)) for i in items]
+    items.append(Weighted(fairness.build(mesh), w_fairness))
+    items.append(Weighted(fairness.build(sheet, block="flat"), o.w_flat * w_fairness))
+    if o.w_closest > 0:
+        items.append(Weighted(proximity.closest(mesh, normals), o.w_closest))
+    items.append(Weighted(proximity.build(mesh, normals), o.w_place))
+    items.append(Weighted(elongation.build(mesh), o.w_elongation))
+    return items
+
+
+def _unknowns(request: Request, mesh: Mesh, layout: Layout, coordinates: Array) -> Variables:
+    if request.reach is not None:
+        return framed_displacements(layout, mesh.vertices, vertex_normals(mesh))
+    own = mesh is request.mesh
+    return constrained.unknowns(request, layout, coordinates) if own else free(layout)
+
+
+def _with_flat(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
+    """Add an initial flat image to a surface, given by the first 3n coordinates."""
+    points = coordinates[: 3 * len(mesh.vertices)].reshape(-1, 3)
+    flat = _begun(_opened(mesh, cut, points))
+    return _layout(mesh, cut).pack({"surface": points, "flat": flat})
+
+
+def _unstarted(levels: list[Mesh], cut: Cut | None) -> Array:
+    """Return the design (the last level) and an image interpolated from that of the first level."""
+    coordinates = _with_flat(levels[0], cut, levels[0].vertices.ravel())
+    for coarse, fine in pairwise(levels):
+        coordinates = _refine(coarse, fine, coordinates)
+    return coordinates
+
+
+def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
+    """Interpolate the displacement and the flat image of a coarse grid to a finer one."""
+    blocks = _layout(coarse).split(coordinates)
+    points = carry(coarse, fine, blocks["surface"])
+    flat = parametrization.refine(coarse, fine.replaced(points), blocks["flat"])
+    return _layout(fine).pack({"surface": points, "flat": flat})
+
+
+def _isometric(mesh: Mesh, cut: Cut | None, enough: float, coordinates: Array) -> bool:
+    blocks = _layout(mesh, cut).split(coordinates)
+    surface = _opened(mesh, cut, blocks["surface"])
+    return measure.isometry_energy(surface, blocks["flat"]) <= enough
+
+
+def lengths_remark(surface: Mesh, flat: Array) -> list[str]:
+    """Return a note if a flat image (n, 2) does not preserve the lengths of its surface."""
+    # The diagonals of the faces may preserve their lengths while the edges do not.
+    faces = 0.5 * measure.isometry_energy(surface, flat) ** 0.5
+    off = max(faces, measure.edge_length_error(surface, flat))
+    if off <= _KEPT:
+        return []
+    return [
+        f"the flat image keeps lengths only to {off:.1%} on average: the surface is not "
+        "developable, or it closes around itself and must be cut open"
+    ]
+
+
+def _remark(mesh: Mesh, cut: Cut | None, coordinates: Array) -> list[str]:
+    blocks = _layout(mesh, cut).split(coordinates)
+    return lengths_remark(_opened(mesh, cut, blocks["surface"]), blocks["flat"])
+
+
+def _place(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
+    blocks = _layout(mesh, cut).split(coordinates)
+    ready, order = parametrization.by_rows(_opened(mesh, cut, blocks["surface"]))
+    flat = np.empty_like(blocks["flat"])
+    flat[order] = parametrization.place(ready, blocks["flat"][order], None)
+    return _layout(mesh, cut).pack({"surface": blocks["surface"], "flat": flat})

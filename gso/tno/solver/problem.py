@@ -1,0 +1,433 @@
+"""The sum of weighted terms over given unknowns: energy, gradient, Gauss-Newton matrix.
+
+The sparsity pattern of the matrix is computed once; an evaluation only fills in its values.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from gso.energy.base import Limit, Weighted
+from gso.energy.losses import Loss
+from gso.linalg.base import Pattern
+from gso.tno.solver.kernels import kernel, turning
+from gso.typing import Array, Ints
+from gso.unknowns import Layout, Variables
+
+
+class _Values:
+    """One weighted term on given coordinates: gathers, residuals, energy."""
+
+    def __init__(self, item: Weighted, layout: Layout):
+        term = item.term
+        columns, shape = [], []
+        for block, index in term.stencil:
+            dim = layout.where(block)[2]
+            shape += [dim] * index.shape[1]
+            columns.append(layout.columns(block, index).reshape(len(index), -1))
+        self.item = item
+        self.gather = np.ascontiguousarray(np.concatenate(columns, axis=1).T)
+        self.constants = term.constants if term.constants.size else np.empty((0, term.count))
+        self.shape = tuple(shape)
+        self.weights = term.weights
+
+    def refresh(self, coordinates: Array) -> None:
+        """Update the constants of a term that depend on the coordinates."""
+        if self.item.term.refresh is not None:
+            self.constants = self.item.term.refresh(coordinates)
+
+    def residual(self, coordinates: Array) -> Array:
+        """Residuals (r, e)."""
+        run = kernel(self.item.term.residual, self.shape, len(self.constants), False)
+        return run(coordinates[self.gather], self.constants)[0]
+
+    def energy(self, residual: Array) -> float:
+        """Weighted cost."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            total = self.item.weight * float((self.item.loss.value(residual) @ self.weights).sum())
+        return total if np.isfinite(total) else np.inf
+
+
+class _Elements(_Values):
+    """One weighted term on given unknowns, with the Jacobian by the unknowns (chain rule)."""
+
+    def __init__(self, item: Weighted, variables: Variables):
+        super().__init__(item, variables.layout)
+        self._pull, self.columns = _pull_back(self.gather, variables)
+
+    def linearise(self, coordinates: Array) -> tuple[Array, Array]:
+        """Return residuals (r, e) and their Jacobian by the element's unknowns (r, q, e)."""
+        run = kernel(self.item.term.residual, self.shape, len(self.constants), True)
+        value, slope = run(coordinates[self.gather], self.constants)
+        return value, self._pulled(slope)
+
+    def turning(self, coordinates: Array) -> Array | None:
+        """Return rows h (t, q, e): ``h h^T`` is the geometric stiffness of the first residuals."""
+        vectors = self.item.term.vectors
+        if vectors is None:
+            return None
+        run = turning(vectors, self.shape, len(self.constants))
+        return self._pulled(run(coordinates[self.gather], self.constants)[1])
+
+    def _pulled(self, slope: Array) -> Array:
+        if self._pull is None:
+            return slope
+        q = len(self.columns)
+        return np.stack([(self._pull @ s.ravel()).reshape(q, -1) for s in slope])
+
+
+def _pull_back(gather: Ints, variables: Variables):
+    """Return the map from derivatives by coordinates to those by unknowns, and the unknowns.
+
+    The map is None where every coordinate is a single unknown or fixed. The unknowns (q, e)
+    of each element are padded with `variables.size`.
+    """
+    if variables.basis is None:
+        return None, gather
+    chosen = _chosen(variables)
+    if chosen is not None:
+        return None, chosen[gather]
+    from scipy.sparse import csr_matrix
+
+    k, count = gather.shape
+    part = variables.basis[gather.T.ravel()].tocoo()
+    element = part.row // k
+    key, at = np.unique(element * np.int64(variables.size) + part.col, return_inverse=True)
+    owner, column = key // variables.size, key % variables.size
+    start = np.searchsorted(owner, np.arange(count + 1))
+    place = np.arange(len(key)) - start[owner]
+    q = int(np.diff(start).max()) if len(key) else 1
+    columns = np.full((q, count), variables.size)
+    columns[place, owner] = column
+    pull = csr_matrix(
+        (part.data, (place[at] * count + element, (part.row % k) * count + element)),
+        shape=(q * count, k * count),
+    )
+    return pull, columns
+
+
+def _repeated(columns: Ints) -> Ints:
+    """Find pairs a < b of an element that are the same unknown, as ordered by :func:`_products`.
+
+    Such a pair contributes to the diagonal of the matrix twice.
+    """
+    a, b = np.triu_indices(columns.shape[0])
+    apart = np.flatnonzero(a != b)
+    same = columns[a[apart]] == columns[b[apart]]
+    which, element = np.nonzero(same)
+    return apart[which] * columns.shape[1] + element
+
+
+def _chosen(variables: Variables) -> Ints | None:
+    """Return the unknown that each coordinate equals; None unless each is one, or fixed."""
+    basis = variables.basis
+    if basis is None:
+        return np.arange(variables.size)
+    count = np.diff(basis.indptr)
+    if count.max(initial=0) > 1 or not (basis.data == 1.0).all():
+        return None
+    chosen = np.full(len(count), variables.size)
+    chosen[count > 0] = basis.indices
+    return chosen
+
+
+@dataclass
+class _Assembly:
+    """Positions of the element matrices' entries in the whole matrix, and which count twice."""
+
+    pattern: Pattern
+    scatter: list[Ints]
+    repeated: list[Ints]
+    quadratic: Ints
+    diagonal: Ints
+
+
+_assemblies: OrderedDict[bytes, _Assembly] = OrderedDict()
+_ASSEMBLIES_KEPT = 24
+_LARGEST_KEPT = 4_000_000
+
+
+class Problem:
+    """Objective over unknowns.
+
+    Parameters
+    ----------
+    items : sequence of Weighted
+        The terms with their weights and losses.
+    variables : Variables
+        The unknowns.
+    limits : sequence of callables
+        Bounds on a step, see :data:`Limit`.
+    like : Problem, optional
+        A problem whose sparsity pattern is reused if it is the same.
+    """
+
+    def __init__(
+        self,
+        items: Sequence[Weighted],
+        variables: Variables,
+        limits: Sequence[Limit] = (),
+        like: Problem | None = None,
+    ):
+        self.variables = variables
+        self.limits = tuple(limits)
+        used = _counted(items)
+        self._elements = [_Elements(i, variables) for i in used if not i.quadratic]
+        self._quadratic = _Quadratic(
+            [_Elements(i, variables) for i in used if i.quadratic], variables
+        )
+        if like is not None and self._sparsity_of(like):
+            self._assembly = like._assembly
+
+    def _sparsity_of(self, other: Problem) -> bool:
+        """Return whether the Gauss-Newton matrices have the same sparsity pattern."""
+        if self.variables.size != other.variables.size:
+            return False
+        here, there = ([e.columns for e in p._elements] for p in (self, other))
+        here += [self._quadratic.matrix.indptr, self._quadratic.matrix.indices]
+        there += [other._quadratic.matrix.indptr, other._quadratic.matrix.indices]
+        return len(here) == len(there) and all(map(np.array_equal, here, there))
+
+    @cached_property
+    def _assembly(self) -> _Assembly:
+        return _assemble(
+            self.variables.size, [e.columns for e in self._elements], self._quadratic.matrix
+        )
+
+    @cached_property
+    def _constant(self) -> Array:
+        values = np.zeros(self._assembly.pattern.nnz)
+        values[self._assembly.quadratic] = self._quadratic.matrix.data
+        return values
+
+    @property
+    def pattern(self) -> Pattern:
+        """Sparsity pattern of the Gauss-Newton matrix."""
+        return self._assembly.pattern
+
+    @property
+    def diagonal(self) -> Ints:
+        """Positions of the diagonal among the matrix values."""
+        return self._assembly.diagonal
+
+    def with_loss(self, name: str, loss: Loss) -> None:
+        """Set the loss of the non-quadratic terms of one name."""
+        for element in self._elements:
+            if element.item.term.name == name:
+                element.item = replace(element.item, loss=loss)
+
+    def refresh(self, x: Array) -> None:
+        """Update the constants that depend on the unknowns: closest points, shifted targets."""
+        coordinates = self.variables.points(x)
+        for element in self._elements:
+            element.refresh(coordinates)
+
+    def by_term(self, x: Array) -> dict[str, float]:
+        """Return the energy by term name, with updated constants; it sums to :meth:`energy`."""
+        out = _by_term(self._elements, self.variables.points(x))
+        for name, value in self._quadratic.by_term(x).items():
+            out[name] = out.get(name, 0.0) + value
+        return out
+
+    def energy(self, x: Array) -> float:
+        """Return the objective; infinity where it is not finite."""
+        coordinates = self.variables.points(x)
+        total = self._quadratic.energy(x)
+        for element in self._elements:
+            total += element.energy(element.residual(coordinates))
+        return total if np.isfinite(total) else np.inf
+
+    def linearise(self, x: Array) -> tuple[float, Array, Array]:
+        """Return energy, gradient (n,) and values of the Gauss-Newton matrix's lower triangle."""
+        coordinates = self.variables.points(x)
+        n = self.variables.size
+        total, gradient = self._quadratic.energy_and_gradient(x)
+        values = self._constant.copy()
+        places = self._assembly.scatter, self._assembly.repeated
+        for element, scatter, repeated in zip(self._elements, *places, strict=True):
+            residual, slope = element.linearise(coordinates)
+            first, second = element.item.loss.weights(residual)
+            factor = element.item.weight * element.weights
+            total += element.energy(residual)
+            pulled = np.einsum("re,rqe->qe", first * factor, slope, optimize=False)
+            gradient += np.bincount(element.columns.ravel(), pulled.ravel(), n + 1)[:n]
+            products = _products(slope, second * factor)
+            turn = element.turning(coordinates)
+            if turn is not None:
+                products += _products(turn, np.maximum(first[: len(turn)], 0.0) * factor)
+            products.ravel()[repeated] *= 2.0
+            values += np.bincount(scatter, products.ravel(), len(values) + 1)[:-1]
+        return total if np.isfinite(total) else np.inf, gradient, values
+
+    def largest_step(self, x: Array, dx: Array) -> float:
+        """Return the largest step along dx, at most 1, that crosses no limit."""
+        if not self.limits:
+            return 1.0
+        coordinates, direction = self.variables.points(x), self.variables.direction(dx)
+        return min(1.0, *(limit(coordinates, direction) for limit in self.limits))
+
+
+class _Quadratic:
+    """The sum of the quadratic terms: ``|A x - b|^2 / 2`` with constant A and b."""
+
+    def __init__(self, elements: list[_Elements], variables: Variables):
+        from scipy.sparse import csr_matrix
+
+        n = variables.size
+        rows, columns, entries, rhs, self.slices = [], [], [], [], []
+        zero = np.zeros(n)
+        start = variables.points(zero)
+        base = 0
+        for element in elements:
+            residual, slope = element.linearise(start)
+            root = np.sqrt(element.item.weight * element.weights)
+            r, _, count = slope.shape
+            row = base + np.arange(r * count).reshape(r, 1, count)
+            keep = (slope != 0) & (element.columns < n)
+            rows.append(np.broadcast_to(row, slope.shape)[keep])
+            columns.append(np.broadcast_to(element.columns, slope.shape)[keep])
+            entries.append((slope * root)[keep])
+            rhs.append(-(residual * root).ravel())
+            self.slices.append((element.item.term.name, slice(base, base + r * count)))
+            base += r * count
+        join = np.concatenate
+        self.a = csr_matrix(
+            (join(entries), (join(rows), join(columns))) if base else ([], ([], [])),
+            shape=(base, n),
+        )
+        self.b = join(rhs) if base else np.zeros(0)
+        self.at = self.a.T.tocsr()
+
+    @cached_property
+    def matrix(self) -> Any:
+        """Lower triangle of ``A^T A``, CSC with sorted rows."""
+        from scipy.sparse import tril
+
+        lower = tril((self.at @ self.a).tocsc(), format="csc")
+        lower.sort_indices()
+        return lower
+
+    def _residual(self, x: Array) -> Array:
+        return self.a @ x - self.b
+
+    def energy(self, x: Array) -> float:
+        r = self._residual(x)
+        return 0.5 * float(r @ r)
+
+    def energy_and_gradient(self, x: Array) -> tuple[float, Array]:
+        r = self._residual(x)
+        return 0.5 * float(r @ r), self.at @ r
+
+    def by_term(self, x: Array) -> dict[str, float]:
+        r = self._residual(x)
+        out: dict[str, float] = {}
+        for name, part in self.slices:
+            out[name] = out.get(name, 0.0) + 0.5 * float(r[part] @ r[part])
+        return out
+
+
+def energies(items: Sequence[Weighted], layout: Layout, coordinates: Array) -> dict[str, float]:
+    """Return the energy by term name at given coordinates, with updated constants."""
+    return _by_term([_Values(item, layout) for item in _counted(items)], coordinates)
+
+
+def _by_term(terms: Sequence[_Values], coordinates: Array) -> dict[str, float]:
+    out: dict[str, float] = {}
+    for term in terms:
+        term.refresh(coordinates)
+        name = term.item.term.name
+        out[name] = out.get(name, 0.0) + term.energy(term.residual(coordinates))
+    return out
+
+
+def _counted(items: Sequence[Weighted]) -> list[Weighted]:
+    """Return the active terms: those with a positive weight and at least one element."""
+    return [i for i in items if i.weight > 0 and i.term.count]
+
+
+def _products(slope: Array, weight: Array) -> Array:
+    """Sum weight * J_a * J_b over the residuals, for all pairs a <= b, (pairs, e)."""
+    r, q, count = slope.shape
+    out = np.empty((q * (q + 1) // 2, count))
+    weighted = slope * weight[:, None, :]
+    start = 0
+    for a in range(q):
+        part = out[start : start + q - a]
+        np.multiply(weighted[0, a], slope[0, a:], out=part)
+        for k in range(1, r):
+            part += weighted[k, a] * slope[k, a:]
+        start += q - a
+    return out
+
+
+def _assemble(n: int, columns: list[Ints], quadratic) -> _Assembly:
+    """Return the pattern of element matrices, a constant matrix and a diagonal; cached."""
+    pairs = sum(c.shape[0] * (c.shape[0] + 1) // 2 * c.shape[1] for c in columns)
+    digest = hashlib.blake2b(str(n).encode())
+    for c in (*columns, quadratic.indptr, quadratic.indices):
+        digest.update(str(c.shape).encode())
+        digest.update(np.ascontiguousarray(c).data)
+    key = digest.digest()
+    if key in _assemblies:
+        _assemblies.move_to_end(key)
+        return _assemblies[key]
+    assembly = _analyse(n, columns, quadratic)
+    if pairs <= _LARGEST_KEPT:
+        _assemblies[key] = assembly
+        while len(_assemblies) > _ASSEMBLIES_KEPT:
+            _assemblies.popitem(last=False)
+    return assembly
+
+
+def _analyse(n: int, columns: list[Ints], quadratic: Any) -> _Assembly:
+    """Compute the position in the matrix of every product of two unknowns of an element."""
+    lows, highs = [], []
+    for c in columns:
+        a, b = np.triu_indices(c.shape[0])
+        low, high = np.minimum(c[a], c[b]).ravel(), np.maximum(c[a], c[b]).ravel()
+        # Padding (index n) is written to an entry past the end.
+        lows.append(np.where(high < n, low, n))
+        highs.append(np.where(high < n, high, n))
+    lows.append(np.repeat(np.arange(n), np.diff(quadratic.indptr)))
+    highs.append(quadratic.indices.astype(np.int64))
+    lows.append(np.arange(n))
+    highs.append(np.arange(n))
+    splits = np.cumsum([len(x) for x in lows])[:-1]
+    place, column, row = _places(np.concatenate(lows), np.concatenate(highs), n)
+    keep = column < n
+    indptr = np.searchsorted(column[keep], np.arange(n + 1))
+    *scatter, fixed, diagonal = np.split(place, splits)
+    pattern = Pattern(n, indptr, row[keep])
+    return _Assembly(pattern, scatter, [_repeated(c) for c in columns], fixed, diagonal)
+
+
+#: Largest table, columns times diagonals, for which :func:`_places` does not sort.
+_LARGEST_TABLE = 200_000_000
+
+
+def _places(column: Ints, row: Ints, n: int) -> tuple[Ints, Ints, Ints]:
+    """Rank every (column, row) among the distinct pairs, sorted by column then row; return both.
+
+    Matrices with few diagonals (grids) are marked in a table; the pairs of others are sorted.
+    """
+    distance = row - column
+    used = np.bincount(distance) > 0
+    count = int(used.sum())
+    if (n + 1) * count > _LARGEST_TABLE:
+        every, place = np.unique(column * np.int64(n + 1) + row, return_inverse=True)
+        return place, every // (n + 1), every % (n + 1)
+    slot = np.cumsum(used) - 1
+    at = column * count + slot[distance]
+    mark = np.zeros((n + 1) * count, bool)
+    mark[at] = True
+    found = np.flatnonzero(mark)
+    rank = np.cumsum(mark, dtype=np.int32)
+    columns = found // count
+    return rank[at].astype(np.int64) - 1, columns, columns + np.flatnonzero(used)[found % count]

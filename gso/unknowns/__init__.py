@@ -1,0 +1,20 @@
+"""Kinds of unknowns: one module each."""
+
+from gso.unknowns.base import Layout, Variables
+from gso.unknowns.framed import ALONG, ball_bounds, framed_displacements
+from gso.unknowns.free import free
+from gso.unknowns.normal import normal_offsets, vertex_normals
+from gso.unknowns.spline import spline_offsets, spline_surface
+
+__all__ = [
+    "ALONG",
+    "Layout",
+    "Variables",
+    "ball_bounds",
+    "framed_displacements",
+    "free",
+    "normal_offsets",
+    "spline_offsets",
+    "spline_surface",
+    "vertex_normals",
+]

@@ -1,0 +1,53 @@
+"""Displacements in normal and tangential directions: three unknowns per vertex."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gso.unknowns.base import Array, Layout, Variables
+
+#: Bound on each of the two tangential components, relative to the bound on the length.
+_TANGENTIAL = 0.3
+#: The remaining bound on the normal component, so that the box lies in the ball.
+ALONG = (1.0 - 2.0 * _TANGENTIAL**2) ** 0.5
+
+
+def framed_displacements(layout: Layout, points: Array, normals: Array) -> Variables:
+    """Make "surface" vertices = points + (unknowns along the normal and two tangents).
+
+    Coordinates of other blocks are unknowns themselves, after those of the surface. With
+    these unknowns, simple bounds keep a vertex in a ball around its point and still allow
+    most of the displacement along the normal.
+
+    Parameters
+    ----------
+    points, normals : ndarray, (n, 3)
+        Points at zero displacement, and unit normals.
+    """
+    from scipy.sparse import block_diag, csr_matrix, identity
+
+    n = len(points)
+    # The coordinate axis most orthogonal to the normal gives the first tangent.
+    axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(normals, axis)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    frames = np.stack([normals, first, np.cross(normals, first)], axis=2)
+    columns = 3 * np.repeat(np.arange(n), 9) + np.tile(np.arange(3), 3 * n)
+    turn = csr_matrix((frames.ravel(), columns, 3 * np.arange(3 * n + 1)), shape=(3 * n, 3 * n))
+    rest = layout.size - 3 * n
+    basis = block_diag([turn, identity(rest)], format="csr") if rest else turn
+    return Variables(layout, basis, np.concatenate([points.ravel(), np.zeros(rest)]))
+
+
+def ball_bounds(layout: Layout, count: int, reach: float) -> tuple[Array, Array]:
+    """Bound :func:`framed_displacements` of `count` vertices by a box within balls.
+
+    Parameters
+    ----------
+    reach : float
+        Radius of the balls around the points at zero displacement.
+    """
+    along, across = reach * ALONG, reach * _TANGENTIAL
+    high = np.full(layout.size, np.inf)
+    high[: 3 * count] = np.tile([along, across, across], count)
+    return -high, high
