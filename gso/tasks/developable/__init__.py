@@ -5,8 +5,9 @@ from gso.tasks.developable.curvature import (
     IMPLIES,
     OPTIONS,
     Options,
+    flat_metrics,
     metrics,
     plan,
 )
 
-__all__ = ["FORMULATIONS", "IMPLIES", "OPTIONS", "Options", "metrics", "plan"]
+__all__ = ["FORMULATIONS", "IMPLIES", "OPTIONS", "Options", "flat_metrics", "metrics", "plan"]
