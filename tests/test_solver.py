@@ -129,9 +129,9 @@ def test_backends_give_the_same_result(backend):
 def test_a_falling_epsilon_reports_the_last_one():
     variables = unknowns()["normal"]
     problem = Problem(items(), variables)
-    eps = (0.5, 0.1, 0.05)
+    losses = [Absolute(eps) for eps in (0.5, 0.1, 0.05)]
     solution = minimise(
-        problem, np.zeros(variables.size), iterations=9, eps=eps, robust="curvature"
+        problem, np.zeros(variables.size), iterations=9, continuation=losses, continued="curvature"
     )
     fresh = Problem(items(), variables)
     assert solution.energy == pytest.approx(fresh.energy(solution.x))
