@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from gso.tasks.base import Analysis
     from gso.tasks.options import Options
 
-_SUPPORT = ("base", "constrained", "evaluation", "options", "per_component")
+_SUPPORT = ("base", "constrained", "evaluation", "imposed", "options", "per_component")
 
 
 def names() -> list[str]:

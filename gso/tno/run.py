@@ -19,7 +19,7 @@ from gso.tno.solver import Callback, Minimum, Timings, minimise
 from gso.tno.solver.augmented_lagrangian import tighten
 from gso.tno.solver.problem import Problem, energies
 from gso.typing import Array
-from gso.unknowns import Variables, control_points
+from gso.unknowns import control_points
 
 
 def objective(stage: Stage, coordinates: Array) -> dict[str, float]:
@@ -40,8 +40,6 @@ class Reached:
         Coordinates of that stage.
     entered : ndarray or None
         Coordinates before the plan's last stage; None where that was not solved.
-    variables : Variables
-        Unknowns of the stage solved last.
     minimum : Minimum
         Its result.
     """
@@ -49,7 +47,6 @@ class Reached:
     stage: Stage
     coordinates: Array
     entered: Array | None
-    variables: Variables
     minimum: Minimum
 
 
@@ -120,9 +117,6 @@ class Run:
             return _finished(plan, plan.start, plan.status or Status.CONVERGED)
         reached = self.through(plan, options)
         coordinates, energy = _guard(plan, reached.stage, reached.coordinates)
-        x = reached.minimum.x
-        if coordinates is not reached.coordinates:
-            x = reached.variables.project(coordinates)
         status = reached.minimum.status
         if plan.status is not None and status is not Status.CANCELLED:
             status = plan.status
@@ -130,9 +124,13 @@ class Run:
         if plan.result_notes is not None:
             solution.notes += tuple(plan.result_notes(plan.finish(coordinates)))
         solution.backend = reached.minimum.backend
-        if plan.spline is not None and reached.entered is not None:
+        if plan.spline is not None:
+            x = reached.minimum.x
+            if reached.entered is None or coordinates is not reached.coordinates:
+                x = plan.stages[-1].unknowns(coordinates).project(coordinates)
             solution.spline = control_points(plan.layout, plan.spline, x)
-            solution.fitted = plan.layout.split(reached.entered).get("surface")
+            if reached.entered is not None:
+                solution.fitted = plan.layout.split(reached.entered)["surface"]
         return solution
 
     def usable_start(self, *requests: Request) -> bool:
@@ -193,7 +191,7 @@ class Run:
                 place=(number, len(stages)),
                 reserved=reserved,
             )
-            coordinates, variables, minimum = solve(coordinates)
+            coordinates, minimum = solve(coordinates)
             if minimum.status is Status.CANCELLED:
                 break
             if stage.finished is not None and stage.finished(coordinates):
@@ -208,9 +206,9 @@ class Run:
                 stage.items,
                 coordinates,
                 minimum,
-                lambda items, at: solve(at, items=items)[::2],
+                lambda items, at: solve(at, items=items),
             )
-        return Reached(stage, coordinates, None if after else entered, variables, minimum)
+        return Reached(stage, coordinates, None if after else entered, minimum)
 
     def minimise(
         self,
@@ -221,7 +219,7 @@ class Run:
         items: Any = None,
         place: tuple[int, int] = (0, 1),
         reserved: int = 0,
-    ) -> tuple[Array, Variables, Minimum]:
+    ) -> tuple[Array, Minimum]:
         """Minimise the objective of one stage from coordinates.
 
         Parameters
@@ -269,7 +267,7 @@ class Run:
         )
         self.iterations += minimum.iterations
         self.history += minimum.history
-        return variables.points(minimum.x), variables, minimum
+        return variables.points(minimum.x), minimum
 
 
 def _finished(

@@ -234,7 +234,7 @@ class Session:
             before = self._coordinates
             solve = partial(self._run.minimise, self._options, stage)
             self._coordinates, _ = tighten(
-                stage.items, before, minimum, lambda items, at: solve(at, items=items)[::2]
+                stage.items, before, minimum, lambda items, at: solve(at, items=items)
             )
             if self._coordinates is not before:
                 self._pose()
