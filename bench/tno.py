@@ -259,12 +259,12 @@ def last_problem(points: np.ndarray, task: str, options: str) -> tuple[Any, np.n
     module = tasks.get(task)
     frame = Canonical(gso.Mesh.from_grid(points))
     settings = module.Options.coerce(options)
-    request = Request(frame.mesh, settings, module.FORMULATIONS[0], Compiled())
-    plan = module.plan(request)
+    analysis = tasks.analyse(module, frame.mesh, Compiled())
+    plan = module.plan(analysis, Request(settings, module.FORMULATIONS[0]))
     coordinates = plan.start
     for stage in plan.stages:
         coordinates = stage.enter(coordinates)
-    variables = plan.stages[-1].variables(coordinates)
+    variables = plan.stages[-1].unknowns(coordinates)
     problem = Problem(plan.stages[-1].items, variables, plan.stages[-1].limits)
     return problem, variables.project(coordinates)
 

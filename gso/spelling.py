@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import inspect
+import warnings
 from collections.abc import Callable, Iterable
 from functools import wraps
-from typing import Any, TypeVar, cast
+from typing import Any, ClassVar, TypeVar, cast
 
 from gso.errors import OptionError
 
@@ -108,8 +109,24 @@ class _Signature:
         return whole.replace(parameters=list(whole.parameters.values())[1:])
 
 
-class KnownFields:
+class _CheckedFields(type):
+    """Metaclass that checks field names before an object is made, and translates old ones."""
+
+    def __call__(cls, *positional: Any, **given: Any) -> Any:
+        renamed: dict[str, str] = getattr(cls, "RENAMED", {})
+        for old in renamed.keys() & given.keys():
+            _warn_of(old, renamed[old])
+            given[renamed[old]] = given.pop(old)
+        if given:
+            check_keywords(cls.__qualname__, given, _names(cls.__init__)[1:])  # type: ignore[misc]
+        return super().__call__(*positional, **given)
+
+
+class KnownFields(metaclass=_CheckedFields):
     """Base class of dataclasses in which an unknown field name raises :class:`gso.OptionError`.
+
+    Fields that were renamed are still accepted and readable by the old names in `RENAMED`, with
+    a `DeprecationWarning`.
 
     Examples
     --------
@@ -122,13 +139,20 @@ class KnownFields:
     gso.errors.OptionError: Blade takes no 'widht'; did you mean 'width'? There are width
     """
 
+    #: New names of fields by their old ones.
+    RENAMED: ClassVar[dict[str, str]] = {}
+
     __signature__ = _Signature()
 
-    def __new__(cls, *positional: Any, **given: Any) -> Any:
-        """Check the field names; values are checked by the class itself."""
-        if given:
-            check_keywords(cls.__qualname__, given, _names(cls.__init__)[1:])
-        return super().__new__(cls)
+    def __getattr__(self, name: str) -> Any:
+        if name in type(self).RENAMED:
+            _warn_of(name, type(self).RENAMED[name])
+            return getattr(self, type(self).RENAMED[name])
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+
+def _warn_of(old: str, new: str) -> None:
+    warnings.warn(f"{old!r} is now called {new!r}", DeprecationWarning, stacklevel=3)
 
 
 def _names(function: Callable[..., Any]) -> list[str]:

@@ -224,8 +224,8 @@ class TestJoint:
 
     def test_fairness_falls_until_the_defect_is_small_enough(self, curved):
         options = gso.IsometryOptions.preset("jiang2020")
-        often = gso.tno.optimize(curved, options=replace(options, enough=0.0))
-        once = gso.tno.optimize(curved, options=replace(options, enough=1.0))
+        often = gso.tno.optimize(curved, options=replace(options, isometry_threshold=0.0))
+        once = gso.tno.optimize(curved, options=replace(options, isometry_threshold=1.0))
         last = [p.name for p in often.history][-1], [p.name for p in once.history][-1]
         assert last == ("24x24, fairness 1e-04", "24x24, fairness 1e-03")
 
@@ -236,7 +236,7 @@ class TestJoint:
         assert gso.tno.optimize(sheet, **JOINT).notes == ()
 
     def test_a_spline_is_the_result_although_fairness_need_not_fall(self, curved):
-        options = gso.IsometryOptions(variables="surface", controls=6, enough=1.0)
+        options = gso.IsometryOptions(variables="surface", controls=6, isometry_threshold=1.0)
         result = gso.tno.optimize(curved, options=options)
         np.testing.assert_allclose(result.spline.sample(*curved.shape[:2]), result.grid, atol=1e-9)
 
@@ -247,7 +247,7 @@ class TestJoint:
 
     def test_warm_start(self, curved):
         cold = gso.tno.optimize(curved, options="jiang2020")
-        options = replace(gso.IsometryOptions.preset("jiang2020"), stiff=1e-4)
+        options = replace(gso.IsometryOptions.preset("jiang2020"), w_fairness_start=1e-4)
         warm = gso.tno.optimize(curved, options=options, x0=cold.mesh)
         assert warm.iterations < cold.iterations
         assert sum(warm.energy.values()) <= 1.01 * sum(cold.energy.values())
@@ -273,9 +273,9 @@ class TestJoint:
 class TestOptions:
     def test_the_reference_preset_is_frozen(self):
         o = gso.IsometryOptions.preset("jiang2020")
-        weights = (o.w_isometry, o.w_mapping, o.w_fairness, o.stiff, o.w_flat)
+        weights = (o.w_isometry, o.w_mapping, o.w_fairness, o.w_fairness_start, o.w_flat)
         assert weights == (100.0, 3.0, 1e-4, 1e-3, 0.01)
-        assert (o.w_closest, o.w_place, o.enough) == (0.5, 0.5, 1e-8)
+        assert (o.w_closest, o.w_place, o.isometry_threshold) == (0.5, 0.5, 1e-8)
         assert (o.iterations, o.coarse_iterations, o.coarse_size) == (15, 12, 32)
         assert (o.begin, o.variables, o.tolerance) == ("design", "free", 1e-3)
 
@@ -291,7 +291,7 @@ class TestOptions:
             ({"formulation": "curvature", "options": "jiang2020"}, "those of the formulation"),
             (
                 {"formulation": "isometry", "options": gso.DevelopableOptions()},
-                r"gso\.tasks\.joint\.Options.*not gso\.tasks\.developable\.Options",
+                r"developable\.isometry\.Options.*not gso\.tasks\.developable\.options\.Options",
             ),
             (
                 {"formulation": "isometry", "max_deviation": 0.1, "target_curvature": 0.1},

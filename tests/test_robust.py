@@ -83,8 +83,8 @@ def test_developable_results_have_no_more_energy_than_the_design(surface):
     except gso.GSOError:
         return
     module = tasks.get("developable")
-    request = Request(frame.mesh, module.Options.preset("fast"), "curvature", Compiled())
-    plan = module.plan(request)
+    request = Request(module.Options.preset("fast"), "curvature")
+    plan = module.plan(tasks.analyse(module, frame.mesh, Compiled()), request)
     if not plan.stages:
         return
     stage = plan.stages[-1]

@@ -14,8 +14,7 @@ from gso.constraints import compile_constraints
 from gso.energy import Weighted, curvature, fairness, position, proximity
 from gso.energy.losses import Absolute, Distance
 from gso.mesh import Mesh
-from gso.tno.solver import minimise
-from gso.tno.solver.directions import DIRECTIONS
+from gso.tno.solver import METHODS, minimise
 from gso.tno.solver.problem import Problem
 from gso.unknowns import (
     Layout,
@@ -100,7 +99,7 @@ def test_project_inverts_points(kind):
     np.testing.assert_allclose(variables.project(variables.points(x)), x, atol=1e-7)
 
 
-@pytest.mark.parametrize("method", DIRECTIONS)
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_energy_falls_monotonically_and_the_best_comes_back(kind, method):
     variables = unknowns()[kind]
@@ -129,9 +128,9 @@ def test_backends_give_the_same_result(backend):
 def test_a_falling_epsilon_reports_the_last_one():
     variables = unknowns()["normal"]
     problem = Problem(items(), variables)
-    eps = (0.5, 0.1, 0.05)
+    losses = [Absolute(eps) for eps in (0.5, 0.1, 0.05)]
     solution = minimise(
-        problem, np.zeros(variables.size), iterations=9, eps=eps, robust="curvature"
+        problem, np.zeros(variables.size), iterations=9, continuation=losses, continued="curvature"
     )
     fresh = Problem(items(), variables)
     assert solution.energy == pytest.approx(fresh.energy(solution.x))

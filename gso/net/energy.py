@@ -18,8 +18,9 @@ from gso.energy import curvature, edges, elongation, fairness, proximity, stretc
 from gso.energy.losses import Absolute, Distance, Squared
 from gso.net import grids
 from gso.net.grids import Planes, planes
-from gso.tasks import flatten
-from gso.tasks.developable import curvature as developable
+from gso.tasks import developable, flatten
+from gso.tasks.developable.analysis import kept_bending
+from gso.tasks.developable.objective import adapted_weights
 
 #: Lower bound on the mean |K| of a design in the unit ball, where weights depend on it.
 LEAST_CURVATURE = 1e-3
@@ -56,14 +57,14 @@ class Developable:
         self.lengths = [1.0 / geometry.norm(d).clamp_min(1e-9) for d in _edges(p)]
         self.bands = [_bands(d[0], axis) for d, axis in zip(_edges(p), (2, 1), strict=True)]
         own = [_second(p, axis, h) for axis, h in zip((1, 2), self.spacing, strict=True)]
-        kept = developable.kept_bending(k)
+        kept = kept_bending(k)
         self.wanted = [
             tuple(c * _mean_of_three(kept, axis) for c in second)
             for axis, second in zip((1, 2), own, strict=True)
         ]
         count = sum(second[0][0].numel() for second in own)
         bending = sum(geometry.norm2(second).sum(dim=(1, 2)) for second in own) * 2.0 / count
-        self.w_curvature, self.w_fairness = developable.adapted_weights(
+        self.w_curvature, self.w_fairness = adapted_weights(
             self.options, self.curved.clamp_min(LEAST_CURVATURE), bending
         )
 
@@ -90,7 +91,7 @@ class Developable:
         fair = self._fairness(x)
         ones = torch.full_like(x[0], o.tangential)
         moved = proximity.residual([x], [*self.points, *self.normals, ones])
-        distance: Any = Distance(o.near)
+        distance: Any = Distance(o.quadratic_below)
         near = distance.value(torch.stack(moved))[0].mean(dim=(1, 2))
         return {
             "curvature": self.w_curvature * bent,

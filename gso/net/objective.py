@@ -15,8 +15,8 @@ from gso.net.base import Net
 from gso.net.config import Phase
 from gso.net.data import Batch
 from gso.net.grids import planes
-from gso.tasks import flatten
-from gso.tasks.developable import curvature as developable
+from gso.tasks import developable, flatten
+from gso.tasks.developable.objective import TYPICAL_CURVATURE
 
 #: Lower bound on the size of a label's displacement, by which the misfit is divided.
 _LEAST = 3e-3
@@ -103,7 +103,7 @@ def _energy(task: str, batch: Batch, start: Tensor, phase: Phase, progress: floa
     first, last = phase.eps
     eps = last * (first / last) ** max(1.0 - 2.0 * progress, 0.0)
     before = whole.at_start.clamp_min(_LEAST_ENERGY)
-    typical = phase.weights.get("w_curvature", 1e-3) * developable.TYPICAL_CURVATURE
+    typical = phase.weights.get("w_curvature", 1e-3) * TYPICAL_CURVATURE
     scale = before**balance * typical ** (1.0 - balance)
     return lambda result: whole(result, eps) / scale
 

@@ -116,16 +116,16 @@ def interpolated(points: Array, controls: tuple[int, int]) -> BSplineSurface:
 
 
 def describe_spline(
-    mesh: Mesh, controls: tuple[int, int], design: Mesh, fitted: Array | None = None
+    net: Array, mesh: Mesh, design: Mesh, fitted: Array | None = None
 ) -> tuple[BSplineSurface, dict[str, Any]]:
-    """Recover the spline that a mesh samples, with its curvature and distances.
+    """Describe the spline of a solve by its curvature and distances.
 
     Parameters
     ----------
+    net : ndarray, (p, q, 3)
+        Control points.
     mesh : Mesh
-        Samples of a spline at uniform parameters.
-    controls : (int, int)
-        The spline's control points along both sides.
+        The spline's samples at uniform parameters.
     design : Mesh
         The surface that the spline should stay close to.
     fitted : ndarray, (n, 3), optional
@@ -139,7 +139,8 @@ def describe_spline(
         design's size; and distances (:class:`gso.spline.Gap`): "mesh" and "design" from the
         spline to these two, "fitted" from the first fit to its data.
     """
-    spline = interpolated(grid_of(mesh), controls)
+    controls = net.shape[0], net.shape[1]
+    spline = BSplineSurface(net, clamped_knots(controls[0]), clamped_knots(controls[1]))
     spline = replace(spline, gap=gap(spline, mesh))
     said: dict[str, Any] = {
         "controls": list(controls),

@@ -1,7 +1,7 @@
 """Tasks: one file each, found by name.
 
 A task module defines ``FORMULATIONS`` (the first is the default), an ``Options``
-dataclass with presets, ``plan(request)`` and ``metrics(...)``; see :mod:`gso.tasks.base`.
+dataclass with presets, ``plan(analysis, request)`` and ``metrics(...)``; see :mod:`gso.tasks.base`.
 """
 
 from __future__ import annotations
@@ -15,9 +15,12 @@ from gso.errors import OptionError
 from gso.spelling import choices
 
 if TYPE_CHECKING:
+    from gso.constraints import Compiled
+    from gso.mesh import Mesh
+    from gso.tasks.base import Analysis
     from gso.tasks.options import Options
 
-_SUPPORT = ("base", "constrained", "evaluation", "options", "per_component")
+_SUPPORT = ("base", "constrained", "evaluation", "imposed", "options", "per_component")
 
 
 def names() -> list[str]:
@@ -53,3 +56,21 @@ def get(name: str) -> ModuleType:
     if name not in names():
         raise OptionError(f"no task {name!r}; {choices(name, names())}")
     return importlib.import_module(f"{__name__}.{name}")
+
+
+def analyse(module: ModuleType, mesh: Mesh, constraints: Compiled) -> Analysis:
+    """Analyse a design for a task.
+
+    Parameters
+    ----------
+    module : module
+        The task.
+    mesh : Mesh
+        The design, scaled to the unit ball, with grids numbered row by row.
+    constraints : Compiled
+        Constraints on it, in the same frame and numbering.
+    """
+    from gso.tasks import base
+
+    made: Analysis = getattr(module, "Analysis", base.Analysis)(mesh, constraints)
+    return made

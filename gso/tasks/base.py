@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
+from typing import Any, Protocol
 
 from gso import parametrization
 from gso.constraints import Compiled
 from gso.energy import Limit, Weighted
+from gso.energy.losses import Loss
 from gso.mesh import Mesh
 from gso.mesh.cutting import Cut
+from gso.pattern import Pattern
 from gso.status import Status
+from gso.tasks.imposed import Imposed
 from gso.tasks.options import Options
 from gso.typing import Array
 from gso.unknowns import Layout, Variables
@@ -22,7 +26,69 @@ def same(coordinates: Array) -> Array:
     return coordinates
 
 
-@dataclass
+class Analysis:
+    """A design and its constraints, with what its plans need to know about them.
+
+    It is made once for a design; tasks derive from it. Quantities are computed when first used.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The design, scaled to the unit ball, with grids numbered row by row.
+    constraints : Compiled
+        Hard and soft constraints on it.
+    """
+
+    def __init__(self, mesh: Mesh, constraints: Compiled):
+        self.mesh, self.constraints = mesh, constraints
+
+    @cached_property
+    def imposed(self) -> Imposed:
+        """The constraints as eliminated unknowns and terms."""
+        return Imposed(self.constraints)
+
+    @cached_property
+    def opened(self) -> parametrization.Opened:
+        """The design, cut open where it closes around itself, ready to be flattened."""
+        return parametrization.opened(self.mesh)
+
+    def opened_for(self, request: Request) -> parametrization.Opened:
+        """Return the design ready to be flattened.
+
+        Constraints and warm starts refer to the vertices of the uncut design: with them it is
+        not cut.
+        """
+        if request.start is not None or not self.constraints.empty:
+            return parametrization.Opened(self.mesh)
+        return self.opened
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to solve for a design, in the unit ball.
+
+    Attributes
+    ----------
+    options : Options
+        Settings of the task.
+    formulation : str
+        Which energy to minimise.
+    start : ndarray or None
+        Warm start: (n, 3), or (n, 2) for a flat image.
+    max_displacement : float or None
+        Largest displacement of a vertex. Only tasks with bounds have it.
+    weight_factor : float
+        Factor on the weight of the task's main term (curvature, isometry), which searches vary.
+    """
+
+    options: Any
+    formulation: str
+    start: Array | None = None
+    max_displacement: float | None = None
+    weight_factor: float = 1.0
+
+
+@dataclass(frozen=True)
 class Stage:
     """One solve of a continuation or coarse-to-fine sequence.
 
@@ -32,79 +98,57 @@ class Stage:
         Name in the progress and the history.
     layout : Layout
         Blocks of its coordinates.
-    items : list of Weighted
-        Weighted terms of its objective.
+    own_items : sequence of Weighted
+        Weighted terms of its objective, without those of constraints.
     variables : callable
         Builds the unknowns from the coordinates at the start of the stage.
     enter : callable
         Maps the final coordinates of the stage before to the initial ones of this stage.
     iterations, tolerance : int, float
         Largest number of iterations, and relative decrease of the energy at which to stop.
-    eps : sequence of float
-        Smoothing of the absolute value in the terms named `robust`, one value per iteration.
-    robust : str
-        Name of the terms that use `eps`.
+    continuation : sequence of Loss
+        Losses by iteration of the terms named `continued`. The last one holds for all later
+        iterations and for the energy of the result.
+    continued : str
+        Name of the terms that `continuation` refers to.
     limits : sequence of Limit
         Bounds on the step length, such as "no triangle is inverted".
     bounds : callable, optional
         Computes the lower and upper bounds of all unknowns from the coordinates at the start of
         the stage.
-    enough : callable, optional
-        Stopping test of the continuation: tells from the coordinates at the end of the stage
-        whether the remaining stages can be skipped.
+    finished : callable, optional
+        Stopping test of the sequence: tells from the coordinates at the end of the stage whether
+        the remaining stages can be skipped.
+    imposed : Imposed, optional
+        Constraints on the stage's coordinates.
     """
 
     name: str
     layout: Layout
-    items: list[Weighted]
+    own_items: Sequence[Weighted]
     variables: Callable[[Array], Variables]
     enter: Callable[[Array], Array] = same
     iterations: int = 10
     tolerance: float = 1e-4
-    eps: Sequence[float] = ()
-    robust: str = ""
+    continuation: Sequence[Loss] = ()
+    continued: str = ""
     limits: Sequence[Limit] = ()
     bounds: Callable[[Array], tuple[Array, Array]] | None = None
-    enough: Callable[[Array], bool] | None = None
-
-
-@dataclass
-class Request:
-    """A user's problem, scaled to the unit ball, with grids numbered row by row.
-
-    Attributes
-    ----------
-    mesh : Mesh
-        The design.
-    options : Options
-        Settings of the task.
-    formulation : str
-        Which energy to minimise.
-    constraints : Compiled
-        Hard and soft constraints.
-    start : ndarray or None
-        Warm start: (n, 3), or (n, 2) for a flat image.
-    max_deviation : float or None
-        Largest distance from the design.
-    demand : float
-        Factor on the weight of the task's main term (curvature, isometry), which searches vary.
-    """
-
-    mesh: Mesh
-    options: Any
-    formulation: str
-    constraints: Compiled
-    start: Array | None = None
-    max_deviation: float | None = None
-    demand: float = 1.0
+    finished: Callable[[Array], bool] | None = None
+    imposed: Imposed | None = None
 
     @property
-    def reach(self) -> float | None:
-        """Bound on the displacement: `max_deviation`, reduced by a tiny margin for rounding."""
-        return None if self.max_deviation is None else self.max_deviation * (1.0 - 1e-7)
+    def items(self) -> list[Weighted]:
+        """All weighted terms of the objective, those of the constraints last."""
+        return [*self.own_items, *(() if self.imposed is None else self.imposed.terms)]
+
+    def unknowns(self, coordinates: Array) -> Variables:
+        """Build the unknowns, without those that hard linear constraints eliminate."""
+        variables = self.variables(coordinates)
+        return variables if self.imposed is None else self.imposed.eliminate(variables)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Plan:
     """Stages to solve, or a result that needs no solve.
 
@@ -114,12 +158,12 @@ class Plan:
         Blocks of the result: "surface", "flat", or both.
     start : ndarray
         Coordinates before the first stage.
-    stages : list of Stage
+    stages : sequence of Stage
         Solved in order. The energy of the result is the objective of the last one solved.
     status : Status, optional
         Status of the result where the task knows it beforehand, as for a design that is good
         already.
-    notes : list of str
+    notes : sequence of str
         Messages to the user.
     details : dict
         Numbers that the task adds to the result.
@@ -129,14 +173,14 @@ class Plan:
     finish : callable
         Post-processing of the coordinates that leaves the objective unchanged, such as the
         placement of a flat image.
-    remark : callable, optional
+    result_notes : callable, optional
         Computes more messages to the user from the coordinates of the result.
     spline : (int, int), optional
         Control points along both sides, if the last stage makes the surface a B-spline.
-    unstarted : callable, optional
+    cold_start : callable, optional
         With a warm start: computes the coordinates, in the layout of the last stage, from which
         a cold start would begin.
-    refused : str
+    start_refused : str
         Why the user's start is not used; empty if it is.
     cut : Cut, optional
         The cuts made to open the design. The flat image is then that of the cut mesh, in its
@@ -145,35 +189,90 @@ class Plan:
 
     layout: Layout
     start: Array
-    stages: list[Stage] = field(default_factory=list)
+    stages: Sequence[Stage] = ()
     status: Status | None = None
-    notes: list[str] = field(default_factory=list)
+    notes: Sequence[str] = ()
     details: dict[str, Any] = field(default_factory=dict)
     finish: Callable[[Array], Array] = same
     fallback: Array | None = None
-    remark: Callable[[Array], list[str]] | None = None
+    result_notes: Callable[[Array], list[str]] | None = None
     spline: tuple[int, int] | None = None
-    unstarted: Callable[[], Array] | None = None
-    refused: str = ""
+    cold_start: Callable[[], Array] | None = None
+    start_refused: str = ""
     cut: Cut | None = None
 
-    def entered(self) -> Array:
-        """Compute the initial coordinates of the last stage if no stage before it is solved."""
-        coordinates = self.start
-        for stage in self.stages:
-            coordinates = stage.enter(coordinates)
-        return coordinates
 
+@dataclass
+class Solution:
+    """Final coordinates of a plan, with their status and energy.
 
-def open_up(request: Request) -> parametrization.Opened:
-    """Cut the design open where it closes around itself, ready to be flattened.
-
-    Constraints and warm starts refer to the vertices of the uncut design: with them it is not
-    cut.
+    Attributes
+    ----------
+    blocks : dict of str to ndarray
+        The result's blocks of coordinates by name.
+    status : Status
+        Why the solve ended.
+    energy : dict of str to float
+        The objective by term.
+    backend : str
+        Linear backend of the last stage.
+    notes, details
+        As in the plan.
+    spline : ndarray, (p, q, 3), optional
+        Control points, where the unknowns of the last stage were those of a B-spline surface.
+    fitted : ndarray, (n, 3), optional
+        Vertices that the first spline of that stage was fitted to.
+    cut : Cut, optional
+        As in the plan.
+    stage : Stage, optional
+        The stage that was solved last; None if none was.
+    coordinates : ndarray
+        Coordinates at its end, before the plan's post-processing.
     """
-    if request.start is not None or not request.constraints.empty:
-        return parametrization.Opened(request.mesh)
-    return parametrization.opened(request.mesh)
+
+    blocks: dict[str, Array]
+    status: Status
+    energy: dict[str, float]
+    coordinates: Array
+    backend: str = ""
+    notes: tuple[str, ...] = ()
+    details: dict[str, Any] = field(default_factory=dict)
+    spline: Array | None = None
+    fitted: Array | None = None
+    cut: Cut | None = None
+    stage: Stage | None = None
+
+    @property
+    def points(self) -> Array:
+        """Its surface (n, 3), or its flat image (n, 2) where it has no surface."""
+        return self.blocks["surface"] if "surface" in self.blocks else self.blocks["flat"]
 
 
-__all__ = ["Options", "Plan", "Request", "Stage", "open_up", "same"]
+class Runner(Protocol):
+    """Solver of the requests of one task for one design, as a search sees it."""
+
+    analysis: Any
+
+    def __call__(self, request: Request) -> Solution:
+        """Plan and solve."""
+
+    def usable_start(self, *requests: Request) -> bool:
+        """Return whether the start of these requests, which differ in bounds, is to be used."""
+
+    def moved(self, solution: Solution, blocks: dict[str, Array]) -> Solution:
+        """Return a solution at other coordinates, with the energy that they have."""
+
+    def lay_out(self, surface: Mesh) -> Pattern | None:
+        """Flatten a surface; None where it cannot be flattened."""
+
+
+__all__ = [
+    "Analysis",
+    "Options",
+    "Plan",
+    "Request",
+    "Runner",
+    "Solution",
+    "Stage",
+    "same",
+]

@@ -29,11 +29,11 @@ from gso.energy import Weighted, bending, congruence
 from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.status import Status
-from gso.tasks import constrained, per_component
-from gso.tasks.base import Plan, Request, Stage
+from gso.tasks import per_component
+from gso.tasks.base import Analysis, Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.typing import Array
-from gso.unknowns import Layout
+from gso.unknowns import Layout, free
 
 FORMULATIONS = ("isometry",)
 
@@ -50,7 +50,7 @@ class Options(BaseOptions):
     w_bending : float
         Weight of the mean squared change of curvature, in units of the design's unit ball. It
         is about the strain that remains in a sheet for which a strain-free shape exists.
-    stiff : float
+    w_bending_start : float
         Approximate bending weight of the first stage; it falls tenfold from stage to stage down
         to `w_bending`. Not used with `x0`.
     w_edges : float
@@ -58,6 +58,7 @@ class Options(BaseOptions):
         diagonals.
     """
 
+    RENAMED: ClassVar[dict[str, str]] = {"stiff": "w_bending_start"}
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
         "fast": {"w_bending": 1e-5, "tolerance": 1e-2},
         "balanced": {},
@@ -68,7 +69,7 @@ class Options(BaseOptions):
     tolerance: float = 1e-4
     method: str = "levenberg-marquardt"
     w_bending: float = 1e-6
-    stiff: float = 1e-2
+    w_bending_start: float = 1e-2
     w_edges: float = 0.1
 
     def __post_init__(self) -> None:
@@ -80,31 +81,30 @@ class Options(BaseOptions):
             )
 
 
-def plan(request: Request) -> Plan:
+def plan(analysis: Analysis, request: Request) -> Plan:
     """Plan stages of falling bending weight, from a surface that follows its handles smoothly."""
-    mesh, options = request.mesh, request.options
+    mesh, options = analysis.mesh, request.options
     layout = Layout.of(len(mesh.vertices), "surface")
-    if request.constraints.empty and request.start is None:
+    if analysis.constraints.empty and request.start is None:
         return Plan(layout, mesh.vertices.ravel(), status=Status.ALREADY_GOOD)
     weights = [options.w_bending]
-    while request.start is None and weights[-1] < 0.3 * options.stiff:
+    while request.start is None and weights[-1] < 0.3 * options.w_bending_start:
         weights.append(10.0 * weights[-1])
     lengths = per_component.objective(mesh, partial(_lengths, options))
     change = per_component.objective(mesh, _change)
-    pulls = constrained.pulls(request)
     stages = [
         Stage(
             f"bending {weight:.0e}",
             layout,
-            [*lengths, *(replace(item, weight=weight) for item in change), *pulls],
-            partial(constrained.unknowns, request, layout),
+            [*lengths, *(replace(item, weight=weight) for item in change)],
+            lambda _: free(layout),
             iterations=options.iterations,
-            tolerance=_NEARLY,
+            tolerance=options.tolerance if weight is weights[0] else _NEARLY,
+            imposed=analysis.imposed,
         )
         for weight in weights[::-1]
     ]
-    stages[-1].tolerance = options.tolerance
-    return Plan(layout, _start(request).ravel(), stages)
+    return Plan(layout, _start(analysis, request).ravel(), stages)
 
 
 def _lengths(options: Options, mesh: Mesh) -> list[Weighted]:
@@ -116,10 +116,10 @@ def _change(mesh: Mesh) -> list[Weighted]:
     return [Weighted(t, 1.0) for t in bending.build(mesh)]
 
 
-def _start(request: Request) -> Array:
+def _start(analysis: Analysis, request: Request) -> Array:
     """Move the vertices of the design, or of the user's start, smoothly with the handles."""
-    mesh = request.mesh
-    ids, targets = request.constraints.places
+    mesh = analysis.mesh
+    ids, targets = analysis.constraints.places
     if request.start is not None:
         mesh = mesh.replaced(request.start)
         return mesh.vertices + Spread(mesh, ids)(targets - mesh.vertices[ids])

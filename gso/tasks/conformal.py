@@ -22,12 +22,13 @@ import numpy as np
 
 from gso import metrics as measure
 from gso import parametrization
+from gso.constraints import Compiled
 from gso.energy import Weighted, congruence, scale, shear
 from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.parametrization import orientation
 from gso.tasks import constrained, per_component
-from gso.tasks.base import Plan, Request, Stage, open_up
+from gso.tasks.base import Analysis, Plan, Request, Stage
 from gso.tasks.options import Options as BaseOptions
 from gso.typing import Array
 from gso.unknowns import Layout, free
@@ -73,7 +74,7 @@ class Options(BaseOptions):
             )
 
 
-def plan(request: Request) -> Plan:
+def plan(analysis: Analysis, request: Request) -> Plan:
     """Plan one stage, from an image without inverted triangles; more under constraints.
 
     Raises
@@ -81,10 +82,9 @@ def plan(request: Request) -> Plan:
     MeshError
         A component is closed or has handles: it must be cut open first.
     """
-    options = request.options
-    opened = open_up(request)
-    request = replace(request, mesh=opened.mesh)
-    mesh = request.mesh
+    options, constraints = request.options, analysis.constraints
+    opened = analysis.opened_for(request)
+    mesh = opened.mesh
     layout = Layout((("flat", len(mesh.vertices), 2), ("scale", len(mesh.faces), 1)))
     given, refused = parametrization.given(mesh, request.start)
     flat = given
@@ -102,16 +102,19 @@ def plan(request: Request) -> Plan:
         limits=[orientation.orientation(parametrization.upward(mesh), layout)],
     )
     stages = [stage]
-    if not request.constraints.empty:
-        flat = parametrization.align(mesh, flat, request.constraints)
-        stages = [*constrained.drawing(request, stage), constrained.keeping(request, stage)]
+    if not constraints.empty:
+        flat = parametrization.align(mesh, flat, constraints)
+        stages = [
+            *constrained.gradual(constraints, stage),
+            replace(stage, imposed=analysis.imposed),
+        ]
     return Plan(
         layout,
         layout.pack({"flat": flat, "scale": _area_ratios(mesh, flat)}),
         stages,
-        notes=list(opened.notes),
-        finish=partial(_finish, request, opened, layout, given),
-        refused=refused,
+        notes=opened.notes,
+        finish=partial(_finish, constraints, opened, layout, given),
+        start_refused=refused,
         cut=opened.cut,
     )
 
@@ -129,7 +132,7 @@ def _area_ratios(mesh: Mesh, flat: Array) -> Array:
 
 
 def _finish(
-    request: Request,
+    constraints: Compiled,
     opened: parametrization.Opened,
     layout: Layout,
     given: Array | None,
@@ -143,11 +146,11 @@ def _finish(
     """
     blocks = layout.split(coordinates)
     flat, ratio = blocks["flat"], blocks["scale"]
-    if not request.constraints.empty:
-        flat = parametrization.settle(request.mesh, flat, request.constraints)
+    if not constraints.empty:
+        flat = parametrization.settle(opened.mesh, flat, constraints)
     else:
-        factor = measure.area(request.mesh) / measure.area(request.mesh, flat)
-        flat = parametrization.place(request.mesh, flat * np.sqrt(factor), given)
+        factor = measure.area(opened.mesh) / measure.area(opened.mesh, flat)
+        flat = parametrization.place(opened.mesh, flat * np.sqrt(factor), given)
         ratio = ratio * factor
     lengths = np.sqrt(np.maximum(ratio, 0.0))
     return layout.pack({"flat": opened.back(flat), "scale": opened.faces_back(lengths)})

@@ -17,7 +17,7 @@ from gso.mesh import Mesh
 from gso.smoothing import smooth_grid, smooth_mesh
 from gso.status import Status
 from gso.tasks import constrained
-from gso.tasks.base import Plan, Request
+from gso.tasks.base import Analysis, Plan, Request
 from gso.tasks.options import Options as BaseOptions
 from gso.typing import Array
 from gso.unknowns import Layout
@@ -48,28 +48,27 @@ class Options(BaseOptions):
     weight: float | None = None
 
 
-def plan(request: Request) -> Plan:
+def plan(analysis: Analysis, request: Request) -> Plan:
     """Smooth the surface, unless a start is given, and plan a stage for the constraints if any."""
-    mesh, options = request.mesh, request.options
+    mesh, options = analysis.mesh, request.options
     if request.start is None:
-        points, details = _smoothed(request)
+        points, details = _smoothed(mesh, request)
     else:
         points, details = request.start, {}
     points = np.where(mesh.used[:, None], points, mesh.vertices)
-    bound = not request.constraints.empty
-    stages = [constrained.approach(request, points, iterations=options.iterations)] if bound else []
+    free = analysis.constraints.empty
     return Plan(
         Layout.of(len(points), "surface"),
         points.ravel(),
-        stages,
-        status=None if bound else Status.CONVERGED,
+        [] if free else [constrained.approach(analysis, points, iterations=options.iterations)],
+        status=Status.CONVERGED if free else None,
         details=details,
     )
 
 
-def _smoothed(request: Request) -> tuple[Array, dict[str, Any]]:
+def _smoothed(mesh: Mesh, request: Request) -> tuple[Array, dict[str, Any]]:
     """Compute smoothed vertices (n, 3), and the order, weight, sigma and degrees of freedom."""
-    mesh, options = request.mesh, request.options
+    options = request.options
     settings = {
         "order": options.order,
         "weight": options.weight,

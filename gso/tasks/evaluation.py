@@ -8,6 +8,7 @@ from gso import metrics as measure
 from gso import tasks
 from gso.components import Component, combined, several, split
 from gso.mesh import Mesh
+from gso.pattern import Pattern
 from gso.typing import Array
 
 
@@ -50,3 +51,8 @@ def measured(task: str, design: Mesh, after: Mesh, flat: Array | None) -> dict[s
         for part in parts
     ]
     return combined(found, [part.area for part in parts])
+
+
+def largest_strain(surface: Mesh, pattern: Pattern) -> float:
+    """Return the largest principal strain max |s - 1| of a surface in its pattern."""
+    return float(measure.principal_strains(pattern.surface(surface), pattern.flat).values.max())

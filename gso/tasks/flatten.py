@@ -19,6 +19,7 @@ import numpy as np
 
 from gso import metrics as measure
 from gso import parametrization
+from gso.constraints import Compiled
 from gso.energy import (
     Weighted,
     christoffel,
@@ -36,12 +37,12 @@ from gso.hierarchy import coarser
 from gso.mesh import Mesh
 from gso.parametrization import orientation
 from gso.tasks import constrained, per_component
-from gso.tasks.base import Plan, Request, Stage, open_up, same
-from gso.tasks.developable.isometry import lengths_remark
+from gso.tasks.base import Analysis, Plan, Request, Stage, same
+from gso.tasks.developable.isometry import length_notes
 from gso.tasks.evaluation import parted
 from gso.tasks.options import Options as BaseOptions
 from gso.typing import Array
-from gso.unknowns import Layout, Variables, free
+from gso.unknowns import Layout, free
 
 FORMULATIONS = ("strain", "lengths", "isometry")
 #: The formulation that a preset belongs to.
@@ -128,7 +129,7 @@ class Options(BaseOptions):
             raise OptionError(f"coarse_size is {self.coarse_size}; it must be 4 or more")
 
 
-def plan(request: Request) -> Plan:
+def plan(analysis: Analysis, request: Request) -> Plan:
     """Plan the stages of the solve, from an image without inverted triangles.
 
     Raises
@@ -136,32 +137,31 @@ def plan(request: Request) -> Plan:
     MeshError
         A component is closed or has handles: it must be cut open first.
     """
-    options = request.options
-    opened = open_up(request)
-    request = replace(request, mesh=opened.mesh)
-    mesh = request.mesh
-    grid = mesh.grid_index is not None and request.constraints.empty
+    options, constraints = request.options, analysis.constraints
+    opened = analysis.opened_for(request)
+    mesh = opened.mesh
+    grid = mesh.grid_index is not None and constraints.empty
     levels = [*(coarser(mesh, options.coarse_size) if grid else []), mesh]
     start = parametrization.begin(
         levels[0], iterations=options.relax_iterations, doubtful=opened.doubtful
     )
     notes = [*opened.notes, *_remarks(mesh, start.level)]
     given, refused = parametrization.given(mesh, request.start)
-    strained = given is not None and parametrization.strain(mesh, given) > _STRAINED * start.level
-    below = levels
-    if given is not None:
-        levels = [mesh]
-    stages = _stages(request, levels, max(start.level, _SMALLEST_LEVEL))
-    if given is not None:
-        stages = stages[-1:]
+    typical = max(start.level, _SMALLEST_LEVEL)
+    if given is None:
+        stages = _stages(request, levels, typical)
+    else:
+        stages = _stages(request, [mesh], typical)[-1:]
+        strained = parametrization.strain(mesh, given) > _STRAINED * start.level
         if strained and request.formulation == "strain":
             stages = [_strain_stage(replace(options, norm="l2"), mesh, 1.0), *stages]
     first = start.flat if given is None else given
     finish = partial(_finish, opened, given)
-    if not request.constraints.empty:
-        first = parametrization.align(mesh, first, request.constraints)
-        stages = _bound(request, stages)
-        finish = partial(_settle, request)
+    if not constraints.empty:
+        first = parametrization.align(mesh, first, constraints)
+        stages = _constrained(analysis, request, stages)
+        finish = partial(_settle, mesh, constraints)
+    cold = partial(_cold, levels, constraints, start.flat)
     return Plan(
         Layout.of(len(mesh.vertices), "flat"),
         first.ravel(),
@@ -169,9 +169,9 @@ def plan(request: Request) -> Plan:
         notes=notes,
         details={"strain_level": start.level},
         finish=finish,
-        remark=partial(_remark, opened) if request.formulation == "isometry" else None,
-        unstarted=None if given is None else partial(_unstarted, request, below, start.flat),
-        refused=refused,
+        result_notes=partial(_notes, opened) if request.formulation == "isometry" else None,
+        cold_start=None if given is None else cold,
+        start_refused=refused,
         cut=opened.cut,
     )
 
@@ -181,24 +181,24 @@ def _finish(opened: parametrization.Opened, given: Array | None, coordinates: Ar
     return opened.back(_place(opened.mesh, given, coordinates).reshape(-1, 2)).ravel()
 
 
-def _remark(opened: parametrization.Opened, coordinates: Array) -> list[str]:
+def _notes(opened: parametrization.Opened, coordinates: Array) -> list[str]:
     surface = opened.mesh if opened.cut is None else opened.cut.mesh
-    return lengths_remark(surface, coordinates.reshape(-1, 2))
+    return length_notes(surface, coordinates.reshape(-1, 2))
 
 
-def _bound(request: Request, stages: list[Stage]) -> list[Stage]:
+def _constrained(analysis: Analysis, request: Request, stages: list[Stage]) -> list[Stage]:
     """Plan stages under constraints: first soft with growing weight, then as they are given."""
-    even = _strain_stage(replace(request.options, norm="l2"), request.mesh, 1.0)
-    steps = constrained.drawing(request, replace(even, iterations=30))
-    return [*steps, *(constrained.keeping(request, stage) for stage in (even, *stages))]
+    even = _strain_stage(replace(request.options, norm="l2"), analysis.mesh, 1.0)
+    steps = constrained.gradual(analysis.constraints, replace(even, iterations=30))
+    return [*steps, *(replace(stage, imposed=analysis.imposed) for stage in (even, *stages))]
 
 
-def _settle(request: Request, coordinates: Array) -> Array:
+def _settle(mesh: Mesh, constraints: Compiled, coordinates: Array) -> Array:
     """Place the parts of a constrained image that no constraint anchors; keep the others."""
-    mesh, flat = request.mesh, coordinates.reshape(-1, 2)
-    if not request.constraints.anchored and len(parametrization.parts(mesh)) == 1:
+    flat = coordinates.reshape(-1, 2)
+    if not constraints.anchored and len(parametrization.parts(mesh)) == 1:
         return _place(mesh, None, coordinates)
-    return parametrization.settle(mesh, flat, request.constraints).ravel()
+    return parametrization.settle(mesh, flat, constraints).ravel()
 
 
 def _remarks(mesh: Mesh, level: float) -> list[str]:
@@ -220,14 +220,15 @@ def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
     """Plan coarse-to-fine stages, the last of which has the objective of the formulation."""
     options, mesh = request.options, levels[-1]
     even = options if options.norm != "l1" else replace(options, norm="mixed")
-    stages = [_strain_stage(even, m, level) for m in levels]
-    for below, above, stage in zip(levels, levels[1:], stages[1:], strict=False):
-        stage.enter = partial(_refine, below, above)
+    stages = [_strain_stage(even, levels[0], level)]
+    for below, above in pairwise(levels):
+        enter = partial(_refine, below, above)
+        stages.append(replace(_strain_stage(even, above, level), enter=enter))
     if request.formulation == "lengths":
         lengths = _length_stage(options, mesh, level)
         if len(levels) > 1:
             # The interpolated coarser image is close enough: no strain stage on this grid.
-            lengths.enter = stages.pop().enter
+            lengths = replace(lengths, enter=stages.pop().enter)
         stages.append(lengths)
     elif request.formulation == "isometry":
         stages.append(_isometry_stage(options, mesh))
@@ -235,7 +236,9 @@ def _stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
         stages.append(_strain_stage(options, mesh, level))
     # On meshes that are not grids the last stage starts farther from the minimum.
     closer = 1.0 if levels[-1].grid_index is not None else 0.2
-    stages[-1].iterations, stages[-1].tolerance = options.iterations, closer * options.tolerance
+    stages[-1] = replace(
+        stages[-1], iterations=options.iterations, tolerance=closer * options.tolerance
+    )
     if request.formulation == "strain" and level > _FAR_FROM_FLAT:
         stages = [*stages[:-1], *_unsqueezing(mesh, stages[-1])]
     return stages
@@ -251,7 +254,7 @@ def _unsqueezing(mesh: Mesh, last: Stage) -> list[Stage]:
     before = [
         replace(
             last,
-            items=[*last.items, *(Weighted(t, weight) for t in resistance)],
+            own_items=[*last.own_items, *(Weighted(t, weight) for t in resistance)],
             enter=last.enter if k == 0 else same,
             tolerance=_NEARLY,
         )
@@ -305,7 +308,8 @@ def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:
     stage = _stage("lengths", mesh, items)
     if options.norm == "l2":
         return stage
-    return replace(stage, eps=(10.0 * eps, eps), robust="isometry")
+    losses = (Absolute(10.0 * eps), Absolute(eps))
+    return replace(stage, continuation=losses, continued="isometry")
 
 
 def _length_terms(options: Options, level: float, eps: float, mesh: Mesh) -> list[Weighted]:
@@ -342,22 +346,18 @@ def _stage(name: str, mesh: Mesh, items: list[Weighted]) -> Stage:
         name,
         layout,
         items,
-        partial(_unknowns, layout),
+        lambda _: free(layout),
         tolerance=_NEARLY,
         limits=[orientation.orientation(parametrization.upward(mesh), layout)],
     )
 
 
-def _unknowns(layout: Layout, coordinates: Array) -> Variables:
-    return free(layout)
-
-
-def _unstarted(request: Request, levels: list[Mesh], flat: Array) -> Array:
+def _cold(levels: list[Mesh], constraints: Compiled, flat: Array) -> Array:
     """Interpolate the image of the coarsest grid to the finest and align it to constraints."""
     for coarse, fine in pairwise(levels):
         flat = parametrization.refine(coarse, fine, flat)
-    if not request.constraints.empty:
-        flat = parametrization.align(levels[-1], flat, request.constraints)
+    if not constraints.empty:
+        flat = parametrization.align(levels[-1], flat, constraints)
     return flat.ravel()
 
 

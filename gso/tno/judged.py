@@ -6,10 +6,11 @@ import time
 
 import numpy as np
 
+from gso.constraints import Compiled
+from gso.mesh import Mesh
 from gso.metrics import nonplanarity
 from gso.result import Result
 from gso.status import Status
-from gso.tasks.base import Request
 from gso.tno.layout import lay_out
 from gso.verdict import Asked, judge
 
@@ -18,12 +19,12 @@ from gso.verdict import Asked, judge
 _PLANAR, _BENT = 1e-6, 1e-3
 
 
-def asked_of(request: Request, scale: float, **limits: float | None) -> Asked:
-    """Gather what the user asked for, in the user's unit, from a request in the unit ball.
+def requirements(mesh: Mesh, compiled: Compiled, scale: float, **limits: float | None) -> Asked:
+    """Gather what a result has to meet, in the user's unit.
 
-    `moved` is the design's largest violation of the constraints.
+    Design and constraints are the solver's, in the unit ball of radius `scale`. `moved` is the
+    design's largest violation of the constraints.
     """
-    compiled, mesh = request.constraints, request.mesh
     moved = 0.0
     if not compiled.empty and not compiled.flat:
         misses = compiled.misses(mesh.vertices).values()

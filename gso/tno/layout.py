@@ -7,7 +7,8 @@ from gso.constraints import Compiled
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.tasks.base import Request
+from gso.tasks.base import Analysis, Request
+from gso.tasks.evaluation import largest_strain
 from gso.tno.normalise import Canonical
 from gso.tno.run import Run
 
@@ -50,9 +51,9 @@ def lay_out(
     if not parametrization.flattens(surface):
         return given
     frame = Canonical(surface)
-    request = Request(frame.mesh, flatten.Options.preset(options), "strain", Compiled(flat=True))
+    analysis = Analysis(frame.mesh, Compiled(flat=True))
     try:
-        outcome = Run(flatten, None)(request)
+        outcome = Run(flatten, analysis)(Request(flatten.Options.preset(options), "strain"))
     except MeshError:
         return given
     flat = outcome.points * frame.frame.scale
@@ -65,12 +66,6 @@ def lay_out(
     if given is not None and largest_strain(surface, given) <= largest_strain(surface, found):
         return given
     return found
-
-
-def largest_strain(surface: Mesh, pattern: Pattern) -> float:
-    """Return the largest principal strain max |s - 1| of a surface in its pattern."""
-    values = metrics.principal_strains(pattern.surface(surface), pattern.flat).values
-    return float(values.max())
 
 
 def strains_of(surface: Mesh) -> dict[str, float]:

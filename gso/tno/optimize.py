@@ -5,16 +5,16 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from gso import linalg, parametrization, tasks
+from gso import linalg, tasks
 from gso.components import several
-from gso.constraints import TIGHT, Constraint, compile_constraints
+from gso.constraints import TIGHT, Compiled, Constraint, compile_constraints
 from gso.errors import ConvergenceWarning, OptionError
 from gso.mesh import Mesh
 from gso.pattern import Pattern
@@ -22,13 +22,13 @@ from gso.result import Result
 from gso.spelling import known_keywords
 from gso.spline.fit import describe_spline
 from gso.status import Status
-from gso.tasks.base import Options, Request
+from gso.tasks.base import Options, Request, Solution
 from gso.tno import components
 from gso.tno.job import Job
-from gso.tno.judged import asked_of, judged, warning
+from gso.tno.judged import judged, requirements, warning
+from gso.tno.layout import lay_out
 from gso.tno.normalise import Canonical
-from gso.tno.run import Outcome, Run
-from gso.tno.search import of_curvature, of_strain, reach, stay_within, strain_left
+from gso.tno.run import Run
 from gso.tno.solver import Callback
 from gso.tno.start import Start
 
@@ -121,27 +121,21 @@ def optimize(
     clock = time.perf_counter()
     from gso.io import as_mesh
 
-    design, given_formulation = as_mesh(mesh), formulation
+    design = as_mesh(mesh)
     design.check_joined()
-    module, formulation, settings = check(
-        task, formulation, options, max_deviation, target_curvature, max_strain
-    )
-    given = x0 if isinstance(x0, Start) else Start(x0)
-    if given.iterations is not None:
-        for name, value in (("target_curvature", target_curvature), ("max_strain", max_strain)):
-            if value is not None:
-                raise OptionError(
-                    f"{name} takes many solves, which the iterations of a start would cut off; "
-                    "leave one of them out"
-                )
-    flat = getattr(module, "BLOCK", "surface") == "flat"
-    whole = Job(design, compile_constraints(constraints, design, flat=flat), given)
-    wanted = {
+    bounds = {
         "max_deviation": max_deviation,
         "max_strain": max_strain,
         "target_curvature": target_curvature,
     }
-    one = partial(_solved, task, formulation, given_formulation, settings, wanted, verdict)
+    module, chosen, settings = check(task, formulation, options, **bounds)
+    given = x0 if isinstance(x0, Start) else Start(x0)
+    flat = getattr(module, "BLOCK", "surface") == "flat"
+    whole = Job(design, compile_constraints(constraints, design, flat=flat), given)
+    asked = Asked(task, chosen, settings, bounds, formulation is not None, verdict)
+    if given.iterations is not None and asked.bounded:
+        module.check_iterations(bounds)
+    one = partial(_solved, asked)
     pieces = components.parts(design, whole.constraints)
     if pieces:
         result = components.solve(one, whole, pieces, callback)
@@ -153,103 +147,72 @@ def optimize(
     return result
 
 
-def _solved(
-    task: str,
-    formulation: str,
-    given_formulation: str | None,
-    settings: Options,
-    wanted: dict[str, float | None],
-    verdict: bool,
-    job: Job,
-    callback: Callback | None,
-) -> Result:
+@dataclass(frozen=True)
+class Asked:
+    """What the user asked for, with checked options.
+
+    Attributes
+    ----------
+    task, formulation, options
+        As for :func:`optimize`.
+    bounds : dict
+        Bounds on the result by name, in the user's unit; None where there is none.
+    formulation_given : bool
+        Whether the user named the formulation.
+    verdict : bool
+        Whether to judge the result.
+    """
+
+    task: str
+    formulation: str
+    options: Options
+    bounds: dict[str, float | None]
+    formulation_given: bool
+    verdict: bool
+
+    @property
+    def bounded(self) -> bool:
+        """Whether there is any bound."""
+        return any(value is not None for value in self.bounds.values())
+
+
+def _solved(asked: Asked, job: Job, callback: Callback | None) -> Result:
     """Solve one job: a single component, or several that constraints join."""
-    module, given = tasks.get(task), job.start
+    module, given = tasks.get(asked.task), job.start
     frame = Canonical(job.design, job.names)
+    unit = frame.frame.scale
     flat = job.constraints.flat
-    request = Request(
-        frame.mesh,
-        settings,
-        formulation,
-        frame.constraints(job.constraints, flat=flat),
-        start=frame.start(given.points, flat=flat),
-    )
+    compiled = frame.constraints(job.constraints, flat=flat)
+    analysis = tasks.analyse(module, frame.mesh, compiled)
     run = Run(
         module,
+        analysis,
         callback,
         guarded=given.guarded,
         budget=given.iterations,
         tolerance=given.tolerance,
+        lay_out=lay_out,
     )
-    bound = wanted["max_deviation"]
-    outcome, request = _searched(
-        run,
-        request,
-        None if bound is None else bound / frame.frame.scale,
-        wanted["max_strain"],
-        wanted["target_curvature"],
-        others=others(request, given_formulation),
-    )
-    formulation = request.formulation
-    judge(request, frame, outcome)
-    result = packed(task, formulation, job.design, frame, outcome, run)
+    request = Request(asked.options, asked.formulation, frame.start(given.points, flat=flat))
+    if asked.bounded:
+        solution, formulation = module.search(
+            run, request, asked.bounds, unit, others=not asked.formulation_given
+        )
+    else:
+        if not run.usable_start(request):
+            request = replace(request, start=None)
+        solution, formulation = run(request), asked.formulation
+    record_violations(compiled, frame, solution)
+    result = packed(asked.task, formulation, job.design, frame, solution, run)
     if several(job.design):
         result.notes += ("its components are joined by constraints and solved together",)
-    if run.refused:
-        result.notes += (f"the start ({given.source}) was not used: {run.refused}",)
+    if run.start_refused:
+        result.notes += (f"the start ({given.source}) was not used: {run.start_refused}",)
     elif given.points is not None:
         result.warm_start = given.source
-    if verdict:
-        result = judged(result, asked_of(request, frame.frame.scale, **wanted))
+    if asked.verdict:
+        result = judged(result, requirements(frame.mesh, compiled, unit, **asked.bounds))
     return result
-
-
-def _searched(
-    run: Run,
-    request: Request,
-    bound: float | None,
-    max_strain: float | None,
-    target_curvature: float | None,
-    *,
-    others: Sequence[Request],
-) -> tuple[Outcome, Request]:
-    """Solve once, or search for the given bounds; return the outcome and its request.
-
-    If a bound on distance or strain is missed, the other formulations are tried too.
-    """
-    if target_curvature is not None:
-        return reach(run, request, of_curvature(request, target_curvature))[0], request
-    if bound is None and max_strain is None:
-        return run(request), request
-    best: Any = None
-    least, chosen = np.inf, request
-    for asked in (request, *others):
-        if bound is not None:
-            outcome, met = stay_within(run, asked, bound, max_strain)
-        else:
-            outcome, met = reach(run, asked, of_strain(asked, max_strain))  # type: ignore[arg-type]
-        if best is not None or not met:
-            value = strain_left(asked, outcome)
-        if best is None or met or value < least:
-            best, chosen = outcome, asked
-        if met:
-            break
-        least = min(least, value)
-    return best, chosen
-
-
-def others(request: Request, formulation: str | None) -> list[Request]:
-    """Return a request for "isometry", if the user named no formulation and it is applicable.
-
-    It is for meshes that can be flattened, without hard constraints, B-splines or options of
-    another formulation than "curvature".
-    """
-    kind = tasks.get("developable").OPTIONS
-    usual = type(request.options) is kind["curvature"] and request.options.variables != "surface"
-    hard = any(part.hard for part in request.constraints.parts)
-    if formulation is not None or not usual or hard or not parametrization.flattens(request.mesh):
-        return []
-    return [replace(request, formulation="isometry", options=kind["isometry"](), start=None)]
 
 
 def check(
@@ -287,34 +250,29 @@ def check(
     for name, value in bounds.items():
         if value is None:
             continue
-        if task != "developable":
+        if not hasattr(module, "check_bounds"):
             raise OptionError(f"{name} belongs to task 'developable', not {task!r}")
-        if name == "target_curvature" and formulation != "curvature":
-            raise OptionError(f"{name} belongs to the formulation 'curvature', not {formulation!r}")
         if not (isinstance(value, int | float | np.number) and 0 < value < np.inf):
             raise OptionError(f"{name} is {value!r}; it must be a positive number")
-    if target_curvature is not None:
-        for name in ("max_deviation", "max_strain"):
-            if bounds[name] is not None:
-                raise OptionError(f"give {name} or target_curvature, not both")
+    if any(value is not None for value in bounds.values()):
+        module.check_bounds(formulation, bounds)
     return module, formulation, settings
 
 
-def judge(request: Request, frame: Canonical, outcome: Outcome) -> None:
+def record_violations(compiled: Compiled, frame: Canonical, solution: Solution) -> None:
     """Record the violation of each constraint, in the user's unit; note missed hard ones."""
-    compiled = request.constraints
     if not compiled.names:
         return
     unit = frame.frame.scale
-    misses = compiled.misses(outcome.blocks[compiled.block])
+    misses = compiled.misses(solution.blocks[compiled.block])
     lengths = {name: unit * miss.length for name, miss in misses.items()}
-    outcome.details = {**outcome.details, "constraints": lengths}
+    solution.details = {**solution.details, "constraints": lengths}
     broken = [k for k, miss in misses.items() if miss.hard and not miss.length <= TIGHT]
     for name in broken:
         where = ", ".join(map(str, frame.names[misses[name].vertices]))
-        outcome.notes += (f"{name} is missed by {lengths[name]:.3g} (vertices {where})",)
-    if broken and outcome.status is not Status.CANCELLED:
-        outcome.status = Status.CONSTRAINTS_MISSED
+        solution.notes += (f"{name} is missed by {lengths[name]:.3g} (vertices {where})",)
+    if broken and solution.status is not Status.CANCELLED:
+        solution.status = Status.CONSTRAINTS_MISSED
 
 
 def packed(
@@ -322,19 +280,19 @@ def packed(
     formulation: str,
     design: Mesh,
     frame: Canonical,
-    outcome: Outcome,
+    solution: Solution,
     run: Run,
 ) -> Result:
-    """Convert an outcome to a result in the user's frame and numbering."""
+    """Convert a solution to a result in the user's frame and numbering."""
     # The numbering of a cut mesh begins with the user's.
-    own = {"flat"} if outcome.cut is not None else set()
-    blocks = {k: x if k in own else frame.back(k, x) for k, x in outcome.blocks.items()}
+    own = {"flat"} if solution.cut is not None else set()
+    blocks = {k: x if k in own else frame.back(k, x) for k, x in solution.blocks.items()}
     flat = blocks["flat"] * frame.frame.scale if "flat" in blocks else None
     pattern = None
-    if outcome.cut is not None and flat is not None:
-        pattern = Pattern(flat, outcome.cut.mesh.faces, outcome.cut.vertex, outcome.cut.seams)
+    if solution.cut is not None and flat is not None:
+        pattern = Pattern(flat, solution.cut.mesh.faces, solution.cut.vertex, solution.cut.seams)
         flat = None
-    if outcome.status is Status.ALREADY_GOOD:
+    if solution.status is Status.ALREADY_GOOD:
         mesh = design
     elif "surface" in blocks:
         mesh = design.replaced(frame.frame.to_user(blocks["surface"]))
@@ -343,13 +301,13 @@ def packed(
     else:
         mesh = design.replaced(np.c_[flat, np.zeros(len(design.vertices))])
     seconds = run.timings.as_dict()
-    spline, details = None, dict(outcome.details)
+    spline, details = None, dict(solution.details)
     lengths = getattr(tasks.get(task), "LENGTHS", ())
     details |= {name: details[name] * frame.frame.scale for name in lengths if name in details}
-    if outcome.spline is not None:
-        before = outcome.fitted.get("surface")
+    if solution.spline is not None:
+        before = solution.fitted
         fitted = None if before is None else frame.frame.to_user(frame.back("surface", before))
-        spline, said = describe_spline(mesh, outcome.spline, design, fitted)
+        spline, said = describe_spline(frame.frame.to_user(solution.spline), mesh, design, fitted)
         details = {**details, "spline": said}
     return Result(
         task=task,
@@ -359,13 +317,13 @@ def packed(
         flat=flat,
         pattern=pattern,
         cell_scale=blocks["scale"][:, 0] if "scale" in blocks else None,
-        status=outcome.status,
+        status=solution.status,
         iterations=run.iterations,
-        energy=outcome.energy,
+        energy=solution.energy,
         history=run.history,
         seconds=seconds,
-        backend=outcome.backend,
-        notes=design.notes + outcome.notes,
+        backend=solution.backend,
+        notes=design.notes + solution.notes,
         details=details,
         spline=spline,
     )

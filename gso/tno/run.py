@@ -1,68 +1,25 @@
-"""The solve of a task's plan, stage by stage, with history and timings."""
+"""The solve of a task's plans, stage by stage, with history and timings."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from gso.mesh.cutting import Cut
+from gso.mesh import Mesh
+from gso.pattern import Pattern
 from gso.status import Progress, Status
-from gso.tasks.base import Options, Plan, Request, Stage, same
-from gso.tno.solver import Callback, Solution, Timings, minimise
+from gso.tasks.base import Options, Plan, Request, Solution, Stage, same
+from gso.tno.solver import Callback, Minimum, Timings, minimise
 from gso.tno.solver.augmented_lagrangian import tighten
 from gso.tno.solver.problem import Problem, energies
 from gso.typing import Array
-
-
-@dataclass
-class Outcome:
-    """Final coordinates of a run, with status and energy.
-
-    Where the surface is a B-spline, `spline` is the number of control points along both sides,
-    and `fitted` the coordinates before the spline's own stage. Where the design was cut open
-    to flatten it, `cut` says how. `stage` is the stage that was solved last.
-    """
-
-    blocks: dict[str, Array]
-    status: Status
-    energy: dict[str, float] = field(default_factory=dict)
-    backend: str = ""
-    notes: tuple[str, ...] = ()
-    details: dict[str, Any] = field(default_factory=dict)
-    spline: tuple[int, int] | None = None
-    fitted: dict[str, Array] = field(default_factory=dict)
-    cut: Cut | None = None
-    stage: Stage | None = None
-
-    def move(self, blocks: dict[str, Array]) -> None:
-        """Replace the coordinates, and recompute the energy."""
-        self.blocks = blocks
-        if self.stage is not None:
-            self.energy = objective(self.stage, self.stage.layout.pack(blocks))
-
-    @property
-    def points(self) -> Array:
-        """Its surface (n, 3), or its flat image (n, 2) where it has no surface."""
-        return self.blocks["surface"] if "surface" in self.blocks else self.blocks["flat"]
-
-
-class End(NamedTuple):
-    """Final state of the stages of a plan.
-
-    `coordinates` belong to `stage`: the stage solved last, or the plan's last stage where the
-    solve was cancelled. `given` are the coordinates before the plan's last stage, or None where
-    that was not solved.
-    """
-
-    coordinates: Array
-    given: Array | None
-    stage: Stage
-    solution: Solution
+from gso.unknowns import control_points
 
 
 def objective(stage: Stage, coordinates: Array) -> dict[str, float]:
@@ -71,156 +28,219 @@ def objective(stage: Stage, coordinates: Array) -> dict[str, float]:
     return energies(items, stage.layout, coordinates)
 
 
-class Run:
-    """Solver of requests of one task, with history and timings over all of them.
+@dataclass(frozen=True)
+class Reached:
+    """The state after some stages of a plan.
 
     Attributes
     ----------
+    stage : Stage
+        The stage solved last, or the plan's last stage where the solve was cancelled.
+    coordinates : ndarray
+        Coordinates of that stage.
+    entered : ndarray or None
+        Coordinates before the plan's last stage; None where that was not solved.
+    minimum : Minimum
+        Its result.
+    """
+
+    stage: Stage
+    coordinates: Array
+    entered: Array | None
+    minimum: Minimum
+
+
+class Run:
+    """Solver of requests of one task for one design, with history and timings over all of them.
+
+    Parameters
+    ----------
+    module : module
+        The task.
+    analysis : Analysis
+        Its analysis of the design and the constraints.
+    callback : callable, optional
+        Called after each iteration.
     guarded : bool
-        Whether the start of the first request is dropped, there and in later requests, if the
-        plan refuses it or its energy is above that of a cold start.
+        Whether :meth:`usable_start` refuses a start with more energy than a cold start.
     budget : int or None
         Largest number of iterations of all solves together.
     tolerance : float
         Lower limit of the stages' tolerance where a start was given.
-    refused : str
-        Why that start was not used.
+    lay_out : callable, optional
+        Flattens a surface, for searches that bound its strain.
+
+    Attributes
+    ----------
+    start_refused : str
+        Why the start was not used; empty if it was.
     """
 
     def __init__(
         self,
         module: ModuleType,
-        callback: Callback | None,
+        analysis: Any,
+        callback: Callback | None = None,
         *,
         guarded: bool = False,
         budget: int | None = None,
         tolerance: float = 0.0,
+        lay_out: Callable[[Mesh], Pattern | None] = lambda surface: None,
     ):
         self.module = module
+        self.analysis = analysis
         self.callback = callback
         self.guarded = guarded
         self.budget = budget
         self.tolerance = tolerance
-        self.refused = ""
-        self._judged = False
-        self._dropped: Array | None = None
+        self.lay_out = lay_out
+        self.start_refused = ""
+        self._planned: tuple[Request, Plan] | None = None
         self.history: list[Progress] = []
         self.timings = Timings()
         self.iterations = 0
 
-    def __call__(self, request: Request) -> Outcome:
+    def __call__(self, request: Request) -> Solution:
         """Plan and solve the stages."""
         clock = time.perf_counter()
-        plan = self._plan(request)
+        made, self._planned = self._planned, None
+        if made is not None and made[0] is request:
+            plan = made[1]
+        else:
+            plan = self.module.plan(self.analysis, request)
         self.timings.setup += time.perf_counter() - clock
-        outcome = Outcome(
-            {},
-            plan.status or Status.CONVERGED,
-            {"objective": 0.0},
-            notes=tuple(plan.notes),
-            details=plan.details,
-            spline=plan.spline,
-            cut=plan.cut,
-        )
+        return self.solve(plan, request.options)
+
+    def solve(self, plan: Plan, options: Options) -> Solution:
+        """Solve the stages of a plan, and post-process the coordinates."""
         if not plan.stages:
-            outcome.blocks = plan.layout.split(plan.start)
-            return outcome
-        end = self.through(plan, request.options)
-        coordinates, outcome.energy = self.guard(plan, end.stage, end.coordinates)
-        coordinates = plan.finish(coordinates)
-        outcome.blocks = plan.layout.split(coordinates)
-        if plan.spline is not None and end.given is not None:
-            outcome.fitted = plan.layout.split(end.given)
-        outcome.notes += tuple(plan.remark(coordinates)) if plan.remark is not None else ()
-        outcome.backend, outcome.stage = end.solution.backend, end.stage
-        if plan.status is None or end.solution.status is Status.CANCELLED:
-            outcome.status = end.solution.status
-        return outcome
+            return _finished(plan, plan.start, plan.status or Status.CONVERGED)
+        reached = self.through(plan, options)
+        coordinates, energy = _guard(plan, reached.stage, reached.coordinates)
+        status = reached.minimum.status
+        if plan.status is not None and status is not Status.CANCELLED:
+            status = plan.status
+        solution = _finished(plan, coordinates, status, energy, reached.stage)
+        if plan.result_notes is not None:
+            solution.notes += tuple(plan.result_notes(plan.finish(coordinates)))
+        solution.backend = reached.minimum.backend
+        if plan.spline is not None:
+            x = reached.minimum.x
+            if reached.entered is None or coordinates is not reached.coordinates:
+                x = plan.stages[-1].unknowns(coordinates).project(coordinates)
+            solution.spline = control_points(plan.layout, plan.spline, x)
+            if reached.entered is not None:
+                solution.fitted = plan.layout.split(reached.entered)["surface"]
+        return solution
 
-    def _plan(self, request: Request) -> Plan:
-        """Return the task's plan, from the given start unless that is dropped."""
-        if request.start is not None and request.start is self._dropped:
-            request = replace(request, start=None)
-        plan: Plan = self.module.plan(request)
-        # Later requests have starts that a search chose.
-        first, self._judged = not self._judged, True
-        if not first or request.start is None:
-            return plan
-        self.refused = plan.refused
-        if self.guarded and not self.refused:
-            self.refused = self._worse(plan)
-            if not self.refused and request.max_deviation is not None:
-                # `stay_within` also solves without the bound.
-                free = self.module.plan(replace(request, max_deviation=None))
-                self.refused = self._worse(free)
-        if not (self.guarded and self.refused):
-            return plan
-        self._dropped = request.start
-        return self.module.plan(replace(request, start=None))
+    def usable_start(self, *requests: Request) -> bool:
+        """Return whether a start is to be used for requests that differ in bounds only.
 
-    @staticmethod
-    def _worse(plan: Plan) -> str:
-        """Say that the start has more energy than a cold start; empty if it has not."""
-        if plan.unstarted is None or not plan.stages:
-            return ""
-        # The spline is fitted to the result of the stage before its own: compare there.
-        stages = plan.stages if plan.spline is None else plan.stages[:-1]
-        # Enter the first stage only once, for both the comparison and the solve.
-        plan.start, stages[0].enter = stages[0].enter(plan.start), same
-        warm, cold = (
-            sum(objective(stages[-1], coordinates).values())
-            for coordinates in (replace(plan, stages=stages).entered(), plan.unstarted())
-        )
-        if warm <= cold:
-            return ""
-        return f"its energy, {warm:.3g}, is above that of the start without it, {cold:.3g}"
-
-    def through(self, plan: Plan, options: Options) -> End:
-        """Solve the stages of a plan with at least one, the last one until hard terms hold."""
-        coordinates, given = plan.start, None
-        least = 0.0 if plan.unstarted is None else self.tolerance
-        for number, stage in enumerate(plan.stages):
-            stage.tolerance = max(stage.tolerance, least)
+        It is not if a plan refuses it, or, with `guarded`, if its energy is above that of a
+        cold start. :attr:`start_refused` says why.
+        """
+        for number, request in enumerate(requests):
+            if request.start is None:
+                return True
             clock = time.perf_counter()
-            given, coordinates = coordinates, stage.enter(coordinates)
+            plan = self.module.plan(self.analysis, request)
+            if number == 0:
+                self.start_refused = plan.start_refused
+            if self.guarded and not self.start_refused:
+                plan = _entered(plan)
+                self.start_refused = _worse(plan)
+            if number == 0:
+                self._planned = (request, plan)
             self.timings.setup += time.perf_counter() - clock
-            last = stage is plan.stages[-1]
+        return not (self.guarded and self.start_refused)
+
+    def continue_from(self, other: Run) -> None:
+        """Continue the history, the timings and the count of iterations of another run."""
+        self.history, self.timings = other.history, other.timings
+        self.iterations = other.iterations
+
+    def moved(self, solution: Solution, blocks: dict[str, Array]) -> Solution:
+        """Return a solution at other coordinates, with the energy that they have."""
+        stage = solution.stage
+        if stage is None:
+            return replace(solution, blocks=blocks)
+        coordinates = stage.layout.pack(blocks)
+        return replace(
+            solution,
+            blocks=blocks,
+            coordinates=coordinates,
+            energy=objective(stage, coordinates),
+        )
+
+    def through(self, plan: Plan, options: Options) -> Reached:
+        """Solve the stages of a plan with at least one, the last one until hard terms hold."""
+        coordinates, entered = plan.start, None
+        least = 0.0 if plan.cold_start is None else self.tolerance
+        stages = plan.stages
+        for number, stage in enumerate(stages):
+            clock = time.perf_counter()
+            entered, coordinates = coordinates, stage.enter(coordinates)
+            self.timings.setup += time.perf_counter() - clock
+            last = number == len(stages) - 1
             # A warm start is close to the solution: reserve iterations for the last stage.
-            kept = 0 if last or plan.unstarted is None else plan.stages[-1].iterations
-            solve = partial(self.solve, options, (number, len(plan.stages)), kept=kept)
-            coordinates, solution = solve(stage, coordinates)
-            if solution.status is Status.CANCELLED:
+            reserved = 0 if last or plan.cold_start is None else stages[-1].iterations
+            solve = partial(
+                self.minimise,
+                options,
+                replace(stage, tolerance=max(stage.tolerance, least)),
+                place=(number, len(stages)),
+                reserved=reserved,
+            )
+            coordinates, minimum = solve(coordinates)
+            if minimum.status is Status.CANCELLED:
                 break
-            if stage.enough is not None and stage.enough(coordinates):
+            if stage.finished is not None and stage.finished(coordinates):
                 break
-        after = plan.stages[number + 1 :]
-        if solution.status is Status.CANCELLED:
+        after = stages[number + 1 :]
+        if minimum.status is Status.CANCELLED:
             # Transfer the coordinates to the last stage without solving.
             for stage in after:
                 coordinates = stage.enter(coordinates)
         else:
-            again = replace(stage, eps=stage.eps[-1:])
-            coordinates, solution = tighten(
+            coordinates, minimum = tighten(
                 stage.items,
                 coordinates,
-                solution,
-                lambda items, at: solve(replace(again, items=list(items)), at),
+                minimum,
+                lambda items, at: solve(at, items=items),
             )
-        return End(coordinates, None if after else given, stage, solution)
+        return Reached(stage, coordinates, None if after else entered, minimum)
 
-    def solve(
+    def minimise(
         self,
         options: Options,
-        place: tuple[int, int],
         stage: Stage,
         coordinates: Array,
         *,
-        kept: int = 0,
-    ) -> tuple[Array, Solution]:
-        """Solve one stage from coordinates, leaving `kept` iterations of the budget."""
+        items: Any = None,
+        place: tuple[int, int] = (0, 1),
+        reserved: int = 0,
+    ) -> tuple[Array, Minimum]:
+        """Minimise the objective of one stage from coordinates.
+
+        Parameters
+        ----------
+        options : Options
+            Settings of the solver.
+        stage : Stage
+            The stage.
+        coordinates : ndarray
+            Its initial coordinates.
+        items : sequence of Weighted, optional
+            Terms in place of the stage's, without continuation.
+        place : (int, int)
+            Index and number of stages, for the callback.
+        reserved : int
+            Iterations of the budget to leave for later stages.
+        """
         clock = time.perf_counter()
-        variables = stage.variables(coordinates)
-        problem = Problem(stage.items, variables, stage.limits)
+        variables = stage.unknowns(coordinates)
+        again = items is not None
+        problem = Problem(items if again else stage.items, variables, stage.limits)
         x = variables.project(coordinates)
         bounds = None if stage.bounds is None else stage.bounds(coordinates)
         if bounds is not None:
@@ -228,14 +248,14 @@ class Run:
         self.timings.setup += time.perf_counter() - clock
         most = stage.iterations
         if self.budget is not None:
-            most = min(most, max(self.budget - self.iterations - kept, 0))
-        solution = minimise(
+            most = min(most, max(self.budget - self.iterations - reserved, 0))
+        minimum = minimise(
             problem,
             x,
             iterations=most,
             tolerance=stage.tolerance,
-            eps=stage.eps,
-            robust=stage.robust,
+            continuation=stage.continuation[-1:] if again else stage.continuation,
+            continued=stage.continued,
             bounds=bounds,
             method=options.method,
             backend=options.backend,
@@ -245,16 +265,64 @@ class Run:
             name=stage.name,
             timings=self.timings,
         )
-        self.iterations += solution.iterations
-        self.history += solution.history
-        return variables.points(solution.x), solution
+        self.iterations += minimum.iterations
+        self.history += minimum.history
+        return variables.points(minimum.x), minimum
 
-    @staticmethod
-    def guard(plan: Plan, stage: Stage, coordinates: Array) -> tuple[Array, dict[str, float]]:
-        """Return the coordinates and their energy, or the fallback's if that has less."""
-        energy = objective(stage, coordinates)
-        if plan.fallback is not None:
-            other = objective(stage, plan.fallback)
-            if not sum(energy.values()) <= sum(other.values()):
-                return plan.fallback, other
-        return coordinates, energy
+
+def _finished(
+    plan: Plan,
+    coordinates: Array,
+    status: Status,
+    energy: dict[str, float] | None = None,
+    stage: Stage | None = None,
+) -> Solution:
+    """Return the solution of a plan at the coordinates of its last stage."""
+    done = coordinates if stage is None else plan.finish(coordinates)
+    return Solution(
+        plan.layout.split(done),
+        status,
+        {"objective": 0.0} if energy is None else energy,
+        coordinates,
+        notes=tuple(plan.notes),
+        details=dict(plan.details),
+        cut=plan.cut,
+        stage=stage,
+    )
+
+
+def _guard(plan: Plan, stage: Stage, coordinates: Array) -> tuple[Array, dict[str, float]]:
+    """Return the coordinates and their energy, or the fallback's if that has less."""
+    energy = objective(stage, coordinates)
+    if plan.fallback is not None:
+        other = objective(stage, plan.fallback)
+        if not sum(energy.values()) <= sum(other.values()):
+            return plan.fallback, other
+    return coordinates, energy
+
+
+def _entered(plan: Plan) -> Plan:
+    """Return an equivalent plan whose start is that of its first stage."""
+    if not plan.stages:
+        return plan
+    first, *others = plan.stages
+    return replace(
+        plan, start=first.enter(plan.start), stages=[replace(first, enter=same), *others]
+    )
+
+
+def _worse(plan: Plan) -> str:
+    """Say that the start has more energy than a cold start; empty if it has not."""
+    if plan.cold_start is None or not plan.stages:
+        return ""
+    # A spline is fitted to the result of the stage before its own: compare there.
+    stages = plan.stages if plan.spline is None else plan.stages[:-1]
+    coordinates = plan.start
+    for stage in stages:
+        coordinates = stage.enter(coordinates)
+    warm, cold = (
+        sum(objective(stages[-1], at).values()) for at in (coordinates, plan.cold_start())
+    )
+    if warm <= cold:
+        return ""
+    return f"its energy, {warm:.3g}, is above that of the start without it, {cold:.3g}"

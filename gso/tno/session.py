@@ -11,25 +11,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso import linalg
-from gso.constraints import Constraint, Handle, Pins, listed
+from gso import linalg, tasks
+from gso.constraints import Compiled, Constraint, Handle, listed
 from gso.deformation import Spread
-from gso.energy import Weighted
 from gso.errors import ConvergenceWarning, OptionError
 from gso.result import Result
 from gso.spelling import known_keywords
 from gso.status import Status
-from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.base import Plan, Request, Solution, Stage
 from gso.tno.handles import moved, pinned
-from gso.tno.judged import asked_of, judged, warning
+from gso.tno.judged import judged, requirements, warning
 from gso.tno.normalise import Canonical
-from gso.tno.optimize import check, judge, packed
-from gso.tno.run import Outcome, Run, objective
-from gso.tno.solver import Solution, minimise
+from gso.tno.optimize import check, packed, record_violations
+from gso.tno.run import Run, objective
+from gso.tno.solver import METHODS, Minimum, minimise
 from gso.tno.solver.augmented_lagrangian import tighten
-from gso.tno.solver.directions import DIRECTIONS
 from gso.tno.solver.problem import Problem
 from gso.typing import Array, Ints
+from gso.unknowns import control_points
 
 #: Iteration limit of the solve in :meth:`Session.settle`.
 _SETTLED = 100
@@ -102,14 +101,16 @@ class Session:
             raise OptionError(f"task {task!r} makes no surface that handles could move")
         self._task = task
         self._frame = Canonical(self._design)
-        self._run = Run(self._module, None)
         self.analyses = 0
         self._constraints: list[Constraint] = []
         self._spread: Spread | None = None
         self._solver: Any = None
         self._problem: Problem | None = None
-        self._direction = DIRECTIONS[self._options.method]()
+        self._direction = METHODS[self._options.method].direction()
         self._x0 = self._frame.start(x0, flat=False)
+        self._run: Any = None
+        self._compiled = Compiled()
+        self._stage: Stage | None = None
         self._plan = self._planned(constraints, self._x0)
         self._status = self._plan.status or Status.CONVERGED
         self._coordinates = self._solved(self._plan)
@@ -140,8 +141,11 @@ class Session:
         asked = pinned(Handle(ids, positions), self._design, "move()")
         constraints = moved(self._constraints, self._design, asked)
         compiled = self._frame.constraints(constraints, flat=False)
-        before = self._request.constraints.places[1]
-        self._constraints, self._request.constraints = constraints, compiled
+        before = self._compiled.places[1]
+        self._constraints, self._compiled = constraints, compiled
+        stage = self._stage
+        if stage is not None and stage.imposed is not None:
+            self._stage = replace(stage, imposed=stage.imposed.moved(compiled))
         held, after = compiled.places
         self._follow(held, after - before)
         self._pose()
@@ -159,7 +163,7 @@ class Session:
             Constraints contradict each other, or one is invalid.
         """
         self._plan = self._planned(constraints, self._surface)
-        c = self._request.constraints
+        c = self._compiled
         self._follow(c.hard_ids, c.hard_positions - self._surface[c.hard_ids])
         self._pose()
         self._left_to_do()
@@ -207,7 +211,7 @@ class Session:
         """
         result = self._settled()
         if self._stage is not None:
-            dragged, kept = result, (self._plan, self._coordinates, self._status)
+            dragged, kept = result, (self._plan, self._stage, self._coordinates, self._status)
             self._plan = self._planned(self._constraints, self._x0)
             self._coordinates = self._solved(self._plan)
             self._pose()
@@ -216,7 +220,7 @@ class Session:
                 result.notes += (_jumped(dragged, result),)
             else:
                 result = dragged
-                self._plan, self._coordinates, self._status = kept
+                self._plan, self._stage, self._coordinates, self._status = kept
                 self._pose()
         if not result.converged:
             warnings.warn(warning(result) or str(result.status), ConvergenceWarning, stacklevel=2)
@@ -226,14 +230,11 @@ class Session:
         """Iterate from the current surface until the stage converges."""
         stage = self._stage
         if stage is not None:
-            solution = self._iterate(stage, _SETTLED, stage.tolerance)
-            solve = partial(self._run.solve, self._options, (0, 1))
-            again, before = replace(stage, eps=stage.eps[-1:]), self._coordinates
+            minimum = self._iterate(stage, _SETTLED, stage.tolerance)
+            before = self._coordinates
+            solve = partial(self._run.minimise, self._options, stage)
             self._coordinates, _ = tighten(
-                self._aimed(stage),
-                before,
-                solution,
-                lambda items, at: solve(replace(again, items=list(items)), at),
+                stage.items, before, minimum, lambda items, at: solve(at, items=items)
             )
             if self._coordinates is not before:
                 self._pose()
@@ -241,40 +242,40 @@ class Session:
 
     def result(self) -> Result:
         """Return the current surface as a result, like that of :func:`gso.tno.optimize`."""
-        plan, stage = self._plan, self._stage
-        finished = plan.finish(self._coordinates)
-        outcome = Outcome(
-            plan.layout.split(finished), self._status, {"objective": 0.0}, notes=tuple(plan.notes)
+        plan, stage, at = self._plan, self._stage, self._coordinates
+        solution = Solution(
+            plan.layout.split(plan.finish(at)),
+            self._status,
+            {"objective": 0.0} if stage is None else objective(stage, at),
+            at,
+            backend="" if stage is None else self._solver.name,
+            notes=tuple(plan.notes),
+            details=dict(plan.details),
+            cut=plan.cut,
         )
-        outcome.details, outcome.spline = dict(plan.details), plan.spline
-        outcome.cut = plan.cut
-        if stage is not None and self._problem is not None:
-            aimed = replace(stage, items=self._aimed(stage))
-            outcome.energy = objective(aimed, self._coordinates)
-            outcome.backend = self._solver.name
-        judge(self._request, self._frame, outcome)
+        if plan.spline is not None:
+            solution.spline = control_points(plan.layout, plan.spline, self._x)
+        record_violations(self._compiled, self._frame, solution)
         result = packed(
-            self._task, self._formulation, self._design, self._frame, outcome, self._run
+            self._task, self._formulation, self._design, self._frame, solution, self._run
         )
         result.warm_start = "session"
-        return judged(result, asked_of(self._request, self._frame.frame.scale))
+        return judged(
+            result, requirements(self._frame.mesh, self._compiled, self._frame.frame.scale)
+        )
 
     @property
     def _surface(self) -> Array:
         """Current vertices (n, 3), in the solver's frame and numbering."""
         return self._plan.layout.split(self._coordinates)["surface"]
 
-    @property
-    def _stage(self) -> Stage | None:
-        return self._plan.stages[-1] if self._plan.stages else None
-
     def _solved(self, plan: Plan) -> Array:
         """Solve all stages of a plan, and return the final coordinates."""
         if not plan.stages:
             return plan.start
-        end = self._run.through(plan, self._options)
-        self._status = plan.status or end.solution.status
-        return end.coordinates
+        reached = self._run.through(plan, self._options)
+        self._status = plan.status or reached.minimum.status
+        return reached.coordinates
 
     def _left_to_do(self) -> None:
         """Mark the surface as not converged, because its constraints have changed."""
@@ -285,11 +286,15 @@ class Session:
         """Check constraints, and return the task's plan with them."""
         given = listed(constraints)
         compiled = self._frame.constraints(given, flat=False)
-        request = Request(self._frame.mesh, self._options, self._formulation, compiled, start)
-        plan = self._module.plan(request)
+        run = Run(self._module, tasks.analyse(self._module, self._frame.mesh, compiled))
+        plan = self._module.plan(run.analysis, Request(self._options, self._formulation, start))
         if not plan.stages and plan.status is not Status.ALREADY_GOOD:
             raise OptionError(f"task {self._task!r} has no iterations to go on with")
-        self._request, self._constraints, self._spread = request, given, None
+        if self._run is not None:
+            run.continue_from(self._run)
+        self._run = run
+        self._compiled, self._constraints, self._spread = compiled, given, None
+        self._stage = plan.stages[-1] if plan.stages else None
         return plan
 
     def _follow(self, ids: Ints, displacement: Array) -> None:
@@ -310,8 +315,8 @@ class Session:
             self._problem = None
             return
         before = self._problem
-        variables = stage.variables(self._coordinates)
-        self._problem = Problem(self._aimed(stage), variables, stage.limits, like=before)
+        variables = stage.unknowns(self._coordinates)
+        self._problem = Problem(stage.items, variables, stage.limits, like=before)
         if before is None or self._problem.pattern is not before.pattern:
             self._solver = linalg.choose(self._problem.pattern, self._options.backend)
             self.analyses += 1
@@ -319,27 +324,16 @@ class Session:
         self._coordinates = variables.points(self._x)
         self._bounds = None if stage.bounds is None else stage.bounds(self._coordinates)
 
-    def _aimed(self, stage: Stage) -> list[Weighted]:
-        """Return the terms of a stage, with the current targets of soft handles."""
-        pins = iter(self._request.constraints.of(Pins, hard=False))
-        items = []
-        for item in stage.items:
-            if item.term.name == "position":
-                targets = next(pins).positions.T.copy()
-                item = replace(item, term=replace(item.term, constants=targets))
-            items.append(item)
-        return items
-
-    def _iterate(self, stage: Stage, iterations: int, tolerance: float) -> Solution:
+    def _iterate(self, stage: Stage, iterations: int, tolerance: float) -> Minimum:
         """Iterate a stage from the current unknowns; the current problem must be its own."""
         problem: Any = self._problem
-        solution = minimise(
+        minimum = minimise(
             problem,
             self._x,
             iterations=iterations,
             tolerance=tolerance,
-            eps=stage.eps[-1:],
-            robust=stage.robust,
+            continuation=stage.continuation[-1:],
+            continued=stage.continued,
             bounds=self._bounds,
             solver=self._solver,
             direction=self._direction,
@@ -347,11 +341,11 @@ class Session:
             name=stage.name,
             timings=self._run.timings,
         )
-        self._x, self._status = solution.x, solution.status
-        self._coordinates = problem.variables.points(solution.x)
-        self._run.iterations += solution.iterations
-        self._run.history += solution.history
-        return solution
+        self._x, self._status = minimum.x, minimum.status
+        self._coordinates = problem.variables.points(minimum.x)
+        self._run.iterations += minimum.iterations
+        self._run.history += minimum.history
+        return minimum
 
 
 def _better(one: Result, other: Result) -> bool:

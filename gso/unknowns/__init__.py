@@ -4,13 +4,14 @@ from gso.unknowns.base import Layout, Variables
 from gso.unknowns.framed import ALONG, ball_bounds, framed_displacements
 from gso.unknowns.free import free
 from gso.unknowns.normal import normal_offsets, vertex_normals
-from gso.unknowns.spline import spline_offsets, spline_surface
+from gso.unknowns.spline import control_points, spline_offsets, spline_surface
 
 __all__ = [
     "ALONG",
     "Layout",
     "Variables",
     "ball_bounds",
+    "control_points",
     "framed_displacements",
     "free",
     "normal_offsets",

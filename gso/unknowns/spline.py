@@ -85,3 +85,10 @@ def spline_surface(layout: Layout, shape: tuple[int, int], controls: tuple[int, 
         for name, count, dim in layout.blocks
     ]
     return Variables(layout, block_diag(bases, format="csr"), np.zeros(layout.size))
+
+
+def control_points(layout: Layout, controls: tuple[int, int], x: Array) -> Array:
+    """Return the control points (p, q, 3) among unknowns of :func:`spline_surface`."""
+    start, _, _ = layout.where("surface")
+    count = 3 * controls[0] * controls[1]
+    return x[start : start + count].reshape(*controls, 3)

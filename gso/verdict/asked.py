@@ -9,8 +9,6 @@ from gso import metrics
 
 #: Relative tolerance of the bounds.
 TIGHT = 1e-6
-#: Largest strain of a developable surface when only a maximum deviation was given.
-DEVELOPABLE = 5e-3
 #: Relative tolerance of a target curvature.
 TARGET = 0.05
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gso import metrics
-from gso.verdict.asked import DEVELOPABLE, TARGET, TIGHT, Asked, asked_curvature
+from gso.verdict.asked import TARGET, TIGHT, Asked, asked_curvature
 from gso.wording import length, percent, places, sentence
 
 if TYPE_CHECKING:
@@ -39,6 +39,9 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
         surface = result.pattern.surface(mesh)
         strains = np.nan_to_num(metrics.face_strains(surface, result.pattern.flat))
         strain = found["strain_max"] = float(strains.max())
+    # Imported here, as it imports scipy.
+    from gso.tasks.developable.options import DEVELOPABLE
+
     allowed = asked.max_strain
     if allowed is None and asked.max_deviation is not None:
         allowed = DEVELOPABLE

@@ -1,13 +1,48 @@
 """Make a surface developable, by its curvature or by isometry to its flat image."""
 
-from gso.tasks.developable.curvature import (
-    FORMULATIONS,
-    IMPLIES,
-    OPTIONS,
-    Options,
-    flat_metrics,
-    metrics,
-    plan,
-)
+from __future__ import annotations
 
-__all__ = ["FORMULATIONS", "IMPLIES", "OPTIONS", "Options", "flat_metrics", "metrics", "plan"]
+from dataclasses import replace
+
+from gso.tasks.base import Plan, Request
+from gso.tasks.developable import isometry, schedule
+from gso.tasks.developable.analysis import Analysis
+from gso.tasks.developable.measures import flat_metrics, metrics
+from gso.tasks.developable.options import Options
+from gso.tasks.developable.search import check_bounds, check_iterations, search
+from gso.unknowns import ALONG
+
+__all__ = [
+    "FORMULATIONS",
+    "IMPLIES",
+    "OPTIONS",
+    "Analysis",
+    "Options",
+    "check_bounds",
+    "check_iterations",
+    "flat_metrics",
+    "metrics",
+    "plan",
+    "search",
+]
+
+FORMULATIONS = ("curvature", "isometry")
+#: The formulation that a preset belongs to.
+IMPLIES = {"jiang2020": "isometry"}
+#: Settings by formulation.
+OPTIONS = {"curvature": Options, "isometry": isometry.Options}
+
+
+def plan(analysis: Analysis, request: Request) -> Plan:
+    """Plan the stages of the solve."""
+    if request.formulation == "isometry":
+        return isometry.plan(analysis, request, _before_isometry)
+    return schedule.plan(analysis, request)
+
+
+def _before_isometry(analysis: Analysis, request: Request) -> Plan:
+    """Plan the curvature solve whose result the solve by isometry starts from."""
+    bound = request.max_displacement
+    # The box bounds of the solve by isometry cover only part of the ball around a vertex.
+    bound = None if bound is None else 0.99 * ALONG * bound
+    return schedule.plan(analysis, replace(request, options=Options(), max_displacement=bound))

@@ -38,6 +38,8 @@ from gso.status import Status
 from gso.tasks import constrained, per_component
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.developable import spline_stage
+from gso.tasks.developable.analysis import Analysis
+from gso.tasks.developable.bounds import radius
 from gso.tasks.options import Options as BaseOptions
 from gso.typing import Array
 from gso.unknowns import (
@@ -55,7 +57,8 @@ _FALL = 10.0
 _NEARLY = 1e-3
 #: Relative error of lengths up to which a flat image counts as isometric.
 _KEPT = 2e-3
-#: A warm start whose isometry defect is below this multiple of `enough` needs no coarser grids.
+#: A warm start whose isometry defect is below this multiple of `isometry_threshold`
+#: needs no coarser grids.
 _ISOMETRIC = 100.0
 #: Smallest iteration limit where the design needs no change and only its image is solved for.
 _UNROLL = 100
@@ -74,7 +77,7 @@ class Options(BaseOptions):
         and flat image, of the inner products of second differences and edges.
     w_fairness : float
         Final weight of the mean squared second derivative.
-    stiff : float
+    w_fairness_start : float
         Initial fairness weight, which falls tenfold from stage to stage. Not used with `x0`.
     w_flat : float
         Fairness weight of the flat image, relative to that of the surface.
@@ -85,7 +88,7 @@ class Options(BaseOptions):
         Weight of the squared displacement of the vertices from the design.
     w_elongation : float
         Weight of edges of the surface much shorter or longer than in the design.
-    enough : float
+    isometry_threshold : float
         Stopping threshold: the remaining stages of lower fairness are skipped when the mean
         squared isometry defect is at most this.
     begin : {"curvature", "design"}
@@ -105,6 +108,10 @@ class Options(BaseOptions):
         with its flat image, unless there are constraints, `x0` or variables "surface".
     """
 
+    RENAMED: ClassVar[dict[str, str]] = {
+        "enough": "isometry_threshold",
+        "stiff": "w_fairness_start",
+    }
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
         "fast": {"iterations": 6},
         "balanced": {},
@@ -118,12 +125,12 @@ class Options(BaseOptions):
     w_isometry: float = 100.0
     w_mapping: float = 3.0
     w_fairness: float = 1e-4
-    stiff: float = 1e-3
+    w_fairness_start: float = 1e-3
     w_flat: float = 0.01
     w_closest: float = 0.5
     w_place: float = 0.5
     w_elongation: float = 1.0
-    enough: float = 1e-8
+    isometry_threshold: float = 1e-8
     begin: str = "curvature"
     variables: str = "free"
     controls: int = 16
@@ -146,13 +153,17 @@ class Options(BaseOptions):
             raise OptionError("w_closest or w_place must be positive, or nothing stays in place")
 
 
-def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
+def plan(
+    analysis: Analysis, request: Request, curvature: Callable[[Analysis, Request], Plan]
+) -> Plan:
     """Plan the stages of the joint solve.
 
     Parameters
     ----------
+    analysis : Analysis
+        The design and its constraints.
     request : Request
-        The problem, with the options of this formulation.
+        What to solve, with the options of this formulation.
     curvature : callable
         Makes the plan of the formulation "curvature", for the start.
 
@@ -161,50 +172,55 @@ def plan(request: Request, curvature: Callable[[Request], Plan]) -> Plan:
     MeshError
         A component is closed or has handles: it has no flat image.
     """
-    mesh, options = request.mesh, request.options
-    spline = spline_stage.controls(request)
-    _check_bound(request)
-    begun = mesh if request.start is None else mesh.replaced(request.start)
-    opened = parametrization.opened(begun)
+    mesh, options, constraints = analysis.mesh, request.options, analysis.constraints
+    spline = spline_stage.controls(analysis, request)
+    _check_bound(analysis, request)
+    if request.start is None:
+        begun, opened = mesh, analysis.opened
+    else:
+        begun = mesh.replaced(request.start)
+        opened = parametrization.opened(begun)
     cut = opened.cut
-    own = spline is None and request.start is None and request.constraints.empty
+    own = spline is None and request.start is None and constraints.empty
     if own and measure.loss_gc_worst(mesh, scale=1.0) <= options.developable_below:
-        return _unrolling(request, opened)
-    levels = _levels(request, begun)
-    stages = _chain(request, [*levels, mesh], cut)
-    before, start = [], [*alike(levels, begun), begun][0].vertices
-    if not request.constraints.empty:
-        before = [constrained.approach(request, start)]
+        return _unrolling(analysis, request, opened)
+    levels = _levels(analysis, request, begun)
+    stages = _chain(analysis, request, [*levels, mesh], cut)
+    before: list[Stage] = []
+    start = [*alike(levels, begun), begun][0].vertices
+    if not constraints.empty:
+        before = [constrained.approach(analysis, start)]
     elif request.start is None and options.begin == "curvature":
-        first = curvature(request)
-        before, start = first.stages, first.start.reshape(-1, 3)
-    stages[0].enter = partial(_with_flat, levels[0] if levels else mesh, cut)
+        first = curvature(analysis, request)
+        before, start = list(first.stages), first.start.reshape(-1, 3)
+    enter = partial(_with_flat, levels[0] if levels else mesh, cut)
+    stages[0] = replace(stages[0], enter=enter)
     if spline is not None:
         # The spline stage comes last, so no stage before it may end the solve.
-        stages = [replace(stage, enough=None) for stage in stages]
+        stages = [replace(stage, finished=None) for stage in stages]
         stages.append(spline_stage.stage(stages[-1], mesh, spline))
-    stages = [*before, *stages]
     return Plan(
         _layout(mesh, cut),
         start.ravel(),
-        stages,
-        notes=list(opened.notes),
+        [*before, *stages],
+        notes=opened.notes,
         finish=partial(_place, mesh, cut),
-        remark=partial(_remark, mesh, cut),
+        result_notes=partial(_notes, mesh, cut),
         spline=spline,
-        unstarted=None if request.start is None else partial(_unstarted, [*levels, mesh], cut),
+        cold_start=None if request.start is None else partial(_cold, [*levels, mesh], cut),
         cut=cut,
     )
 
 
-def _check_bound(request: Request) -> None:
+def _check_bound(analysis: Analysis, request: Request) -> None:
     """Raise if constraints or options are incompatible with `max_deviation`."""
-    if request.max_deviation is None:
+    if request.max_displacement is None:
         return
-    hard = [part for part in request.constraints.parts if part.hard]
+    constraints = analysis.constraints
+    hard = [part for part in constraints.parts if part.hard]
     if hard:
         raise OptionError(
-            f"{request.constraints.names[hard[0].owner]} cannot be kept with max_deviation by the "
+            f"{constraints.names[hard[0].owner]} cannot be kept with max_deviation by the "
             "formulation 'isometry'; leave one out, take 'curvature', or give it a weight"
         )
     if request.options.variables == "surface":
@@ -234,15 +250,15 @@ def _begun(surface: Mesh) -> Array:
     return flat
 
 
-def _unrolling(request: Request, opened: parametrization.Opened) -> Plan:
+def _unrolling(analysis: Analysis, request: Request, opened: parametrization.Opened) -> Plan:
     """Plan to keep the design fixed and solve for its flat image."""
-    mesh, options, cut = request.mesh, request.options, opened.cut
+    mesh, options, cut = analysis.mesh, request.options, opened.cut
     flat = _begun(_opened(mesh, cut, mesh.vertices))
-    stage = _stage(request, mesh, 0.0, cut)
+    stage = _stage(analysis, request, mesh, 0.0, cut)
     stage = replace(
         stage,
         name="unroll",
-        items=[item for item in stage.items if item.term.name in ("isometry", "mapping")],
+        own_items=[i for i in stage.own_items if i.term.name in ("isometry", "mapping")],
         variables=partial(_flat_only, stage.layout),
         iterations=max(options.iterations, _UNROLL),
         tolerance=min(options.tolerance, 1e-8),
@@ -253,7 +269,7 @@ def _unrolling(request: Request, opened: parametrization.Opened) -> Plan:
         start,
         [stage],
         status=Status.ALREADY_GOOD,
-        notes=list(opened.notes),
+        notes=opened.notes,
         finish=partial(_place, mesh, cut),
         cut=cut,
     )
@@ -269,83 +285,83 @@ def _flat_only(layout: Layout, coordinates: Array) -> Variables:
     return Variables(layout, basis, offset)
 
 
-def _levels(request: Request, begun: Mesh) -> list[Mesh]:
+def _levels(analysis: Analysis, request: Request, begun: Mesh) -> list[Mesh]:
     """Return the coarser copies of the design on which to solve first, coarsest first.
 
     There are none if the result of the formulation "curvature" is the start, or if a warm start
     has a nearly isometric image already.
     """
     o = request.options
-    grid = request.mesh.grid_index is not None and request.constraints.empty
+    grid = analysis.mesh.grid_index is not None and analysis.constraints.empty
     if not (grid and o.coarse_size):
         return []
     if request.start is None:
         climb = o.begin == "design" and o.variables == "free"
-        return coarser(request.mesh, o.coarse_size) if climb else []
+        return coarser(analysis.mesh, o.coarse_size) if climb else []
     flat = parametrization.begin(begun).flat
-    done = measure.isometry_energy(begun, flat) <= _ISOMETRIC * o.enough
-    return [] if done else coarser(request.mesh, o.coarse_size)
+    done = measure.isometry_energy(begun, flat) <= _ISOMETRIC * o.isometry_threshold
+    return [] if done else coarser(analysis.mesh, o.coarse_size)
 
 
-def _chain(request: Request, levels: list[Mesh], cut: Cut | None = None) -> list[Stage]:
+def _chain(
+    analysis: Analysis, request: Request, levels: list[Mesh], cut: Cut | None = None
+) -> list[Stage]:
     """Plan the stages, coarse to fine, with falling fairness on each grid.
 
     With a warm start there is one stage per grid, with the lowest fairness.
     """
     options = request.options
     weights = [options.w_fairness]
-    while request.start is None and weights[0] < 0.999 * options.stiff:
+    while request.start is None and weights[0] < 0.999 * options.w_fairness_start:
         weights.insert(0, _FALL * weights[0])
     stages = []
     for below, mesh in zip([None, *levels], levels, strict=False):
         for k, weight in enumerate(weights):
-            stage = _stage(request, mesh, weight, cut)
+            stage = _stage(analysis, request, mesh, weight, cut)
             if k == 0 and below is not None:
-                stage.enter = partial(_refine, below, mesh)
-            stage.iterations = options.coarse_iterations
+                stage = replace(stage, enter=partial(_refine, below, mesh))
             if mesh is levels[-1]:
-                stage.iterations = options.iterations
-                stage.enough = partial(_isometric, mesh, cut, options.enough)
+                finished = partial(_isometric, mesh, cut, options.isometry_threshold)
+                stage = replace(stage, iterations=options.iterations, finished=finished)
+            else:
+                stage = replace(stage, iterations=options.coarse_iterations)
             stages.append(stage)
-    stages[-1].tolerance = options.tolerance
+    stages[-1] = replace(stages[-1], tolerance=options.tolerance)
     return stages
 
 
-def _stage(request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None = None) -> Stage:
-    layout, reach = _layout(mesh, cut), request.reach
-    bounds = None if reach is None else partial(_bounds, layout, len(mesh.vertices), reach)
+def _stage(
+    analysis: Analysis, request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None = None
+) -> Stage:
+    layout, bound = _layout(mesh, cut), radius(request)
     sheet = mesh if cut is None else cut.mesh
     name = "x".join(map(str, mesh.grid_shape or ("isometry",)))
+    make = partial(_terms, request.options, request.weight_factor, w_fairness, cut)
     return Stage(
         f"{name}, fairness {w_fairness:.0e}",
         layout,
-        _objective(request, mesh, w_fairness, cut),
-        partial(_unknowns, request, mesh, layout),
+        # A cut refers to the whole mesh, so the components are not treated separately.
+        per_component.objective(mesh, make) if cut is None else make(mesh),
+        partial(_unknowns, bound, mesh, layout),
         tolerance=_NEARLY,
         limits=[orientation.orientation(parametrization.upward(sheet), layout)],
-        bounds=bounds,
+        bounds=None if bound is None else partial(_bounds, layout, len(mesh.vertices), bound),
+        imposed=analysis.imposed if mesh is analysis.mesh else None,
     )
 
 
-def _bounds(layout: Layout, count: int, reach: float, coordinates: Array) -> tuple[Array, Array]:
-    return ball_bounds(layout, count, reach)
-
-
-def _objective(request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None) -> list[Weighted]:
-    make = partial(_terms, request.options, request.demand, w_fairness, cut)
-    # A cut refers to the whole mesh, so the components are not treated separately.
-    items = per_component.objective(mesh, make) if cut is None else make(mesh)
-    return items + (constrained.pulls(request) if mesh is request.mesh else [])
+def _bounds(layout: Layout, count: int, bound: float, coordinates: Array) -> tuple[Array, Array]:
+    return ball_bounds(layout, count, bound)
 
 
 def _terms(
-    o: Options, demand: float, w_fairness: float, cut: Cut | None, mesh: Mesh
+    o: Options, factor: float, w_fairness: float, cut: Cut | None, mesh: Mesh
 ) -> list[Weighted]:
     """Build the terms of one component."""
     normals = vertex_normals(mesh)
     sheet = mesh if cut is None else cut.mesh
     both = {"counterpart": "flat"}
-    asked, mapped = demand * o.w_isometry, demand * o.w_mapping
+    asked, mapped = factor * o.w_isometry, factor * o.w_mapping
     items = [Weighted(t, asked) for t in congruence.build(sheet, "surface", **both)]
     items += [Weighted(t, mapped) for t in christoffel.build(sheet, "surface", **both)]
     if cut is not None:
@@ -359,11 +375,10 @@ def _terms(
     return items
 
 
-def _unknowns(request: Request, mesh: Mesh, layout: Layout, coordinates: Array) -> Variables:
-    if request.reach is not None:
-        return framed_displacements(layout, mesh.vertices, vertex_normals(mesh))
-    own = mesh is request.mesh
-    return constrained.unknowns(request, layout, coordinates) if own else free(layout)
+def _unknowns(bound: float | None, mesh: Mesh, layout: Layout, coordinates: Array) -> Variables:
+    if bound is None:
+        return free(layout)
+    return framed_displacements(layout, mesh.vertices, vertex_normals(mesh))
 
 
 def _with_flat(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
@@ -373,7 +388,7 @@ def _with_flat(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
     return _layout(mesh, cut).pack({"surface": points, "flat": flat})
 
 
-def _unstarted(levels: list[Mesh], cut: Cut | None) -> Array:
+def _cold(levels: list[Mesh], cut: Cut | None) -> Array:
     """Return the design (the last level) and an image interpolated from that of the first level."""
     coordinates = _with_flat(levels[0], cut, levels[0].vertices.ravel())
     for coarse, fine in pairwise(levels):
@@ -389,13 +404,13 @@ def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
     return _layout(fine).pack({"surface": points, "flat": flat})
 
 
-def _isometric(mesh: Mesh, cut: Cut | None, enough: float, coordinates: Array) -> bool:
+def _isometric(mesh: Mesh, cut: Cut | None, threshold: float, coordinates: Array) -> bool:
     blocks = _layout(mesh, cut).split(coordinates)
     surface = _opened(mesh, cut, blocks["surface"])
-    return measure.isometry_energy(surface, blocks["flat"]) <= enough
+    return measure.isometry_energy(surface, blocks["flat"]) <= threshold
 
 
-def lengths_remark(surface: Mesh, flat: Array) -> list[str]:
+def length_notes(surface: Mesh, flat: Array) -> list[str]:
     """Return a note if a flat image (n, 2) does not preserve the lengths of its surface."""
     # The diagonals of the faces may preserve their lengths while the edges do not.
     faces = 0.5 * measure.isometry_energy(surface, flat) ** 0.5
@@ -408,9 +423,9 @@ def lengths_remark(surface: Mesh, flat: Array) -> list[str]:
     ]
 
 
-def _remark(mesh: Mesh, cut: Cut | None, coordinates: Array) -> list[str]:
+def _notes(mesh: Mesh, cut: Cut | None, coordinates: Array) -> list[str]:
     blocks = _layout(mesh, cut).split(coordinates)
-    return lengths_remark(_opened(mesh, cut, blocks["surface"]), blocks["flat"])
+    return length_notes(_opened(mesh, cut, blocks["surface"]), blocks["flat"])
 
 
 def _place(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:

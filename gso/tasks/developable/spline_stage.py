@@ -8,11 +8,11 @@ from functools import partial
 from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.spline.fit import fitting_controls, grid_of
-from gso.tasks.base import Array, Request, Stage
+from gso.tasks.base import Analysis, Array, Request, Stage
 from gso.unknowns import Layout, Variables, spline_surface
 
 
-def controls(request: Request) -> tuple[int, int] | None:
+def controls(analysis: Analysis, request: Request) -> tuple[int, int] | None:
     """Return the control points along both sides of the grid; None when no spline is wanted.
 
     Raises
@@ -25,13 +25,13 @@ def controls(request: Request) -> tuple[int, int] | None:
     """
     if request.options.variables != "surface":
         return None
-    shape = grid_of(request.mesh).shape[:2]
-    if request.max_deviation is not None:
+    shape = grid_of(analysis.mesh).shape[:2]
+    if request.max_displacement is not None:
         raise OptionError(
             "max_deviation cannot be kept with variables='surface'; leave it out, or solve with "
             "variables='normal' and give the result to gso.fit_spline"
         )
-    compiled = request.constraints
+    compiled = analysis.constraints
     hard = [compiled.names[part.owner] for part in compiled.parts if part.hard]
     if hard:
         raise OptionError(
@@ -54,7 +54,7 @@ def stage(before: Stage, mesh: Mesh, wanted: tuple[int, int]) -> Stage:
         name="surface",
         variables=lambda _: unknowns,
         enter=partial(_closest, unknowns),
-        eps=before.eps[-1:],
+        continuation=before.continuation[-1:],
         bounds=None,
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from gso.energy import Weighted
 from gso.status import Status
-from gso.tno.solver.minimiser import Solution
+from gso.tno.solver.minimiser import Minimum
 from gso.typing import Array
 
 #: Stopping threshold of the residual, in the unit ball.
@@ -21,26 +21,26 @@ ROUNDS = 14
 _FAST, _SOFTER, _SOFTEST = 0.3, 0.2, 1e-6
 
 #: ``solve(items, coordinates) -> (coordinates, solution)``: minimise the weighted terms.
-Solve = Callable[[Sequence[Weighted], Array], tuple[Array, Solution]]
+Solve = Callable[[Sequence[Weighted], Array], tuple[Array, Minimum]]
 
 
 def tighten(
-    items: Sequence[Weighted], coordinates: Array, solution: Solution, solve: Solve
-) -> tuple[Array, Solution]:
+    items: Sequence[Weighted], coordinates: Array, solution: Minimum, solve: Solve
+) -> tuple[Array, Minimum]:
     """Repeat a solve, with targets shifted by the residuals, until its hard terms hold.
 
     Parameters
     ----------
     items : sequence of Weighted
         The terms just minimised; those with `multipliers` are hard.
-    coordinates, solution : ndarray, Solution
+    coordinates, solution : ndarray, Minimum
         The final coordinates and the solution of that solve.
     solve : callable
         Minimises terms from given coordinates.
 
     Returns
     -------
-    ndarray, Solution
+    ndarray, Minimum
         The final coordinates; the given solution, or that of a later solve that was cancelled.
     """
     hard = [i.term.multipliers for i in items if i.term.multipliers is not None]

@@ -70,6 +70,3 @@ class LevenbergMarquardt(GaussNewton):
             self.damping = max(self.damping / 5.0, 1e-12)
         elif step < 0.3:
             self.damping = min(max(self.damping, 1e-9) * 8.0, 1.0)
-
-
-DIRECTIONS = {"gauss-newton": GaussNewton, "levenberg-marquardt": LevenbergMarquardt}

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import linalg
-from gso.energy.losses import Absolute
+from gso.energy.losses import Loss
 from gso.status import Progress, Status
-from gso.tno.solver.directions import DIRECTIONS
-from gso.tno.solver.line_search import armijo
+from gso.tno.solver.method import METHODS, Method
 from gso.tno.solver.problem import Problem
 from gso.typing import Array
 
@@ -37,8 +36,8 @@ class Timings:
 
 
 @dataclass
-class Solution:
-    """The result of solving a stage."""
+class Minimum:
+    """The result of a minimisation."""
 
     x: Array
     energy: float
@@ -58,19 +57,19 @@ def minimise(
     *,
     iterations: int,
     tolerance: float = 1e-4,
-    eps: Sequence[float] = (),
-    robust: str = "",
+    continuation: Sequence[Loss] = (),
+    continued: str = "",
     bounds: tuple[Array, Array] | None = None,
-    method: str = "gauss-newton",
+    method: str | Method = "gauss-newton",
+    direction: Any = None,
     backend: str | None = None,
     solver: Any = None,
-    direction: Any = None,
     threads: int = 1,
     callback: Callback | None = None,
     stage: tuple[int, int] = (0, 1),
     name: str = "",
     timings: Timings | None = None,
-) -> Solution:
+) -> Minimum:
     """Minimise a problem from x; the energy returned is never above that of x.
 
     Parameters
@@ -82,23 +81,23 @@ def minimise(
     iterations : int
         Largest number of iterations.
     tolerance : float
-        Stop when an iteration at the last `eps` lowers the energy by less than this
-        share of it.
-    eps : sequence of float
-        Continuation: smoothing of the absolute value by iteration, for the terms named
-        `robust`. The last value holds for all later iterations and for the energy returned.
-    robust : str
-        Name of the term whose loss follows `eps`.
+        Stop when an iteration with the last loss of `continuation` lowers the energy by less
+        than this share of it.
+    continuation : sequence of Loss
+        Losses by iteration of the terms named `continued`. The last one holds for all later
+        iterations and for the energy returned.
+    continued : str
+        Name of these terms.
     bounds : (ndarray, ndarray), optional
         Smallest and largest value of every unknown; x must respect them.
-    method : {"gauss-newton", "levenberg-marquardt"}
-        Direction.
+    method : {"gauss-newton", "levenberg-marquardt"} or Method
+        Direction, line search and stopping rule.
+    direction : GaussNewton, optional
+        A direction that continues with its damping, instead of that of `method`.
     backend : str, optional
         Linear backend; the fastest installed one when not given.
     solver : backend solver, optional
         A solver that has already analysed the problem's sparsity pattern.
-    direction : GaussNewton, optional
-        A direction that continues with its damping; `method` is then ignored.
     threads : int
         BLAS threads around factorisations; 0 leaves them alone.
     callback : callable, optional
@@ -115,31 +114,28 @@ def minimise(
     if solver is None:
         solver = linalg.choose(problem.pattern, backend)
     timings.setup += time.perf_counter() - clock
-    direction = DIRECTIONS[method]() if direction is None else direction
-    schedule = list(eps)
+    method = METHODS[method] if isinstance(method, str) else method
+    direction = method.direction() if direction is None else direction
+    last = len(continuation) - 1
     history: list[Progress] = []
 
     def report(iteration: int, energy: float, step: float) -> None:
-        by_term = problem.by_term(x) if callback is not None else {}
+        by_term = current.by_term(x) if callback is not None else {}
         progress = Progress(*stage, iteration, iterations, energy, by_term, step, name)
         history.append(progress)
         if callback is not None and _says_no(callback(progress)):
             raise Cancelled
 
-    def smooth(iteration: int) -> bool:
-        """Set the loss of this iteration; return whether it is the schedule's last one."""
-        if schedule:
-            problem.with_loss(robust, Absolute(schedule[min(iteration, len(schedule) - 1)]))
-        return iteration >= len(schedule) - 1
-
-    def final_energy(at: Array) -> float:
-        smooth(len(schedule))
-        return problem.energy(at)
+    def continued_to(problem: Problem, iteration: int) -> Problem:
+        """Return a problem with the loss of an iteration."""
+        if not continuation:
+            return problem
+        return problem.with_loss(continued, continuation[min(iteration, last)])
 
     project = None if bounds is None else partial(np.clip, a_min=bounds[0], a_max=bounds[1])
     clock = time.perf_counter()
-    problem.refresh(x)
-    best, best_energy = x, final_energy(x)
+    current = continued_to(problem, last).refreshed(x)
+    best, best_energy = x, current.energy(x)
     timings.search += time.perf_counter() - clock
     status = Status.MAX_ITERATIONS
     if not len(x):
@@ -150,10 +146,10 @@ def minimise(
         report(0, best_energy, 0.0)
         with linalg.blas_threads(threads):
             for k in range(iterations):
-                settled = smooth(k)
+                settled = k >= last
                 t0 = time.perf_counter()
-                problem.refresh(x)
-                energy, gradient, values = problem.linearise(x)
+                current = continued_to(problem, k).refreshed(x)
+                energy, gradient, values = current.linearise(x)
                 t1 = time.perf_counter()
                 if bounds is not None:
                     held = _held(x, gradient, bounds)
@@ -162,8 +158,8 @@ def minimise(
                 d = direction.step(solver, values, problem.diagonal, gradient)
                 t2 = time.perf_counter()
                 longest = problem.largest_step(x, d)
-                x, value, step = armijo(
-                    problem.energy, x, d, energy, gradient, project=project, longest=longest
+                x, value, step = method.line_search(
+                    current.energy, x, d, energy, gradient, project=project, longest=longest
                 )
                 direction.accepted(step)
                 done = k + 1
@@ -173,24 +169,19 @@ def minimise(
                 timings.factor += t2 - t1
                 timings.search += time.perf_counter() - t2
                 report(done, value, step)
-                if settled and energy - value <= tolerance * abs(energy):
-                    # A rejected step is no failure if the predicted decrease is negligible.
-                    expected = -0.5 * float(gradient @ d)
-                    done_well = step > 0 or expected <= max(tolerance * abs(energy), _NOTHING)
-                    status = Status.CONVERGED if done_well else Status.STALLED
+                expected = -0.5 * float(gradient @ d)
+                ended = method.stop(energy, value, step, expected, tolerance) if settled else None
+                if ended is not None:
+                    status = ended
                     break
     except Cancelled:
         status = Status.CANCELLED
-    if done <= len(schedule) - 1:
-        value = final_energy(x)
+    if done <= last:
+        value = continued_to(current, last).energy(x)
         if value < best_energy:
             best, best_energy = x, value
-    smooth(len(schedule))
-    return Solution(best, best_energy, status, done, solver.name, history)
+    return Minimum(best, best_energy, status, done, solver.name, history)
 
-
-#: Energy (dimensionless) that counts as zero.
-_NOTHING = 1e-20
 
 #: Diagonal entry, relative to the largest one, that keeps an unknown at its bound.
 _STIFF = 1e6

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 from collections import OrderedDict
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -38,10 +39,19 @@ class _Values:
         self.shape = tuple(shape)
         self.weights = term.weights
 
-    def refresh(self, coordinates: Array) -> None:
-        """Update the constants of a term that depend on the coordinates."""
-        if self.item.term.refresh is not None:
-            self.constants = self.item.term.refresh(coordinates)
+    def refreshed(self, coordinates: Array) -> Any:
+        """Return the term with those constants updated that depend on the coordinates."""
+        if self.item.term.refresh is None:
+            return self
+        other = copy(self)
+        other.constants = self.item.term.refresh(coordinates)
+        return other
+
+    def with_loss(self, loss: Loss) -> Any:
+        """Return the term with another loss."""
+        other = copy(self)
+        other.item = replace(self.item, loss=loss)
+        return other
 
     def residual(self, coordinates: Array) -> Array:
         """Residuals (r, e)."""
@@ -217,17 +227,22 @@ class Problem:
         """Positions of the diagonal among the matrix values."""
         return self._assembly.diagonal
 
-    def with_loss(self, name: str, loss: Loss) -> None:
-        """Set the loss of the non-quadratic terms of one name."""
-        for element in self._elements:
-            if element.item.term.name == name:
-                element.item = replace(element.item, loss=loss)
+    def with_loss(self, name: str, loss: Loss) -> Problem:
+        """Return the problem with another loss of the non-quadratic terms of one name."""
+        return self._with_elements(
+            [e.with_loss(loss) if e.item.term.name == name else e for e in self._elements]
+        )
 
-    def refresh(self, x: Array) -> None:
-        """Update the constants that depend on the unknowns: closest points, shifted targets."""
+    def refreshed(self, x: Array) -> Problem:
+        """Return the problem with the constants at x: closest points, shifted targets."""
         coordinates = self.variables.points(x)
-        for element in self._elements:
-            element.refresh(coordinates)
+        return self._with_elements([e.refreshed(coordinates) for e in self._elements])
+
+    def _with_elements(self, elements: list[_Elements]) -> Problem:
+        """Return a problem with equivalent elements, which shares the sparsity pattern."""
+        other = copy(self)
+        other._elements = elements
+        return other
 
     def by_term(self, x: Array) -> dict[str, float]:
         """Return the energy by term name, with updated constants; it sums to :meth:`energy`."""
@@ -341,7 +356,7 @@ def energies(items: Sequence[Weighted], layout: Layout, coordinates: Array) -> d
 def _by_term(terms: Sequence[_Values], coordinates: Array) -> dict[str, float]:
     out: dict[str, float] = {}
     for term in terms:
-        term.refresh(coordinates)
+        term = term.refreshed(coordinates)
         name = term.item.term.name
         out[name] = out.get(name, 0.0) + term.energy(term.residual(coordinates))
     return out

@@ -1,0 +1,86 @@
+"""What the plans of the developable task need to know about a design."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from gso import metrics as measure
+from gso.energy import fairness
+from gso.mesh import Mesh
+from gso.smoothing import smooth_grid
+from gso.tasks import base
+from gso.typing import Array
+
+#: Gaussian curvature at which the fairness term preserves half of the design's own bending.
+FLAT_CURVATURE = 0.02
+
+
+class Shape:
+    """A surface in the unit ball: its curvature, its bending, and its shape without noise."""
+
+    def __init__(self, mesh: Mesh):
+        self.mesh = mesh
+
+    @cached_property
+    def curvature(self) -> float:
+        """Mean |K|, averaged over both triangulations of the quads."""
+        return measure.loss_gc_both(self.mesh, scale=1.0)
+
+    @cached_property
+    def bending(self) -> float:
+        """Mean squared second derivative along the polylines."""
+        stencil, coefficients = fairness.differences(self.mesh)
+        if len(stencil) == 0:
+            return 0.0
+        second = np.einsum("ke,ekd->ed", coefficients, self.mesh.vertices[stencil])
+        return float((second**2).sum(axis=1).mean() * 2.0)
+
+    @property
+    def smooth(self) -> Mesh:
+        """The surface without its noise; on grids only, other meshes are returned unchanged."""
+        return self._smoothed[0]
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the noise; 0 on meshes that are not grids."""
+        return self._smoothed[1]
+
+    @cached_property
+    def _smoothed(self) -> tuple[Mesh, float]:
+        mesh = self.mesh
+        if mesh.grid is None:
+            return mesh, 0.0
+        smoothed = smooth_grid(mesh.grid, order=4)
+        return mesh.replaced(smoothed.points.reshape(-1, 3)), smoothed.sigma
+
+
+class Analysis(base.Analysis):
+    """A design and its constraints, analysed for the developable task."""
+
+    @cached_property
+    def shape(self) -> Shape:
+        """The shape of the design."""
+        return Shape(self.mesh)
+
+
+def own_bending(mesh: Mesh) -> Array:
+    """Compute the share (n,) of its own bending that each vertex of a smooth design should keep.
+
+    The share is near one where the design is developable already, so that fairness does not
+    shrink its border, and near zero where the design has Gaussian curvature.
+    """
+    k = 0.5 * (np.abs(measure.curvature(mesh)) + np.abs(measure.curvature(mesh, 1)))
+    grid = mesh.grid_index
+    if grid is not None:
+        inner = grid[1:-1, 1:-1]
+        k[grid] = np.pad(k[inner], 1, mode="edge")
+    k = np.where(np.isnan(k), np.inf, k)
+    return kept_bending(k)
+
+
+def kept_bending(curvature: Any) -> Any:
+    """Compute the share of its own bending that a vertex of a Gaussian curvature should keep."""
+    return 1.0 / (1.0 + (curvature / FLAT_CURVATURE) ** 2)

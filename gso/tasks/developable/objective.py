@@ -1,0 +1,93 @@
+"""The objective of the formulation "curvature".
+
+On the design scaled to the unit ball it is
+
+    w_curvature mean |K| + w_fairness / 2 mean |second derivative|^2 + w_proximity mean d
+    + w_elongation / 2 mean (elongation)^2
+
+with |K| smoothed by a decreasing epsilon. The absolute value concentrates bending along few
+lines, which lets a surface become developable. Second derivatives are relative to a share of
+the design's own, which is large where the design is developable. d penalises the displacement
+from the design, its tangential part less: quadratically below `quadratic_below`, linearly
+beyond. The elongation of an edge is zero within a range of length ratios.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gso import metrics as measure
+from gso.energy import Weighted, curvature, elongation, fairness, proximity
+from gso.energy.losses import Absolute, Distance
+from gso.hierarchy import resample
+from gso.mesh import Mesh
+from gso.tasks import per_component
+from gso.tasks.base import Request
+from gso.tasks.developable.analysis import Analysis, Shape, own_bending
+from gso.tasks.developable.options import Options
+from gso.tasks.evaluation import parted
+from gso.typing import Array
+from gso.unknowns import vertex_normals
+
+#: Mean |K| and mean squared bending of a typical design, for which weights are quoted.
+TYPICAL_CURVATURE = 0.3
+TYPICAL_BENDING = 5.0
+#: Factor on the weight of curvature on meshes that are not grids: more curvature remains there,
+#: around irregular vertices and for lack of a coarse-to-fine sequence.
+GENERAL = 1.8
+
+
+def adapted_weights(options: Options, curved: Any, bending: Any) -> tuple[Any, Any]:
+    """Adapt the curvature and fairness weights to a design's mean |K| and squared bending."""
+    curvature = options.w_curvature * (TYPICAL_CURVATURE / curved) ** 0.2
+    return curvature, options.w_fairness * (TYPICAL_BENDING / (bending + 1.0)) ** 0.5
+
+
+def objective(analysis: Analysis, request: Request, mesh: Mesh) -> list[Weighted]:
+    """Build the terms on the design or on a coarser copy of it, without constraints.
+
+    Several components are weighted each for its own size and curvature.
+    """
+    if not parted(analysis.mesh):
+        shape = analysis.shape
+        return _terms(request, shape.mesh, shape.curvature, shape.bending, shape.smooth, mesh)
+
+    def make(own: Mesh) -> list[Weighted]:
+        shape = Shape(own)
+        curved = measure.loss_gc_worst(own, scale=1.0)
+        return _terms(request, own, curved, shape.bending, shape.smooth, own)
+
+    return per_component.objective(mesh, make)
+
+
+def _terms(
+    request: Request, design: Mesh, curved: float, bending: float, smooth: Mesh, mesh: Mesh
+) -> list[Weighted]:
+    """Build the terms of one component, on its own mesh or on a coarser copy of it."""
+    o = request.options
+    w_curvature, w_fairness = adapted_weights(o, max(curved, 1e-3), bending)
+    w_curvature *= (
+        request.weight_factor if mesh.grid_index is not None else GENERAL * request.weight_factor
+    )
+    w_proximity = o.w_proximity
+    if request.max_displacement is not None:
+        # The bound keeps the result close, so the other terms can be stronger.
+        w_curvature, w_fairness = 4.5 * w_curvature, 3.0 * w_fairness
+        w_proximity = 0.3 * w_proximity
+    normals = vertex_normals(mesh)
+    near = proximity.build(mesh, normals, tangential=o.tangential)
+    items = [Weighted(t, w_curvature, Absolute(o.eps)) for t in curvature.build(mesh)]
+    if mesh is not design:
+        smooth = mesh.replaced(_resampled(smooth, mesh))
+    fair = fairness.build(mesh, reference=smooth.vertices, share=own_bending(smooth))
+    items.append(Weighted(fair, w_fairness))
+    items.append(Weighted(near, w_proximity, Distance(o.quadratic_below)))
+    items.append(Weighted(elongation.build(mesh), o.w_elongation))
+    return items
+
+
+def _resampled(source: Mesh, target: Mesh) -> Array:
+    """Resample the vertices of one grid at the resolution of another, row by row."""
+    if source.grid is None or target.grid_shape is None:
+        return source.vertices
+    return resample(source.grid, *target.grid_shape).reshape(-1, 3)

@@ -1,0 +1,102 @@
+"""Settings of the formulation "curvature"."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from gso.errors import OptionError
+from gso.tasks.options import Options as BaseOptions
+
+#: Largest strain of a developable surface when only a maximum deviation was asked for.
+DEVELOPABLE = 5e-3
+
+
+@dataclass(frozen=True)
+class Options(BaseOptions):
+    """Settings of the developable task; lengths in units of the design's unit ball.
+
+    Attributes
+    ----------
+    w_curvature : float
+        Weight of mean |K| for a design with typical mean |K|; the weight used decreases slowly
+        with the design's mean |K|.
+    w_fairness : float
+        Weight of the mean squared second derivative for a design with typical bending; the
+        weight used decreases with the design's bending.
+    w_proximity : float
+        Weight of the displacement from the design.
+    w_elongation : float
+        Weight of edges much shorter or longer than in the design. Boundary edges are penalised
+        from a change of length of 8 % on.
+    quadratic_below : float
+        Displacements below this are penalised quadratically, larger ones linearly.
+    tangential : float
+        Factor on the tangential part of a displacement.
+    eps : float
+        Smoothing of |K|: curvature well below this is penalised quadratically.
+    variables : {"normal", "free", "spline", "surface"}
+        Unknowns of the last stage: offsets along normals, free vertices, or (on grids) a
+        coarse bicubic field of offsets, which cannot crumple. With "surface" (on grids) they are
+        the control points of a bicubic B-spline surface, returned as the result's `spline`.
+        Except with "surface", `max_deviation` implies offsets along normals, and constraints
+        imply free vertices and no coarser grids.
+    controls : int
+        "spline", "surface": control points along each side; fewer on small grids.
+    coarse_iterations : int
+        Iterations on the coarsest grid; half as many with `x0`.
+    coarse_size : int
+        Largest side of the coarsest grid; a grid that small is halved once.
+    between_iterations : int
+        Iterations on each grid between the coarsest and the design's own, where the unknowns
+        are normal offsets. With "free" and without `x0` the vertices are free there too and
+        take `iterations`, halved from grid to grid on fine grids.
+    developable_below : float
+        A design whose mean |K| is below this is developable already and is returned unchanged,
+        unless there are constraints, `x0` or variables "surface".
+    """
+
+    RENAMED: ClassVar[dict[str, str]] = {"near": "quadratic_below"}
+    PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
+        "fast": {
+            "iterations": 4,
+            "coarse_iterations": 8,
+            "w_curvature": 1.15e-3,
+            "w_fairness": 8.2e-6,
+        },
+        "balanced": {},
+        "accurate": {
+            "iterations": 14,
+            "coarse_iterations": 12,
+            "variables": "free",
+            "w_curvature": 8.9e-4,
+            "w_fairness": 9.0e-6,
+        },
+    }
+
+    iterations: int = 12
+    method: str = "levenberg-marquardt"
+    w_curvature: float = 9.0e-4
+    w_fairness: float = 7.8e-6
+    w_proximity: float = 1.0
+    w_elongation: float = 0.1
+    quadratic_below: float = 0.006
+    tangential: float = 0.5
+    eps: float = 0.007
+    variables: str = "normal"
+    controls: int = 16
+    coarse_iterations: int = 12
+    coarse_size: int = 32
+    between_iterations: int = 6
+    developable_below: float = 1e-3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.variables not in ("normal", "free", "spline", "surface"):
+            raise OptionError(
+                f"variables is {self.variables!r}; take 'normal', 'free', 'spline' or 'surface'"
+            )
+        if self.controls < 4:
+            raise OptionError(f"controls is {self.controls}; it must be 4 or more")
+        if not (self.eps > 0 and self.quadratic_below > 0):
+            raise OptionError("eps and quadratic_below must be positive")

@@ -1,0 +1,68 @@
+"""Methods: the direction of a step, the line search along it, and when to stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from gso.status import Status
+from gso.tno.solver.directions import GaussNewton, LevenbergMarquardt
+from gso.tno.solver.line_search import armijo
+
+#: Energy (dimensionless) that counts as zero.
+_NOTHING = 1e-20
+
+
+def relative_decrease(
+    before: float, after: float, step: float, expected: float, tolerance: float
+) -> Status | None:
+    """Stop when an iteration lowers the energy by less than a share of it.
+
+    Parameters
+    ----------
+    before, after : float
+        Energy at the start and at the end of the iteration.
+    step : float
+        Accepted step length; 0 if no step lowers the energy enough.
+    expected : float
+        Decrease predicted by the quadratic model.
+    tolerance : float
+        The share.
+
+    Returns
+    -------
+    Status or None
+        None to continue.
+    """
+    if before - after > tolerance * abs(before):
+        return None
+    # A rejected step is no failure if the predicted decrease is negligible.
+    done_well = step > 0 or expected <= max(tolerance * abs(before), _NOTHING)
+    return Status.CONVERGED if done_well else Status.STALLED
+
+
+@dataclass(frozen=True)
+class Method:
+    """How a problem is minimised.
+
+    Attributes
+    ----------
+    direction : callable
+        Makes the object that computes the directions of one solve, such as
+        :class:`gso.tno.solver.directions.GaussNewton`.
+    line_search : callable
+        Finds the step, with the arguments of :func:`gso.tno.solver.line_search.armijo`.
+    stop : callable
+        Decides when to stop, with the arguments of :func:`relative_decrease`.
+    """
+
+    direction: Callable[[], Any] = GaussNewton
+    line_search: Callable[..., Any] = armijo
+    stop: Callable[[float, float, float, float, float], Status | None] = relative_decrease
+
+
+METHODS = {
+    "gauss-newton": Method(GaussNewton),
+    "levenberg-marquardt": Method(LevenbergMarquardt),
+}
