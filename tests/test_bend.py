@@ -192,7 +192,9 @@ def test_a_start_is_taken_up():
     np.testing.assert_allclose(warm.mesh.vertices, cold.mesh.vertices, atol=1e-4)
 
 
-@pytest.mark.parametrize("wrong", [{"w_bending": 0.0}, {"w_bending_start": -1.0}, {"iterations": 0.5}])
+@pytest.mark.parametrize(
+    "wrong", [{"w_bending": 0.0}, {"w_bending_start": -1.0}, {"iterations": 0.5}]
+)
 def test_wrong_options_are_named(wrong):
     with pytest.raises(gso.OptionError, match=next(iter(wrong))):
         gso.BendOptions(**wrong)

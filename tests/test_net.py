@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import subprocess
 import sys
@@ -26,11 +25,10 @@ from gso.net import (  # noqa: E402
     available,
     catalogue,
     load,
-    onednn,
     predict,
     save,
 )
-from gso.net.blocks import IMDB, Convolution, Stencils  # noqa: E402
+from gso.net.blocks import IMDB, Stencils  # noqa: E402
 from gso.net.catalogue import TASKS  # noqa: E402
 from gso.net.grids import axes  # noqa: E402
 
@@ -72,82 +70,6 @@ def aligned_flatten():
 @pytest.fixture(scope="module")
 def published():
     return shaken(GSONet(channels=8, blocks=1), size=0.01)
-
-
-@pytest.mark.parametrize("size", [(12, 16, 3), (16, 4, 1), (8, 8, 2)])
-def test_single_grids_are_convolved_by_the_weights_of_the_moment(size):
-    inside, outside, width = size
-    how = {"stride": 2 if width == 2 else 1, "padding": width // 2}
-    conv = Convolution(inside, outside, width, **how).eval()
-    wide = torch.randn(1, 2 * inside, 16, 24).contiguous(memory_format=torch.channels_last)
-    grids = [wide[:, inside:], torch.randn(1, inside, 8, 8)]
-
-    def right(conv=conv):
-        for x in grids:
-            with torch.inference_mode():
-                expected = torch.conv2d(x, conv.weight, conv.bias, **how)
-                torch.testing.assert_close(conv(x), expected, atol=1e-3, rtol=0)
-
-    right()
-    with torch.no_grad():
-        conv.weight.mul_(2.0)
-    right()
-    conv.load_state_dict(Convolution(inside, outside, width).state_dict())
-    right()
-    for _ in range(20):
-        # The second may well take the place that the first had in memory.
-        conv.weight.data = torch.empty(0)
-        conv.weight.data = torch.randn(outside, inside, width, width)
-        right()
-    conv.weight.data.mul_(2.0)
-    right(conv.eval())
-    conv.train()
-    conv.weight.grad = torch.ones_like(conv.weight)
-    torch.optim.SGD([conv.weight], lr=1.0, fused=True).step()
-    right()
-    right(conv.eval())
-    right(conv.to(memory_format=torch.channels_last))
-    other = copy.deepcopy(conv)
-    with torch.no_grad():
-        other.weight.zero_()
-    right()
-    right(other)
-    with torch.inference_mode():
-        right(Convolution(inside, outside, width, **how).eval())
-
-
-@pytest.mark.parametrize("channels", [4, 16, 24])
-def test_single_grids_go_through_blocks_of_the_weights_of_the_moment(channels):
-    block = IMDB(channels).eval()
-    grids = [torch.randn(1, channels, *size) for size in ((1, 1), (7, 12), (32, 32))]
-    grids.append(grids[-1].contiguous(memory_format=torch.channels_last))
-
-    def right(block=block):
-        for x in grids:
-            expected = block(x.repeat(2, 1, 1, 1))[:1].detach()
-            with torch.inference_mode():
-                torch.testing.assert_close(block(x), expected, atol=1e-4, rtol=0)
-
-    right()
-    for weight in block.parameters():
-        with torch.no_grad():
-            weight.copy_(torch.randn_like(weight) / channels)
-        right()
-    block.load_state_dict(IMDB(channels).state_dict())
-    right()
-    for weight in block.parameters():
-        weight.data = torch.randn_like(weight) / channels
-        right()
-    for weight in block.parameters():
-        weight.data.mul_(0.5)
-    right(block.eval())
-    right(block.train())
-    right(copy.deepcopy(block).to(memory_format=torch.channels_last).eval())
-    with torch.inference_mode():
-        made_there = IMDB(channels).eval()
-    with torch.no_grad():
-        x = grids[1]
-        torch.testing.assert_close(made_there(x), made_there(x.repeat(2, 1, 1, 1))[:1])
 
 
 def test_stencils_show_place_slope_and_bending():
@@ -197,35 +119,6 @@ def test_single_grids_keep_single_precision_where_others_choose_half():
         expected = block(x)
         with torch.autocast("cpu", torch.bfloat16):
             torch.testing.assert_close(block(x), expected, atol=0.05, rtol=0)
-
-
-def test_what_pytorch_does_otherwise_is_not_called(monkeypatch):
-    onednn.reorders.cache_clear()
-    monkeypatch.setattr(onednn, "_added", lambda *a: a[0])
-    block, x = IMDB(8).eval(), torch.randn(1, 8, 8, 8)
-    with torch.inference_mode():
-        assert not onednn.reorders()
-        torch.testing.assert_close(block(x), block(x.repeat(2, 1, 1, 1))[:1])
-    onednn.reorders.cache_clear()
-
-
-@pytest.mark.parametrize(("kind", "weights"), [(Convolution, 1), (IMDB, 4)])
-def test_weights_are_reordered_once(kind, weights, monkeypatch):
-    if not onednn.reorders():
-        pytest.skip("this version of PyTorch does not reorder weights")
-    made = []
-    reordered = onednn._reordered
-    monkeypatch.setattr(onednn, "_reordered", lambda *a: made.append(1) or reordered(*a))
-    module = (IMDB(8) if kind is IMDB else Convolution(8, 8, 3, padding=1)).eval()
-    with torch.inference_mode():
-        for _ in range(3):
-            module(torch.randn(1, 8, 8, 8))
-        module(torch.randn(2, 8, 8, 8))
-    assert len(made) == weights
-    with torch.inference_mode():
-        module.train()(torch.randn(1, 8, 8, 8))
-        module(torch.randn(1, 8, 8, 8))
-    assert len(made) == weights
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import silu
-
-from gso.net import onednn
 
 #: Channels per group of the group normalisation.
 _GROUP = 16
@@ -17,42 +13,6 @@ _LEAK = 0.05
 #: Scale of positions, and additional scale per order of difference (up to two), such that the
 #: scaled values of surfaces in the unit ball are of order one.
 _PLACE, _SLOPE = 2.0, 32.0
-#: Largest number of vertices for which the merged form of :class:`IMDB` is faster (measured).
-_SMALL = 64 * 64
-
-
-class Convolution(nn.Conv2d):
-    """A 2D convolution that uses :mod:`gso.net.onednn` for single grids on CPUs.
-
-    Weights changed through ``weight.data`` take effect only after the next call of ``eval()``
-    on this module, or on the :class:`IMDB` that contains it.
-
-    >>> x, net = torch.ones(1, 4, 8, 8), Convolution(4, 4, 3, padding=1).eval()
-    >>> with torch.inference_mode():
-    ...     alone = net(x)
-    >>> bool((alone - net(x)).abs().max() < 1e-5)
-    True
-    """
-
-    def forward(self, x: Tensor) -> Tensor:
-        weight = self.weight
-        if (
-            not onednn.takes(x, weight)
-            or isinstance(self.padding, str)
-            or self.padding_mode != "zeros"
-        ):
-            return super().forward(x)
-        how = onednn.How(self.padding, self.stride, self.dilation, self.groups)
-        if not onednn.keeps(self, weight):
-            return torch.mkldnn_convolution(x, weight, self.bias, *how)
-        (kept,) = onednn.kept(
-            self, x.shape, (weight,), lambda w: (onednn.reordered(w, x.shape, how),)
-        )
-        return onednn.convolved(x, kept, self.bias, how)
-
-    def train(self, mode: bool = True) -> Convolution:
-        onednn.forget(self)
-        return super().train(mode)
 
 
 class Stencils(nn.Module):
@@ -123,9 +83,6 @@ class IMDB(nn.Module):
     output and the rest to the next convolution. A fourth convolution computes the last quarter.
     A 1 x 1 convolution mixes the quarters, and the result is added to the input.
 
-    For single small grids on CPUs a merged form is computed in fewer steps. Its rounding
-    differs, and it does not call the submodules or their hooks.
-
     >>> sum(p.numel() for p in IMDB(16).parameters())
     6448
     """
@@ -135,62 +92,19 @@ class IMDB(nn.Module):
         kept, rest = channels // 4, channels - channels // 4
         self.sizes = (kept, rest)
         self.steps = nn.ModuleList(
-            Convolution(n, channels, 3, padding=1, bias=False) for n in (channels, rest, rest)
+            nn.Conv2d(n, channels, 3, padding=1, bias=False) for n in (channels, rest, rest)
         )
-        self.last = Convolution(rest, kept, 3, padding=1, bias=False)
-        self.mix = Convolution(channels, channels, 1, bias=False)
+        self.last = nn.Conv2d(rest, kept, 3, padding=1, bias=False)
+        self.mix = nn.Conv2d(channels, channels, 1, bias=False)
         self.active = nn.LeakyReLU(_LEAK, inplace=True)
 
     def forward(self, x: Tensor) -> Tensor:
-        if x.shape[2] * x.shape[3] <= _SMALL and onednn.takes(x, self.mix.weight):
-            convolutions: list[Any] = [*self.steps, self.last, self.mix]
-            weights = [c.weight for c in convolutions]
-            if onednn.keeps(self, *weights):
-                return self._at_once(x, weights)
         rest, parts = x, []
         for step in self.steps:
             part, rest = self.active(step(rest)).split(self.sizes, dim=1)
             parts.append(part)
         parts.append(self.last(rest))
         return x + self.mix(torch.cat(parts, dim=1))
-
-    def _at_once(self, x: Tensor, weights: list[Tensor]) -> Tensor:
-        """Compute the block from merged weights.
-
-        Every step passes all channels on; zero weights cancel the quarter that belongs to the
-        output. The last convolution includes the mixing of the last two quarters.
-        """
-        x = x.contiguous(memory_format=torch.channels_last)
-        *steps, last, one, two = onednn.kept(
-            self, x.shape, weights, lambda *w: self._merged(x.shape, *w)
-        )
-        made = [x]
-        for weight in steps:
-            made.append(onednn.convolved(made[-1], weight, leak=_LEAK))
-        (kept, _), (_, channels, height, width) = self.sizes, x.shape
-        rows, first, second, _ = (y.permute(0, 2, 3, 1).reshape(-1, channels) for y in made)
-        # In-place operations stay in single precision when the caller uses autocast.
-        rows = rows.clone().addmm_(first[:, :kept], one).addmm_(second[:, :kept], two)
-        total = rows.view(1, height, width, channels).permute(0, 3, 1, 2)
-        return onednn.add_convolved(total, made[-1], last)
-
-    def _merged(self, shape: torch.Size, *weights: Tensor) -> tuple[Tensor, ...]:
-        """Merge weights: three steps, the last convolution, the mixing of the first quarters."""
-        first, second, third, last, mix = weights
-        one, two, three, four = mix.double()[:, :, 0, 0].split(self.sizes[0], dim=1)
-        whole = torch.einsum("oq,qrij->orij", four, last.double())
-        at_vertex = three.new_zeros(*three.shape, 3, 3)
-        at_vertex[:, :, 1, 1] = three
-        whole = torch.cat([at_vertex, whole], dim=1)
-        wide = [
-            torch.cat([torch.zeros_like(w[:, : self.sizes[0]]), w], dim=1) for w in (second, third)
-        ]
-        convolutions = [onednn.reordered(w.float(), shape) for w in (first, *wide, whole)]
-        return *convolutions, one.t().float().contiguous(), two.t().float().contiguous()
-
-    def train(self, mode: bool = True) -> IMDB:
-        onednn.forget(self)
-        return super().train(mode)
 
 
 class Residual(nn.Module):
@@ -203,7 +117,7 @@ class Residual(nn.Module):
         super().__init__()
         groups = max(channels // _GROUP, 1)
         self.before, self.between = (nn.GroupNorm(groups, channels) for _ in range(2))
-        self.first, self.second = (Convolution(channels, channels, 3, padding=1) for _ in range(2))
+        self.first, self.second = (nn.Conv2d(channels, channels, 3, padding=1) for _ in range(2))
         self.everywhere = nn.Linear(channels, channels)
 
     def forward(self, x: Tensor) -> Tensor:

@@ -9,7 +9,7 @@ from torch.nn.functional import interpolate
 from gso.errors import OptionError
 from gso.net import inputs
 from gso.net.base import Net
-from gso.net.blocks import Convolution, Residual
+from gso.net.blocks import Residual
 from gso.net.catalogue import TASKS
 from gso.net.grids import Frame, planes
 from gso.net.resampling import spline_field
@@ -79,17 +79,17 @@ class CoarseNet(Net):
             return nn.Sequential(*(Residual(width) for _ in range(depth)))
 
         seen = inputs.SHAPE + inputs.BENDING + state + dim
-        self.stem = Convolution(seen, w[0], 4, stride=2, padding=1)
+        self.stem = nn.Conv2d(seen, w[0], 4, stride=2, padding=1)
         self.fine_in = blocks(w[0], d[0])
-        self.to_middle = Convolution(w[0], w[1], 2, stride=2)
+        self.to_middle = nn.Conv2d(w[0], w[1], 2, stride=2)
         self.middle_in = blocks(w[1], d[1])
-        self.to_body = Convolution(w[1], w[2], 2, stride=2)
+        self.to_body = nn.Conv2d(w[1], w[2], 2, stride=2)
         self.body = blocks(w[2], d[2])
-        self.from_body = Convolution(w[2], w[1], 1)
+        self.from_body = nn.Conv2d(w[2], w[1], 1)
         self.middle_out = blocks(w[1], d[1] + 1)
-        self.from_middle = Convolution(w[1], w[0], 1)
+        self.from_middle = nn.Conv2d(w[1], w[0], 1)
         self.fine_out = blocks(w[0], d[0] + 1)
-        self.coarse_head, self.fine_head = (Convolution(n, dim, 3, padding=1) for n in (w[1], w[0]))
+        self.coarse_head, self.fine_head = (nn.Conv2d(n, dim, 3, padding=1) for n in (w[1], w[0]))
         for head in (self.coarse_head, self.fine_head):
             nn.init.zeros_(head.weight)
             nn.init.zeros_(head.bias)  # type: ignore[arg-type]
