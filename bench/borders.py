@@ -62,7 +62,7 @@ def figures(design: designs.Design, after: gso.Mesh) -> list[Any]:
         edges.min(),
         design.asymmetry(after.vertices) if design.symmetries else "",
         *(percent * x for x in (there, both, 0.5 * (true.there_mean + true.back_mean))),
-        *(metrics.folds(m).max() for m in (before, after)),
+        *(metrics.dihedral_angles(m).max() for m in (before, after)),
         metrics.loss_gc_worst(before),
         metrics.loss_gc_worst(after, scale=metrics.unit(before)),
         metrics.fairness_ratio(before, after),

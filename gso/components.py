@@ -126,8 +126,8 @@ def combined(
 ) -> dict[str, float]:
     """Combine the metrics of the components into those of the whole mesh.
 
-    Means are weighted by the components' areas; see :attr:`gso.metrics.Info.joined`. Components
-    that lack a metric are left out of its mean, maximum, minimum or sum.
+    Means are weighted by the components' areas; see :attr:`gso.metrics.Info.aggregation`.
+    Components that lack a metric are left out of its mean, maximum, minimum or sum.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def combined(
     for name in names:
         have = [k for k, metrics in enumerate(several) if name in metrics]
         values = np.array([several[k][name] for k in have])
-        how = info[name].joined if name in info else "mean"
+        how = info[name].aggregation if name in info else "mean"
         if how == "mean":
             out[name] = mean(values, np.array([areas[k] for k in have]))
         else:

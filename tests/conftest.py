@@ -10,6 +10,11 @@ from gso.mesh import Mesh
 from gso.mesh.topology import reverse
 
 
+def is_disk(mesh: Mesh) -> bool:
+    """Whether a mesh is a disk: one component, one boundary loop, no handles."""
+    return mesh.euler_characteristic == 1 and len(mesh.boundary_loops) == 1
+
+
 def saddle(height: int = 9, width: int | None = None, strength: float = 0.4) -> np.ndarray:
     """A smooth saddle over the square [-1, 1]^2, (height, width, 3)."""
     u, v = np.meshgrid(

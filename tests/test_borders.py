@@ -111,7 +111,7 @@ def test_ratios_and_folds_of_a_folded_sheet():
     after = sheet.replaced(folded @ rotation(0).T)
     np.testing.assert_allclose(metrics.edge_ratios(sheet, after), 1.0)
     np.testing.assert_allclose(metrics.loop_ratios(sheet, after), [1.0])
-    angles = metrics.folds(after)
+    angles = metrics.dihedral_angles(after)
     assert np.count_nonzero(angles > 1e-6) == 4
     assert angles.max() == pytest.approx(90.0)
 

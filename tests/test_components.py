@@ -329,7 +329,7 @@ def test_measures_of_the_whole():
     assert np.isfinite(list(other.values())).all()
     flips = [{"flipped_cells": 1.0, "scale_min": 0.5}, {"flipped_cells": 2.0, "scale_min": 0.2}]
     assert combined(flips, [1.0, 1.0]) == {"flipped_cells": 3.0, "scale_min": 0.2}
-    assert {info.joined for info in metrics.INFO.values()} == {"mean", "max", "min", "sum"}
+    assert {info.aggregation for info in metrics.INFO.values()} == {"mean", "max", "min", "sum"}
 
 
 def test_labels_follow_the_numbering_and_links():

@@ -95,7 +95,7 @@ def test_losses_are_the_metrics(pair):
     compared = (losses.k_left, losses.d_h, losses.fair_ratio)
     left, near, ratio = (f(batch(*results), batch(*designs)) for f in compared)
     for k, (design, result) in enumerate(zip(designs, results, strict=True)):
-        was, is_left = (metrics.loss_gc_both(x, scale=1.0) for x in (design, result))
+        was, is_left = (metrics.loss_gc_mean(x, scale=1.0) for x in (design, result))
         assert float(left[k]) == pytest.approx(is_left / was, rel=1e-12)
         assert float(near[k]) == pytest.approx(metrics.d_H(design, result), rel=1e-12)
         assert float(gc[k]) == pytest.approx(is_left, rel=1e-12)

@@ -28,7 +28,7 @@ PACKAGE = Path(gso.__file__).parent
 #: Parts of the package that do not affect the optimiser's figures.
 _ASIDE = ("cli", "dataset", "hybrid", "io", "net", "plot", "rulings")
 #: Parts that the metrics of a peer's result depend on.
-_MEASURES = ("geometry", "mesh", "metrics.py", "tasks")
+_MEASURES = ("geometry", "mesh", "metrics", "tasks")
 
 
 class Store:

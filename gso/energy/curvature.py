@@ -32,9 +32,9 @@ def build(mesh: Mesh) -> list[Term]:
     density.
     """
     terms: dict[int, list[tuple[Ints, Array]]] = {}
-    for stars in mesh.splits:
+    for stars in mesh.stars_by_triangulation:
         areas = [_weights(mesh, centre, ring) for centre, ring in stars]
-        total = len(mesh.splits) * sum(float(a.sum()) for a in areas)
+        total = len(mesh.stars_by_triangulation) * sum(float(a.sum()) for a in areas)
         for (centre, ring), area in zip(stars, areas, strict=True):
             element = np.concatenate([centre[:, None], ring], axis=1)
             terms.setdefault(ring.shape[1], []).append((element, area / total))

@@ -43,7 +43,7 @@ def build(mesh: Mesh) -> Term:
     length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
     count = len(length)
     measured = length > 1e-9 * length.mean()
-    low, high = np.where(mesh.rim, np.transpose([BOUNDARY]), np.transpose([INSIDE]))
+    low, high = np.where(mesh.boundary_edges, np.transpose([BOUNDARY]), np.transpose([INSIDE]))
     constants = np.stack([1.0 / np.maximum(length, 1e-300), low, high])
     return Term(
         "elongation",

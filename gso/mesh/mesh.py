@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +12,15 @@ from gso import geometry
 from gso.errors import MeshError
 from gso.mesh import topology
 from gso.mesh.attributes import Attributes
-from gso.mesh.welding import collapse, seams
+from gso.mesh.validation import (
+    check_area,
+    checked_faces,
+    checked_vertices,
+    numbers,
+    reordered,
+    weld_poles,
+)
+from gso.mesh.welding import seams
 from gso.typing import Array, Ints
 
 
@@ -86,14 +93,14 @@ class Mesh:
         notes: tuple[str, ...] = (),
         attributes: Attributes | None = None,
     ):
-        points = _checked_vertices(vertices)
-        table, flipped, said = _checked_faces(faces, points)
+        points = checked_vertices(vertices)
+        table, flipped, said = checked_faces(faces, points)
         self.vertices: Array = points
         self.faces: Ints = table
         topology.check_vertices(self.half_edges)
         self.given_notes: tuple[str, ...] = tuple(notes)
         self.notes: tuple[str, ...] = self.given_notes + _unjoined(self) + said
-        self.attributes = None if attributes is None else _turned(attributes, table, flipped)
+        self.attributes = None if attributes is None else reordered(attributes, table, flipped)
         self.vertices.flags.writeable = False
         self.faces.flags.writeable = False
 
@@ -105,7 +112,7 @@ class Mesh:
         mesh with triangles at the pole, and `notes` says so. With ``weld=False`` it stays
         a grid.
         """
-        grid = _numbers(points, "a grid is an array of numbers (H, W, 3)")
+        grid = numbers(points, "a grid is an array of numbers (H, W, 3)")
         if grid.ndim != 3 or grid.shape[2] != 3:
             raise MeshError(f"a grid is an array (H, W, 3), not {grid.shape}")
         height, width = grid.shape[:2]
@@ -117,16 +124,16 @@ class Mesh:
             i, j = np.argwhere(~np.isfinite(grid))[0][:2]
             raise MeshError(f"the coordinates of grid vertex ({i}, {j}) are not finite")
         template = _grid_template(height, width)
-        welded = _weld_poles(grid, template.faces) if weld else None
+        welded = weld_poles(grid, template.faces) if weld else None
         if welded is not None:
             return cls(welded[0], welded[1], notes=welded[2])
         points = grid.reshape(-1, 3)
-        _check_area(template.faces, points)
+        check_area(template.faces, points)
         return template.replaced(points)
 
     def replaced(self, vertices: Array, *, notes: tuple[str, ...] = ()) -> Mesh:
         """Copy the mesh with other vertices (n, 3); the connectivity is shared, not rechecked."""
-        points = _checked_vertices(vertices)
+        points = checked_vertices(vertices)
         if points.shape != self.vertices.shape:
             raise MeshError(f"{points.shape[0]} vertices given for {len(self.vertices)}")
         points.flags.writeable = False
@@ -178,7 +185,7 @@ class Mesh:
         return topology.half_edges(self.triangles, len(self.vertices))
 
     @cached_property
-    def splits(self) -> tuple[topology.Stars, ...]:
+    def stars_by_triangulation(self) -> tuple[topology.Stars, ...]:
         """Vertex stars of both triangulations of the quads, grouped by ring length.
 
         First the mesh's own triangulation, then that along the other diagonals (see
@@ -192,7 +199,7 @@ class Mesh:
     @property
     def stars(self) -> topology.Stars:
         """Interior vertices and their rings in the mesh's own triangulation, by ring length."""
-        return self.splits[0]
+        return self.stars_by_triangulation[0]
 
     @cached_property
     def edges(self) -> Ints:
@@ -200,9 +207,9 @@ class Mesh:
         return topology.edges(self.half_edges)
 
     @cached_property
-    def rim(self) -> NDArray[np.bool_]:
+    def boundary_edges(self) -> NDArray[np.bool_]:
         """Mask over :attr:`edges`: boundary edges."""
-        return topology.rim(self.half_edges)
+        return topology.boundary_edges(self.half_edges)
 
     @cached_property
     def boundary_loops(self) -> list[Ints]:
@@ -251,15 +258,6 @@ class Mesh:
     def euler_characteristic(self) -> int:
         """Number of vertices - edges + faces; unused vertices are not counted."""
         return int(self.used.sum()) - len(self.edges) + len(self.faces)
-
-    @property
-    def is_disk(self) -> bool:
-        """Whether it is one component of genus zero with one boundary loop."""
-        return (
-            len(self.boundary_loops) == 1
-            and self.euler_characteristic == 1
-            and np.unique(self.components[self.used]).size == 1
-        )
 
     @property
     def has_triangles(self) -> bool:
@@ -314,6 +312,18 @@ def _grid_template(height: int, width: int) -> Mesh:
     return mesh
 
 
+_CONNECTIVITY = (
+    "faces",
+    "half_edges",
+    "grid_index",
+    "triangles",
+    "triangle_edges",
+    "stars_by_triangulation",
+    "edges",
+    "boundary_edges",
+    "boundary_loops",
+    "components",
+)
 #: Tolerance for coincident vertices, relative to the longest side of the bounding box.
 _JOINED = 1e-7
 #: Number of touching components per face from which on a mesh counts as a polygon soup.
@@ -331,165 +341,3 @@ def _unjoined(mesh: Mesh) -> tuple[str, ...]:
 def _advice(mesh: Mesh) -> str:
     least = 10 * _JOINED * mesh.diagonal
     return f"Merge their vertices with weld={least:.1g} of gso.load, --weld {least:.1g} of gso"
-
-
-def _turned(attributes: Attributes, table: Ints, flipped: NDArray[np.bool_]) -> Attributes:
-    """Reorder the corners of the attributes for faces that were reversed or lost a column."""
-    corners = np.broadcast_to(np.arange(table.shape[1]), table.shape).copy()
-    corners[table < 0] = -1
-    corners[flipped] = topology.reverse(corners[flipped])
-    return attributes.taken(np.arange(len(table)), corners)
-
-
-_CONNECTIVITY = (
-    "faces",
-    "half_edges",
-    "grid_index",
-    "triangles",
-    "triangle_edges",
-    "splits",
-    "edges",
-    "rim",
-    "boundary_loops",
-    "components",
-)
-
-
-def _numbers(values: ArrayLike, expected: str) -> Array:
-    """Copy to an array of double precision."""
-    try:
-        given = np.asarray(values)
-        if given.dtype.kind not in "c":
-            return np.array(given, dtype=np.float64)
-        error: Any = "complex numbers"
-    except (TypeError, ValueError, OverflowError) as caught:
-        error = caught
-    raise MeshError(f"{expected}: {error}")
-
-
-def _checked_vertices(vertices: ArrayLike) -> Array:
-    points = _numbers(vertices, "vertices must be numbers in an array (n, 3)")
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise MeshError(f"vertices must be an array (n, 3), not {points.shape}")
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if bad.size:
-        raise MeshError(
-            f"the coordinates of vertex {bad[0]} are not finite ({bad.size} such vertices); "
-            "remove or replace them"
-        )
-    return points
-
-
-def _checked_faces(faces: Any, points: Array) -> tuple[Ints, NDArray[np.bool_], tuple[str, ...]]:
-    """Check and orient faces; return them, a mask of the reversed ones, and notes."""
-    try:
-        given = np.asarray(faces)
-    except ValueError:
-        raise MeshError("faces must be an array (m, 3) or (m, 4); pad triangles with -1") from None
-    if given.ndim != 2 or given.shape[1] not in (3, 4) or given.dtype.kind not in "iuf":
-        raise MeshError(f"faces must be integers in an array (m, 3) or (m, 4), not {given.shape}")
-    with np.errstate(invalid="ignore"):
-        table = given.astype(np.int64)
-    if given.dtype.kind == "f" and (table != given).any():
-        raise MeshError(f"face {np.argwhere(table != given)[0][0]} has an index that is no integer")
-    if len(table) == 0:
-        raise MeshError("the mesh has no faces")
-    if table.shape[1] == 4 and (table[:, 3] == -1).all():
-        table = table[:, :3].copy()
-    tri = table[:, 3] == -1 if table.shape[1] == 4 else np.ones(len(table), bool)
-    inside = (table >= 0) & (table < len(points))
-    inside[tri, 3:] = True
-    bad = np.flatnonzero(~inside.all(axis=1))
-    if bad.size:
-        raise MeshError(
-            f"face {bad[0]} = {table[bad[0]].tolist()} points outside the {len(points)} vertices "
-            f"({bad.size} such faces)"
-        )
-    _check_corners(table)
-    given_table = table
-    table, flips, components = topology.orient(table, len(points))
-    _check_area(table, points)
-    said = []
-    if flips:
-        said.append(f"{flips} faces were reversed to make the orientation consistent")
-    if components > 1:
-        said.append(f"the mesh has {components} components; each is treated on its own")
-    unused = np.ones(len(points), bool)
-    unused[table[table >= 0]] = False
-    if unused.any():
-        said.append(
-            f"{int(unused.sum())} vertices belong to no face and stay as they are "
-            f"(the first is vertex {np.flatnonzero(unused)[0]})"
-        )
-    return table, table[:, 1] != given_table[:, 1], tuple(said)
-
-
-def _check_corners(table: Ints) -> None:
-    ordered = np.sort(table, axis=1)
-    bad = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
-    if bad.size:
-        raise MeshError(
-            f"face {bad[0]} = {table[bad[0]].tolist()} repeats a vertex ({bad.size} such faces); "
-            "write it with one corner less or delete it"
-        )
-    _, first, count = np.unique(ordered, axis=0, return_index=True, return_counts=True)
-    if (count > 1).any():
-        raise MeshError(
-            f"face {first[count > 1][0]} = {table[first[count > 1][0]].tolist()} is there "
-            f"{count[count > 1][0]} times; delete the duplicates"
-        )
-
-
-def _check_area(table: Ints, points: Array) -> None:
-    """Refuse faces without area, measured by the cross product of two spanning vectors."""
-    mask = np.zeros(len(points), bool)
-    mask[table[table >= 0]] = True
-    used = points[mask]
-    # Squares and products of lengths must stay in the range of double precision.
-    farthest = np.abs(used).max()
-    size = np.ptp(used, axis=0).max() if farthest < 1e100 else np.inf
-    if not 1e-100 < size < np.inf:
-        raise MeshError(
-            f"the surface is {size:.3g} wide and reaches to {farthest:.3g}: all its vertices are "
-            "one point, or its unit of length needs changing"
-        )
-    p = points - used.mean(axis=0)
-    if table.shape[1] == 3:
-        last = table[:, 2]
-    else:
-        last = np.where(table[:, 3] < 0, table[:, 0], table[:, 3])
-    # Diagonals of a quad, two edges of a triangle.
-    a = p[table[:, 2]] - p[table[:, 0]]
-    b = p[last] - p[table[:, 1]] if table.shape[1] == 4 else p[table[:, 1]] - p[table[:, 0]]
-    scaled = np.linalg.norm(np.cross(a / size, b / size), axis=1)
-    bad = np.flatnonzero(~(scaled > 1e-14))
-    if bad.size:
-        raise MeshError(
-            f"face {bad[0]} = {table[bad[0]].tolist()} has no area ({bad.size} such faces); "
-            "merge its vertices or delete it"
-        )
-
-
-def _weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]] | None:
-    """Weld the sides of a grid that are one point; None if there are none."""
-    points = grid.reshape(-1, 3)
-    ids = np.arange(len(points)).reshape(grid.shape[:2])
-    sides = {
-        "first row": ids[0],
-        "last row": ids[-1],
-        "first column": ids[:, 0],
-        "last column": ids[:, -1],
-    }
-    size = np.ptp(points, axis=0).max()
-    poles = [n for n, s in sides.items() if np.ptp(points[s], axis=0).max() <= 1e-9 * size]
-    if not poles or size == 0:
-        return None
-    target = np.arange(len(points))
-    for name in poles:
-        # A corner may already be welded to another side: merge that side as well.
-        target[np.isin(target, target[sides[name]])] = target[sides[name]].min()
-    kept, new = np.unique(target, return_inverse=True)
-    table = collapse(faces, new).faces
-    verb = "is one point" if len(poles) == 1 else "are one point each"
-    note = f"the {' and the '.join(poles)} of the grid {verb}: welded to a pole"
-    return points[kept], table, (note,)

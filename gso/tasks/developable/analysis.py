@@ -27,7 +27,7 @@ class Shape:
     @cached_property
     def curvature(self) -> float:
         """Mean |K|, averaged over both triangulations of the quads."""
-        return measure.loss_gc_both(self.mesh, scale=1.0)
+        return measure.loss_gc_mean(self.mesh, scale=1.0)
 
     @cached_property
     def bending(self) -> float:

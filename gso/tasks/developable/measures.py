@@ -57,8 +57,8 @@ def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict
         "distance_max": percent * max(true.there_max, true.back_max),
         "deviation_max": percent * true.there_max,
         "fairness_ratio": measure.fairness_ratio(before, after),
-        "fold_max_before": float(measure.folds(before).max(initial=0.0)),
-        "fold_max": float(measure.folds(after).max(initial=0.0)),
+        "fold_max_before": float(measure.dihedral_angles(before).max(initial=0.0)),
+        "fold_max": float(measure.dihedral_angles(after).max(initial=0.0)),
     }
     same = np.array_equal(before.faces, after.faces)
     if same:

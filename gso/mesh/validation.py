@@ -1,0 +1,162 @@
+"""Checks and repairs of vertices and faces that a mesh is made of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gso.errors import MeshError
+from gso.mesh import topology
+from gso.mesh.attributes import Attributes
+from gso.mesh.welding import collapse
+from gso.typing import Array, Ints
+
+
+def reordered(attributes: Attributes, table: Ints, flipped: NDArray[np.bool_]) -> Attributes:
+    """Reorder the corners of the attributes for faces that were reversed or lost a column."""
+    corners = np.broadcast_to(np.arange(table.shape[1]), table.shape).copy()
+    corners[table < 0] = -1
+    corners[flipped] = topology.reverse(corners[flipped])
+    return attributes.taken(np.arange(len(table)), corners)
+
+
+def numbers(values: ArrayLike, expected: str) -> Array:
+    """Copy to an array of double precision."""
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind not in "c":
+            return np.array(given, dtype=np.float64)
+        error: Any = "complex numbers"
+    except (TypeError, ValueError, OverflowError) as caught:
+        error = caught
+    raise MeshError(f"{expected}: {error}")
+
+
+def checked_vertices(vertices: ArrayLike) -> Array:
+    points = numbers(vertices, "vertices must be numbers in an array (n, 3)")
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise MeshError(f"vertices must be an array (n, 3), not {points.shape}")
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if bad.size:
+        raise MeshError(
+            f"the coordinates of vertex {bad[0]} are not finite ({bad.size} such vertices); "
+            "remove or replace them"
+        )
+    return points
+
+
+def checked_faces(faces: Any, points: Array) -> tuple[Ints, NDArray[np.bool_], tuple[str, ...]]:
+    """Check and orient faces; return them, a mask of the reversed ones, and notes."""
+    try:
+        given = np.asarray(faces)
+    except ValueError:
+        raise MeshError("faces must be an array (m, 3) or (m, 4); pad triangles with -1") from None
+    if given.ndim != 2 or given.shape[1] not in (3, 4) or given.dtype.kind not in "iuf":
+        raise MeshError(f"faces must be integers in an array (m, 3) or (m, 4), not {given.shape}")
+    with np.errstate(invalid="ignore"):
+        table = given.astype(np.int64)
+    if given.dtype.kind == "f" and (table != given).any():
+        raise MeshError(f"face {np.argwhere(table != given)[0][0]} has an index that is no integer")
+    if len(table) == 0:
+        raise MeshError("the mesh has no faces")
+    if table.shape[1] == 4 and (table[:, 3] == -1).all():
+        table = table[:, :3].copy()
+    tri = table[:, 3] == -1 if table.shape[1] == 4 else np.ones(len(table), bool)
+    inside = (table >= 0) & (table < len(points))
+    inside[tri, 3:] = True
+    bad = np.flatnonzero(~inside.all(axis=1))
+    if bad.size:
+        raise MeshError(
+            f"face {bad[0]} = {table[bad[0]].tolist()} points outside the {len(points)} vertices "
+            f"({bad.size} such faces)"
+        )
+    check_corners(table)
+    given_table = table
+    table, flips, components = topology.orient(table, len(points))
+    check_area(table, points)
+    said = []
+    if flips:
+        said.append(f"{flips} faces were reversed to make the orientation consistent")
+    if components > 1:
+        said.append(f"the mesh has {components} components; each is treated on its own")
+    unused = np.ones(len(points), bool)
+    unused[table[table >= 0]] = False
+    if unused.any():
+        said.append(
+            f"{int(unused.sum())} vertices belong to no face and stay as they are "
+            f"(the first is vertex {np.flatnonzero(unused)[0]})"
+        )
+    return table, table[:, 1] != given_table[:, 1], tuple(said)
+
+
+def check_corners(table: Ints) -> None:
+    ordered = np.sort(table, axis=1)
+    bad = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
+    if bad.size:
+        raise MeshError(
+            f"face {bad[0]} = {table[bad[0]].tolist()} repeats a vertex ({bad.size} such faces); "
+            "write it with one corner less or delete it"
+        )
+    _, first, count = np.unique(ordered, axis=0, return_index=True, return_counts=True)
+    if (count > 1).any():
+        raise MeshError(
+            f"face {first[count > 1][0]} = {table[first[count > 1][0]].tolist()} is there "
+            f"{count[count > 1][0]} times; delete the duplicates"
+        )
+
+
+def check_area(table: Ints, points: Array) -> None:
+    """Refuse faces without area, measured by the cross product of two spanning vectors."""
+    mask = np.zeros(len(points), bool)
+    mask[table[table >= 0]] = True
+    used = points[mask]
+    # Squares and products of lengths must stay in the range of double precision.
+    farthest = np.abs(used).max()
+    size = np.ptp(used, axis=0).max() if farthest < 1e100 else np.inf
+    if not 1e-100 < size < np.inf:
+        raise MeshError(
+            f"the surface is {size:.3g} wide and reaches to {farthest:.3g}: all its vertices are "
+            "one point, or its unit of length needs changing"
+        )
+    p = points - used.mean(axis=0)
+    if table.shape[1] == 3:
+        last = table[:, 2]
+    else:
+        last = np.where(table[:, 3] < 0, table[:, 0], table[:, 3])
+    # Diagonals of a quad, two edges of a triangle.
+    a = p[table[:, 2]] - p[table[:, 0]]
+    b = p[last] - p[table[:, 1]] if table.shape[1] == 4 else p[table[:, 1]] - p[table[:, 0]]
+    scaled = np.linalg.norm(np.cross(a / size, b / size), axis=1)
+    bad = np.flatnonzero(~(scaled > 1e-14))
+    if bad.size:
+        raise MeshError(
+            f"face {bad[0]} = {table[bad[0]].tolist()} has no area ({bad.size} such faces); "
+            "merge its vertices or delete it"
+        )
+
+
+def weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]] | None:
+    """Weld the sides of a grid that are one point; None if there are none."""
+    points = grid.reshape(-1, 3)
+    ids = np.arange(len(points)).reshape(grid.shape[:2])
+    sides = {
+        "first row": ids[0],
+        "last row": ids[-1],
+        "first column": ids[:, 0],
+        "last column": ids[:, -1],
+    }
+    size = np.ptp(points, axis=0).max()
+    poles = [n for n, s in sides.items() if np.ptp(points[s], axis=0).max() <= 1e-9 * size]
+    if not poles or size == 0:
+        return None
+    target = np.arange(len(points))
+    for name in poles:
+        # A corner may already be welded to another side: merge that side as well.
+        target[np.isin(target, target[sides[name]])] = target[sides[name]].min()
+    kept, new = np.unique(target, return_inverse=True)
+    table = collapse(faces, new).faces
+    verb = "is one point" if len(poles) == 1 else "are one point each"
+    note = f"the {' and the '.join(poles)} of the grid {verb}: welded to a pole"
+    return points[kept], table, (note,)

@@ -1,0 +1,169 @@
+"""Gaussian curvature."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gso import geometry
+from gso.metrics.surfaces import components, grid_of, mesh_of, unit
+from gso.typing import Array
+
+
+def curvature_grid(points: Array) -> Array:
+    """Return the discrete Gaussian curvature (H-2, W-2) at interior grid vertices, 1/length^2."""
+    return geometry.grid_curvature(components(np.asarray(points, float)))
+
+
+def curvature(surface: Any, split: int = 0) -> Array:
+    """Return the discrete Gaussian curvature of every vertex (n,); NaN on the boundary, 1/length^2.
+
+    Interior vertices may have any valence. Those of a grid come in the order of the mesh.
+
+    Parameters
+    ----------
+    surface : Mesh or array (H, W, 3)
+    split : {0, 1}
+        Triangulation of the quads: the mesh's own one, or that along the other diagonals. On a
+        mesh of triangles both are the same.
+    """
+    mesh = mesh_of(surface)
+    out = np.full(len(mesh.vertices), np.nan)
+    stars = mesh.stars_by_triangulation
+    for centre, ring in stars[min(split, len(stars) - 1)]:
+        out[centre] = geometry.gaussian_curvature(
+            components(mesh.vertices[centre]),
+            [components(mesh.vertices[ring[:, k]]) for k in range(ring.shape[1])],
+        )
+    return out
+
+
+def worst_curvature(surface: Any) -> Array:
+    """Return the Gaussian curvature of every vertex, from the triangulation with larger |K|, (n,).
+
+    NaN on the boundary, 1/length^2, with Meyer's area: 1 on a unit sphere.
+
+    >>> u, v = np.mgrid[-0.2:0.2:9j, -0.2:0.2:9j]
+    >>> ball = np.dstack([u, v, np.sqrt(1.0 - u**2 - v**2)])
+    >>> bool(abs(np.nanmean(worst_curvature(ball)) - 1.0) < 0.02)
+    True
+    """
+    own, other = curvature(surface), curvature(surface, 1)
+    return 3.0 * np.where(np.abs(other) > np.abs(own), other, own)
+
+
+def _interior_curvature(surface: Any, split: int = 0) -> Array:
+    grid = grid_of(surface)
+    if grid is None:
+        values = curvature(surface, split)
+    else:
+        values = geometry.grid_curvature(components(grid), split).ravel()
+    values = values[~np.isnan(values)]
+    return values if values.size else np.zeros(1)
+
+
+def _mean_abs(surface: Any, split: int) -> float:
+    return float(np.abs(_interior_curvature(surface, split)).mean())
+
+
+def loss_gc(surface: Any, *, scale: float | None = None, split: int = 0) -> float:
+    """Return the mean absolute Gaussian curvature K_A of interior vertices (Wang et al. 2024).
+
+    This is Eq. 1 of the paper, multiplied by `scale` squared. Without `scale` it is that of
+    the surface in the unit ball.
+
+    Only one triangulation of the quads is used, so curvature along the other diagonals is not
+    seen: see :func:`loss_gc_worst`.
+
+    Parameters
+    ----------
+    surface : Mesh or array (H, W, 3)
+    scale : float, optional
+        Length that counts as one.
+    split : {0, 1}
+        Triangulation of the quads; 0 is the published figure.
+
+    Examples
+    --------
+    >>> flat = np.zeros((4, 4, 3)); flat[..., :2] = np.mgrid[:4, :4].transpose(1, 2, 0)
+    >>> round(loss_gc(flat), 12)
+    0.0
+    """
+    scale = unit(surface) if scale is None else scale
+    return _mean_abs(surface, split) * scale**2
+
+
+def loss_gc_worst(surface: Any, *, scale: float | None = None) -> float:
+    """Return :func:`loss_gc` in the triangulation of the quads where it is larger.
+
+    On meshes of triangles it equals ``loss_gc``.
+
+    >>> crumpled = np.dstack([*np.mgrid[:6.0, :6.0], np.indices((6, 6)).sum(axis=0) % 2])
+    >>> loss_gc_worst(crumpled) >= loss_gc(crumpled)
+    True
+    """
+    scale = unit(surface) if scale is None else scale
+    return max(_mean_abs(surface, split) for split in (0, 1)) * scale**2
+
+
+def loss_gc_mean(surface: Any, *, scale: float | None = None) -> float:
+    """Return the mean of :func:`loss_gc` over both triangulations of the quads, as in the energy.
+
+    It does not depend on the numbering of the mesh.
+
+    >>> saddle = np.dstack([*np.mgrid[:4.0, :4.0], np.outer(np.arange(4.0), np.arange(4.0))])
+    >>> loss_gc_mean(saddle) <= loss_gc_worst(saddle)
+    True
+    """
+    scale = unit(surface) if scale is None else scale
+    return 0.5 * sum(_mean_abs(surface, split) for split in (0, 1)) * scale**2
+
+
+def loss_gc_half(surface: Any, *, scale: float | None = None) -> float:
+    """Return :func:`loss_gc` at half the resolution, an independent check that no energy minimises.
+
+    It is the mean over the four sub-grids of every second vertex, and over both triangulations
+    of each. NaN for meshes that are not grids, and for grids smaller than 6 x 6.
+
+    >>> u, v = np.mgrid[-1:1:16j, -1:1:16j]
+    >>> saddle = np.dstack([u, v, 0.3 * u * v])
+    >>> 0.9 < loss_gc_half(saddle) / loss_gc(saddle) < 1.1
+    True
+    """
+    grid = grid_of(surface)
+    if grid is None or min(grid.shape[:2]) < 6:
+        return float("nan")
+    scale = unit(surface) if scale is None else scale
+    some = [grid[i::2, j::2] for i in (0, 1) for j in (0, 1)]
+    return float(np.mean([_mean_abs(g, split) for g in some for split in (0, 1)]) * scale**2)
+
+
+def mean_abs_K(surface: Any, *, scale: float | None = None) -> float:
+    """Return the mean absolute Gaussian curvature with the area of Meyer et al. 2003.
+
+    It is 1 on a unit sphere, and taken from the triangulation of the quads where it is larger:
+    three times :func:`loss_gc_worst`, which divides by the areas of whole stars.
+    """
+    return 3.0 * loss_gc_worst(surface, scale=scale)
+
+
+def curvature_features(surface: Any, *, scale: float | None = None) -> tuple[float, float, float]:
+    """Return (K_P, K_N, K_A): means of the positive, negative and absolute curvature (Eq. 1)."""
+    scale = unit(surface) if scale is None else scale
+    k = _interior_curvature(surface) * scale**2
+    return float(np.maximum(k, 0).mean()), float(np.minimum(k, 0).mean()), float(np.abs(k).mean())
+
+
+def K_A_r(before: Any, after: Any) -> float:
+    """Return the share of mean |K| removed, 1 - K_A(after) / K_A(before); 0 for a flat input."""
+    return _removed(loss_gc(before, scale=1.0), loss_gc(after, scale=1.0))
+
+
+def K_A_r_worst(before: Any, after: Any) -> float:
+    """Return the share of :func:`loss_gc_worst` removed; 0 for a flat input."""
+    return _removed(loss_gc_worst(before, scale=1.0), loss_gc_worst(after, scale=1.0))
+
+
+def _removed(was: float, left: float) -> float:
+    return (was - left) / was if was > 0 else 0.0

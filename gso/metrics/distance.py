@@ -1,0 +1,63 @@
+"""Distances between two surfaces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from gso import geometry
+from gso.mesh.closest_point import Nearest
+from gso.metrics.surfaces import mesh_of, used_points
+from gso.typing import Array
+
+if TYPE_CHECKING:
+    from gso.mesh import Mesh
+
+
+class Distances(NamedTuple):
+    """Distances between two surfaces in both directions, in the unit of their coordinates."""
+
+    there_mean: float
+    there_max: float
+    back_mean: float
+    back_max: float
+
+
+def d_H(before: Any, after: Any) -> float:
+    """Return the published proximity, percent of the input's bounding-box diagonal.
+
+    Mean over *output* vertices of the distance to the nearest *input* vertex. It is one-sided
+    and includes tangential sliding; see :func:`surface_distance` for the true distance.
+    """
+    from scipy.spatial import cKDTree
+
+    source = used_points(before)
+    distance, _ = cKDTree(source).query(used_points(after))
+    return float(100.0 * distance.mean() / geometry.box_diagonal(source))
+
+
+def point_to_surface(points: Array, mesh: Mesh) -> Array:
+    """Return the distance (n,) of points (n, 3) to the triangulated surface, in its unit."""
+    return Nearest(mesh).distances(points)
+
+
+def surface_distance(before: Any, after: Any) -> Distances:
+    """Measure true point-to-surface distances: output to input ("there"), and back."""
+    a, b = mesh_of(before), mesh_of(after)
+    there = point_to_surface(used_points(b), a)
+    back = point_to_surface(used_points(a), b)
+    return Distances(float(there.mean()), float(there.max()), float(back.mean()), float(back.max()))
+
+
+def displacement(before: Any, after: Any) -> tuple[float, float]:
+    """Return the root mean square and largest vertex displacement, percent of the diagonal.
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> displacement(grid, grid + [0.0, 0.0, 0.1 * np.sqrt(0.08)])
+    (1.0, 1.0)
+    """
+    source = used_points(before)
+    moved = np.linalg.norm(used_points(after) - source, axis=1)
+    percent = 100.0 / geometry.box_diagonal(source)
+    return float(percent * np.sqrt((moved**2).mean())), float(percent * moved.max())
