@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gso.components import Component, several, split
 from gso.energy import fairness
+from gso.geometry import closest_motion
+from gso.linalg import spd
 from gso.mesh import Mesh
 from gso.typing import Array, Ints
 from gso.unknowns import vertex_normals
@@ -20,11 +24,9 @@ _BULGE = 0.5
 _SHORTER = 1e-9
 #: Relative improvement that is required to bulge against the normals instead of along them.
 _EVEN = 1e-3
-#: Singular value, relative to the largest, that counts as zero.
-_THIN = 1e-9
 
 
-class Spread:
+class ThinPlateField:
     """Interpolation of handle displacements over a surface with the least bending.
 
     The field minimises the squared second differences (a thin plate with free ends), so it is
@@ -42,24 +44,23 @@ class Spread:
     >>> y, x = np.mgrid[:5.0, :5.0]
     >>> mesh = Mesh.from_grid(np.stack([x, y, 0 * x], axis=-1))
     >>> ends = np.r_[0:5, 20:25]
-    >>> field = Spread(mesh, ends)(mesh.vertices[ends])
+    >>> field = ThinPlateField(mesh, ends)(mesh.vertices[ends])
     >>> bool(np.allclose(field, mesh.vertices, atol=1e-4))
     True
     """
 
     def __init__(self, mesh: Mesh, ids: Ints):
         from scipy.sparse import csr_matrix, identity
-        from scipy.sparse.linalg import splu
 
         n = len(mesh.vertices)
         self.mesh, self.ids = mesh, ids
         #: Per component: the component, a mask of its handles, and its own field.
-        self.parts: list[tuple[Component, NDArray[np.bool_], Spread]] = []
+        self.parts: list[tuple[Component, NDArray[np.bool_], ThinPlateField]] = []
         if several(mesh):
             for part in split(mesh):
                 own = np.searchsorted(part.vertices, ids).clip(max=len(part.vertices) - 1)
                 here = part.vertices[own] == ids
-                self.parts.append((part, here, Spread(part.mesh, own[here])))
+                self.parts.append((part, here, ThinPlateField(part.mesh, own[here])))
             return
         self.free = np.setdiff1d(np.arange(n), ids)
         stencil, coefficients = fairness.differences(mesh)
@@ -79,14 +80,9 @@ class Spread:
         energy = energy + _SLOPE * typical * (slope.T @ slope) + _SIZE * typical * identity(n)
         rows = energy.tocsr()[self.free]
         self._coupling = rows[:, ids]
-        self._factor = None
+        self._solve: Any = None
         if len(self.free):
-            self._factor = splu(
-                rows[:, self.free].tocsc(),
-                permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            )
+            self._solve = spd(rows[:, self.free])
 
     def __call__(self, displacement: Array) -> Array:
         """Interpolate the displacements (k, 3) of the handles, (n, 3)."""
@@ -96,8 +92,8 @@ class Spread:
             for part, here, own in self.parts:
                 field[part.vertices] = own(displacement[here])
             return field
-        if self._factor is not None:
-            field[self.free] = self._factor.solve(-(self._coupling @ displacement))
+        if self._solve is not None:
+            field[self.free] = self._solve(-(self._coupling @ displacement))
         return field
 
     def deflection(self) -> Array:
@@ -107,13 +103,13 @@ class Spread:
             for part, _, own in self.parts:
                 out[part.vertices] = own.deflection()
             return out
-        if self._factor is not None:
+        if self._solve is not None:
             load = np.where(self.mesh.used[self.free], 1.0, 0.0)
-            out[self.free] = self._factor.solve(load)
+            out[self.free] = self._solve(load)
         return out / max(float(np.abs(out).max()), 1e-300)
 
 
-def follow(mesh: Mesh, spread: Spread, targets: Array) -> Array:
+def follow(mesh: Mesh, spread: ThinPlateField, targets: Array) -> Array:
     """Deform a surface so that its handles reach their targets, (n, 3).
 
     Each component follows the best rigid motion of its handles. The remaining displacement of
@@ -124,7 +120,7 @@ def follow(mesh: Mesh, spread: Spread, targets: Array) -> Array:
     ----------
     mesh : Mesh
         The surface.
-    spread : Spread
+    spread : ThinPlateField
         Interpolation from its handles.
     targets : ndarray, (k, 3)
         Positions that the handles move to.
@@ -137,7 +133,7 @@ def follow(mesh: Mesh, spread: Spread, targets: Array) -> Array:
     for part in np.unique(mesh.components[spread.ids]):
         which = mesh.components[spread.ids] == part
         inside = mesh.components == part
-        turn, shift = _motion(mesh.vertices[spread.ids[which]], targets[which])
+        turn, shift = closest_motion(mesh.vertices[spread.ids[which]], targets[which])
         points[inside] = mesh.vertices[inside] @ turn.T + shift
     points += spread(targets - points[spread.ids])
     shorter = _lost(mesh, points)
@@ -154,23 +150,3 @@ def _lost(mesh: Mesh, points: Array) -> float:
     a, b = mesh.edges.T
     before, after = (np.linalg.norm(p[a] - p[b], axis=1) for p in (mesh.vertices, points))
     return float(np.maximum(before - after, 0.0).sum() / before.sum())
-
-
-def _motion(points: Array, targets: Array) -> tuple[Array, Array]:
-    """Find the rotation (3, 3) and shift (3,) that bring points (k, 3) closest to targets.
-
-    Where the points do not determine the rotation (one point, or collinear points), it is the
-    smallest possible.
-    """
-    from scipy.spatial.transform import Rotation
-
-    here, there = points.mean(axis=0), targets.mean(axis=0)
-    p, q = points - here, targets - there
-    u, s, vt = np.linalg.svd(q.T @ p)
-    if s[0] <= _THIN**2 * max(float((p * p).sum()), 1e-300):
-        turn = np.eye(3)
-    elif s[1] <= _THIN * s[0]:
-        turn = Rotation.align_vectors(u[:, 0], vt[0])[0].as_matrix()
-    else:
-        turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
-    return turn, there - turn @ here

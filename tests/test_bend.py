@@ -212,7 +212,7 @@ def test_results_are_drawn_and_saved(tmp_path):
 def test_spread_is_affine_where_it_can_be():
     mesh = Mesh.from_grid(sheet(9))
     ids = ends(9)
-    field = deformation.Spread(mesh, ids)(mesh.vertices[ids] @ MOTION.as_matrix() + 1.0)
+    field = deformation.ThinPlateField(mesh, ids)(mesh.vertices[ids] @ MOTION.as_matrix() + 1.0)
     np.testing.assert_allclose(field, mesh.vertices @ MOTION.as_matrix() + 1.0, atol=1e-3)
 
 

@@ -20,7 +20,7 @@ _CORNERS = ((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2))
 _ROOT2 = 2.0**0.5
 #: Corners with a smaller ratio of doubled area to the sum of squared sides count as degenerate:
 #: they have no usable rest frame.
-_FLAT_CORNER = 1e-6
+FLAT_CORNER = 1e-6
 #: Multiple of the knee beyond which the loss continues quadratically in the strain.
 _STEEPEST = 1.3
 
@@ -126,7 +126,7 @@ def cells(mesh: Mesh) -> list[Ints]:
     if len(quads):
         share = corner_shares(mesh.vertices, quads)
         worst = share.argmin(axis=0)
-        bad = share.min(axis=0) <= _FLAT_CORNER
+        bad = share.min(axis=0) <= FLAT_CORNER
         turned = np.take_along_axis(quads[bad], (worst[bad, None] + np.arange(4)) % 4, axis=1)
         quads = quads[~bad]
         triangles = np.concatenate([triangles, turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
@@ -139,7 +139,7 @@ def pieces(mesh: Mesh) -> list[Ints]:
     for faces in cells(mesh):
         if faces.shape[1] == 3:
             area, sides = _corner(mesh.vertices, faces, (0, 1, 2))
-            faces = faces[np.linalg.norm(area, axis=1) > _FLAT_CORNER * sides]
+            faces = faces[np.linalg.norm(area, axis=1) > FLAT_CORNER * sides]
         out.append(faces)
     return [f for f in out if len(f)]
 
@@ -147,7 +147,8 @@ def pieces(mesh: Mesh) -> list[Ints]:
 def _corner(vertices: Array, faces: Ints, corner: tuple[int, int, int]) -> tuple[Array, Array]:
     """Return doubled area vectors (e, 3) of a corner, and the sums (e,) of its squared sides."""
     p, q, r = (vertices[faces[:, k]] for k in corner)
-    return np.cross(q - p, r - p), ((q - p) ** 2).sum(axis=1) + ((r - p) ** 2).sum(axis=1)
+    area = geometry.area_vectors(vertices, faces[:, corner])
+    return area, ((q - p) ** 2).sum(axis=1) + ((r - p) ** 2).sum(axis=1)
 
 
 def corner_shares(vertices: Array, quads: Ints) -> Array:
@@ -155,8 +156,7 @@ def corner_shares(vertices: Array, quads: Ints) -> Array:
 
     The sign is relative to the normal of the face.
     """
-    p = vertices[quads]
-    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    normal = geometry.quad_area_vectors(vertices, quads)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     corners = [_corner(vertices, quads, c) for c in _CORNERS]
     return np.stack([(a * normal).sum(axis=1) / np.maximum(s, 1e-300) for a, s in corners])

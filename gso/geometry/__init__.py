@@ -4,7 +4,7 @@ The functions take *component tuples* ``(x, y, z)`` or ``(x, y)`` and use only
 ``+ - * /`` and the few functions of :mod:`gso.geometry.ops`. The same code runs on
 NumPy arrays (metrics), torch tensors (losses) and CasADi symbols (derivatives), so
 solver residuals, training losses and metrics always agree. Only :mod:`gso.geometry.size`,
-the sizes of point sets, takes NumPy arrays of points.
+:mod:`gso.geometry.triangle` and :mod:`gso.geometry.rigid` take NumPy arrays of points.
 """
 
 from gso.geometry.cells import (
@@ -20,10 +20,10 @@ from gso.geometry.curvature import (
     grid_curvature,
     grid_star,
     star_area,
-    star_defect,
 )
 from gso.geometry.differences import second_difference
 from gso.geometry.parametric import smooth_gaussian_curvature
+from gso.geometry.rigid import closest_motion
 from gso.geometry.shape import (
     Matrix,
     determinant,
@@ -33,22 +33,31 @@ from gso.geometry.shape import (
     tangent_frame,
 )
 from gso.geometry.size import ball, box_diagonal
-from gso.geometry.strain import rest_frame, singular_values, stretch, turn_and_shear
+from gso.geometry.strain import rest_frame, singular_values, turn_and_shear
 from gso.geometry.stretches import first_form, principal_stretches
+from gso.geometry.triangle import (
+    area_vectors,
+    doubled_areas,
+    quad_area_vectors,
+    signed_areas,
+)
 from gso.geometry.vector import angle, cross, dot, norm, norm2, sub
 
 __all__ = [
     "GRID_RINGS",
     "Matrix",
     "angle",
+    "area_vectors",
     "ball",
     "box_diagonal",
+    "closest_motion",
     "corner_area2",
     "cross",
     "determinant",
     "diagonal_distance",
     "diagonals",
     "dot",
+    "doubled_areas",
     "eigen",
     "face_products",
     "first_form",
@@ -60,14 +69,14 @@ __all__ = [
     "norm",
     "norm2",
     "principal_stretches",
+    "quad_area_vectors",
     "rest_frame",
     "second_difference",
     "shape_matrix",
+    "signed_areas",
     "singular_values",
     "smooth_gaussian_curvature",
     "star_area",
-    "star_defect",
-    "stretch",
     "sub",
     "tangent_frame",
     "turn_and_shear",

@@ -33,11 +33,6 @@ def _curvature(angles: Any, area2: Any) -> Any:
     return (2.0 * math.pi - angles) / (0.5 * area2)
 
 
-def star_defect(centre: Vec, ring: Sequence[Vec]) -> Any:
-    """Return the angle defect ``2 pi - sum of angles`` of an interior vertex, radians."""
-    return 2.0 * math.pi - _star(centre, ring)[0]
-
-
 def star_area(centre: Vec, ring: Sequence[Vec]) -> Any:
     """Sum the full areas of the triangles of a star (three times the barycentric area)."""
     return 0.5 * _star(centre, ring)[1]

@@ -27,17 +27,6 @@ def rest_frame(p: Vec, q: Vec, r: Vec) -> tuple[Any, Any, Any]:
     return 1.0 / length, -dot(e, f) / (length * length * height), 1.0 / height
 
 
-def stretch(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
-    """Return the residuals of the membrane strain of the plane triangle p q r.
-
-    Returns ``(Q - 1, c, d)``, where ``R^2 = c^2 + d^2``; twice the sum of their squares
-    is ``(s1 - 1)^2 + (s2 - 1)^2``, the as-rigid-as-possible energy (Sorkine and Alexa
-    2007) without a singular value decomposition. `c` and `d` are linear in the unknowns.
-    """
-    q_part, c, d = turn_and_shear(p, q, r, rest)
-    return norm(q_part) - 1.0, c, d
-
-
 def singular_values(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, Any]:
     """Return the principal stretches ``(s1, s2)`` of a triangle; ``s2 < 0`` when it is inverted."""
     q_part, c, d = turn_and_shear(p, q, r, rest)

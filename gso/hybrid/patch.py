@@ -8,6 +8,7 @@ import numpy as np
 
 from gso import parametrization
 from gso.errors import MeshError
+from gso.linalg import spd
 from gso.mesh import Mesh
 from gso.spline import clamped_knots
 from gso.typing import Array, Ints
@@ -194,7 +195,6 @@ def _spline(points: Array, parameters: Array, size: int) -> tuple[Array, Array]:
     """Fit a smooth bicubic spline to points; evaluate it at their parameters and on a grid."""
     from scipy.interpolate import BSpline
     from scipy.sparse import diags, identity, kron
-    from scipy.sparse.linalg import splu
 
     count = int(np.clip(0.75 * np.sqrt(len(points)), 4, _CONTROLS))
     knots = clamped_knots(count)
@@ -207,7 +207,7 @@ def _spline(points: Array, parameters: Array, size: int) -> tuple[Array, Array]:
     stiffness = kron(bent, one) + kron(one, bent)
     centre = points.mean(axis=0)
     normal = matrix.T @ matrix / len(points) + _SMOOTH * stiffness
-    net = splu(normal.tocsc()).solve(np.asarray(matrix.T @ (points - centre)) / len(points))
+    net = spd(normal)(np.asarray(matrix.T @ (points - centre)) / len(points))
     samples = BSpline.design_matrix(np.linspace(0.0, 1.0, size), knots, 3).toarray()
     grid = np.einsum(
         "ia,jb,abk->ijk", samples, samples, net.reshape(count, count, 3), optimize=True

@@ -6,6 +6,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from gso import geometry
 from gso.errors import MeshError
 from gso.io.source import doubles
 from gso.io.surface import Surface, merged
@@ -59,7 +60,7 @@ def write(mesh: Mesh, file: BinaryIO) -> None:
     corners = mesh.vertices[mesh.triangles]
     if np.abs(corners).max() > np.finfo(np.float32).max:
         raise MeshError("the coordinates are too large for the single precision of STL")
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = geometry.area_vectors(mesh.vertices, mesh.triangles)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     table = np.zeros(len(corners), _RECORD)
     table["normal"] = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)

@@ -14,11 +14,12 @@ from typing import Any
 
 from gso.errors import BackendError, OptionError
 from gso.linalg.base import Pattern, SingularError, blas_threads
+from gso.linalg.spd import spd
 from gso.spelling import choices
 
-__all__ = ["Pattern", "SingularError", "backends", "blas_threads", "choose", "find"]
+__all__ = ["Pattern", "SingularError", "backends", "blas_threads", "choose", "find", "spd"]
 
-_SUPPORT = ("base",)
+_SUPPORT = ("base", "spd")
 
 
 def backends() -> dict[str, ModuleType]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gso.linalg.base import Pattern, SingularError
+from gso.linalg.spd import spd
 
 PACKAGE = "scipy"
 
@@ -38,23 +39,16 @@ class Solver:
         full.sort_indices()
         self._entry = full.data - 1
         self._matrix = csc_matrix((full.data.astype(float), full.indices, full.indptr), (n, n))
-        self._factor: Any = None
+        self._solve: Any = None
 
     def factor(self, values: np.ndarray) -> None:
         """Factor the matrix with these values of the lower triangle."""
-        from scipy.sparse.linalg import splu
-
         self._matrix.data[:] = values[self._entry]
         try:
-            self._factor = splu(
-                self._matrix,
-                permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            )
+            self._solve = spd(self._matrix)
         except RuntimeError as error:
             raise SingularError(str(error)) from None
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solve for one right-hand side (n,) or several (n, k)."""
-        return self._factor.solve(rhs)
+        return self._solve(rhs)

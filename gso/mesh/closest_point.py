@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gso import geometry
 from gso.mesh import Mesh
 from gso.typing import Array
 
@@ -59,7 +60,7 @@ class Nearest:
         corner = self._triangles[triangle]
         a, b, c = (self._vertices[corner[:, k]] for k in range(3))
         opposite = [np.cross(c - b, foot - b), np.cross(a - c, foot - c), np.cross(b - a, foot - a)]
-        face = np.cross(b - a, c - a)
+        face = geometry.area_vectors(self._vertices, corner)
         # Barycentric coordinates up to a factor, signed by the triangle's own normal.
         share = np.stack([np.einsum("kd,kd->k", x, face) for x in opposite])
         share = np.maximum(share, 0.0)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gso import geometry
 from gso.errors import MeshError
 from gso.mesh import topology
-from gso.metrics.surfaces import components, faces_of, image_of, in_range, points_of
+from gso.metrics.surfaces import faces_of, image_of, in_range, points_of
 from gso.typing import Array
 
 if TYPE_CHECKING:
@@ -25,8 +25,8 @@ def area(mesh: Mesh, points: Array | None = None) -> float:
     6.0
     """
     v = mesh.vertices if points is None else points
-    p, q, r = (np.pad(v[k], ((0, 0), (0, 3 - v.shape[1]))) for k in mesh.triangles.T)
-    return float(0.5 * np.linalg.norm(np.cross(q - p, r - p), axis=1).sum())
+    v = np.pad(v, ((0, 0), (0, 3 - v.shape[1])))
+    return float(0.5 * geometry.doubled_areas(v, mesh.triangles).sum())
 
 
 def area_error(surface: Any, flat: Any) -> float:
@@ -95,11 +95,9 @@ def flips(mesh: Mesh, flat: Array) -> int:
 
 def space_areas(points: Array, faces: NDArray[np.int64]) -> Array:
     """Return the doubled areas of the corner triangles of faces in space."""
-    p, q, r = (points[k] for k in topology.corner_triangles(faces).T)
-    return np.linalg.norm(np.cross(q - p, r - p), axis=1)
+    return geometry.doubled_areas(points, topology.corner_triangles(faces))
 
 
 def corner_areas(flat: Array, faces: NDArray[np.int64]) -> Array:
     """Return the doubled signed areas of the faces' corner triangles in a flat image (n, 2)."""
-    tri = topology.corner_triangles(faces)
-    return geometry.corner_area2(*(components(flat[tri[:, k]]) for k in range(3)))
+    return geometry.signed_areas(flat, topology.corner_triangles(faces))

@@ -24,8 +24,6 @@ from gso.tasks.developable.objective import adapted_weights
 
 #: Lower bound on the mean |K| of a design in the unit ball, where weights depend on it.
 LEAST_CURVATURE = 1e-3
-#: Corners of cells more degenerate than this are ignored (doubled area over squared sides).
-_FLAT_CORNER = 1e-5
 #: Lower bound on the typical strain of a flat image, by which its energy is divided.
 _LEAST_STRAIN = 1e-3
 
@@ -174,7 +172,7 @@ class Strain:
             frame = geometry.rest_frame(cell[a], cell[b], cell[c])
             e, f = geometry.sub(cell[b], cell[a]), geometry.sub(cell[c], cell[a])
             area = geometry.norm(geometry.cross(e, f))
-            good = area > _FLAT_CORNER * (geometry.norm2(e) + geometry.norm2(f))
+            good = area > stretch.FLAT_CORNER * (geometry.norm2(e) + geometry.norm2(f))
             rest += [torch.where(good, x, torch.zeros_like(x)) for x in frame]
             self.sound.append(good)
         self.rest = rest

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gso import geometry
 from gso.components import labels
 from gso.constraints import Compiled, OnLines, Part, Pins, Relations
 from gso.constraints.compiled import is_glue
@@ -99,12 +100,8 @@ def _closer(image: Array, ids: Ints, flat: Array, held: Compiled) -> tuple[float
 
 def _moved(image: Array, p: Array, q: Array) -> Array:
     """Apply to an image the rigid motion that brings points p closest to q."""
-    number = np.array([1.0, 1j])
-    here, there = p.mean(axis=0), q.mean(axis=0)
-    turn = ((p - here) @ number).conj() @ ((q - there) @ number)
-    turn = turn / abs(turn) if abs(turn) > 0 else 1.0
-    z = ((image - here) @ number) * turn
-    return np.stack([z.real, z.imag], axis=1) + there
+    turn, shift = geometry.closest_motion(p, q)
+    return image @ turn.T + shift
 
 
 def _targets(flat: Array, held: Compiled) -> tuple[Ints, Array]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gso import geometry
+from gso.linalg import spd
 from gso.parametrization.orientation import orientation
 from gso.typing import Array, Ints
 from gso.unknowns import Layout
@@ -86,7 +87,6 @@ def relax(
         Largest number of iterations, and relative decrease of the energy at which to stop.
     """
     from scipy.sparse import identity
-    from scipy.sparse.linalg import splu
 
     gradients = _Gradients(vertices, triangles)
     m = gradients.matrix
@@ -94,12 +94,7 @@ def relax(
     laplacian = (adjoint @ m).real.tocsc()
     # Translations of each component are a null space; a little damping makes it regular.
     damping = 1e-9 * laplacian.diagonal().max()
-    factor = splu(
-        (laplacian + damping * identity(len(vertices))).tocsc(),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+    solve = spd(laplacian + damping * identity(len(vertices)))
     kept = triangles if upward is None else upward
     limit = orientation(kept, Layout((("flat", len(vertices), 2),)))
     z = np.ascontiguousarray(flat) @ np.array([1.0, 1j])
@@ -107,7 +102,7 @@ def relax(
     for _ in range(iterations):
         rotation = turn / np.maximum(size, 1e-300)
         pull = adjoint @ rotation - laplacian @ z
-        step = factor.solve(np.stack([pull.real, pull.imag], axis=1))
+        step = solve(np.stack([pull.real, pull.imag], axis=1))
         z = z + limit(_pairs(z), step.ravel()) * (step @ np.array([1.0, 1j]))
         before = energy
         energy, turn, size = gradients.energy(z)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso import geometry
 from gso.errors import MeshError
+from gso.linalg import spd
 from gso.mesh import Mesh
 from gso.parametrization.arap import strain_level
 from gso.typing import Array, Ints
@@ -101,7 +103,7 @@ def _embed(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
         if image is None or not np.isfinite(image).all():
             continue
         scaled = _scaled(mesh, image)
-        flipped = int((_areas(scaled, upward) <= 0).sum())
+        flipped = int((geometry.signed_areas(scaled, upward) <= 0).sum())
         rated.append((flipped, strain_level(mesh.vertices, triangles, scaled), scaled))
     rated.sort(key=lambda r: r[:2])
     return [image for flipped, _, image in rated if flipped == rated[0][0]]
@@ -129,17 +131,11 @@ def _perimeter(points: Array) -> float:
     return float(np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).sum())
 
 
-def _areas(flat: Array, triangles: Ints) -> Array:
-    """Compute the doubled signed areas of triangles."""
-    a, b = (flat[triangles[:, k]] - flat[triangles[:, 0]] for k in (1, 2))
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-
-
 def _scaled(mesh: Mesh, image: Array) -> Array:
     """Scale an image to the area of the surface and centre it at the origin."""
     v, t = mesh.vertices, mesh.triangles
-    space = np.linalg.norm(np.cross(v[t[:, 1]] - v[t[:, 0]], v[t[:, 2]] - v[t[:, 0]]), axis=1)
-    plane = np.abs(_areas(image, t)).sum()
+    space = geometry.doubled_areas(v, t)
+    plane = np.abs(geometry.signed_areas(image, t)).sum()
     return (image - image.mean(axis=0)) * np.sqrt(space.sum() / max(plane, 1e-300))
 
 
@@ -179,7 +175,11 @@ def spanned(mesh: Mesh, loop: Ints, at: Array) -> Array:
         Positions of the loop's vertices: on a convex curve, anticlockwise.
     """
     image = _harmonic(mesh, loop, at)
-    if image is not None and np.isfinite(image).all() and (_areas(image, mesh.triangles) > 0).all():
+    if (
+        image is not None
+        and np.isfinite(image).all()
+        and (geometry.signed_areas(image, mesh.triangles) > 0).all()
+    ):
         return image
     return _tutte(mesh, loop, at)
 
@@ -201,7 +201,6 @@ def _tutte(mesh: Mesh, loop: Ints, at: Array) -> Array:
     are convex.
     """
     from scipy.sparse import coo_matrix
-    from scipy.sparse.linalg import splu
 
     n = len(mesh.vertices)
     a, b = mesh.edges.T
@@ -220,10 +219,5 @@ def _tutte(mesh: Mesh, loop: Ints, at: Array) -> Array:
 
     rows = links[inner]
     matrix = diags(np.asarray(rows.sum(axis=1)).ravel()) - rows[:, inner]
-    image[inner] = splu(
-        matrix.tocsc(),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    ).solve(rows @ image)
+    image[inner] = spd(matrix)(rows @ image)
     return image[:n]

@@ -53,8 +53,7 @@ def upward(mesh: Mesh) -> Ints:
 
 def flips(mesh: Mesh, flat: Array) -> int:
     """Count the inverted triangles of an image (n, 2)."""
-    corners = upward(mesh).T
-    return int((geometry.corner_area2(*(tuple(flat[k].T) for k in corners)) <= 0).sum())
+    return int((geometry.signed_areas(flat, upward(mesh)) <= 0).sum())
 
 
 def strain(mesh: Mesh, flat: Array) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso import geometry
 from gso.mesh import Mesh
 from gso.parametrization.embedding import parts
 from gso.parametrization.grid import rectangle
@@ -38,8 +39,6 @@ def place(mesh: Mesh, flat: Array, target: Array | None = None) -> Array:
 def closest_motion(flat: Array, target: Array) -> Array:
     """Move an image rigidly, without reflection, as close as possible to a target (n, 2).
 
-    Least squares over vertices (Procrustes); in the plane the angle has a closed form.
-
     >>> square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
     >>> closest_motion(square @ np.array([[0.0, 1], [-1, 0]]) + 5, square).round(12) + 0.0
     array([[0., 0.],
@@ -47,9 +46,8 @@ def closest_motion(flat: Array, target: Array) -> Array:
            [1., 1.],
            [0., 1.]])
     """
-    p, q = flat - flat.mean(axis=0), target - target.mean(axis=0)
-    turn = _complex(p).conj() @ _complex(q)
-    return _turned(p, turn) + target.mean(axis=0)
+    turn, shift = geometry.closest_motion(flat, target)
+    return flat @ turn.T + shift
 
 
 def upright(flat: Array) -> Array:

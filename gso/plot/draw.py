@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso import geometry
 from gso.io import check_writable, replacing
 from gso.mesh import topology
 from gso.plot.heat import Heat, Scale
@@ -202,8 +203,7 @@ def _colours(panel: Panel) -> tuple[Array, ScalarMappable | None]:
 
 def _shading(panel: Panel, ambient: float) -> Array:
     """Compute the brightness of every face (m,), the same for both orientations."""
-    p = panel.points[panel.corners]
-    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    normal = geometry.quad_area_vectors(panel.points, panel.corners)
     length = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
     lit = np.abs(normal @ panel.light) / (length * np.linalg.norm(panel.light))
     return ambient + (1.05 - ambient) * lit

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso import geometry
 from gso.mesh import Frame, Mesh
 from gso.typing import Array
 
@@ -29,8 +30,7 @@ class View:
         seen obliquely from above, with x or their longest axis to the right.
         """
         points, triangles = mesh.frame.to_unit(mesh.vertices), mesh.triangles
-        a, b, c = (points[triangles[:, k]] for k in range(3))
-        normals = np.cross(b - a, c - a)
+        normals = geometry.area_vectors(points, triangles)
         used = points[np.unique(triangles)]
         _, extent, axes = np.linalg.svd(used - used.mean(axis=0), full_matrices=False)
         total = normals.sum(axis=0)

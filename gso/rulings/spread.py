@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gso import geometry
 from gso.mesh import Mesh
 from gso.typing import Array, Ints
 
@@ -40,8 +41,8 @@ def region_areas(mesh: Mesh, points: Array, triangles: Ints) -> Array:
 
     if not len(points):
         return np.empty(0)
-    p = mesh.vertices[mesh.triangles[triangles]]
-    area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
+    chosen = mesh.triangles[triangles]
+    p, area = mesh.vertices[chosen], geometry.doubled_areas(mesh.vertices, chosen) / 2
     owner = cKDTree(points).query(p.mean(axis=1))[1]
     return np.asarray(np.bincount(owner, area, len(points)), float)
 

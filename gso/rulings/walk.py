@@ -66,7 +66,7 @@ class Field:
     def along(cls, mesh: Mesh, directions: Array, flat: NDArray[np.bool_]) -> Field:
         """Build a field from given directions (t, 3) of any length."""
         p = mesh.vertices[mesh.triangles]
-        normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        normal = geometry.area_vectors(mesh.vertices, mesh.triangles)
         twice = np.linalg.norm(normal, axis=1)[:, None]
         # A quad may have a degenerate triangle, which no line can cross.
         thin = twice <= _THIN * twice.max()

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from gso.linalg import spd
 from gso.typing import Array
 
 STEPS = 10
@@ -171,7 +172,6 @@ def factor(penalty: Any, weight: float) -> Callable[[Array], Array]:
     from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
     from scipy.sparse import identity
     from scipy.sparse.csgraph import reverse_cuthill_mckee
-    from scipy.sparse.linalg import splu
 
     count = penalty.shape[0]
     matrix = (identity(count) + weight * penalty).tocsc()
@@ -197,6 +197,4 @@ def factor(penalty: Any, weight: float) -> Callable[[Array], Array]:
                 return out
 
             return solve
-    options = {"SymmetricMode": True}
-    lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    return lu.solve
+    return spd(matrix)

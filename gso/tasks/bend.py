@@ -24,7 +24,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gso import metrics as measure
-from gso.deformation import Spread, follow
+from gso.deformation import ThinPlateField, follow
 from gso.energy import Weighted, bending, congruence
 from gso.errors import OptionError
 from gso.mesh import Mesh
@@ -122,8 +122,8 @@ def _start(analysis: Analysis, request: Request) -> Array:
     ids, targets = analysis.constraints.places
     if request.start is not None:
         mesh = mesh.replaced(request.start)
-        return mesh.vertices + Spread(mesh, ids)(targets - mesh.vertices[ids])
-    return follow(mesh, Spread(mesh, ids), targets)
+        return mesh.vertices + ThinPlateField(mesh, ids)(targets - mesh.vertices[ids])
+    return follow(mesh, ThinPlateField(mesh, ids), targets)
 
 
 def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict[str, float]:

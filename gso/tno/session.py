@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from gso import linalg, tasks
 from gso.constraints import Compiled, Constraint, Handle, listed
-from gso.deformation import Spread
+from gso.deformation import ThinPlateField
 from gso.errors import ConvergenceWarning, OptionError
 from gso.result import Result
 from gso.spelling import known_keywords
@@ -103,7 +103,7 @@ class Session:
         self._frame = Canonical(self._design)
         self.analyses = 0
         self._constraints: list[Constraint] = []
-        self._spread: Spread | None = None
+        self._spread: ThinPlateField | None = None
         self._solver: Any = None
         self._problem: Problem | None = None
         self._direction = METHODS[self._options.method].direction()
@@ -302,7 +302,7 @@ class Session:
         if self._stage is None or not len(ids):
             return
         if self._spread is None or not np.array_equal(self._spread.ids, ids):
-            self._spread = Spread(self._frame.mesh, ids)
+            self._spread = ThinPlateField(self._frame.mesh, ids)
         start, count, dim = self._stage.layout.where("surface")
         self._coordinates = self._coordinates.copy()
         surface = self._coordinates[start : start + count * dim].reshape(count, dim)

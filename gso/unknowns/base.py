@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gso.linalg import spd
 from gso.typing import Array, Ints
 
 if TYPE_CHECKING:
@@ -101,7 +102,6 @@ class Variables:
         if self.basis is None:
             return coordinates.copy()
         from scipy.sparse import identity
-        from scipy.sparse.linalg import splu
 
         rhs = self.basis.T @ (coordinates - self.offset)
         gram = (self.basis.T @ self.basis).tocsc()
@@ -111,7 +111,7 @@ class Variables:
         if gram.nnz == np.count_nonzero(diagonal):
             return rhs / np.where(diagonal > 0, diagonal, 1.0)
         ridge = 1e-12 * diagonal.max()
-        return splu((gram + ridge * identity(gram.shape[0], format="csc")).tocsc()).solve(rhs)
+        return spd(gram + ridge * identity(gram.shape[0], format="csc"))(rhs)
 
     def following(self, projection: csr_matrix, basis: csr_matrix, offset: Array) -> Variables:
         """Eliminate linear constraints: restrict the map to coordinates that satisfy them.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso import geometry
 from gso.mesh import Mesh, topology
 from gso.unknowns.base import Array, Layout, Variables
 
@@ -18,11 +19,11 @@ def vertex_normals(mesh: Mesh) -> Array:
     """
     v, he = mesh.vertices, mesh.half_edges
     four = topology.four_corners(mesh.faces)
-    whole = np.cross(v[four[:, 2]] - v[four[:, 0]], v[four[:, 3]] - v[four[:, 1]])
+    whole = geometry.quad_area_vectors(v, four)
     # A triangle belongs to both triangulations, so it counts twice.
     whole[~topology.are_quads(mesh.faces)] *= 2.0
     tri = topology.corner_triangles(topology.by_size(mesh.faces)[0])
-    corner = np.cross(v[tri[:, 1]] - v[tri[:, 0]], v[tri[:, 2]] - v[tri[:, 0]])
+    corner = geometry.area_vectors(v, tri)
     at, area = np.r_[he.origin, tri[:, 0]], np.concatenate([whole[he.face], corner])
     total = np.stack([np.bincount(at, area[:, d], len(v)) for d in range(3)], axis=1)
     length = np.linalg.norm(total, axis=1, keepdims=True)

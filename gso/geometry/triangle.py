@@ -1,0 +1,35 @@
+"""Areas of triangles and quads, of arrays of points and faces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gso.geometry.cells import corner_area2
+from gso.typing import Array, Ints
+
+
+def area_vectors(points: Array, triangles: Ints) -> Array:
+    """Return the doubled areas of triangles times their unit normals, (t, 3).
+
+    >>> corners = np.array([[0.0, 0, 0], [2, 0, 0], [0, 3, 0]])
+    >>> area_vectors(corners, np.array([[0, 1, 2]]))
+    array([[0., 0., 6.]])
+    """
+    p, q, r = (points[triangles[:, k]] for k in range(3))
+    return np.cross(q - p, r - p)
+
+
+def doubled_areas(points: Array, triangles: Ints) -> Array:
+    """Return the doubled areas (t,) of triangles of points (n, 3)."""
+    return np.linalg.norm(area_vectors(points, triangles), axis=1)
+
+
+def signed_areas(flat: Array, triangles: Ints) -> Array:
+    """Return the doubled signed areas (t,) of triangles of points (n, 2)."""
+    return corner_area2(*(tuple(flat[triangles[:, k]].T) for k in range(3)))
+
+
+def quad_area_vectors(points: Array, quads: Ints) -> Array:
+    """Return the doubled area vectors (q, 3) of quads: the products of their diagonals."""
+    v0, v1, v2, v3 = (points[quads[:, k]] for k in range(4))
+    return np.cross(v2 - v0, v3 - v1)

@@ -1,0 +1,33 @@
+"""Factorisation of single sparse symmetric positive definite matrices."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from gso.typing import Array
+
+
+def spd(matrix: Any) -> Callable[[Array], Array]:
+    """Factor a sparse symmetric positive definite matrix (n, n), and return its solver.
+
+    The solver takes a right-hand side (n,) or several (n, k). Matrices that are factored again
+    and again with the same pattern have their own solvers, see :func:`gso.linalg.choose`.
+
+    >>> import numpy as np
+    >>> from scipy.sparse import diags
+    >>> spd(diags([2.0, 4.0]))(np.array([2.0, 2.0]))
+    array([1. , 0.5])
+    """
+    from scipy.sparse.linalg import splu
+
+    factor = splu(
+        matrix.tocsc(),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+    solve: Callable[[Array], Array] = factor.solve
+    return solve

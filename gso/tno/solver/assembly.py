@@ -1,0 +1,111 @@
+"""The sparsity pattern of the Gauss-Newton matrix, and the places of elements in it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gso.linalg.base import Pattern
+from gso.typing import Ints
+
+
+def _repeated(columns: Ints) -> Ints:
+    """Find pairs a < b of an element that are the same unknown, as ordered by :func:`_products`.
+
+    Such a pair contributes to the diagonal of the matrix twice.
+    """
+    a, b = np.triu_indices(columns.shape[0])
+    apart = np.flatnonzero(a != b)
+    same = columns[a[apart]] == columns[b[apart]]
+    which, element = np.nonzero(same)
+    return apart[which] * columns.shape[1] + element
+
+
+@dataclass
+class Assembly:
+    """Positions of the element matrices' entries in the whole matrix, and which count twice."""
+
+    pattern: Pattern
+    scatter: list[Ints]
+    repeated: list[Ints]
+    quadratic: Ints
+    diagonal: Ints
+
+
+_assemblies: OrderedDict[bytes, Assembly] = OrderedDict()
+
+
+_ASSEMBLIES_KEPT = 24
+
+
+_LARGEST_KEPT = 4_000_000
+
+
+def assemble(n: int, columns: list[Ints], quadratic) -> Assembly:
+    """Return the pattern of element matrices, a constant matrix and a diagonal; cached."""
+    pairs = sum(c.shape[0] * (c.shape[0] + 1) // 2 * c.shape[1] for c in columns)
+    digest = hashlib.blake2b(str(n).encode())
+    for c in (*columns, quadratic.indptr, quadratic.indices):
+        digest.update(str(c.shape).encode())
+        digest.update(np.ascontiguousarray(c).data)
+    key = digest.digest()
+    if key in _assemblies:
+        _assemblies.move_to_end(key)
+        return _assemblies[key]
+    assembly = _analysed(n, columns, quadratic)
+    if pairs <= _LARGEST_KEPT:
+        _assemblies[key] = assembly
+        while len(_assemblies) > _ASSEMBLIES_KEPT:
+            _assemblies.popitem(last=False)
+    return assembly
+
+
+def _analysed(n: int, columns: list[Ints], quadratic: Any) -> Assembly:
+    """Compute the position in the matrix of every product of two unknowns of an element."""
+    lows, highs = [], []
+    for c in columns:
+        a, b = np.triu_indices(c.shape[0])
+        low, high = np.minimum(c[a], c[b]).ravel(), np.maximum(c[a], c[b]).ravel()
+        # Padding (index n) is written to an entry past the end.
+        lows.append(np.where(high < n, low, n))
+        highs.append(np.where(high < n, high, n))
+    lows.append(np.repeat(np.arange(n), np.diff(quadratic.indptr)))
+    highs.append(quadratic.indices.astype(np.int64))
+    lows.append(np.arange(n))
+    highs.append(np.arange(n))
+    splits = np.cumsum([len(x) for x in lows])[:-1]
+    place, column, row = _places(np.concatenate(lows), np.concatenate(highs), n)
+    keep = column < n
+    indptr = np.searchsorted(column[keep], np.arange(n + 1))
+    *scatter, fixed, diagonal = np.split(place, splits)
+    pattern = Pattern(n, indptr, row[keep])
+    return Assembly(pattern, scatter, [_repeated(c) for c in columns], fixed, diagonal)
+
+
+#: Largest table, columns times diagonals, for which :func:`_places` does not sort.
+_LARGEST_TABLE = 200_000_000
+
+
+def _places(column: Ints, row: Ints, n: int) -> tuple[Ints, Ints, Ints]:
+    """Rank every (column, row) among the distinct pairs, sorted by column then row; return both.
+
+    Matrices with few diagonals (grids) are marked in a table; the pairs of others are sorted.
+    """
+    distance = row - column
+    used = np.bincount(distance) > 0
+    count = int(used.sum())
+    if (n + 1) * count > _LARGEST_TABLE:
+        every, place = np.unique(column * np.int64(n + 1) + row, return_inverse=True)
+        return place, every // (n + 1), every % (n + 1)
+    slot = np.cumsum(used) - 1
+    at = column * count + slot[distance]
+    mark = np.zeros((n + 1) * count, bool)
+    mark[at] = True
+    found = np.flatnonzero(mark)
+    rank = np.cumsum(mark, dtype=np.int32)
+    columns = found // count
+    return rank[at].astype(np.int64) - 1, columns, columns + np.flatnonzero(used)[found % count]
