@@ -12,8 +12,8 @@ from gso.energy import fairness
 from gso.geometry import closest_motion
 from gso.linalg import spd
 from gso.mesh import Mesh
+from gso.mesh.normals import vertex_normals
 from gso.typing import Array, Ints
-from gso.unknowns import vertex_normals
 
 #: Weights of a field's slope and of its size, relative to its bending. They only select a
 #: solution where the handles leave the thin plate free.

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import gso
-from gso.constraints import compile_constraints, read_constraints
+from gso import geometry
+from gso.constraints import Constraint, compile_constraints, read_constraints
 from gso.constraints.conflicts import check
 from gso.constraints.linear import reduce
-from gso.constraints.parts import Pins, Relations
-from gso.constraints.polyline import Polylines
+from gso.constraints.parts import Part, Pins, Relations
+from gso.energy import Term, Weighted
+from gso.energy.multipliers import STIFF, hardened
 from gso.mesh import Frame, Mesh
-from gso.unknowns import Layout, free, normal_offsets, vertex_normals
+from gso.mesh.normals import vertex_normals
+from gso.mesh.polyline import Polylines
+from gso.unknowns import Layout, free, normal_offsets
 from tests.conftest import saddle, shuffled, sphere_cap
 
 TIGHT = 1e-6
@@ -519,3 +524,65 @@ def test_nearest_points_of_polylines():
     # Open ends and the right angle end a slide, the slight turn does not.
     np.testing.assert_array_equal(line.stop, [[True, True], [True, False], [False, True]])
     np.testing.assert_allclose(line.tangent[1, 1], line.tangent[2, 0])
+
+
+@dataclass(frozen=True)
+class Within(Part):
+    """Vertices at a distance `radius` from the point `centre`: a part from outside the package."""
+
+    ids: np.ndarray
+    centre: np.ndarray
+    radius: float
+
+    @property
+    def vertices(self):
+        return self.ids[:, None]
+
+    def mapped(self, frame, order):
+        centre = frame.to_unit(self.centre[None])[0]
+        radius = self.radius / frame.scale
+        return replace(self, ids=order[self.ids], centre=centre, radius=radius)
+
+    def kept(self, rows):
+        return replace(self, ids=self.ids[rows])
+
+    def violation(self, points):
+        return np.abs(np.linalg.norm(points[self.ids] - self.centre, axis=1) - self.radius)
+
+    def items(self, block):
+        dim = len(self.centre)
+        constants = np.r_[self.centre, self.radius, 0.0]
+        term = Term(
+            "sphere",
+            on_sphere,
+            ((block, self.vertices),),
+            weights=np.ones(len(self.ids)),
+            constants=np.repeat(constants[:, None], len(self.ids), axis=1),
+        )
+        return [Weighted(hardened(term, dim), STIFF)]
+
+
+def on_sphere(points, constants):
+    away = geometry.sub(points[0], tuple(constants[:-2]))
+    return (geometry.norm(away) - constants[-2] + constants[-1],)
+
+
+@dataclass(frozen=True)
+class OnSphere(Constraint):
+    ids: tuple
+    centre: tuple
+    radius: float
+
+    def parts(self, subject):
+        return [Within(subject.number, np.array(self.ids), np.array(self.centre), self.radius)]
+
+
+@pytest.mark.parametrize("task", ["developable", "flatten"])
+def test_a_constraint_from_outside_the_package(task):
+    mesh = gso.Mesh.from_grid(saddle(9))
+    dim = 2 if task == "flatten" else 3
+    ids = (0, 8, 72, 80)
+    sphere = OnSphere(ids, (0.0,) * dim, 1.35)
+    result = gso.tno.optimize(mesh, task=task, constraints=[sphere])
+    points = result.flat if dim == 2 else result.mesh.vertices
+    np.testing.assert_allclose(np.linalg.norm(points[list(ids)], axis=1), 1.35, atol=1e-5)

@@ -212,7 +212,7 @@ class TestLabels:
         assert {k: v.shape for k, v in label.arrays.items()} == labels.shapes("developable", 16)
 
     def test_offsets_are_displacements_along_the_normals_of_the_design(self, tiny):
-        from gso.unknowns import vertex_normals
+        from gso.mesh.normals import vertex_normals
 
         item = tiny["validation"][2]
         normals = vertex_normals(gso.Mesh.from_grid(item["surface"])).reshape(16, 16, 3)

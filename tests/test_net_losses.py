@@ -8,10 +8,10 @@ import pytest
 from gso import metrics, tasks
 from gso.constraints.compiled import compile_constraints
 from gso.mesh import Mesh
+from gso.mesh.normals import vertex_normals
 from gso.parametrization import rectangle
 from gso.tasks import developable, flatten
 from gso.tasks.base import Request
-from gso.unknowns import vertex_normals
 from tests.conftest import cylinder, saddle
 
 torch = pytest.importorskip("torch")

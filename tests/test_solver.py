@@ -14,17 +14,10 @@ from gso.constraints import compile_constraints
 from gso.energy import Weighted, curvature, fairness, position, proximity
 from gso.energy.losses import Absolute, Distance
 from gso.mesh import Mesh
+from gso.mesh.normals import vertex_normals
 from gso.tno.solver import METHODS, minimise
 from gso.tno.solver.problem import Problem
-from gso.unknowns import (
-    Layout,
-    Variables,
-    free,
-    normal_offsets,
-    spline_offsets,
-    spline_surface,
-    vertex_normals,
-)
+from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets, spline_surface
 from tests.conftest import saddle
 
 MESH = Mesh.from_grid(saddle(13, 11))
@@ -177,7 +170,7 @@ def test_held_coordinates_stay():
 
 
 def test_the_sorting_and_the_table_analysis_agree(monkeypatch):
-    from gso.tno.solver import problem as module
+    from gso.tno.solver import assembly as module
 
     rng = np.random.default_rng(3)
     column = rng.integers(0, 40, 500)
@@ -208,12 +201,12 @@ def test_an_element_may_name_a_vertex_twice(held_ids):
 
 
 def test_a_problem_takes_over_the_sparsity_of_one_like_it(monkeypatch):
-    from gso.tno.solver import problem as module
+    from gso.tno.solver import assembly as module
 
     variables = unknowns()["normal"]
     first = Problem(items(), variables)
     pattern = first.pattern
-    monkeypatch.setattr(module, "_assemble", None)
+    monkeypatch.setattr(module, "_analysed", None)
     assert Problem(items(), variables, like=first).pattern is pattern
     with pytest.raises(TypeError):
         Problem(items()[:1], variables, like=first).pattern  # noqa: B018

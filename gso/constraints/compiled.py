@@ -12,7 +12,7 @@ import numpy as np
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.conflicts import check
 from gso.constraints.linear import Reduction, reduce
-from gso.constraints.parts import Lengths, Part, Pins, Planar, Relations
+from gso.constraints.parts import Part, Pins
 from gso.errors import OptionError
 from gso.mesh import Frame, Mesh
 from gso.typing import Array, Ints
@@ -93,8 +93,7 @@ class Compiled:
     @property
     def anchored(self) -> tuple[Part, ...]:
         """Parts that refer to absolute positions: all but glue, planarity and lengths."""
-        loose = Lengths | Planar
-        return tuple(p for p in self.parts if not (isinstance(p, loose) or is_glue(p)))
+        return tuple(p for p in self.parts if p.anchored)
 
     def mapped(self, frame: Frame, order: Ints) -> Compiled:
         """Return the constraints in the unit of a frame, with vertex i numbered ``order[i]``."""
@@ -124,11 +123,6 @@ class Compiled:
             if not violation[at] < out[name].length:
                 out[name] = Miss(float(violation[at]), p.vertices[at], p.hard)
         return out
-
-
-def is_glue(part: Part) -> bool:
-    """Return whether a part makes vertices coincide."""
-    return isinstance(part, Relations) and bool((part.matrix == np.eye(len(part.matrix))).all())
 
 
 def listed(constraints: Iterable[Constraint] | Constraint) -> list[Constraint]:

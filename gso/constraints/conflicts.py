@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gso.constraints.linear import reduce
-from gso.constraints.parts import OnPlane, Part, Pins, Relations
+from gso.constraints.parts import Part
 from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.typing import Ints
@@ -61,10 +61,6 @@ def _worst(parts: Sequence[Part], tolerance: float) -> tuple[float, int, Ints] |
 
 def _within(parts: Sequence[Part], ids: Ints) -> list[Part]:
     """Return the linear parts on some vertices."""
-    linear = (p for p in parts if isinstance(p, OnPlane | Relations) or _pinned(p))
+    linear = (q for p in parts for q in p.linear)
     out = [p.kept(np.isin(p.vertices[:, 0], ids)) for p in linear]
     return [p for p in out if p.count]
-
-
-def _pinned(part: Part) -> bool:
-    return isinstance(part, Pins) and part.hard

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.parts import OnLines, Part, Pins
-from gso.constraints.polyline import CORNER, Polylines, turns
+from gso.mesh.polyline import CORNER, Polylines, turns
 from gso.typing import Array, Ints
 
 

@@ -121,8 +121,9 @@ def reduce(parts: Sequence[Part]) -> Reduction | None:
 
     Contradicting equations are solved in the least-squares sense.
     """
-    relations = [p for p in parts if isinstance(p, Relations) and len(p.first)]
-    places = [p for p in parts if isinstance(p, Pins | OnPlane) and p.hard and len(p.ids)]
+    linear = [q for p in parts for q in p.linear]
+    relations = [p for p in linear if isinstance(p, Relations) and len(p.first)]
+    places = [p for p in linear if isinstance(p, Pins | OnPlane) and len(p.ids)]
     if not relations and not places:
         return None
     every = [p.ids for p in places] + [x for p in relations for x in (p.first, p.second)]

@@ -1,7 +1,8 @@
 """The few kinds of equations on vertices that all constraints consist of.
 
 Hard `Pins`, `Relations` and `OnPlane` are linear, and are eliminated from the unknowns (see
-:mod:`gso.constraints.linear`). The others become terms.
+:mod:`gso.constraints.linear`). The others are terms. A new kind of part derives from
+:class:`Part`; it gives its equivalent linear parts or its terms.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import geometry
-from gso.constraints.polyline import Polylines
+from gso.energy import Term, Weighted, curve, equation, length, planarity, position
+from gso.energy.multipliers import STIFF, hardened
 from gso.mesh import Frame
+from gso.mesh.polyline import Polylines
 from gso.typing import Array, Ints
 
 
@@ -56,6 +59,31 @@ class Part:
         """Number of equations."""
         return len(self.vertices)
 
+    @property
+    def anchored(self) -> bool:
+        """Whether the equations refer to absolute positions."""
+        return True
+
+    @property
+    def linear(self) -> tuple[Part, ...]:
+        """Equivalent `Pins`, `Relations` and `OnPlane`, which are eliminated from the unknowns."""
+        return ()
+
+    def items(self, block: str) -> list[Weighted]:
+        """Return the terms of equations that are not eliminated, on a block of coordinates."""
+        return []
+
+    def soft_term(self, block: str) -> Term | None:
+        """Return a soft term of weight one by which a start approaches the constraint."""
+        return None
+
+    def targets(self, points: Array) -> tuple[Ints, Array] | None:
+        """Return the vertices (k,) and positions (k, dim) near points that satisfy soft equations.
+
+        None where the equations are eliminated, or give no positions.
+        """
+        return None
+
 
 @dataclass(frozen=True)
 class Pins(Part):
@@ -77,6 +105,22 @@ class Pins(Part):
 
     def violation(self, points: Array) -> Array:
         return np.linalg.norm(points[self.ids] - self.positions, axis=1)
+
+    @property
+    def linear(self) -> tuple[Part, ...]:
+        return (self,) if self.hard else ()
+
+    def items(self, block: str) -> list[Weighted]:
+        if self.weight is None:
+            return []
+        weights = np.full(len(self.ids), self.weight)
+        return [Weighted(position.build(self.ids, self.positions, weights, block=block), 1.0)]
+
+    def soft_term(self, block: str) -> Term:
+        return position.build(self.ids, self.positions, np.ones(len(self.ids)), block=block)
+
+    def targets(self, points: Array) -> tuple[Ints, Array] | None:
+        return None if self.hard else (self.ids, self.positions)
 
 
 @dataclass(frozen=True)
@@ -107,6 +151,26 @@ class Relations(Part):
         image = self.anchor + (points[self.first] - self.anchor) @ self.matrix.T
         return np.linalg.norm(points[self.second] - image, axis=1)
 
+    @property
+    def is_glue(self) -> bool:
+        """Whether the part makes vertices coincide."""
+        return bool((self.matrix == np.eye(len(self.matrix))).all())
+
+    @property
+    def anchored(self) -> bool:
+        return not self.is_glue
+
+    @property
+    def linear(self) -> tuple[Part, ...]:
+        return (self,)
+
+    def soft_term(self, block: str) -> Term:
+        dim, count = len(self.matrix), len(self.first)
+        shift = self.anchor - self.matrix @ self.anchor
+        each = np.concatenate([-self.matrix, np.eye(dim), shift[:, None]], axis=1)
+        index = np.repeat(self.vertices, dim, axis=0)
+        return equation.build(index, np.tile(each, (count, 1)), block=block)
+
 
 @dataclass(frozen=True)
 class OnPlane(Part):
@@ -128,6 +192,14 @@ class OnPlane(Part):
 
     def violation(self, points: Array) -> Array:
         return np.abs((points[self.ids] - self.anchor) @ self.normal)
+
+    @property
+    def linear(self) -> tuple[Part, ...]:
+        return (self,)
+
+    def soft_term(self, block: str) -> Term:
+        row = np.r_[self.normal, self.normal @ self.anchor]
+        return equation.build(self.vertices, np.tile(row, (len(self.ids), 1)), block=block)
 
 
 @dataclass(frozen=True)
@@ -153,6 +225,16 @@ class OnLines(Part):
             points[self.ids] - self.lines.nearest(points[self.ids]).points, axis=1
         )
 
+    def items(self, block: str) -> list[Weighted]:
+        term = curve.build(self.ids, self.lines, block=block, weight=self.weight)
+        return [Weighted(term, STIFF if self.hard else 1.0)]
+
+    def soft_term(self, block: str) -> Term:
+        return curve.build(self.ids, self.lines, block=block, weight=1.0)
+
+    def targets(self, points: Array) -> tuple[Ints, Array]:
+        return self.ids, self.lines.nearest(points[self.ids]).points
+
 
 @dataclass(frozen=True)
 class Planar(Part):
@@ -174,6 +256,13 @@ class Planar(Part):
     def violation(self, points: Array) -> Array:
         corners = (tuple(points[self.quads[:, k]].T) for k in range(4))
         return np.abs(geometry.diagonal_distance(*corners))
+
+    @property
+    def anchored(self) -> bool:
+        return False
+
+    def items(self, block: str) -> list[Weighted]:
+        return _imposed(planarity.build(self.quads, weight=self.weight or 1.0), self, block)
 
 
 @dataclass(frozen=True)
@@ -197,3 +286,22 @@ class Lengths(Part):
     def violation(self, points: Array) -> Array:
         a, b = (points[self.pairs[:, k]] for k in (0, 1))
         return np.abs(np.linalg.norm(a - b, axis=1) - self.lengths)
+
+    @property
+    def anchored(self) -> bool:
+        return False
+
+    def items(self, block: str) -> list[Weighted]:
+        weight = self.weight or 1.0
+        term = length.build(self.pairs, self.lengths, block=block, weight=weight)
+        return _imposed(term, self, block)
+
+    def soft_term(self, block: str) -> Term:
+        return length.build(self.pairs, self.lengths, block=block)
+
+
+def _imposed(term: Term, part: Part, block: str) -> list[Weighted]:
+    """Return a term of a part, with multipliers if the part is hard."""
+    if not part.hard:
+        return [Weighted(term, 1.0)]
+    return [Weighted(hardened(term, 2 if block == "flat" else 3), STIFF)]

@@ -13,10 +13,10 @@ import numpy as np
 from gso import tasks, tno
 from gso.errors import ConvergenceWarning, GSOError, MeshError
 from gso.mesh import Mesh
+from gso.mesh.normals import vertex_normals
 from gso.metrics import unit
 from gso.result import Result
 from gso.typing import Array
-from gso.unknowns import vertex_normals
 from gso.unknowns.spline import spline_matrix
 
 #: Control points along each side of the spline fitted to the normal offsets.

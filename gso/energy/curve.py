@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from gso.constraints import OnLines
-from gso.constraints.polyline import Polylines
-from gso.energy.base import Array, Term
+from gso.energy.base import Array, Ints, Term
 from gso.geometry import dot, sub
 from gso.mesh import Mesh
+from gso.mesh.polyline import Polylines
 
 #: The curve does not move with the surface.
 INVARIANT = ()
@@ -30,8 +29,10 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
     return tuple(a - along * t for a, t in zip(away, tangent, strict=True))
 
 
-def build(part: OnLines, *, block: str = "surface") -> Term:
-    """Build the constraint of vertices to polylines, soft or hard.
+def build(
+    ids: Ints, lines: Polylines, *, block: str = "surface", weight: float | None = None
+) -> Term:
+    """Build the constraint of vertices (k,) to polylines: soft with a weight, otherwise hard.
 
     The nearest point is recomputed before every linearisation, as in iterated closest points,
     and the vertex is free to move along the tangent there. Tangents are interpolated along the
@@ -39,26 +40,26 @@ def build(part: OnLines, *, block: str = "surface") -> Term:
     open line, or at a corner, a vertex can only slide back. The block must be the first of its
     layout.
     """
-    dim = part.lines.start.shape[1]
-    sliding = _Sliding(part)
+    dim = lines.start.shape[1]
+    sliding = _Sliding(ids, lines)
     term = Term(
         "curve",
         residual,
-        ((block, part.ids[:, None]),),
-        weights=np.full(len(part.ids), 1.0 if part.weight is None else part.weight),
-        constants=np.zeros((2 * dim, len(part.ids))),
+        ((block, ids[:, None]),),
+        weights=np.full(len(ids), 1.0 if weight is None else weight),
+        constants=np.zeros((2 * dim, len(ids))),
         refresh=sliding.constants,
     )
-    return replace(term, multipliers=sliding) if part.hard else term
+    return replace(term, multipliers=sliding) if weight is None else term
 
 
 class _Sliding:
     """Targets and directions of vertices on polylines, and their multipliers."""
 
-    def __init__(self, part: OnLines):
-        self.lines = part.lines
-        self.dim = part.lines.start.shape[1]
-        self.rows = part.ids[:, None] * self.dim + np.arange(self.dim)
+    def __init__(self, ids: Ints, lines: Polylines):
+        self.lines = lines
+        self.dim = lines.start.shape[1]
+        self.rows = ids[:, None] * self.dim + np.arange(self.dim)
         #: Multipliers over the weight, (k, dim): see :mod:`gso.energy.multipliers`.
         self.shift = np.zeros(self.rows.shape)
 
@@ -103,7 +104,7 @@ def examples(mesh: Mesh) -> list[Term]:
     out = []
     for block, dim in (("surface", 3), ("flat", 2)):
         points = mesh.vertices[[0, 5, 11], :dim]
-        term = build(OnLines(0, ids, Polylines.of(points, closed=False), 1.0), block=block)
+        term = build(ids, Polylines.of(points, closed=False), block=block, weight=1.0)
         constants = term.refresh(mesh.vertices[:, :dim].ravel() + 0.01)  # type: ignore[misc]
         out.append(replace(term, constants=constants, refresh=None))
     return out

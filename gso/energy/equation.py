@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from gso.constraints import OnPlane, Relations
 from gso.energy.base import Array, Ints, Term
 from gso.geometry import dot
 from gso.mesh import Mesh
@@ -25,20 +24,18 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
     return (total,)
 
 
-def build(part: OnPlane | Relations, *, block: str = "surface") -> Term:
-    """Build the soft constraint of vertices to a plane, or to affine images of other vertices."""
-    if isinstance(part, OnPlane):
-        count = len(part.ids)
-        rows = np.tile(np.r_[part.normal, part.normal @ part.anchor], (count, 1))
-        return _term(part.ids[:, None], rows, block)
-    dim, count = len(part.matrix), len(part.first)
-    shift = part.anchor - part.matrix @ part.anchor
-    each = np.concatenate([-part.matrix, np.eye(dim), shift[:, None]], axis=1)
-    index = np.repeat(np.stack([part.first, part.second], axis=1), dim, axis=0)
-    return _term(index, np.tile(each, (count, 1)), block)
+def build(index: Ints, rows: Array, *, block: str = "surface") -> Term:
+    """Build linear equations of vertices as soft constraints.
 
-
-def _term(index: Ints, rows: Array, block: str) -> Term:
+    Parameters
+    ----------
+    index : ndarray of int, (e, k)
+        Vertices of each equation.
+    rows : ndarray, (e, k dim + 1)
+        Coefficients of their coordinates, and the right-hand side.
+    block : str
+        Block of the vertices.
+    """
     return Term(
         "equation",
         residual,
@@ -53,8 +50,9 @@ def examples(mesh: Mesh) -> list[Term]:
     """Build terms for the conformance tests."""
     ids, out = np.arange(4), []
     for block, dim in (("surface", 3), ("flat", 2)):
-        normal, anchor = np.full(dim, dim**-0.5), np.full(dim, 0.1)
-        mirror = np.eye(dim) - 2.0 * np.outer(normal, normal)
-        out.append(build(OnPlane(0, ids, normal, anchor), block=block))
-        out.append(build(Relations(0, ids, ids + 5, mirror, anchor), block=block))
+        normal = np.full(dim, dim**-0.5)
+        plane = np.tile(np.r_[normal, 0.1], (4, 1))
+        out.append(build(ids[:, None], plane, block=block))
+        mirror = np.r_[2.0 * normal[0] * normal, normal, 0.2]
+        out.append(build(np.stack([ids, ids + 5], axis=1), np.tile(mirror, (4, 1)), block=block))
     return out

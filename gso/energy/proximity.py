@@ -81,6 +81,6 @@ def closest(mesh: Mesh, normals: Array, *, tangential: float = 0.0) -> Term:
 
 def examples(mesh: Mesh) -> list[Term]:
     """Build terms for the conformance tests."""
-    from gso.unknowns.normal import vertex_normals
+    from gso.mesh.normals import vertex_normals
 
     return [build(mesh, vertex_normals(mesh), tangential=0.5)]

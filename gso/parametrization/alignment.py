@@ -8,8 +8,7 @@ import numpy as np
 
 from gso import geometry
 from gso.components import labels
-from gso.constraints import Compiled, OnLines, Part, Pins, Relations
-from gso.constraints.compiled import is_glue
+from gso.constraints import Compiled, Part, Relations
 from gso.constraints.linear import reduce
 from gso.mesh import Mesh
 from gso.parametrization.embedding import parts
@@ -43,7 +42,7 @@ def _seams(mesh: Mesh, constraints: Compiled) -> list[Part]:
     """Return the glue constraints between different components of a mesh."""
     out: list[Part] = []
     for p in constraints.parts:
-        if isinstance(p, Relations) and is_glue(p):
+        if isinstance(p, Relations) and p.is_glue:
             apart = mesh.components[p.first] != mesh.components[p.second]
             if apart.any():
                 out.append(replace(p, first=p.first[apart], second=p.second[apart]))
@@ -113,10 +112,10 @@ def _targets(flat: Array, held: Compiled) -> tuple[Ints, Array]:
         ids.append(reduction.ids)
         there.append((offset + projection @ flat.ravel()).reshape(-1, 2)[reduction.ids])
     for part in held.parts:
-        if isinstance(part, OnLines):
-            ids.append(part.ids)
-            there.append(part.lines.nearest(flat[part.ids]).points)
-        elif isinstance(part, Pins) and not part.hard:
-            ids.append(part.ids)
-            there.append(part.positions)
+        found = part.targets(flat)
+        if found is not None:
+            ids.append(found[0])
+            there.append(found[1])
+    if not ids:
+        return np.zeros(0, np.int64), np.zeros((0, 2))
     return np.concatenate(ids), np.concatenate(there)

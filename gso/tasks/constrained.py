@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gso.constraints import Compiled, Lengths, OnLines, OnPlane, Pins, Relations
-from gso.energy import Weighted, curve, equation, fairness, length, position, proximity
+from gso.constraints import Compiled
+from gso.energy import Weighted, fairness, proximity
 from gso.mesh import Mesh
 from gso.tasks import per_component
 from gso.tasks.base import Analysis, Stage
@@ -56,18 +56,5 @@ def gradual(constraints: Compiled, stage: Stage) -> list[Stage]:
 
 def _soft(c: Compiled, weight: float) -> list[Weighted]:
     """Build all but planarity constraints as terms of one weight, to approach them."""
-    block = c.block
-    out = []
-    for p in c.parts:
-        if isinstance(p, Pins):
-            term = position.build(p.ids, p.positions, np.ones(len(p.ids)), block=block)
-        elif isinstance(p, OnPlane | Relations):
-            term = equation.build(p, block=block)
-        elif isinstance(p, Lengths):
-            term = length.build(p.pairs, p.lengths, block=block)
-        elif isinstance(p, OnLines):
-            term = curve.build(replace(p, weight=1.0), block=block)
-        else:
-            continue
-        out.append(Weighted(term, weight))
-    return out
+    terms = (part.soft_term(c.block) for part in c.parts)
+    return [Weighted(term, weight) for term in terms if term is not None]

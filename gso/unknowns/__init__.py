@@ -3,7 +3,7 @@
 from gso.unknowns.base import Layout, Variables
 from gso.unknowns.framed import ALONG, ball_bounds, framed_displacements
 from gso.unknowns.free import free
-from gso.unknowns.normal import normal_offsets, vertex_normals
+from gso.unknowns.normal import normal_offsets
 from gso.unknowns.spline import control_points, spline_offsets, spline_surface
 
 __all__ = [
@@ -17,5 +17,4 @@ __all__ = [
     "normal_offsets",
     "spline_offsets",
     "spline_surface",
-    "vertex_normals",
 ]

@@ -10,10 +10,10 @@ import numpy as np
 from gso.constraints import Pins
 from gso.errors import OptionError
 from gso.mesh import Mesh
+from gso.mesh.normals import vertex_normals
 from gso.tasks.base import Request
 from gso.tasks.developable.analysis import Analysis
 from gso.typing import Array
-from gso.unknowns import vertex_normals
 
 
 def radius(request: Request) -> float | None:

@@ -33,6 +33,7 @@ from gso.errors import OptionError
 from gso.hierarchy import alike, carry, coarser
 from gso.mesh import Mesh
 from gso.mesh.cutting import Cut
+from gso.mesh.normals import vertex_normals
 from gso.parametrization import orientation
 from gso.status import Status
 from gso.tasks import constrained, per_component
@@ -42,14 +43,7 @@ from gso.tasks.developable.analysis import Analysis
 from gso.tasks.developable.bounds import radius
 from gso.tasks.options import Options as BaseOptions
 from gso.typing import Array
-from gso.unknowns import (
-    Layout,
-    Variables,
-    ball_bounds,
-    framed_displacements,
-    free,
-    vertex_normals,
-)
+from gso.unknowns import Layout, Variables, ball_bounds, framed_displacements, free
 
 #: Factor by which the fairness weight falls from stage to stage.
 _FALL = 10.0

@@ -21,13 +21,13 @@ from gso.energy import Weighted, curvature, elongation, fairness, proximity
 from gso.energy.losses import Absolute, Distance
 from gso.hierarchy import resample
 from gso.mesh import Mesh
+from gso.mesh.normals import vertex_normals
 from gso.tasks import per_component
 from gso.tasks.base import Request
 from gso.tasks.developable.analysis import Analysis, Shape, own_bending
 from gso.tasks.developable.options import Options
 from gso.tasks.evaluation import parted
 from gso.typing import Array
-from gso.unknowns import vertex_normals
 
 #: Mean |K| and mean squared bending of a typical design, for which weights are quoted.
 TYPICAL_CURVATURE = 0.3

@@ -13,6 +13,7 @@ from gso.energy.losses import Absolute
 from gso.errors import MeshError
 from gso.hierarchy import alike, carry, coarser
 from gso.mesh import Mesh
+from gso.mesh.normals import vertex_normals
 from gso.status import Status
 from gso.tasks import constrained
 from gso.tasks.base import Plan, Request, Stage
@@ -22,7 +23,7 @@ from gso.tasks.developable.bounds import check_handles, inside, offset_bounds, r
 from gso.tasks.developable.objective import objective
 from gso.tasks.developable.options import Options
 from gso.typing import Array
-from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets, vertex_normals
+from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets
 
 #: A design counts as a developable surface with noise if smoothing leaves at most this share of
 #: its curvature. Displacements are then bounded by this many standard deviations of the noise.

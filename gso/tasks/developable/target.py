@@ -19,7 +19,6 @@ from gso.tasks.base import Analysis, Request, Runner, Solution
 from gso.tasks.evaluation import largest_strain
 from gso.typing import Array
 
-
 #: Curvature threshold above the curvature of every design.
 _ANY = 1e300
 #: Largest numbers of solves in one search, and of bisection steps between two of its results.
