@@ -28,9 +28,14 @@ def iterations() -> Iterator[Callable[[Progress], None] | None]:
         return
     start = time.monotonic()
     bars: list[Any] = []
+    began = (-1, start)
 
     def show(progress: Progress) -> None:
-        if time.monotonic() - start < PATIENCE:
+        nonlocal began
+        now = time.monotonic()
+        if progress.stage != began[0]:
+            began = (progress.stage, now)
+        if now - start < PATIENCE:
             return
         stage = f"stage {progress.stage + 1}/{progress.stages}"
         if not bars:
@@ -42,7 +47,12 @@ def iterations() -> Iterator[Callable[[Progress], None] | None]:
         bar = bars[0]
         bar.total, bar.n = progress.iterations, progress.iteration
         bar.set_description_str(stage, refresh=False)
-        bar.set_postfix_str(f"energy {progress.energy:.4g}")
+        said = f"energy {progress.energy:.4g}"
+        if progress.iteration:
+            left = progress.iterations - progress.iteration
+            seconds = left * (now - began[1]) / progress.iteration
+            said += f", at most {seconds:.0f} s left in this stage"
+        bar.set_postfix_str(said)
 
     try:
         yield show

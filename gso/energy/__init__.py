@@ -8,20 +8,19 @@ which find it there.
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from types import ModuleType
 
 from gso.energy.base import Limit, Term, Weighted
+from gso.registry import Registry
 
-__all__ = ["Limit", "Term", "Weighted", "registry"]
+__all__ = ["Limit", "Term", "Weighted", "add", "registry"]
+
+_MODULES = Registry(__name__, __path__)
+#: Register a term module from outside the package: ``add(name, module)``.
+add = _MODULES.add
 
 
 def registry() -> dict[str, ModuleType]:
-    """Return every term module of this package by name."""
-    found = {}
-    for info in pkgutil.iter_modules(__path__):
-        module = importlib.import_module(f"{__name__}.{info.name}")
-        if hasattr(module, "residual"):
-            found[info.name] = module
-    return found
+    """Return every term module by name."""
+    found = {name: _MODULES.get(name) for name in _MODULES.names()}
+    return {name: module for name, module in found.items() if hasattr(module, "residual")}

@@ -16,9 +16,10 @@ import os
 import warnings
 from collections.abc import Callable
 from os import PathLike
+from types import ModuleType
 from typing import Any, NamedTuple
 
-from gso.errors import MeshError
+from gso.errors import MeshError, OptionError
 from gso.io.atomic import check_writable, replacing
 from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_spline
 from gso.io.convert import Unwelded, as_mesh
@@ -34,6 +35,7 @@ __all__ = [
     "SPLINE_SUFFIXES",
     "SUFFIXES",
     "Unwelded",
+    "add_format",
     "as_mesh",
     "check_spline",
     "check_writable",
@@ -53,12 +55,15 @@ __all__ = [
 class _Format(NamedTuple):
     """Module and function names of a file format; the module is imported on first use."""
 
-    module: str
+    module: str | ModuleType
     read: str = "read"
     write: str = "write"
 
     def function(self, name: str) -> Callable[..., Any]:
-        return getattr(importlib.import_module(f"gso.io.{self.module}"), name)
+        module = self.module
+        if isinstance(module, str):
+            module = importlib.import_module(f"gso.io.{module}")
+        return getattr(module, name)
 
 
 _FORMATS = {
@@ -73,6 +78,27 @@ _FORMATS = {
 
 SUFFIXES = tuple(_FORMATS)
 """Suffixes of the mesh files that are read and written."""
+
+
+def add_format(suffix: str, module: ModuleType) -> None:
+    """Register a file format from outside the package, for this process.
+
+    Parameters
+    ----------
+    suffix : str
+        Such as ".msh".
+    module : module
+        With ``read(data)``, which returns an object whose ``mesh(weld)`` makes the mesh, and
+        ``write(mesh, file)``; see :class:`gso.io.surface.Surface`.
+
+    Raises
+    ------
+    OptionError
+        The suffix is taken, or does not begin with a dot.
+    """
+    if not suffix.startswith(".") or suffix.lower() in _FORMATS:
+        raise OptionError(f"{suffix!r} is taken or is no suffix; give a new one such as '.msh'")
+    _FORMATS[suffix.lower()] = _Format(module)
 
 
 @known_keywords()
@@ -110,7 +136,7 @@ def load(path: str | PathLike[str], *, weld: float | None = None) -> Mesh:
     try:
         if suffix not in _FORMATS and not os.path.isdir(name):
             what = f"a {suffix!r} file" if suffix else "a file without a suffix"
-            raise MeshError(f"cannot read {what}; use {', '.join(SUFFIXES)}")
+            raise MeshError(f"cannot read {what}; use {', '.join(_FORMATS)}")
         data = read_bytes(name)
         form = _FORMATS[suffix]
         return form.function(form.read)(data).mesh(weld)
@@ -152,7 +178,7 @@ def save(mesh: Any, path: str | PathLike[str]) -> None:
 
 def write(mesh: Any, path: str | PathLike[str]) -> tuple[str, ...]:
     """Write a mesh as :func:`save` does, and return its warnings instead of issuing them."""
-    check_writable(path, SUFFIXES)
+    check_writable(path, tuple(_FORMATS))
     name = os.fsdecode(path)
     surface = as_mesh(mesh)
     form = _FORMATS[os.path.splitext(name)[1].lower()]

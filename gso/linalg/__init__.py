@@ -7,28 +7,25 @@ factorisation, roughly: who is fastest) and a class ``Solver(pattern)`` with
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from types import ModuleType
 from typing import Any
 
 from gso.errors import BackendError, OptionError
 from gso.linalg.base import Pattern, SingularError, blas_threads
 from gso.linalg.spd import spd
+from gso.registry import Registry
 from gso.spelling import choices
 
-__all__ = ["Pattern", "SingularError", "backends", "blas_threads", "choose", "find", "spd"]
+__all__ = ["Pattern", "SingularError", "add", "backends", "blas_threads", "choose", "find", "spd"]
 
-_SUPPORT = ("base", "spd")
+_MODULES = Registry(__name__, __path__, ("base", "spd"))
+#: Register a backend module from outside the package: ``add(name, module)``.
+add = _MODULES.add
 
 
 def backends() -> dict[str, ModuleType]:
-    """Every backend module of this folder by name, installed or not."""
-    return {
-        info.name: importlib.import_module(f"{__name__}.{info.name}")
-        for info in pkgutil.iter_modules(__path__)
-        if info.name not in _SUPPORT
-    }
+    """Every backend module by name, installed or not."""
+    return {name: _MODULES.get(name) for name in _MODULES.names()}
 
 
 def find(name: str) -> ModuleType:

@@ -6,12 +6,11 @@ dataclass with presets, ``plan(analysis, request)`` and ``metrics(...)``; see :m
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from gso.errors import OptionError
+from gso.registry import Registry
 from gso.spelling import choices
 
 if TYPE_CHECKING:
@@ -20,12 +19,18 @@ if TYPE_CHECKING:
     from gso.tasks.base import Analysis
     from gso.tasks.options import Options
 
-_SUPPORT = ("base", "constrained", "evaluation", "imposed", "options", "per_component")
+_MODULES = Registry(
+    __name__,
+    __path__,
+    ("base", "constrained", "evaluation", "imposed", "options", "per_component"),
+)
+#: Register a task module from outside the package: ``add(name, module)``.
+add = _MODULES.add
 
 
 def names() -> list[str]:
     """List the names of the tasks."""
-    return sorted(info.name for info in pkgutil.iter_modules(__path__) if info.name not in _SUPPORT)
+    return _MODULES.names()
 
 
 def choose(module: ModuleType, formulation: str | None, options: Any) -> tuple[str, type[Options]]:
@@ -55,7 +60,7 @@ def get(name: str) -> ModuleType:
     """Import the module of a task."""
     if name not in names():
         raise OptionError(f"no task {name!r}; {choices(name, names())}")
-    return importlib.import_module(f"{__name__}.{name}")
+    return _MODULES.get(name)
 
 
 def analyse(module: ModuleType, mesh: Mesh, constraints: Compiled) -> Analysis:

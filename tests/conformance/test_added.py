@@ -1,0 +1,114 @@
+"""What is added from outside the package works like its own, without a change to the package."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import gso
+from gso import energy, io, linalg, tasks
+from gso.energy import Term, Weighted
+from gso.geometry import sub
+from gso.io.surface import Surface
+from gso.tasks.base import Plan, Stage
+from gso.unknowns import Layout, free
+from tests.conftest import saddle
+
+
+def module(name, **members):
+    made = ModuleType(name)
+    made.__dict__.update(members)
+    return made
+
+
+@pytest.fixture
+def added():
+    """Register modules, and remove them after the test."""
+    registries = {"term": energy._MODULES, "task": tasks._MODULES, "backend": linalg._MODULES}
+
+    def add(kind, name, **members):
+        registries[kind].add(name, module(name, **members))
+
+    yield add
+    for registry in registries.values():
+        registry._added.clear()
+
+
+def to_origin(points, constants):
+    return sub(points[0], (0.0, 0.0, 0.0))
+
+
+def origin_term(mesh):
+    ids = np.arange(len(mesh.vertices))[:, None]
+    return Term("origin", to_origin, (("surface", ids),), np.full(len(ids), 1.0 / len(ids)))
+
+
+def near(points, constants):
+    return sub(points[0], tuple(constants))
+
+
+def shrink(analysis, request):
+    """Plan to move every vertex half way to the centroid."""
+    mesh = analysis.mesh
+    layout = Layout.of(len(mesh.vertices), "surface")
+    ids = np.arange(len(mesh.vertices))[:, None]
+    stay = Term(
+        "near", near, (("surface", ids),), np.full(len(ids), 1.0 / len(ids)), mesh.vertices.T.copy()
+    )
+    items = [Weighted(stay, 1.0), Weighted(origin_term(mesh), 1.0)]
+    stage = Stage("shrink", layout, items, lambda _: free(layout), imposed=analysis.imposed)
+    return Plan(layout, mesh.vertices.ravel(), [stage])
+
+
+def test_a_term(added):
+    added("term", "origin", residual=to_origin, examples=lambda mesh: [origin_term(mesh)])
+    assert energy.registry()["origin"].residual is to_origin
+
+
+def test_a_task(added):
+    options = tasks.get("denoise").Options
+    added(
+        "task",
+        "shrink",
+        FORMULATIONS=("half",),
+        Options=options,
+        plan=shrink,
+        metrics=lambda before, after, flat, scale: {"displacement_rms": 1.0},
+    )
+    points = saddle(7)
+    result = gso.tno.optimize(points, task="shrink", verdict=False)
+    centre = points.reshape(-1, 3).mean(axis=0)
+    np.testing.assert_allclose(result.grid - centre, 0.5 * (points - centre), atol=1e-9)
+    assert result.metrics == {"displacement_rms": 1.0}
+    held = gso.tno.optimize(points, task="shrink", constraints=[gso.Fixed([0])], verdict=False)
+    np.testing.assert_allclose(held.mesh.vertices[0], points[0, 0])
+    with pytest.raises(gso.OptionError, match="shrink"):
+        tasks.add("shrink", module("shrink"))
+
+
+def test_a_backend(added):
+    own = linalg.find("superlu")
+    members = {"PACKAGE": "scipy", "available": own.available, "cost": own.cost}
+    added("backend", "mine", Solver=own.Solver, **members)
+    result = gso.tno.optimize(saddle(9), options=gso.DevelopableOptions(backend="mine"))
+    assert result.usable or result.reasons
+
+
+def test_a_format(tmp_path):
+    def read(data):
+        return Surface(np.frombuffer(data).reshape(-1, 3), np.array([[0, 1, 2, 3]]))
+
+    def write(mesh, file):
+        file.write(mesh.vertices.tobytes())
+
+    with pytest.raises(gso.OptionError, match="obj"):
+        io.add_format(".obj", module("raw"))
+    io.add_format(".raw", module("raw", read=read, write=write))
+    try:
+        square = gso.Mesh(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), [[0, 1, 2, 3]])
+        gso.save(square, tmp_path / "square.raw")
+        np.testing.assert_array_equal(gso.load(tmp_path / "square.raw").vertices, square.vertices)
+    finally:
+        io._FORMATS.pop(".raw")
