@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -146,6 +147,13 @@ class Mesh:
             notes=self.notes + tuple(notes),
         )
         return other
+
+    def __getattr__(self, name: str) -> Any:
+        new = _RENAMED.get(name)
+        if new is None:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        warnings.warn(f"Mesh.{name} is now called {new}", DeprecationWarning, stacklevel=2)
+        return getattr(self, new)
 
     def __repr__(self) -> str:
         if self.grid_shape:
@@ -312,6 +320,10 @@ def _grid_template(height: int, width: int) -> Mesh:
     return mesh
 
 
+#: Attributes that were renamed, by their former names.
+_RENAMED = {"splits": "stars_by_triangulation", "rim": "boundary_edges"}
+
+#: Cached attributes that meshes of the same faces share.
 _CONNECTIVITY = (
     "faces",
     "half_edges",

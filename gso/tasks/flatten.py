@@ -38,7 +38,7 @@ from gso.mesh import Mesh
 from gso.parametrization import orientation
 from gso.tasks import constrained, per_component
 from gso.tasks.base import Analysis, Plan, Request, Stage, same
-from gso.tasks.developable.isometry import length_notes
+from gso.tasks.developable.flat_image import length_notes
 from gso.tasks.evaluation import parted
 from gso.tasks.options import Options as BaseOptions
 from gso.typing import Array

@@ -74,3 +74,29 @@ def warning(result: Result) -> str:
     if result.status is not Status.UNUSABLE:
         return str(result.status)
     return f"not usable as what was asked for: {result.reasons[0]}"
+
+
+#: Relative difference up to which two energies count as the same minimum.
+_SAME = 1e-3
+
+
+def better(one: Result, other: Result) -> bool:
+    """Return whether a result alone is usable, or has less energy at equal usability."""
+    if one.usable != other.usable:
+        return one.usable
+    return sum(one.energy.values()) < (1.0 - _SAME) * sum(other.energy.values())
+
+
+def difference(dragged: Result, taken: Result) -> str:
+    """Describe how the result that was taken differs from the dragged one."""
+    apart = np.linalg.norm(taken.mesh.vertices - dragged.mesh.vertices, axis=1)
+    k = int(apart.argmax())
+    why = (
+        "has less energy than the dragged surface"
+        if taken.usable == dragged.usable
+        else "is usable and the dragged surface is not"
+    )
+    return (
+        f"the solve from the design {why}, and was taken; the two are up to {apart[k]:.4g} apart, "
+        f"at vertex {k}"
+    )

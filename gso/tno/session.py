@@ -20,7 +20,7 @@ from gso.spelling import known_keywords
 from gso.status import Status
 from gso.tasks.base import Plan, Request, Solution, Stage
 from gso.tno.handles import moved, pinned
-from gso.tno.judged import judged, requirements, warning
+from gso.tno.judged import better, difference, judged, requirements, warning
 from gso.tno.normalise import Canonical
 from gso.tno.optimize import check, packed, record_violations
 from gso.tno.run import Run, objective
@@ -32,8 +32,6 @@ from gso.unknowns import control_points
 
 #: Iteration limit of the solve in :meth:`Session.settle`.
 _SETTLED = 100
-#: Relative difference up to which two energies count as the same minimum.
-_SAME = 1e-3
 
 
 class Session:
@@ -216,8 +214,8 @@ class Session:
             self._coordinates = self._solved(self._plan)
             self._pose()
             result = self.result()
-            if _better(result, dragged):
-                result.notes += (_jumped(dragged, result),)
+            if better(result, dragged):
+                result.notes += (difference(dragged, result),)
             else:
                 result = dragged
                 self._plan, self._stage, self._coordinates, self._status = kept
@@ -346,25 +344,3 @@ class Session:
         self._run.iterations += minimum.iterations
         self._run.history += minimum.history
         return minimum
-
-
-def _better(one: Result, other: Result) -> bool:
-    """Return whether a result alone is usable, or has less energy at equal usability."""
-    if one.usable != other.usable:
-        return one.usable
-    return sum(one.energy.values()) < (1.0 - _SAME) * sum(other.energy.values())
-
-
-def _jumped(dragged: Result, taken: Result) -> str:
-    """Describe how the result that was taken differs from the dragged one."""
-    apart = np.linalg.norm(taken.mesh.vertices - dragged.mesh.vertices, axis=1)
-    k = int(apart.argmax())
-    why = (
-        "has less energy than the dragged surface"
-        if taken.usable == dragged.usable
-        else "is usable and the dragged surface is not"
-    )
-    return (
-        f"the solve from the design {why}, and was taken; the two are up to {apart[k]:.4g} apart, "
-        f"at vertex {k}"
-    )

@@ -21,16 +21,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
 from typing import Any, ClassVar
-
-import numpy as np
 
 from gso import metrics as measure
 from gso import parametrization
 from gso.energy import Weighted, christoffel, congruence, elongation, fairness, proximity
 from gso.errors import OptionError
-from gso.hierarchy import alike, carry, coarser
+from gso.hierarchy import alike, coarser
 from gso.mesh import Mesh
 from gso.mesh.cutting import Cut
 from gso.mesh.normals import vertex_normals
@@ -38,7 +35,7 @@ from gso.parametrization import orientation
 from gso.status import Status
 from gso.tasks import constrained, per_component
 from gso.tasks.base import Plan, Request, Stage
-from gso.tasks.developable import spline_stage
+from gso.tasks.developable import flat_image, spline_stage
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.developable.bounds import radius
 from gso.tasks.options import Options as BaseOptions
@@ -49,8 +46,6 @@ from gso.unknowns import Layout, Variables, ball_bounds, framed_displacements, f
 _FALL = 10.0
 #: Tolerance (relative decrease of the energy) of all stages but the last.
 _NEARLY = 1e-3
-#: Relative error of lengths up to which a flat image counts as isometric.
-_KEPT = 2e-3
 #: A warm start whose isometry defect is below this multiple of `isometry_threshold`
 #: needs no coarser grids.
 _ISOMETRIC = 100.0
@@ -187,21 +182,23 @@ def plan(
     elif request.start is None and options.begin == "curvature":
         first = curvature(analysis, request)
         before, start = list(first.stages), first.start.reshape(-1, 3)
-    enter = partial(_with_flat, levels[0] if levels else mesh, cut)
+    enter = partial(flat_image.with_flat, levels[0] if levels else mesh, cut)
     stages[0] = replace(stages[0], enter=enter)
     if spline is not None:
         # The spline stage comes last, so no stage before it may end the solve.
         stages = [replace(stage, finished=None) for stage in stages]
         stages.append(spline_stage.stage(stages[-1], mesh, spline))
     return Plan(
-        _layout(mesh, cut),
+        flat_image.layout_of(mesh, cut),
         start.ravel(),
         [*before, *stages],
         notes=opened.notes,
-        finish=partial(_place, mesh, cut),
-        result_notes=partial(_notes, mesh, cut),
+        finish=partial(flat_image.placed, mesh, cut),
+        result_notes=partial(flat_image.notes, mesh, cut),
         spline=spline,
-        cold_start=None if request.start is None else partial(_cold, [*levels, mesh], cut),
+        cold_start=None
+        if request.start is None
+        else partial(flat_image.cold_start, [*levels, mesh], cut),
         cut=cut,
     )
 
@@ -224,30 +221,10 @@ def _check_bound(analysis: Analysis, request: Request) -> None:
         )
 
 
-def _layout(mesh: Mesh, cut: Cut | None = None) -> Layout:
-    """Return the layout of the surface and its flat image, which has the vertices of a cut mesh."""
-    count = len(mesh.vertices)
-    flat = count if cut is None else len(cut.vertex)
-    return Layout((("surface", count, 3), ("flat", flat, 2)))
-
-
-def _opened(mesh: Mesh, cut: Cut | None, points: Array) -> Mesh:
-    """Return the surface with vertices (n, 3), cut open if there is a cut."""
-    return mesh.replaced(points) if cut is None else cut.mesh.replaced(points[cut.vertex])
-
-
-def _begun(surface: Mesh) -> Array:
-    """Compute an initial flat image of an open surface, in its numbering."""
-    ready, order = parametrization.by_rows(surface)
-    flat = np.empty((len(order), 2))
-    flat[order] = parametrization.begin(ready).flat
-    return flat
-
-
 def _unrolling(analysis: Analysis, request: Request, opened: parametrization.Opened) -> Plan:
     """Plan to keep the design fixed and solve for its flat image."""
     mesh, options, cut = analysis.mesh, request.options, opened.cut
-    flat = _begun(_opened(mesh, cut, mesh.vertices))
+    flat = flat_image.initial(flat_image.opened(mesh, cut, mesh.vertices))
     stage = _stage(analysis, request, mesh, 0.0, cut)
     stage = replace(
         stage,
@@ -264,7 +241,7 @@ def _unrolling(analysis: Analysis, request: Request, opened: parametrization.Ope
         [stage],
         status=Status.ALREADY_GOOD,
         notes=opened.notes,
-        finish=partial(_place, mesh, cut),
+        finish=partial(flat_image.placed, mesh, cut),
         cut=cut,
     )
 
@@ -313,9 +290,9 @@ def _chain(
         for k, weight in enumerate(weights):
             stage = _stage(analysis, request, mesh, weight, cut)
             if k == 0 and below is not None:
-                stage = replace(stage, enter=partial(_refine, below, mesh))
+                stage = replace(stage, enter=partial(flat_image.refined, below, mesh))
             if mesh is levels[-1]:
-                finished = partial(_isometric, mesh, cut, options.isometry_threshold)
+                finished = partial(flat_image.is_isometric, mesh, cut, options.isometry_threshold)
                 stage = replace(stage, iterations=options.iterations, finished=finished)
             else:
                 stage = replace(stage, iterations=options.coarse_iterations)
@@ -327,7 +304,7 @@ def _chain(
 def _stage(
     analysis: Analysis, request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None = None
 ) -> Stage:
-    layout, bound = _layout(mesh, cut), radius(request)
+    layout, bound = flat_image.layout_of(mesh, cut), radius(request)
     sheet = mesh if cut is None else cut.mesh
     name = "x".join(map(str, mesh.grid_shape or ("isometry",)))
     make = partial(_terms, request.options, request.weight_factor, w_fairness, cut)
@@ -373,58 +350,3 @@ def _unknowns(bound: float | None, mesh: Mesh, layout: Layout, coordinates: Arra
     if bound is None:
         return free(layout)
     return framed_displacements(layout, mesh.vertices, vertex_normals(mesh))
-
-
-def _with_flat(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
-    """Add an initial flat image to a surface, given by the first 3n coordinates."""
-    points = coordinates[: 3 * len(mesh.vertices)].reshape(-1, 3)
-    flat = _begun(_opened(mesh, cut, points))
-    return _layout(mesh, cut).pack({"surface": points, "flat": flat})
-
-
-def _cold(levels: list[Mesh], cut: Cut | None) -> Array:
-    """Return the design (the last level) and an image interpolated from that of the first level."""
-    coordinates = _with_flat(levels[0], cut, levels[0].vertices.ravel())
-    for coarse, fine in pairwise(levels):
-        coordinates = _refine(coarse, fine, coordinates)
-    return coordinates
-
-
-def _refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
-    """Interpolate the displacement and the flat image of a coarse grid to a finer one."""
-    blocks = _layout(coarse).split(coordinates)
-    points = carry(coarse, fine, blocks["surface"])
-    flat = parametrization.refine(coarse, fine.replaced(points), blocks["flat"])
-    return _layout(fine).pack({"surface": points, "flat": flat})
-
-
-def _isometric(mesh: Mesh, cut: Cut | None, threshold: float, coordinates: Array) -> bool:
-    blocks = _layout(mesh, cut).split(coordinates)
-    surface = _opened(mesh, cut, blocks["surface"])
-    return measure.isometry_energy(surface, blocks["flat"]) <= threshold
-
-
-def length_notes(surface: Mesh, flat: Array) -> list[str]:
-    """Return a note if a flat image (n, 2) does not preserve the lengths of its surface."""
-    # The diagonals of the faces may preserve their lengths while the edges do not.
-    faces = 0.5 * measure.isometry_energy(surface, flat) ** 0.5
-    off = max(faces, measure.edge_length_error(surface, flat))
-    if off <= _KEPT:
-        return []
-    return [
-        f"the flat image keeps lengths only to {off:.1%} on average: the surface is not "
-        "developable, or it closes around itself and must be cut open"
-    ]
-
-
-def _notes(mesh: Mesh, cut: Cut | None, coordinates: Array) -> list[str]:
-    blocks = _layout(mesh, cut).split(coordinates)
-    return length_notes(_opened(mesh, cut, blocks["surface"]), blocks["flat"])
-
-
-def _place(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
-    blocks = _layout(mesh, cut).split(coordinates)
-    ready, order = parametrization.by_rows(_opened(mesh, cut, blocks["surface"]))
-    flat = np.empty_like(blocks["flat"])
-    flat[order] = parametrization.place(ready, blocks["flat"][order], None)
-    return _layout(mesh, cut).pack({"surface": blocks["surface"], "flat": flat})

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from gso.linalg.base import Pattern
-from gso.typing import Ints
+from gso.typing import Array, Ints
 
 
 def _repeated(columns: Ints) -> Ints:
-    """Find pairs a < b of an element that are the same unknown, as ordered by :func:`_products`.
+    """Find pairs a < b of an element that are the same unknown, as ordered by :func:`products`.
 
     Such a pair contributes to the diagonal of the matrix twice.
     """
@@ -109,3 +109,18 @@ def _places(column: Ints, row: Ints, n: int) -> tuple[Ints, Ints, Ints]:
     rank = np.cumsum(mark, dtype=np.int32)
     columns = found // count
     return rank[at].astype(np.int64) - 1, columns, columns + np.flatnonzero(used)[found % count]
+
+
+def products(slope: Array, weight: Array) -> Array:
+    """Sum weight * J_a * J_b over the residuals, for all pairs a <= b, (pairs, e)."""
+    r, q, count = slope.shape
+    out = np.empty((q * (q + 1) // 2, count))
+    weighted = slope * weight[:, None, :]
+    start = 0
+    for a in range(q):
+        part = out[start : start + q - a]
+        np.multiply(weighted[0, a], slope[0, a:], out=part)
+        for k in range(1, r):
+            part += weighted[k, a] * slope[k, a:]
+        start += q - a
+    return out

@@ -16,7 +16,7 @@ import numpy as np
 from gso.energy.base import Limit, Weighted
 from gso.energy.losses import Loss
 from gso.linalg.base import Pattern
-from gso.tno.solver.assembly import Assembly, assemble
+from gso.tno.solver.assembly import Assembly, assemble, products
 from gso.tno.solver.kernels import kernel, turning
 from gso.typing import Array, Ints
 from gso.unknowns import Layout, Variables
@@ -244,12 +244,12 @@ class Problem:
             total += element.energy(residual)
             pulled = np.einsum("re,rqe->qe", first * factor, slope, optimize=False)
             gradient += np.bincount(element.columns.ravel(), pulled.ravel(), n + 1)[:n]
-            products = _products(slope, second * factor)
+            entries = products(slope, second * factor)
             turn = element.turning(coordinates)
             if turn is not None:
-                products += _products(turn, np.maximum(first[: len(turn)], 0.0) * factor)
-            products.ravel()[repeated] *= 2.0
-            values += np.bincount(scatter, products.ravel(), len(values) + 1)[:-1]
+                entries += products(turn, np.maximum(first[: len(turn)], 0.0) * factor)
+            entries.ravel()[repeated] *= 2.0
+            values += np.bincount(scatter, entries.ravel(), len(values) + 1)[:-1]
         return total if np.isfinite(total) else np.inf, gradient, values
 
     def largest_step(self, x: Array, dx: Array) -> float:
@@ -336,18 +336,3 @@ def _by_term(terms: Sequence[_Values], coordinates: Array) -> dict[str, float]:
 def _counted(items: Sequence[Weighted]) -> list[Weighted]:
     """Return the active terms: those with a positive weight and at least one element."""
     return [i for i in items if i.weight > 0 and i.term.count]
-
-
-def _products(slope: Array, weight: Array) -> Array:
-    """Sum weight * J_a * J_b over the residuals, for all pairs a <= b, (pairs, e)."""
-    r, q, count = slope.shape
-    out = np.empty((q * (q + 1) // 2, count))
-    weighted = slope * weight[:, None, :]
-    start = 0
-    for a in range(q):
-        part = out[start : start + q - a]
-        np.multiply(weighted[0, a], slope[0, a:], out=part)
-        for k in range(1, r):
-            part += weighted[k, a] * slope[k, a:]
-        start += q - a
-    return out

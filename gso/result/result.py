@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+import warnings
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from typing import Any
@@ -15,14 +14,10 @@ from numpy.typing import NDArray
 
 from gso.errors import MeshError
 from gso.mesh import Mesh
-from gso.mesh.attributes import Attributes
 from gso.pattern import Pattern
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
 from gso.typing import Array
-
-_FORMAT = 1
-_PATTERN = ("flat", "faces", "vertex", "seams")
 
 
 @dataclass(repr=False)
@@ -59,7 +54,7 @@ class Result:
         One entry per iteration.
     seconds : dict of str to float
         Time by phase.
-    backend, device : str
+    backend : str
         Linear solver of the last stage, and where it ran.
     warm_start : str
         Initial guess of the solve: "cold" for a cold start, "x0", "session", "net"
@@ -101,7 +96,6 @@ class Result:
     history: list[Progress] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
     backend: str = ""
-    device: str = "cpu"
     warm_start: str = "cold"
     notes: tuple[str, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
@@ -120,6 +114,12 @@ class Result:
         from gso.wording import summary
 
         return summary(self)
+
+    @property
+    def device(self) -> str:
+        """The processor that solved: always "cpu". Deprecated."""
+        warnings.warn("Result.device is always 'cpu'", DeprecationWarning, stacklevel=2)
+        return "cpu"
 
     @property
     def converged(self) -> bool:
@@ -191,11 +191,12 @@ class Result:
         the notes.
         """
         from gso import io
+        from gso.result.file import arrays
 
         suffix = os.path.splitext(os.fsdecode(path))[1].lower()[1:]
         if suffix == "npz":
             with io.replacing(path) as file:
-                np.savez(file, **self._arrays())
+                np.savez(file, **arrays(self))
         elif suffix == "svg":
             if self.pattern is None:
                 raise MeshError(
@@ -221,52 +222,6 @@ class Result:
             io.write(self.mesh, path)
         self.notes += tuple(n for n in io.left_out(self.mesh, path) if n not in self.notes)
 
-    def _record(self) -> dict[str, Any]:
-        """Collect everything but the arrays, as JSON-compatible values."""
-        return {
-            "format": _FORMAT,
-            "task": self.task,
-            "formulation": self.formulation,
-            "status": self.status.name,
-            "iterations": self.iterations,
-            "energy": self.energy,
-            "seconds": self.seconds,
-            "backend": self.backend,
-            "device": self.device,
-            "warm_start": self.warm_start,
-            "notes": list(self.notes),
-            "reasons": list(self.reasons),
-            "details": self.details,
-            "metrics": self.metrics,
-            "history": [asdict(p) for p in self.history],
-            "components": [part._record() for part in self.components],
-        }
-
-    def _arrays(self) -> dict[str, Any]:
-        record = self._record()
-        arrays = {
-            "record": np.frombuffer(json.dumps(record, default=float).encode(), np.uint8),
-            "design": self.design.vertices,
-            "vertices": self.mesh.vertices,
-            "faces": self.design.faces,
-        }
-        if self.flat is not None:
-            arrays["flat"] = self.flat
-        if self.pattern is not None and self.pattern.flat is not self.flat:
-            arrays |= {f"pattern_{name}": getattr(self.pattern, name) for name in _PATTERN}
-        if self.cell_scale is not None:
-            arrays["cell_scale"] = self.cell_scale
-        if self.spline is not None:
-            arrays |= self.spline.arrays()
-        if self.components:
-            label = np.full(len(self.design.vertices), -1)
-            for number, part in enumerate(self.components):
-                label[part.names] = number
-            arrays["component"] = label
-        if self.design.attributes is not None:
-            arrays |= self.design.attributes.arrays()
-        return arrays
-
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Result:
         """Read a result written as ``.npz``; nothing is unpickled.
@@ -276,117 +231,6 @@ class Result:
         MeshError
             The file is missing or damaged, is not a result, or has another format version.
         """
-        from gso.io.arrays import read_arrays
-        from gso.io.source import read_bytes
+        from gso.result import file
 
-        try:
-            data = read_arrays(read_bytes(path))
-        except MeshError as error:
-            raise MeshError(f"{path}: {error}") from None
-        try:
-            record = json.loads(data["record"].tobytes())
-            if record["format"] != _FORMAT:
-                raise MeshError(
-                    f"{path} was written by another version (format {record['format']})"
-                )
-            said = Attributes.from_arrays(data, data["faces"])
-            design = Mesh(data["design"], data["faces"], attributes=said)
-            pattern = _pattern(data, design)
-            same = len(data["vertices"]) == len(design.vertices)
-            result = cls._read(
-                record,
-                design,
-                design.replaced(data["vertices"]) if same or pattern is None else pattern.mesh,
-                _checked(data, "flat", (len(design.vertices), 2)),
-                _checked(data, "cell_scale", (len(design.faces),)),
-                pattern,
-            )
-            result.spline = BSplineSurface.from_arrays(data)
-            label = _checked(data, "component", (len(design.vertices),))
-            if label is not None:
-                result._divide(record.get("components", []), label.astype(np.int64))
-        except (KeyError, TypeError, ValueError) as error:
-            if isinstance(error, MeshError):
-                raise
-            raise MeshError(f"{path} is no result of gso: {error}") from None
-        return result
-
-    @classmethod
-    def _read(
-        cls,
-        record: Mapping[str, Any],
-        design: Mesh,
-        mesh: Mesh,
-        flat: Array | None,
-        cell_scale: Array | None,
-        pattern: Pattern | None = None,
-    ) -> Result:
-        """Build a result from its record and arrays."""
-        result = cls(
-            record["task"],
-            record["formulation"],
-            design,
-            mesh,
-            flat,
-            Status[record["status"]],
-            record["iterations"],
-            record["energy"],
-            [Progress(**p) for p in record["history"]],
-            record["seconds"],
-            record["backend"],
-            record["device"],
-            record["warm_start"],
-            tuple(record["notes"]),
-            record["details"],
-            cell_scale=cell_scale,
-            pattern=pattern,
-            # Files of earlier versions have none.
-            reasons=tuple(record.get("reasons", ())),
-        )
-        result.__dict__["metrics"] = record["metrics"]
-        return result
-
-    def _divide(self, records: list[Mapping[str, Any]], label: NDArray[np.int64]) -> None:
-        """Restore the component results from the arrays of the whole mesh."""
-        from gso.components import split
-
-        for record, piece in zip(records, split(self.design, label), strict=True):
-            part = self._read(
-                record,
-                piece.mesh,
-                piece.of(self.mesh),
-                None if self.flat is None else self.flat[piece.vertices],
-                None if self.cell_scale is None else self.cell_scale[piece.faces],
-            )
-            part.names = piece.vertices
-            self.components.append(part)
-
-
-def _pattern(data: Mapping[str, Any], design: Mesh) -> Pattern | None:
-    """Read and check the pattern that a file stores besides the flat image; None without one."""
-    if "pattern_flat" not in data:
-        return None
-    flat, faces, vertex, seams = (data[f"pattern_{name}"] for name in _PATTERN)
-    count = len(flat)
-    fits = flat.shape == (count, 2) and vertex.shape == (count,) and seams.shape[1:] == (2, 2)
-    kept = faces >= 0
-    if not fits or faces.shape != design.faces.shape or (kept != (design.faces >= 0)).any():
-        raise ValueError("the arrays of the pattern do not fit each other")
-    for name, ids, end in (
-        ("faces", faces[kept], count),
-        ("vertex", vertex, len(design.vertices)),
-        ("seams", seams, count),
-    ):
-        if ids.dtype.kind not in "iu" or (ids.size and not 0 <= ids.min() <= ids.max() < end):
-            raise ValueError(f"pattern_{name} points outside")
-    if (vertex[faces[kept]] != design.faces[kept]).any():
-        raise ValueError("the pattern's vertices are not those of the surface's faces")
-    return Pattern(flat, faces, vertex, seams)
-
-
-def _checked(data: Mapping[str, Array], name: str, shape: tuple[int, ...]) -> Array | None:
-    """Return an array of a file after checking its shape; None if the file has none."""
-    array = data.get(name)
-    if array is not None and array.shape != shape:
-        raise ValueError(f"{name} is an array {array.shape}, not {shape}")
-    return array
+        return file.read(path)

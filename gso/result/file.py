@@ -1,0 +1,188 @@
+"""Results in files: NumPy archives of arrays and a JSON record."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gso.errors import MeshError
+from gso.mesh import Mesh
+from gso.mesh.attributes import Attributes
+from gso.pattern import Pattern
+from gso.result.result import Result
+from gso.spline import BSplineSurface
+from gso.status import Progress, Status
+from gso.typing import Array
+
+_FORMAT = 1
+_PATTERN = ("flat", "faces", "vertex", "seams")
+
+
+def _record(result: Result) -> dict[str, Any]:
+    """Collect everything but the arrays, as JSON-compatible values."""
+    return {
+        "format": _FORMAT,
+        "task": result.task,
+        "formulation": result.formulation,
+        "status": result.status.name,
+        "iterations": result.iterations,
+        "energy": result.energy,
+        "seconds": result.seconds,
+        "backend": result.backend,
+        "device": "cpu",
+        "warm_start": result.warm_start,
+        "notes": list(result.notes),
+        "reasons": list(result.reasons),
+        "details": result.details,
+        "metrics": result.metrics,
+        "history": [asdict(p) for p in result.history],
+        "components": [_record(part) for part in result.components],
+    }
+
+
+def arrays(result: Result) -> dict[str, Any]:
+    """Return everything of a result as arrays by name; the record is JSON."""
+    record = _record(result)
+    out = {
+        "record": np.frombuffer(json.dumps(record, default=float).encode(), np.uint8),
+        "design": result.design.vertices,
+        "vertices": result.mesh.vertices,
+        "faces": result.design.faces,
+    }
+    if result.flat is not None:
+        out["flat"] = result.flat
+    if result.pattern is not None and result.pattern.flat is not result.flat:
+        out |= {f"pattern_{name}": getattr(result.pattern, name) for name in _PATTERN}
+    if result.cell_scale is not None:
+        out["cell_scale"] = result.cell_scale
+    if result.spline is not None:
+        out |= result.spline.arrays()
+    if result.components:
+        label = np.full(len(result.design.vertices), -1)
+        for number, part in enumerate(result.components):
+            label[part.names] = number
+        out["component"] = label
+    if result.design.attributes is not None:
+        out |= result.design.attributes.arrays()
+    return out
+
+
+def read(path: str | PathLike[str]) -> Result:
+    """Read a result; see :meth:`gso.Result.load`."""
+    from gso.io.arrays import read_arrays
+    from gso.io.source import read_bytes
+
+    try:
+        data = read_arrays(read_bytes(path))
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
+    try:
+        record = json.loads(data["record"].tobytes())
+        if record["format"] != _FORMAT:
+            raise MeshError(f"{path} was written by another version (format {record['format']})")
+        said = Attributes.from_arrays(data, data["faces"])
+        design = Mesh(data["design"], data["faces"], attributes=said)
+        pattern = _pattern(data, design)
+        same = len(data["vertices"]) == len(design.vertices)
+        result = _read(
+            record,
+            design,
+            design.replaced(data["vertices"]) if same or pattern is None else pattern.mesh,
+            _checked(data, "flat", (len(design.vertices), 2)),
+            _checked(data, "cell_scale", (len(design.faces),)),
+            pattern,
+        )
+        result.spline = BSplineSurface.from_arrays(data)
+        label = _checked(data, "component", (len(design.vertices),))
+        if label is not None:
+            _divide(result, record.get("components", []), label.astype(np.int64))
+    except (KeyError, TypeError, ValueError) as error:
+        if isinstance(error, MeshError):
+            raise
+        raise MeshError(f"{path} is no result of gso: {error}") from None
+    return result
+
+
+def _read(
+    record: Mapping[str, Any],
+    design: Mesh,
+    mesh: Mesh,
+    flat: Array | None,
+    cell_scale: Array | None,
+    pattern: Pattern | None = None,
+) -> Result:
+    """Build a result from its record and arrays."""
+    result = Result(
+        record["task"],
+        record["formulation"],
+        design,
+        mesh,
+        flat,
+        Status[record["status"]],
+        record["iterations"],
+        record["energy"],
+        [Progress(**p) for p in record["history"]],
+        record["seconds"],
+        record["backend"],
+        record["warm_start"],
+        tuple(record["notes"]),
+        record["details"],
+        cell_scale=cell_scale,
+        pattern=pattern,
+        # Files of earlier versions have none.
+        reasons=tuple(record.get("reasons", ())),
+    )
+    result.__dict__["metrics"] = record["metrics"]
+    return result
+
+
+def _divide(result: Result, records: list[Mapping[str, Any]], label: NDArray[np.int64]) -> None:
+    """Restore the component results from the arrays of the whole mesh."""
+    from gso.components import split
+
+    for record, piece in zip(records, split(result.design, label), strict=True):
+        part = _read(
+            record,
+            piece.mesh,
+            piece.of(result.mesh),
+            None if result.flat is None else result.flat[piece.vertices],
+            None if result.cell_scale is None else result.cell_scale[piece.faces],
+        )
+        part.names = piece.vertices
+        result.components.append(part)
+
+
+def _pattern(data: Mapping[str, Any], design: Mesh) -> Pattern | None:
+    """Read and check the pattern that a file stores besides the flat image; None without one."""
+    if "pattern_flat" not in data:
+        return None
+    flat, faces, vertex, seams = (data[f"pattern_{name}"] for name in _PATTERN)
+    count = len(flat)
+    fits = flat.shape == (count, 2) and vertex.shape == (count,) and seams.shape[1:] == (2, 2)
+    kept = faces >= 0
+    if not fits or faces.shape != design.faces.shape or (kept != (design.faces >= 0)).any():
+        raise ValueError("the arrays of the pattern do not fit each other")
+    for name, ids, end in (
+        ("faces", faces[kept], count),
+        ("vertex", vertex, len(design.vertices)),
+        ("seams", seams, count),
+    ):
+        if ids.dtype.kind not in "iu" or (ids.size and not 0 <= ids.min() <= ids.max() < end):
+            raise ValueError(f"pattern_{name} points outside")
+    if (vertex[faces[kept]] != design.faces[kept]).any():
+        raise ValueError("the pattern's vertices are not those of the surface's faces")
+    return Pattern(flat, faces, vertex, seams)
+
+
+def _checked(data: Mapping[str, Array], name: str, shape: tuple[int, ...]) -> Array | None:
+    """Return an array of a file after checking its shape; None if the file has none."""
+    array = data.get(name)
+    if array is not None and array.shape != shape:
+        raise ValueError(f"{name} is an array {array.shape}, not {shape}")
+    return array
