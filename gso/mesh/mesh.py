@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,12 +15,15 @@ from gso.errors import MeshError
 from gso.mesh import topology
 from gso.mesh.attributes import Attributes
 from gso.mesh.validation import (
+    JOINED,
     check_area,
     checked_faces,
     checked_vertices,
     numbers,
     reordered,
+    unjoined,
     weld_poles,
+    welding_advice,
 )
 from gso.mesh.welding import seams
 from gso.typing import Array, Ints
@@ -100,7 +104,7 @@ class Mesh:
         self.faces: Ints = table
         topology.check_vertices(self.half_edges)
         self.given_notes: tuple[str, ...] = tuple(notes)
-        self.notes: tuple[str, ...] = self.given_notes + _unjoined(self) + said
+        self.notes: tuple[str, ...] = self.given_notes + unjoined(self) + said
         self.attributes = None if attributes is None else reordered(attributes, table, flipped)
         self.vertices.flags.writeable = False
         self.faces.flags.writeable = False
@@ -241,7 +245,7 @@ class Mesh:
         he = self.half_edges
         mask = he.twin < 0
         # Files have rounded coordinates, so vertices coincide up to a tolerance.
-        step = _JOINED * np.ptp(self.vertices[self.used], axis=0).max()
+        step = JOINED * np.ptp(self.vertices[self.used], axis=0).max()
         origin, dest = he.origin[mask], he.dest[mask]
         mask[mask] = seams(np.round((self.vertices - self.frame.centre) / step), origin, dest)
         return mask
@@ -259,7 +263,7 @@ class Mesh:
         if touching >= max(2, _HEAP * len(self.faces)):
             raise MeshError(
                 f"the {len(self.faces)} faces are {touching} separate pieces that touch: each "
-                f"has vertices of its own. {_advice(self)}"
+                f"has vertices of its own. {welding_advice(self)}"
             )
 
     @property
@@ -336,20 +340,5 @@ _CONNECTIVITY = (
     "boundary_loops",
     "components",
 )
-#: Tolerance for coincident vertices, relative to the longest side of the bounding box.
-_JOINED = 1e-7
 #: Number of touching components per face from which on a mesh counts as a polygon soup.
 _HEAP = 0.4
-
-
-def _unjoined(mesh: Mesh) -> tuple[str, ...]:
-    """Write the note on coincident edges that are not joined; empty where there are none."""
-    count = int(mesh.seams.sum())
-    if not count:
-        return ()
-    return (f"{count} edges lie on others without being joined to them. {_advice(mesh)}",)
-
-
-def _advice(mesh: Mesh) -> str:
-    least = 10 * _JOINED * mesh.diagonal
-    return f"Merge their vertices with weld={least:.1g} of gso.load, --weld {least:.1g} of gso"

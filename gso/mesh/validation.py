@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,12 @@ from gso.mesh import topology
 from gso.mesh.attributes import Attributes
 from gso.mesh.welding import collapse
 from gso.typing import Array, Ints
+
+if TYPE_CHECKING:
+    from gso.mesh.mesh import Mesh
+
+#: Tolerance for coincident vertices, relative to the longest side of the bounding box.
+JOINED = 1e-7
 
 
 def reordered(attributes: Attributes, table: Ints, flipped: NDArray[np.bool_]) -> Attributes:
@@ -160,3 +166,17 @@ def weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]] 
     verb = "is one point" if len(poles) == 1 else "are one point each"
     note = f"the {' and the '.join(poles)} of the grid {verb}: welded to a pole"
     return points[kept], table, (note,)
+
+
+def unjoined(mesh: Mesh) -> tuple[str, ...]:
+    """Write the note on coincident edges that are not joined; empty where there are none."""
+    count = int(mesh.seams.sum())
+    if not count:
+        return ()
+    return (f"{count} edges lie on others without being joined to them. {welding_advice(mesh)}",)
+
+
+def welding_advice(mesh: Mesh) -> str:
+    """Return advice on how to merge the vertices of a mesh, with a suitable distance."""
+    least = 10 * JOINED * mesh.diagonal
+    return f"Merge their vertices with weld={least:.1g} of gso.load, --weld {least:.1g} of gso"

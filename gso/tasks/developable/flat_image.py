@@ -12,7 +12,7 @@ from gso.hierarchy import carry
 from gso.mesh import Mesh
 from gso.mesh.cutting import Cut
 from gso.typing import Array
-from gso.unknowns import Layout
+from gso.unknowns import Layout, Variables
 
 #: Relative error of lengths up to which a flat image counts as isometric.
 _KEPT = 2e-3
@@ -91,3 +91,14 @@ def placed(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
     flat = np.empty_like(blocks["flat"])
     flat[order] = parametrization.place(ready, blocks["flat"][order], None)
     return layout_of(mesh, cut).pack({"surface": blocks["surface"], "flat": flat})
+
+
+def only_flat(layout: Layout, coordinates: Array) -> Variables:
+    """Make the flat image the unknowns, and keep the surface."""
+    from scipy.sparse import identity
+
+    start, count, _ = layout.where("flat")
+    basis = identity(layout.size, format="csc")[:, start : start + 2 * count].tocsr()
+    offset = coordinates.copy()
+    offset[start : start + 2 * count] = 0.0
+    return Variables(layout, basis, offset)

@@ -230,7 +230,7 @@ def _unrolling(analysis: Analysis, request: Request, opened: parametrization.Ope
         stage,
         name="unroll",
         own_items=[i for i in stage.own_items if i.term.name in ("isometry", "mapping")],
-        variables=partial(_flat_only, stage.layout),
+        variables=partial(flat_image.only_flat, stage.layout),
         iterations=max(options.iterations, _UNROLL),
         tolerance=min(options.tolerance, 1e-8),
     )
@@ -244,16 +244,6 @@ def _unrolling(analysis: Analysis, request: Request, opened: parametrization.Ope
         finish=partial(flat_image.placed, mesh, cut),
         cut=cut,
     )
-
-
-def _flat_only(layout: Layout, coordinates: Array) -> Variables:
-    from scipy.sparse import identity
-
-    start, count, _ = layout.where("flat")
-    basis = identity(layout.size, format="csc")[:, start : start + 2 * count].tocsr()
-    offset = coordinates.copy()
-    offset[start : start + 2 * count] = 0.0
-    return Variables(layout, basis, offset)
 
 
 def _levels(analysis: Analysis, request: Request, begun: Mesh) -> list[Mesh]:
