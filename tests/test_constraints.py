@@ -476,14 +476,14 @@ def test_eliminated_unknowns_reach_all_that_is_allowed_and_nothing_else():
     maps = compiled.reduction.maps(0, layout.size)
     rng = np.random.default_rng(0)
     for before in (free(layout), normal_offsets(layout, V, vertex_normals(GRID))):
-        variables = before.following(*maps)
+        variables = before.constrained(*maps)
         points = variables.points(rng.standard_normal(variables.size)).reshape(-1, 3)
-        assert max(m.length for m in compiled.misses(points).values()) < 1e-12
+        assert max(m.length for m in compiled.violations(points).values()) < 1e-12
         x = variables.project(points.ravel())
         np.testing.assert_allclose(variables.points(x).reshape(-1, 3), points, atol=1e-9)
     # Of 13 x 13 vertices, 6 x 13 have three freedoms and 13 on the plane two; one pair is
     # pinned, and the glued corners lose the freedom of one.
-    assert free(layout).following(*maps).size == 3 * 78 + 2 * 13 - 3 - 3
+    assert free(layout).constrained(*maps).size == 3 * 78 + 2 * 13 - 3 - 3
 
 
 def test_files_of_constraints(tmp_path):

@@ -37,7 +37,7 @@ def items() -> list[Weighted]:
 
 def held(*constraints) -> Variables:
     reduction = compile_constraints(constraints, MESH).reduction
-    return free(LAYOUT).following(*reduction.maps(0, LAYOUT.size))
+    return free(LAYOUT).constrained(*reduction.maps(0, LAYOUT.size))
 
 
 def unknowns() -> dict:

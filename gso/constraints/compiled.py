@@ -79,7 +79,7 @@ class Compiled:
         return self._pins(True)[1]
 
     @property
-    def places(self) -> tuple[Ints, Array]:
+    def pinned_positions(self) -> tuple[Ints, Array]:
         """Vertices with a hard or soft position, each once, and the positions (k, dim)."""
         return self._pins(True, False)
 
@@ -114,7 +114,7 @@ class Compiled:
         kept = (p.kept(np.all(number[p.vertices] >= 0, axis=1)) for p in self.parts)
         return replace(self, parts=tuple(p.mapped(frame, number) for p in kept if p.count))
 
-    def misses(self, points: Array) -> dict[str, Miss]:
+    def violations(self, points: Array) -> dict[str, Miss]:
         """Return the most violated equation of each constraint, by name, at vertices (n, dim)."""
         out = {name: Miss(0.0, np.zeros(0, np.int64), False) for name in self.names}
         for p in self.parts:

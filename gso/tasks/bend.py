@@ -119,7 +119,7 @@ def _change(mesh: Mesh) -> list[Weighted]:
 def _start(analysis: Analysis, request: Request) -> Array:
     """Move the vertices of the design, or of the user's start, smoothly with the handles."""
     mesh = analysis.mesh
-    ids, targets = analysis.constraints.places
+    ids, targets = analysis.constraints.pinned_positions
     if request.start is not None:
         mesh = mesh.replaced(request.start)
         return mesh.vertices + ThinPlateField(mesh, ids)(targets - mesh.vertices[ids])

@@ -40,7 +40,7 @@ class Imposed:
             return variables
         layout = variables.layout
         start, _, _ = layout.where(self.constraints.block)
-        return variables.following(*reduction.maps(start, layout.size))
+        return variables.constrained(*reduction.maps(start, layout.size))
 
     def moved(self, constraints: Compiled) -> Imposed:
         """Return the same constraints with other positions of handles; multipliers stay."""

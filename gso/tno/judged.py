@@ -27,7 +27,7 @@ def requirements(mesh: Mesh, compiled: Compiled, scale: float, **limits: float |
     """
     moved = 0.0
     if not compiled.empty and not compiled.flat:
-        misses = compiled.misses(mesh.vertices).values()
+        misses = compiled.violations(mesh.vertices).values()
         # Violations below rounding errors do not count.
         moved = max((miss.length for miss in misses if miss.length > 1e-9), default=0.0)
     return Asked(**limits, moved=scale * moved)

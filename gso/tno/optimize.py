@@ -264,7 +264,7 @@ def record_violations(compiled: Compiled, frame: Canonical, solution: Solution) 
     if not compiled.names:
         return
     unit = frame.frame.scale
-    misses = compiled.misses(solution.blocks[compiled.block])
+    misses = compiled.violations(solution.blocks[compiled.block])
     lengths = {name: unit * miss.length for name, miss in misses.items()}
     solution.details = {**solution.details, "constraints": lengths}
     broken = [k for k, miss in misses.items() if miss.hard and not miss.length <= TIGHT]

@@ -139,12 +139,12 @@ class Session:
         asked = pinned(Handle(ids, positions), self._design, "move()")
         constraints = moved(self._constraints, self._design, asked)
         compiled = self._frame.constraints(constraints, flat=False)
-        before = self._compiled.places[1]
+        before = self._compiled.pinned_positions[1]
         self._constraints, self._compiled = constraints, compiled
         stage = self._stage
         if stage is not None and stage.imposed is not None:
             self._stage = replace(stage, imposed=stage.imposed.moved(compiled))
-        held, after = compiled.places
+        held, after = compiled.pinned_positions
         self._follow(held, after - before)
         self._pose()
         self._left_to_do()

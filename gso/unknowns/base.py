@@ -113,7 +113,7 @@ class Variables:
         ridge = 1e-12 * diagonal.max()
         return spd(gram + ridge * identity(gram.shape[0], format="csc"))(rhs)
 
-    def following(self, projection: csr_matrix, basis: csr_matrix, offset: Array) -> Variables:
+    def constrained(self, projection: csr_matrix, basis: csr_matrix, offset: Array) -> Variables:
         """Eliminate linear constraints: restrict the map to coordinates that satisfy them.
 
         The coordinates c of these unknowns are projected to ``offset + projection @ c``. If the
