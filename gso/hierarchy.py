@@ -34,7 +34,7 @@ def resample(values: Array, height: int, width: int) -> Array:
     return np.einsum("ia,jb,abk->ijk", _matrix(h, height), _matrix(w, width), values, optimize=True)
 
 
-def carry(coarse: Mesh, fine: Mesh, points: Array) -> Array:
+def prolong_displacement(coarse: Mesh, fine: Mesh, points: Array) -> Array:
     """Move a finer grid by the interpolated displacement of a coarse one to points (m, 3)."""
     shift = (points - coarse.vertices)[coarse.grid_index]
     return fine.vertices + resample(shift, *fine.grid_shape).reshape(-1, 3)  # type: ignore[misc]
@@ -62,11 +62,11 @@ def coarser(mesh: Mesh, largest: int) -> list[Mesh]:
     return levels[::-1]
 
 
-def alike(levels: list[Mesh], mesh: Mesh) -> list[Mesh]:
+def resample_like(levels: list[Mesh], mesh: Mesh) -> list[Mesh]:
     """Resample another surface with the same grid at the resolutions of coarser levels.
 
     >>> fine = Mesh.from_grid(np.dstack([*np.mgrid[:39.0, :39.0], np.zeros((39, 39))]))
-    >>> [m.grid_shape for m in alike(coarser(fine, 32), fine)]
+    >>> [m.grid_shape for m in resample_like(coarser(fine, 32), fine)]
     [(20, 20)]
     """
     grid: Any = mesh.grid

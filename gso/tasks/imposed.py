@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from gso.constraints import Compiled, Pins
 from gso.energy import Weighted
@@ -17,21 +16,22 @@ class Imposed:
     ----------
     constraints : Compiled
         The constraints.
-    terms : sequence of Weighted, optional
-        Their terms, if they exist already.
+    items : sequence of lists of Weighted, optional
+        The terms of each of its parts, if they exist already.
 
     Attributes
     ----------
-    terms : sequence of Weighted
+    terms : tuple of Weighted
         The soft constraints and the hard non-linear ones. The latter have `multipliers`
         (augmented Lagrangian): the last stage is repeated until they hold.
     """
 
-    def __init__(self, constraints: Compiled, terms: Sequence[Weighted] | None = None):
+    def __init__(self, constraints: Compiled, items: Sequence[list[Weighted]] | None = None):
+        if items is None:
+            items = [part.items(constraints.block) for part in constraints.parts]
         self.constraints = constraints
-        if terms is None:
-            terms = [i for p in constraints.parts for i in p.items(constraints.block)]
-        self.terms = tuple(terms)
+        self._items = items
+        self.terms = tuple(item for own in items for item in own)
 
     def eliminate(self, variables: Variables) -> Variables:
         """Eliminate the hard linear constraints from unknowns."""
@@ -43,12 +43,12 @@ class Imposed:
         return variables.constrained(*reduction.maps(start, layout.size))
 
     def moved(self, constraints: Compiled) -> Imposed:
-        """Return the same constraints with other positions of handles; multipliers stay."""
-        pins = iter(constraints.of(Pins, hard=False))
-        terms = []
-        for item in self.terms:
-            if item.term.name == "position":
-                targets = next(pins).positions.T.copy()
-                item = replace(item, term=replace(item.term, constants=targets))
-            terms.append(item)
-        return Imposed(constraints, terms)
+        """Return the same constraints with other positions of handles; multipliers stay.
+
+        The parts of `constraints` must be those of this object, in the same order.
+        """
+        items = [
+            part.items(constraints.block) if isinstance(part, Pins) else own
+            for part, own in zip(constraints.parts, self._items, strict=True)
+        ]
+        return Imposed(constraints, items)

@@ -8,7 +8,7 @@ import numpy as np
 
 from gso import metrics as measure
 from gso import parametrization
-from gso.hierarchy import carry
+from gso.hierarchy import prolong_displacement
 from gso.mesh import Mesh
 from gso.mesh.cutting import Cut
 from gso.typing import Array
@@ -56,7 +56,7 @@ def cold_start(levels: list[Mesh], cut: Cut | None) -> Array:
 def refined(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
     """Interpolate the displacement and the flat image of a coarse grid to a finer one."""
     blocks = layout_of(coarse).split(coordinates)
-    points = carry(coarse, fine, blocks["surface"])
+    points = prolong_displacement(coarse, fine, blocks["surface"])
     flat = parametrization.refine(coarse, fine.replaced(points), blocks["flat"])
     return layout_of(fine).pack({"surface": points, "flat": flat})
 

@@ -27,7 +27,7 @@ from gso import metrics as measure
 from gso import parametrization
 from gso.energy import Weighted, christoffel, congruence, elongation, fairness, proximity
 from gso.errors import OptionError
-from gso.hierarchy import alike, coarser
+from gso.hierarchy import coarser, resample_like
 from gso.mesh import Mesh
 from gso.mesh.cutting import Cut
 from gso.mesh.normals import vertex_normals
@@ -176,7 +176,7 @@ def plan(
     levels = _levels(analysis, request, begun)
     stages = _chain(analysis, request, [*levels, mesh], cut)
     before: list[Stage] = []
-    start = [*alike(levels, begun), begun][0].vertices
+    start = [*resample_like(levels, begun), begun][0].vertices
     if not constraints.empty:
         before = [constrained.approach(analysis, start)]
     elif request.start is None and options.begin == "curvature":

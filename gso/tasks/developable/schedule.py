@@ -11,7 +11,7 @@ import numpy as np
 from gso import metrics as measure
 from gso.energy.losses import Absolute
 from gso.errors import MeshError
-from gso.hierarchy import alike, carry, coarser
+from gso.hierarchy import coarser, prolong_displacement, resample_like
 from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
 from gso.status import Status
@@ -104,7 +104,7 @@ def _starts(analysis: Analysis, request: Request, levels: list[Mesh]) -> list[Me
     if request.start is None:
         return [*levels, analysis.mesh]
     begun = analysis.mesh.replaced(request.start)
-    return [*alike(levels, begun), begun]
+    return [*resample_like(levels, begun), begun]
 
 
 def _nothing_inside(mesh: Mesh) -> MeshError:
@@ -222,4 +222,6 @@ def _coarse_stage(analysis: Analysis, request: Request, level: Mesh, number: int
 
 def _carry(coarse: Mesh, fine: Mesh, bound: float | None, coordinates: Array) -> Array:
     """Interpolate the displacement of a coarse grid and add it to a finer one."""
-    return inside(carry(coarse, fine, coordinates.reshape(-1, 3)), fine, bound).ravel()
+    return inside(
+        prolong_displacement(coarse, fine, coordinates.reshape(-1, 3)), fine, bound
+    ).ravel()
