@@ -38,7 +38,8 @@ from gso import hybrid
 from gso.hierarchy import resample
 from gso.io import as_mesh
 from gso.mesh import Mesh
-from gso.net.catalogue import DEFAULTS, available
+from gso.net import tasks as net_tasks
+from gso.net.catalogue import available
 from gso.parallel import spread
 from gso.tno import Start, optimize
 
@@ -145,7 +146,7 @@ def speed(test: Surfaces, count: int) -> None:
         f"\nSpeed: medians over {len(chosen)} surfaces, milliseconds; energies over the cold ones"
     )
     for name, (task, keywords) in CASES.items():
-        if DEFAULTS[task] not in available(task):
+        if net_tasks.get(task).default not in available(task):
             print(f"  {name:10s} no net comes with the package")
             continue
         compared(chosen[:2], task, keywords)  # imports and code generation of the first use
@@ -261,7 +262,7 @@ def main() -> None:
     unknown = set(arguments.sections) - set(SECTIONS)
     if unknown:
         parser.error(f"no section {', '.join(sorted(unknown))}; there are {', '.join(SECTIONS)}")
-    if DEFAULTS["developable"] not in available("developable"):
+    if net_tasks.get("developable").default not in available("developable"):
         parser.error("no net comes with the package: gso train developable, then see docs/net.rst")
     store, n, folder = Store(arguments.out), arguments.n, arguments.out / "surfaces"
     if arguments.data is None:

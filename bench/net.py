@@ -37,11 +37,11 @@ from gso import dataset, net
 from gso.cli.progress import share
 from gso.dataset.noise import LEVELS
 from gso.io import replacing
-from gso.net import catalogue, checkpoint, weights
-from gso.net.config import from_dict
-from gso.net.curves import read
-from gso.net.run import CHECKPOINT
-from gso.net.validate import SCORE, figures
+from gso.net import catalogue, tasks, weights
+from gso.net.training import checkpoint
+from gso.net.training.config import from_dict
+from gso.net.training.curves import read
+from gso.net.training.run import CHECKPOINT
 
 OTHERS = (
     "enneper",
@@ -73,8 +73,6 @@ def measured(task: str, model: Any, split: Any, count: int | None = None) -> dic
         return found
     rows = over(task, model, split, "surface", count)
     out = {name: float(np.mean([r[name] for r in rows])) for name in rows[0] if name != "score"}
-    if task == "flatten":
-        out["unflipped"] = float(np.mean([r["flipped_cells"] == 0 for r in rows]))
     return out
 
 
@@ -89,7 +87,7 @@ def over(
         clean = split["surface"][block]
         given = clean if array == "surface" else split[array][block]
         results = net.predict(given, task=task, model=model)
-        rows += [figures(task, a, b) for a, b in zip(clean, results, strict=True)]
+        rows += [tasks.get(task).figures(a, b) for a, b in zip(clean, results, strict=True)]
     return rows
 
 
@@ -178,7 +176,7 @@ def curve(names: list[str], target: str) -> None:
     for name in names:
         card = catalogue.read_card(catalogue.located(name))
         seen = np.array(card["curve"]).reshape(-1, 2)
-        label = f"{card['name']}: {SCORE[card['model']['task']]}"
+        label = f"{card['name']}: {tasks.get(card['model']['task']).score}"
         axes.plot(*seen.T, marker=".", label=label)
     axes.set(xlabel="hours", ylabel="validation, lower is better", yscale="log")
     axes.legend()

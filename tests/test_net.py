@@ -27,10 +27,10 @@ from gso.net import (  # noqa: E402
     load,
     predict,
     save,
+    tasks,
 )
-from gso.net.blocks import IMDB, Stencils  # noqa: E402
-from gso.net.catalogue import TASKS  # noqa: E402
-from gso.net.grids import axes  # noqa: E402
+from gso.net.models.blocks import IMDB, Stencils  # noqa: E402
+from gso.net.models.grids import axes  # noqa: E402
 
 
 def shaken(net, seed=0, size=0.05):
@@ -135,15 +135,15 @@ def test_stencils_add_no_parameters():
 def test_stencils_take_the_weights_of_a_net_without():
     one = shaken(GSONet(channels=4, blocks=1), size=0.01)
     two, three = GSONet(channels=4, blocks=1, stencils=True), GSONet(channels=4, blocks=1)
-    two.begin_with(one)
+    two.copy_weights_from(one)
     x = torch.randn(2, 3, 16, 16)
     torch.testing.assert_close(torch.conv2d(x, two.head.kernels()), one.head(x)[..., 1:-1, 1:-1])
-    three.begin_with(two)
+    three.copy_weights_from(two)
     for name, weight in one.state_dict().items():
         torch.testing.assert_close(three.state_dict()[name], weight, atol=1e-5, rtol=1e-4)
-    two.begin_with(GSONet(channels=4, blocks=1, stencils=True))
+    two.copy_weights_from(GSONet(channels=4, blocks=1, stencils=True))
     with pytest.raises(RuntimeError, match="size"):
-        two.begin_with(GSONet(channels=8, blocks=1))
+        two.copy_weights_from(GSONet(channels=8, blocks=1))
 
 
 def test_published_net_has_no_biases():
@@ -439,7 +439,7 @@ class TestFiles:
 @pytest.mark.parametrize("name", [n for n in available() if n not in catalogue.CHAINS])
 def test_shipped_weights_load(name):
     net = load(name)
-    assert net.task in TASKS
+    assert net.task in tasks.names()
     card = catalogue.read_card(catalogue.located(name))
     assert card["parameters"] == sum(p.numel() for p in net.parameters())
     result = predict(saddle(16), task=net.task, model=name)
@@ -469,7 +469,7 @@ def test_neither_casadi_nor_the_solver_is_loaded():
         "from gso.net import CoarseNet, predict\n"
         "u, v = np.mgrid[:8.0, :8.0]\n"
         "predict(np.dstack([u, v, u * v / 9]), model=CoarseNet(widths=(8, 8, 8)))\n"
-        "import gso.net.prediction\n"
+        "import gso.net.inference.prediction\n"
         "print([m for m in ('casadi', 'gso.tno') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

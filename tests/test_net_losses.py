@@ -16,7 +16,8 @@ from tests.conftest import cylinder, saddle
 
 torch = pytest.importorskip("torch")
 
-from gso.net import energy, grids, losses  # noqa: E402
+from gso.net.models import grids  # noqa: E402
+from gso.net.training import energy, losses  # noqa: E402
 
 
 def batch(*surfaces):

@@ -25,18 +25,19 @@ from tests.conftest import saddle, sphere_cap
 torch = pytest.importorskip("torch")
 pytest.importorskip("safetensors")
 
-from gso.net import GSONet, augment, checkpoint, load, losses, save, train  # noqa: E402
-from gso.net.config import FOLDER, TERMS, Config, Phase, from_dict, read  # noqa: E402
-from gso.net.curves import Curves  # noqa: E402
-from gso.net.curves import read as read_curves  # noqa: E402
-from gso.net.data import Batch, Source, fresh, noisy, open_source  # noqa: E402
-from gso.net.grids import ball, normalise  # noqa: E402
-from gso.net.muon import optimisers, orthogonal  # noqa: E402
-from gso.net.objective import _COSTS, Objective, aligned  # noqa: E402
-from gso.net.processes import Processes  # noqa: E402
-from gso.net.run import begin  # noqa: E402
-from gso.net.schedule import place  # noqa: E402
-from gso.net.validate import SCORE, applied, mean_figures  # noqa: E402
+from gso.net import GSONet, load, save, tasks, train  # noqa: E402
+from gso.net.models.grids import ball, normalise  # noqa: E402
+from gso.net.training import augment, checkpoint, losses  # noqa: E402
+from gso.net.training.config import FOLDER, TERMS, Config, Phase, from_dict, read  # noqa: E402
+from gso.net.training.curves import Curves  # noqa: E402
+from gso.net.training.curves import read as read_curves  # noqa: E402
+from gso.net.training.data import Batch, Source, fresh, noisy, open_source  # noqa: E402
+from gso.net.training.muon import optimisers, orthogonal  # noqa: E402
+from gso.net.training.objective import _COSTS, Objective, aligned  # noqa: E402
+from gso.net.training.processes import Processes  # noqa: E402
+from gso.net.training.run import begin  # noqa: E402
+from gso.net.training.schedule import place  # noqa: E402
+from gso.net.training.validate import applied, mean_figures  # noqa: E402
 
 SMALL = {"kind": "coarse", "widths": [8, 8, 8], "depths": [0, 0, 1]}
 PUBLISHED = {"kind": "gsonet", "channels": 4, "blocks": 1}
@@ -170,7 +171,13 @@ def test_every_term_of_a_configuration_is_a_loss():
     results = {name: designs + 0.01 * torch.rand_like(designs) for name in TERMS}
     for name, result in results.items():
         phase, flat = Phase(weights={name: 2.0}), name.startswith("iso")
-        cost = _COSTS["published"]("", Batch(designs, designs), designs, phase, 0.0)
+        cost = _COSTS["published"](
+            tasks.get("flatten" if flat else "developable"),
+            Batch(designs, designs),
+            designs,
+            phase,
+            0.0,
+        )
         value = cost(result[..., :2] if flat else result)
         assert value.shape == (2,) and (value > 0).all()
 
@@ -265,7 +272,7 @@ def test_bfloat16_spares_the_curvature(name):
     for net.bf16 in (False, True):
         results = applied(net, surfaces, None)
         found.append(mean_figures(net.task, surfaces.double().numpy(), results))
-    exact, rounded = (f[SCORE[net.task]] for f in found)
+    exact, rounded = (f[net.kind.score] for f in found)
     assert abs(rounded - exact) < 0.05 * exact
 
 
@@ -428,7 +435,7 @@ def test_matrices_are_made_orthogonal_together_as_alone():
     "name", ["developable", "net-c", "net-f", "flatten-strain", "flatten", "denoise"]
 )
 def test_a_step_stays_on_the_device_of_its_batch(name, monkeypatch):
-    from gso.net.base import Net
+    from gso.net.models.base import Net
     from gso.net.weights import make
 
     # The device without storage refuses tensors of others, as a GPU does.

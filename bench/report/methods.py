@@ -11,7 +11,7 @@ from typing import Any
 import gso
 from gso import hybrid
 from gso.hybrid.prediction import STARTED
-from gso.net.catalogue import DEFAULTS
+from gso.net import tasks as net_tasks
 from gso.parametrization import rectangle
 from report.method import TASKS, Method, Solved
 from report.surfaces import Case
@@ -79,7 +79,7 @@ def _own() -> list[Method]:
                 "hybrid",
                 task,
                 partial(_hybrid, task),
-                net=DEFAULTS[task],
+                net=net_tasks.get(task).default,
                 note="the default net, then the optimiser",
                 refused="" if task in STARTED else "a closed form has no start to improve",
                 files=_HERE,

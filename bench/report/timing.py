@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gso.net.catalogue import DEFAULTS
+from gso.net import tasks as net_tasks
 from report import store
 from report.method import TASKS
 from report.methods import DEFAULT, methods, of
@@ -106,7 +106,11 @@ def timings(settings: Settings, kept: Store, tick: Callable[..., None]) -> list[
 def _named(task: str, name: str) -> str:
     """Return the name of a method in the tables of its task."""
     if name == "Net":
-        nets = [m.name for m in methods().values() if (m.task, m.net) == (task, DEFAULTS[task])]
+        nets = [
+            m.name
+            for m in methods().values()
+            if (m.task, m.net) == (task, net_tasks.get(task).default)
+        ]
         return next(n for n in nets if n != "hybrid")
     return DEFAULT[task] if name == "TNO" else name
 

@@ -11,7 +11,7 @@ import click
 from gso.cli import progress
 
 if TYPE_CHECKING:
-    from gso.net.training import Report
+    from gso.net.training.loop import Report
 
 #: Metrics that are shown beside the progress bar, if the task has them.
 _SHOWN = ("loss_gc", "K_A_r", "d_H", "strain_mean", "loss_iso_cell", "theta")
@@ -49,9 +49,9 @@ def train(
     # Set before torch is imported: busily waiting threads slow each other on shared cores.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     _keep_memory()
-    from gso.net.config import read
-    from gso.net.training import MODEL
-    from gso.net.training import train as run
+    from gso.net.training.config import read
+    from gso.net.training.loop import MODEL
+    from gso.net.training.loop import train as run
 
     made = read(config, **changes)
     with progress.counts() as bars, progress.share() as show:

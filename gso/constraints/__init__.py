@@ -7,7 +7,7 @@ from gso.constraints.glue import Glue
 from gso.constraints.linear import Reduction
 from gso.constraints.parts import Lengths, OnLines, OnPlane, Part, Pins, Planar, Relations
 from gso.constraints.positions import Fixed, FixedBoundary, Handle
-from gso.constraints.read import read_constraints
+from gso.constraints.read import add, read_constraints
 from gso.constraints.shape import FixedLengths, PlanarFaces
 from gso.constraints.symmetry import SymmetryPlane
 
@@ -32,6 +32,7 @@ __all__ = [
     "Relations",
     "SlidingBoundary",
     "SymmetryPlane",
+    "add",
     "compile_constraints",
     "listed",
     "read_constraints",

@@ -32,6 +32,19 @@ KINDS: dict[str, type[Constraint]] = {
 }
 
 
+def add(kind: type[Constraint]) -> None:
+    """Register a constraint from outside the package, so that files can name it.
+
+    Raises
+    ------
+    OptionError
+        The name of the class is taken.
+    """
+    if kind.__name__ in KINDS:
+        raise OptionError(f"{kind.__name__!r} is taken among the constraints; rename the class")
+    KINDS[kind.__name__] = kind
+
+
 def read_constraints(path: str | PathLike[str]) -> list[Constraint]:
     """Read a list of constraints.
 

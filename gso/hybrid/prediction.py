@@ -15,12 +15,10 @@ from gso.dataset.screen import CURVED
 from gso.errors import MeshError
 from gso.hybrid.patch import Patch, as_patch
 from gso.mesh import Mesh
-from gso.net.catalogue import DEFAULTS, available, chain
-from gso.net.catalogue import TASKS as NETS
+from gso.net import tasks
+from gso.net.catalogue import available, chain
 from gso.typing import Array
 
-#: Tasks whose solver can start anywhere; the other task of nets has a closed form.
-STARTED = ("developable", "flatten")
 #: Vertices along each side of the grid that a mesh is resampled to.
 _SIZE = 64
 #: Least side of a grid for which a net is used; other meshes need the square of it in vertices.
@@ -78,7 +76,7 @@ def predictions(
     WeightsError
         The net that is named does not exist, or its file is damaged.
     """
-    if net is not None and not hasattr(net, "task") and task in NETS:
+    if net is not None and not hasattr(net, "task") and task in tasks.names():
         chain(net, task)
     why = _missing(task, net, alone)
     if why:
@@ -112,18 +110,18 @@ def predictions(
 
 def _missing(task: str, net: Any, alone: bool) -> str:
     """Say why no net can be used, whatever the design; empty if one can."""
-    if task not in (NETS if alone else STARTED):
+    if task not in tasks.names() or not (alone or tasks.get(task).warm_start):
         return f"no net makes a start for task {task!r}"
     if find_spec("torch") is None or find_spec("safetensors") is None:
         return 'nets need torch and safetensors: pip install ".[net]" in the folder of gso'
-    if net is None and DEFAULTS[task] not in available(task):
+    if net is None and tasks.get(task).default not in available(task):
         return f"no net for task {task!r} comes with this version"
     return ""
 
 
 def _name(task: str, net: Any) -> str:
     if net is None:
-        return DEFAULTS[task]
+        return tasks.get(task).default
     return type(net).__name__ if hasattr(net, "task") else str(net)
 
 
@@ -140,7 +138,7 @@ def _seen(design: Mesh, task: str) -> tuple[Array, Patch | None]:
             height, width = design.grid.shape[:2]
             raise MeshError(f"a grid {height} x {width} is solved faster than a net sees it")
         return design.grid, None
-    if task == "denoise":
+    if tasks.get(task).noisy:
         raise MeshError("denoising nets take grids, and this mesh is none")
     count = int(design.used.sum())
     if count < _SMALLEST**2:

@@ -325,7 +325,7 @@ def _polished(
         tolerance=_NEARLY,
     )
     result = optimize(design, task=task, x0=start, **keywords)
-    if task == "flatten" and result.warm_start == "net" and not keywords["constraints"]:
+    if points.shape[1] == 2 and result.warm_start == "net" and not keywords["constraints"]:
         _place(result)
     return result
 

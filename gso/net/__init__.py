@@ -7,13 +7,15 @@ from typing import Any
 
 # Imported on first use, so that torch is loaded only when a net is used.
 _NAMES = {
-    "CoarseNet": "gso.net.coarse",
-    "GSONet": "gso.net.gsonet",
+    "CoarseNet": "gso.net.models.coarse",
+    "GSONet": "gso.net.models.gsonet",
+    "add_kind": "gso.net.weights",
+    "add_task": "gso.net.tasks",
     "available": "gso.net.catalogue",
     "load": "gso.net.weights",
-    "predict": "gso.net.prediction",
+    "predict": "gso.net.inference.prediction",
     "save": "gso.net.weights",
-    "train": "gso.net.training",
+    "train": "gso.net.training.loop",
 }
 
 __all__ = list(_NAMES)
@@ -22,7 +24,8 @@ __all__ = list(_NAMES)
 def __getattr__(name: str) -> Any:
     if name not in _NAMES:
         raise AttributeError(f"module 'gso.net' has no attribute {name!r}")
-    value = getattr(importlib.import_module(_NAMES[name]), name)
+    attribute = "add" if name == "add_task" else name
+    value = getattr(importlib.import_module(_NAMES[name]), attribute)
     globals()[name] = value
     return value
 

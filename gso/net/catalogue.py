@@ -10,19 +10,16 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from gso.errors import OptionError, WeightsError
+from gso.errors import WeightsError
+from gso.net import tasks
 from gso.spelling import choices
 
 #: Nets that come with the package: NAME.safetensors and NAME.json.
 FOLDER = Path(__file__).parent / "weights"
 #: Version of the card's format.
 FORMAT = 1
-#: Tasks of nets, and the number of components of their results.
-TASKS = {"developable": 3, "flatten": 2, "denoise": 3}
 #: Nets that are applied in sequence, each to the result of the one before.
 CHAINS = {"net-cf": ("net-c", "net-f")}
-#: The default net of each task.
-DEFAULTS = {"developable": "developable", "flatten": "flatten-strain", "denoise": "denoise"}
 
 
 def read_card(path: str | PathLike[str]) -> dict[str, Any]:
@@ -86,8 +83,7 @@ def located(model: str | PathLike[str]) -> Path:
 
 def chain(model: str | PathLike[str] | None, task: str) -> tuple[Path, ...]:
     """Return the files of the nets that a name stands for, in the order of application."""
-    if task not in TASKS:
-        raise OptionError(f"no task {task!r} for a net; {choices(task, TASKS)}")
-    name = DEFAULTS[task] if model is None else model
+    kind = tasks.get(task)
+    name = kind.default if model is None else model
     parts = CHAINS.get(name, (name,)) if isinstance(name, str) else (name,)
     return tuple(located(part) for part in parts)

@@ -13,16 +13,39 @@ import torch
 
 from gso.errors import GSOError, OptionError, WeightsError
 from gso.io import replacing
-from gso.net.base import Net
 from gso.net.catalogue import FORMAT, located, read_card
-from gso.net.coarse import CoarseNet
-from gso.net.gsonet import GSONet
+from gso.net.models.base import Net
+from gso.net.models.coarse import CoarseNet
+from gso.net.models.gsonet import GSONet
 from gso.spelling import choices
 
-#: Kinds of nets, as cards and configurations name them.
+#: Kinds of nets, as cards and configurations name them; :func:`add_kind` adds to them.
 KINDS: dict[str, type[Net]] = {"coarse": CoarseNet, "gsonet": GSONet}
 #: Size limit of files in bytes, far above that of any net of this package.
 _LARGEST = 1 << 30
+
+
+def add_kind(name: str, cls: type[Net]) -> None:
+    """Register a kind of nets from outside the package, for this process.
+
+    Parameters
+    ----------
+    name : str
+        Name in configurations and cards.
+    cls : type
+        Subclass of :class:`gso.net.models.base.Net`; its constructor takes the task and the
+        other settings, and passes all of them on to that of the base class.
+
+    Raises
+    ------
+    OptionError
+        The name is taken, or `cls` is not a subclass of Net.
+    """
+    if name in KINDS:
+        raise OptionError(f"{name!r} is taken among the kinds of nets; choose another name")
+    if not (isinstance(cls, type) and issubclass(cls, Net)):
+        raise OptionError(f"{cls!r} is not a subclass of gso.net.models.base.Net")
+    KINDS[name] = cls
 
 
 def make(settings: dict[str, Any]) -> Net:

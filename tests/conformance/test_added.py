@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
@@ -94,6 +95,97 @@ def test_a_backend(added):
     added("backend", "mine", Solver=own.Solver, **members)
     result = gso.tno.optimize(saddle(9), options=gso.DevelopableOptions(backend="mine"))
     assert result.usable or result.reasons
+
+
+def test_a_constraint_in_a_file(tmp_path):
+    @dataclass(frozen=True)
+    class Centre(gso.constraints.Constraint):
+        def parts(self, subject):
+            return gso.Fixed([len(subject.mesh.vertices) // 2]).parts(subject)
+
+    gso.constraints.add(Centre)
+    try:
+        (tmp_path / "constraints.json").write_text('[{"type": "Centre"}]')
+        (read,) = gso.constraints.read_constraints(tmp_path / "constraints.json")
+        points = saddle(7)
+        result = gso.tno.optimize(points, constraints=[read])
+        np.testing.assert_allclose(result.grid[3, 3], points[3, 3], atol=1e-12)
+        with pytest.raises(gso.OptionError, match="Centre"):
+            gso.constraints.add(Centre)
+    finally:
+        gso.constraints.read.KINDS.pop("Centre")
+
+
+@pytest.fixture
+def lifted():
+    """Register a task of nets that lifts surfaces, and a kind of nets that learns how far."""
+    torch = pytest.importorskip("torch")
+    from gso.net import tasks as net_tasks
+    from gso.net import weights
+    from gso.net.models.base import Net
+    from gso.net.training.data import Batch
+
+    class Lift(Net):
+        def __init__(self, task="lift"):
+            super().__init__(task)
+            self.height = torch.nn.Parameter(torch.zeros(1))
+
+        def displacements(self, surface, sigma=None, *, passes=None):
+            up = torch.tensor([0.0, 0.0, 1.0], device=surface.device)
+            return (self.height * up).expand(surface.shape)
+
+        def displacements_at(self, surface, fine, sigma=None, *, passes=None):
+            return self.displacements(fine)
+
+    def energy(batch: Batch, phase, progress):
+        return lambda result: (result - batch.surface)[..., 2].sub(0.5).square().mean(dim=(1, 2))
+
+    gso.net.add_task(
+        gso.net.tasks.NetTask(
+            name="lift",
+            components=3,
+            default="lift",
+            score="miss",
+            figures=lambda design, result: {
+                "miss": float(abs((result - design)[..., 2].mean() - 0.5))
+            },
+            terms=("in",),
+            energy=energy,
+            warm_start=False,
+        )
+    )
+    gso.net.add_kind("lift", Lift)
+    yield Lift
+    net_tasks._FILES._added.clear()
+    weights.KINDS.pop("lift")
+
+
+def test_a_task_and_a_kind_of_nets(lifted, tmp_path):
+    import torch
+
+    from gso.net.training.config import from_dict
+    from gso.net.training.data import Batch
+    from gso.net.training.objective import Objective
+    from gso.net.training.validate import mean_figures
+
+    config = from_dict(
+        {"task": "lift", "model": {"kind": "lift"}, "phase": [{"loss": "energy", "rate": 0.1}]}
+    )
+    assert config.task == "lift"
+    net = lifted()
+    surfaces = torch.tensor(np.stack([saddle(64)]), dtype=torch.float32)
+    optimiser = torch.optim.SGD(net.parameters(), 0.5)
+    for _ in range(20):
+        optimiser.zero_grad()
+        Objective(net)(Batch(surfaces), config.phases[0], 0.0).backward()
+        optimiser.step()
+    gso.net.save(net, tmp_path / "lift.safetensors")
+    result = gso.net.predict(saddle(64), task="lift", model=tmp_path / "lift.safetensors")
+    moved = gso.net.predict(saddle(64), task="lift", model=net)
+    np.testing.assert_allclose(result, moved, atol=1e-3)
+    assert mean_figures("lift", saddle(64)[None], result[None])["miss"] < 1.0
+    with pytest.raises(gso.OptionError, match="lift"):
+        gso.net.add_kind("lift", lifted)
 
 
 def test_a_format(tmp_path):

@@ -15,9 +15,10 @@ from gso import dataset
 from gso.dataset.drawing import draw_many
 from gso.errors import DatasetError
 from gso.io import replacing
-from gso.net import augment
-from gso.net.config import Config, Phase
-from gso.net.grids import ball, normalise
+from gso.net import tasks
+from gso.net.models.grids import ball, normalise
+from gso.net.training import augment
+from gso.net.training.config import Config, Phase
 
 #: Keys of the run's random streams.
 _ORDER, _CHANGES, _FRESH = 0, 1, 2
@@ -38,7 +39,7 @@ class Batch:
     surface : Tensor, (B, H, W, 3)
         Input of the net, in the unit ball.
     target : Tensor, (B, H, W, d), or None
-        Labels, or for "denoise" the surfaces without noise.
+        Labels; where inputs have noise, the surfaces without it.
     sigma : Tensor, (B,), or None
         Standard deviation of the noise of each surface.
     design : Tensor, (B, H, W, 3), or None
@@ -114,7 +115,7 @@ class Source:
             chosen = _AUGMENTED[config.augment](chosen, generator)
         chosen = [x[:, :: phase.stride, :: phase.stride] for x in chosen]
         found = dict(zip(arrays, chosen, strict=True))
-        if config.task == "denoise":
+        if tasks.get(config.task).noisy:
             seen = noisy(found["surface"], config.sigma, generator)
             found = dict(zip(("surface", "target", "sigma"), seen, strict=True))
         mine = slice(rank, None, world)

@@ -7,15 +7,11 @@ from torch import Tensor, nn
 from torch.nn.functional import interpolate
 
 from gso.errors import OptionError
-from gso.net import inputs
-from gso.net.base import Net
-from gso.net.blocks import Residual
-from gso.net.catalogue import TASKS
-from gso.net.grids import Frame, planes
-from gso.net.resampling import spline_field
-
-#: Unit of the coefficients, in radii of the unit ball: a typical displacement.
-_UNIT = {"developable": 0.01, "flatten": 0.03, "denoise": 0.01}
+from gso.net.models import inputs
+from gso.net.models.base import Net
+from gso.net.models.blocks import Residual
+from gso.net.models.grids import Frame, planes
+from gso.net.models.resampling import spline_field
 
 
 class CoarseNet(Net):
@@ -29,8 +25,8 @@ class CoarseNet(Net):
 
     Parameters
     ----------
-    task : {"developable", "flatten"}
-        Task of the net. It displaces the surface, or for "flatten" the initial rectangle.
+    task : str
+        Task of the net, one whose inputs have no noise.
     widths : sequence of 3 int
         Channels at 1/2, 1/4 and 1/8 of the resolution.
     depths : sequence of 3 int
@@ -67,12 +63,12 @@ class CoarseNet(Net):
                 f"widths {widths}, depths {depths}, passes {passes}: take three widths from 4 to "
                 "512, three depths up to 32, 1 to 8 passes"
             )
-        if task == "denoise":
-            raise OptionError("a coarse field cannot follow noise; take kind 'gsonet'")
         super().__init__(task, widths=list(widths), depths=list(depths), passes=passes)
-        self.passes, self.unit = passes, _UNIT[task]
-        dim = TASKS[task]
-        state = inputs.STRETCHING if task == "flatten" else inputs.BENDING
+        if self.kind.noisy:
+            raise OptionError("a coarse field cannot follow noise; take kind 'gsonet'")
+        self.passes, self.unit = passes, self.kind.displacement
+        dim = self.kind.components
+        state = inputs.STRETCHING if self.kind.flat else inputs.BENDING
         w, d = widths, depths
 
         def blocks(width: int, depth: int) -> nn.Sequential:
@@ -111,9 +107,9 @@ class CoarseNet(Net):
         p = planes(surface)
         bent = inputs.bending(p, frame)
         known = torch.stack([*inputs.shape(p, frame), *bent], dim=1)
-        start = self.start(surface)
-        state = inputs.stretching(frame, planes(start)) if self.task == "flatten" else bent
-        moved = known.new_zeros(len(known), TASKS[self.task], *known.shape[2:])
+        start = self.initial_geometry(surface)
+        state = inputs.stretching(frame, planes(start)) if self.kind.flat else bent
+        moved = known.new_zeros(len(known), self.kind.components, *known.shape[2:])
         coarse: Tensor | float = 0.0
         fine: Tensor | float = 0.0
         for _ in range(passes):
@@ -121,7 +117,7 @@ class CoarseNet(Net):
             coarse, fine = coarse + more[0], fine + more[1]
             moved = self._shares(coarse, fine, *known.shape[2:])
             image = planes(start + self._vectors(moved, frame))
-            if self.task == "flatten":
+            if self.kind.flat:
                 state = inputs.stretching(frame, image)
             else:
                 state = inputs.bending(image, Frame.of(image))
@@ -134,7 +130,7 @@ class CoarseNet(Net):
         fields = self.coefficients(surface, frame, passes)
         return self._vectors(self._shares(*fields, *surface.shape[1:3]), frame)
 
-    def carried(
+    def displacements_at(
         self,
         surface: Tensor,
         fine: Tensor,
@@ -164,7 +160,7 @@ class CoarseNet(Net):
         return self.unit * both
 
     def _vectors(self, shares: Tensor, frame: Frame) -> Tensor:
-        return shares.movedim(1, -1) if self.task == "flatten" else frame.combine(shares)
+        return shares.movedim(1, -1) if self.kind.flat else frame.combine(shares)
 
 
 def _joined(known: Tensor, state: list[Tensor], moved: Tensor) -> Tensor:

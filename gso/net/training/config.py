@@ -11,28 +11,22 @@ from pathlib import Path
 from typing import Any
 
 from gso.errors import OptionError
-from gso.net.catalogue import TASKS
+from gso.net import tasks
 from gso.spelling import check_keywords, choices
 
 #: Configurations that come with the package.
-FOLDER = Path(__file__).parent / "configs"
+FOLDER = Path(__file__).parents[1] / "configs"
 
 LOSSES = ("published", "label", "energy", "clean")
 OPTIMISERS = ("muon", "adamw")
 AUGMENTATIONS = ("none", "symmetries", "shear")
 #: Largest stride of a phase; larger ones leave too few vertices.
 LARGEST_STRIDE = 4
-#: Loss terms equal to metrics of developable surfaces, and terms of flat images only.
-_JUDGED = ("k_left", "d_h", "fair_ratio")
-_FLAT = ("iso", "iso_w", "iso_cell", "iso_cell_w")
 #: All terms of the loss "published": published losses, metrics of results, and the label.
-TERMS = ("in", "fair", "gc", *_JUDGED, *_FLAT, "label")
-#: Terms that are not available for a task.
-_FOREIGN = {
-    "developable": _FLAT,
-    "flatten": ("in", "gc", *_JUDGED),
-    "denoise": (*_JUDGED, *_FLAT, "label"),
-}
+TERMS = (
+    *("in", "fair", "gc", "k_left", "d_h", "fair_ratio"),
+    *("iso", "iso_w", "iso_cell", "iso_cell_w", "label"),
+)
 
 
 @dataclass(frozen=True)
@@ -120,8 +114,8 @@ class Config:
     ----------
     name : str
         Name of the net.
-    task : {"developable", "flatten", "denoise"}
-        Task of the net.
+    task : str
+        Task of the net; see :mod:`gso.net.tasks`.
     model : dict
         Kind and settings of the net; see :class:`gso.net.CoarseNet`, :class:`gso.net.GSONet`.
     phases : tuple of Phase
@@ -190,7 +184,7 @@ class Config:
     validate: int = 128
 
     def __post_init__(self) -> None:
-        _choice("task", self.task, tuple(TASKS))
+        _choice("task", self.task, tuple(tasks.names()))
         _choice("augment", self.augment, AUGMENTATIONS)
         _choice("against", self.against, ("seen", "designs"))
         _choice("optimiser", self.optimiser, OPTIMISERS)
@@ -206,9 +200,9 @@ class Config:
             raise OptionError("ema must be below 1, and sigma two positive numbers that rise")
         if not self.phases:
             raise OptionError("a configuration needs [[phase]] tables")
-        if self.teacher and self.task == "denoise":
+        if self.teacher and tasks.get(self.task).noisy:
             raise OptionError(
-                "teacher does not go with task 'denoise': clean surfaces are its labels"
+                f"teacher does not go with task {self.task!r}: clean surfaces are its labels"
             )
         if self.teacher and not any(phase.labelled for phase in self.phases):
             raise OptionError("teacher: no phase learns labels; give one the weight 'label'")
@@ -226,17 +220,22 @@ class Config:
 
 def _fits(config: Config, phase: Phase) -> None:
     """Reject combinations of a task, a loss and other settings that do not go together."""
-    if (phase.loss == "clean") != (config.task == "denoise" and phase.loss != "published"):
+    task = tasks.get(config.task)
+    clean = phase.loss == "clean"
+    if clean != (task.noisy and phase.loss != "published"):
         raise OptionError(f"loss {phase.loss!r} does not go with task {config.task!r}")
-    if config.through and config.task != "developable":
-        raise OptionError("through is for task 'developable' only")
+    if phase.loss == "energy" and task.energy is None:
+        raise OptionError(f"task {config.task!r} has no loss 'energy'")
+    if config.through and not task.refines:
+        able = " or ".join(repr(n) for n in tasks.names() if tasks.get(n).refines)
+        raise OptionError(f"through is for task {able} only")
     if config.through and phase.labelled and not config.teacher:
         raise OptionError("through: a net's results have no labels, unless a teacher makes them")
     if config.against == "designs" and not config.through:
         raise OptionError("against = 'designs' goes with through only")
     if phase.labelled and config.augment == "shear":
         raise OptionError("labels do not follow a shear; take augment = 'symmetries'")
-    wrong = {k for k, v in phase.weights.items() if v and k in _FOREIGN[config.task]}
+    wrong = {k for k, v in phase.weights.items() if v and k not in task.terms}
     if phase.loss == "published" and wrong:
         raise OptionError(f"weights {', '.join(sorted(wrong))} do not go with task {config.task!r}")
 

@@ -9,10 +9,8 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from gso.errors import OptionError
-from gso.net.catalogue import TASKS
-from gso.net.grids import planes, rectangle
-from gso.spelling import choices
+from gso.net import tasks
+from gso.net.models.grids import planes, rectangle
 
 #: Samples along each side at which nets are trained.
 SIZE = 64
@@ -23,8 +21,10 @@ class Net(nn.Module):
 
     Attributes
     ----------
-    task : {"developable", "flatten", "denoise"}
-        Task of the net.
+    task : str
+        Name of the net's task.
+    kind : NetTask
+        The task.
     settings : dict
         Keyword arguments from which the class makes an equal net.
     passes : int
@@ -41,11 +41,10 @@ class Net(nn.Module):
 
     def __init__(self, task: str, **settings: Any):
         super().__init__()
-        if task not in TASKS:
-            raise OptionError(f"no task {task!r} for a net; {choices(task, TASKS)}")
+        self.kind = tasks.get(task)
         self.task, self.settings, self.bf16 = task, {"task": task, **settings}, False
 
-    def begin_with(self, other: Net) -> None:
+    def copy_weights_from(self, other: Net) -> None:
         """Copy the weights of a net of this kind and size; RuntimeError if they do not fit."""
         self.load_state_dict(other.state_dict())
 
@@ -53,7 +52,7 @@ class Net(nn.Module):
     def displacements(
         self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
     ) -> Tensor:
-        """Compute the displacements (B, H, W, d) from :meth:`start`.
+        """Compute the displacements (B, H, W, d) from :meth:`initial_geometry`.
 
         Gradients flow through the last pass only; results of earlier passes are constants.
 
@@ -68,7 +67,7 @@ class Net(nn.Module):
         """
 
     @abstractmethod
-    def carried(
+    def displacements_at(
         self,
         surface: Tensor,
         fine: Tensor,
@@ -78,13 +77,13 @@ class Net(nn.Module):
     ) -> Tensor:
         """Compute displacements (B, h, w, d) of `fine`, the same surfaces at another resolution."""
 
-    def start(self, surface: Tensor) -> Tensor:
-        """Return what the net displaces: the surface, or for "flatten" the initial rectangle."""
-        return rectangle(planes(surface)) if self.task == "flatten" else surface
+    def initial_geometry(self, surface: Tensor) -> Tensor:
+        """Return what the net displaces: the surface, or for flat images a rectangle."""
+        return rectangle(planes(surface)) if self.kind.flat else surface
 
     def forward(self, surface: Tensor, sigma: Tensor | None = None) -> Tensor:
         """Compute results (B, H, W, 3), or flat images (B, H, W, 2), for grids (B, H, W, 3)."""
-        return self.start(surface) + self.displacements(surface, sigma)
+        return self.initial_geometry(surface) + self.displacements(surface, sigma)
 
     def autocast(self, device: torch.device) -> torch.autocast:
         """Return the autocast context for convolutions, enabled if `bf16` is."""

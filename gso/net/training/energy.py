@@ -16,8 +16,8 @@ from torch import Tensor
 from gso import geometry
 from gso.energy import curvature, edges, elongation, fairness, proximity, stretch
 from gso.energy.losses import Absolute, Distance, Squared
-from gso.net import grids
-from gso.net.grids import Planes, planes
+from gso.net.models import grids
+from gso.net.models.grids import Planes, planes
 from gso.tasks import developable, flatten
 from gso.tasks.developable.analysis import kept_bending
 from gso.tasks.developable.objective import adapted_weights

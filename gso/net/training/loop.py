@@ -13,12 +13,12 @@ from torch import Tensor
 from torch.nn.parallel import DistributedDataParallel
 
 from gso.errors import OptionError
-from gso.net.base import exact
-from gso.net.config import Config
-from gso.net.objective import Objective
-from gso.net.processes import interruption, processes
-from gso.net.run import MODEL, Run, Tick, begin
-from gso.net.schedule import place
+from gso.net.models.base import exact
+from gso.net.training.config import Config
+from gso.net.training.objective import Objective
+from gso.net.training.processes import interruption, processes
+from gso.net.training.run import MODEL, Run, Tick, begin
+from gso.net.training.schedule import place
 
 __all__ = ["MODEL", "Report", "train"]
 
@@ -69,7 +69,7 @@ def train(
     Parameters
     ----------
     config : Config
-        Configuration; see :func:`gso.net.config.read`.
+        Configuration; see :func:`gso.net.training.config.read`.
     data : path
         Dataset with the splits train and validation.
     out : path

@@ -11,9 +11,10 @@ import torch
 
 from gso.errors import MeshError, OptionError
 from gso.hierarchy import resample
-from gso.net import denoising
-from gso.net.base import SIZE, Net, exact
+from gso.net import tasks
 from gso.net.catalogue import chain
+from gso.net.inference import denoising
+from gso.net.models.base import SIZE, Net, exact
 from gso.net.weights import cached
 from gso.spelling import known_keywords
 from gso.typing import Array
@@ -92,11 +93,11 @@ def predict(
     """
     points = _checked(surface)
     batch = points[None] if points.ndim == 3 else points
-    where = _device(device)
+    kind, where = tasks.get(task), _device(device)
     nets = _nets(model, task, where)
     if isinstance(repeat, bool) or not isinstance(repeat, int) or not 1 <= repeat <= 100:
         raise OptionError(f"repeat is {repeat!r}; take a whole number from 1 to 100")
-    if repeat > 1 and task == "flatten":
+    if repeat > 1 and kind.flat:
         raise OptionError("a flat image cannot be flattened again; leave repeat out")
     whole = isinstance(passes, int | np.integer) and not isinstance(passes, bool)
     if passes is not None and not (whole and passes >= 1):
@@ -104,21 +105,19 @@ def predict(
     nets += [nets[-1]] * (repeat - 1)
     if sigma is not None and not (isinstance(sigma, Real) and np.isfinite(sigma) and sigma >= 0):
         raise OptionError(f"sigma is {sigma!r}; it must be a number, zero or more")
-    work = _denoised if task == "denoise" else _predicted
+    work = _denoised if kind.noisy else _predicted
     blocks = [
         work(batch[k : k + _BATCH], nets, passes, sigma, where)
         for k in range(0, len(batch), _BATCH)
     ]
-    out = (
-        np.concatenate(blocks) if blocks else np.empty((*batch.shape[:3], 2 + (task != "flatten")))
-    )
+    out = np.concatenate(blocks) if blocks else np.empty((*batch.shape[:3], kind.components))
     return out[0] if points.ndim == 3 else out
 
 
 def _denoised(
     batch: Array, nets: list[Net], passes: int | None, sigma: float | None, device: str
 ) -> Array:
-    """Predict for noisy grids of any size, which :mod:`gso.net.denoising` converts."""
+    """Predict for noisy grids of any size, which :mod:`gso.net.inference.denoising` converts."""
     height, width = batch.shape[1:3]
     if (height, width) == (SIZE, SIZE):
         return _predicted(batch, nets, passes, sigma, device)
@@ -152,10 +151,10 @@ def _predicted(
                 moved = net.displacements(coarse, noise, passes=most)
             else:
                 fine = torch.as_tensor(unit, dtype=torch.float32, device=device)
-                moved = net.carried(coarse, fine, noise, passes=most)
-            start = net.start(torch.as_tensor(unit))
+                moved = net.displacements_at(coarse, fine, noise, passes=most)
+            start = net.initial_geometry(torch.as_tensor(unit))
         out = scale * (start.numpy() + moved.double().cpu().numpy())
-        if net.task == "flatten":
+        if net.kind.flat:
             return out
         out = out + centre
     return out

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
 
 import torch
 from torch import Tensor, nn
 
-from gso.net import energy, losses
-from gso.net.base import Net
-from gso.net.config import Phase
-from gso.net.data import Batch
-from gso.net.grids import planes
-from gso.tasks import developable, flatten
-from gso.tasks.developable.objective import TYPICAL_CURVATURE
+from gso.net.models.base import Net
+from gso.net.models.grids import planes
+from gso.net.tasks import NetTask
+from gso.net.training import losses
+from gso.net.training.config import Phase
+from gso.net.training.data import Batch
 
 #: Lower bound on the size of a label's displacement, by which the misfit is divided.
 _LEAST = 3e-3
-#: Lower bound on a design's energy, by which that of results is divided.
-_LEAST_ENERGY = 3e-5
 
 Cost = Callable[[Tensor], Tensor]
 Term = Callable[[Tensor, Tensor], Tensor]
@@ -36,15 +31,15 @@ class Objective(nn.Module):
 
     def forward(self, batch: Batch, phase: Phase, progress: float) -> Tensor:
         """Compute the mean loss of a batch; `progress` runs from 0 to 1 within the phase."""
-        start = self.net.start(batch.surface)
+        start = self.net.initial_geometry(batch.surface)
         # Steps train the passes in turn; earlier passes only compute the input of the last one.
         passes = 1 + batch.step % self.net.passes
         moved = self.net.displacements(batch.surface, batch.sigma, passes=passes)
-        cost = _COSTS[phase.loss](self.net.task, batch, start, phase, progress)
+        cost = _COSTS[phase.loss](self.net.kind, batch, start, phase, progress)
         return cost(start + moved).mean()
 
 
-def _published(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
+def _published(task: NetTask, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
     weights = dict(phase.weights)
     if "in" in weights:
         weights["in"] *= math.exp(-phase.decay * progress)
@@ -80,11 +75,11 @@ _TERMS: dict[str, Term] = {
 }
 
 
-def _label(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
+def _label(task: NetTask, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
     """Return the root-mean-square distance to the label, divided by that of the start."""
     if batch.target is None:
         raise ValueError("a batch without labels")
-    target = aligned(batch.target, start) if task == "flatten" else batch.target
+    target = aligned(batch.target, start) if task.flat else batch.target
     size = (target - start).square().sum(dim=-1).mean(dim=(1, 2))
 
     def cost(result: Tensor) -> Tensor:
@@ -94,21 +89,13 @@ def _label(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float
     return cost
 
 
-def _energy(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
-    if task == "flatten":
-        return energy.Strain(batch.surface, flatten.Options())
-    w: dict[str, Any] = dict(phase.weights)
-    balance = w.pop("balance", 0.5)
-    whole = energy.Developable(batch.compared, replace(developable.Options(), **w))
-    first, last = phase.eps
-    eps = last * (first / last) ** max(1.0 - 2.0 * progress, 0.0)
-    before = whole.at_start.clamp_min(_LEAST_ENERGY)
-    typical = phase.weights.get("w_curvature", 1e-3) * TYPICAL_CURVATURE
-    scale = before**balance * typical ** (1.0 - balance)
-    return lambda result: whole(result, eps) / scale
+def _energy(task: NetTask, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
+    if task.energy is None:
+        raise ValueError(f"task {task.name!r} has no energy")
+    return task.energy(batch, phase, progress)
 
 
-def _clean(task: str, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
+def _clean(task: NetTask, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
     if batch.target is None or batch.sigma is None:
         raise ValueError("a batch without clean surfaces")
     target, sigma = batch.target, batch.sigma

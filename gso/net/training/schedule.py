@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from gso.net.config import Phase
+from gso.net.training.config import Phase
 
 #: Fraction of the run over which the learning rate is warmed up.
 _WARM_UP = 0.01

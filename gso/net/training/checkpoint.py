@@ -12,7 +12,7 @@ from torch import Tensor
 
 from gso.errors import WeightsError
 from gso.io import replacing
-from gso.net.base import Net
+from gso.net.models.base import Net
 
 _DAMAGED = "{} is no checkpoint of this run ({}); remove it to begin anew"
 Optimisers = Sequence[torch.optim.Optimizer]

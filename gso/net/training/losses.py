@@ -11,9 +11,9 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from gso import geometry
-from gso.net import grids
-from gso.net.energy import LEAST_CURVATURE
-from gso.net.grids import Planes, planes
+from gso.net.models import grids
+from gso.net.models.grids import Planes, planes
+from gso.net.training.energy import LEAST_CURVATURE
 
 #: Search radius for the nearest vertex, in steps along the grid.
 _REACH = 2

@@ -16,15 +16,16 @@ from torch import Tensor
 
 from gso import dataset
 from gso.errors import OptionError
-from gso.net import checkpoint, muon, weights
-from gso.net.base import Net
-from gso.net.catalogue import TASKS, located, read_card
-from gso.net.config import Config
-from gso.net.curves import Curves, read
-from gso.net.data import Source, noisy, open_source
-from gso.net.grids import normalise, normalise_with
-from gso.net.processes import Processes
-from gso.net.validate import SCORE, applied, mean_figures
+from gso.net import tasks, weights
+from gso.net.catalogue import located, read_card
+from gso.net.models.base import Net
+from gso.net.models.grids import normalise, normalise_with
+from gso.net.training import checkpoint, muon
+from gso.net.training.config import Config
+from gso.net.training.curves import Curves, read
+from gso.net.training.data import Source, noisy, open_source
+from gso.net.training.processes import Processes
+from gso.net.training.validate import applied, mean_figures
 
 #: Files of a run.
 CHECKPOINT, MODEL = "checkpoint.safetensors", "model.safetensors"
@@ -124,7 +125,7 @@ class Run:
 
     def _curve(self) -> list[list[float]]:
         """Return rows of hours and validation score, including earlier runs of this net."""
-        name = SCORE[self.config.task]
+        name = tasks.get(self.config.task).score
         curve = list(self.begun_with.get("curve", [])) if self._goes_on else []
         for row in read(self.folder):
             if name in row:
@@ -215,7 +216,7 @@ def _take(net: Net, other: Net, name: str) -> None:
     if other.settings.keys() != net.settings.keys() or type(other) is not type(net):
         raise OptionError(f"init: {name} is a net of another kind")
     try:
-        net.begin_with(other)
+        net.copy_weights_from(other)
     except RuntimeError as error:
         raise OptionError(f"init: {name} does not fit: {error}") from None
 
@@ -261,7 +262,7 @@ def _pass_through(run: Run, net: Net, tick: Tick | None) -> None:
 
 def _results(net: Net, surfaces: Tensor, here: Processes, tick: Tick | None, what: str) -> Tensor:
     """Compute the results (n, H, W, d) of a net; the processes share the work."""
-    out = torch.zeros(*surfaces.shape[:3], TASKS[net.task])
+    out = torch.zeros(*surfaces.shape[:3], net.kind.components)
     for start in range(here.rank * _BLOCK, len(surfaces), here.world * _BLOCK):
         block = slice(start, start + _BLOCK)
         out[block] = torch.from_numpy(applied(net, surfaces[block]))
@@ -274,7 +275,7 @@ def _validation(config: Config, data: Path) -> tuple[Tensor, Tensor, Tensor | No
     """Return input surfaces for validation, the surfaces to compare with, and the noise."""
     split = dataset.open(data)["validation"]
     clean = normalise(torch.from_numpy(split["surface"][: config.validate])).float()
-    if config.task != "denoise":
+    if not tasks.get(config.task).noisy:
         return clean, clean, None
     return noisy(clean, config.sigma, torch.Generator().manual_seed(_NOISE))
 

@@ -8,11 +8,10 @@ import torch
 from torch import Tensor, nn
 
 from gso.errors import OptionError
-from gso.net.base import Net
-from gso.net.blocks import IMDB, Stencils
-from gso.net.catalogue import TASKS
-from gso.net.grids import axes
-from gso.net.resampling import resampled
+from gso.net.models.base import Net
+from gso.net.models.blocks import IMDB, Stencils
+from gso.net.models.grids import axes
+from gso.net.models.resampling import resampled
 
 _LEVELS = 3
 
@@ -26,8 +25,8 @@ class GSONet(Net):
 
     Parameters
     ----------
-    task : {"developable", "flatten", "denoise"}
-        Task of the net. It displaces the surface, or for "flatten" the initial rectangle.
+    task : str
+        Task of the net.
     channels : int
         Channels at full resolution (NC), a multiple of 4; they double at each level.
     blocks : int
@@ -42,7 +41,7 @@ class GSONet(Net):
         rotated back. The result is then equivariant under rotations, unlike the published net.
     stencils : bool
         Whether the first layer is parametrised by difference stencils, with as many weights as
-        the published net's kernels: see :class:`gso.net.blocks.Stencils`.
+        the published net's kernels: see :class:`gso.net.models.blocks.Stencils`.
 
     Raises
     ------
@@ -95,11 +94,11 @@ class GSONet(Net):
             nn.Sequential(nn.ConvTranspose2d(b, a, 2, stride=2, bias=False), *level(a))
             for a, b in reversed(steps)
         )
-        self.tail = conv(channels, TASKS[task])
+        self.tail = conv(channels, self.kind.components)
         # The initial displacement is zero; random ones would crumple the surface.
         nn.init.zeros_(self.tail.weight)
 
-    def begin_with(self, other: Net) -> None:
+    def copy_weights_from(self, other: Net) -> None:
         """Copy weights, also from a net with the other kind of first layer.
 
         The converted layer is equivalent except at the border of grids.
@@ -138,11 +137,11 @@ class GSONet(Net):
         y = self.tail(finest((y + last).to(x.dtype)) + skips[0])
         moved = (torch.tanh(y) if self.tanh else y).movedim(1, -1)
         # Flat images are already aligned with the axes of their rectangle.
-        if turn is None or self.task == "flatten":
+        if turn is None or self.kind.flat:
             return moved
         return torch.einsum("bhwj,bij->bhwi", moved, turn)
 
-    def carried(
+    def displacements_at(
         self,
         surface: Tensor,
         fine: Tensor,

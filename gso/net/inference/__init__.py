@@ -1,0 +1,1 @@
+"""Application of nets to surfaces."""

@@ -1,0 +1,61 @@
+"""What is specific to one task of nets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from gso.typing import Array
+
+
+@dataclass(frozen=True)
+class NetTask:
+    """A task of nets: their results, training losses and metrics.
+
+    Attributes
+    ----------
+    name : str
+        Name of the task.
+    components : {3, 2}
+        Components of a result: 3 for surfaces, 2 for flat images.
+    default : str
+        Net that is used unless another is named.
+    score : str
+        Metric by which trained nets are compared; lower is better.
+    figures : callable
+        Metrics of one result, ``figures(design, result)``, for arrays (H, W, 3) and (H, W, d).
+        Where `noisy`, the design is the surface without noise.
+    terms : tuple of str
+        Terms of the loss "published" that can be used.
+    energy : callable, optional
+        The loss "energy": ``energy(batch, phase, progress)`` returns a function that maps
+        results (B, H, W, d) to energies (B,).
+    noisy : bool
+        Whether inputs have noise and labels are the surfaces without it. The loss "clean" takes
+        the place of "label" and "energy".
+    warm_start : bool
+        Whether the optimiser can start from a result. If not, the optimiser's method is in
+        closed form.
+    refines : bool
+        Whether a net can be trained on the results of another net of the task.
+    displacement : float
+        Typical displacement, in radii of the unit ball.
+    """
+
+    name: str
+    components: int
+    default: str
+    score: str
+    figures: Callable[[Array, Array], Mapping[str, float]]
+    terms: tuple[str, ...]
+    energy: Callable[..., Any] | None = None
+    noisy: bool = False
+    warm_start: bool = True
+    refines: bool = False
+    displacement: float = 0.01
+
+    @property
+    def flat(self) -> bool:
+        """Whether results are flat images."""
+        return self.components == 2
