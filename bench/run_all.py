@@ -9,30 +9,40 @@
 Writes ``report.html``, ``report.md``, ``results.json`` and the figures. An interrupted run
 resumes; results that depend on changed code, options or packages are measured again. Peers need
 ``pip install ".[bench]"``; the report names those that are missing.
+
+    python bench/run_all.py --only list                  names the other sections of the bench
+    python bench/run_all.py --only tno.developable       prints the tables of one section
+    python bench/run_all.py --only tno jiang             all sections of these subjects
+    python bench/run_all.py --only hybrid.speed n=16     with a setting of the section
+    python bench/run_all.py --only tno --json FILE       the figures as JSON, too
 """
 
 from __future__ import annotations
 
 import argparse
+import inspect
 import json
 import os
 import sys
 from pathlib import Path
 
-# Every process of the run has one thread; this must be set before NumPy is imported.
-os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
-os.environ["MKL_NUM_THREADS"] = "1"
+# Every process of the run has one thread, unless a section is run with more; this must be set
+# before NumPy is imported.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = os.environ.get(name, "1") if "--only" in sys.argv else "1"
 # Nets run on the CPU, as the optimiser does.
 os.environ["CUDA_VISIBLE_DEVICES"] = ""
 
 BENCH = Path(__file__).resolve().parent
 sys.path.insert(0, str(BENCH))
 
+from harness import called, machine  # noqa: E402
 from report import build, surfaces, tuning  # noqa: E402
 from report.methods import methods  # noqa: E402
 from report.quality import levels  # noqa: E402
 from report.settings import FULL, QUICK  # noqa: E402
 from report.store import Store  # noqa: E402
+from sections import sections  # noqa: E402
 
 
 def main() -> None:
@@ -45,7 +55,12 @@ def main() -> None:
     parser.add_argument("--data", type=Path, metavar="DIR", help="set of gso dataset build")
     parser.add_argument("--store", action="store_true", help="keep the figures in bench/data")
     parser.add_argument("--tune", action="store_true", help="tune the peers, and end")
+    parser.add_argument("--only", nargs="+", metavar="SECTION", help="sections and name=value")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="of --only: write the figures")
     arguments = parser.parse_args()
+    if arguments.only:
+        _sections(parser, arguments)
+        return
     command = " ".join(["python bench/run_all.py", *(f"--{k}" for k in _asked(arguments))])
     if arguments.tune:
         some = _screened(arguments.out, "validation")
@@ -66,6 +81,38 @@ def main() -> None:
     if arguments.store:
         _store(settings.name, result)
     print(out / "report.html")
+
+
+def _sections(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
+    """Run the sections that are named, or all of the subjects that are named."""
+    every = sections()
+    words = [word for word in arguments.only if "=" not in word]
+    settings = dict(word.split("=", 1) for word in arguments.only if "=" in word)
+    if arguments.data:
+        settings["data"] = str(arguments.data)
+    if words == ["list"]:
+        for name, section in every.items():
+            signature = str(inspect.signature(section)).partition(" ->")[0]
+            print(f"{name:20s} {(section.__doc__ or '').splitlines()[0]}\n{'':20s} {signature}")
+        return
+    chosen = {n: s for n, s in every.items() if n in words or n.partition(".")[0] in words}
+    unknown = [w for w in words if w not in every and not any(n.startswith(f"{w}.") for n in every)]
+    known = {p for s in chosen.values() for p in inspect.signature(s).parameters}
+    if unknown or not chosen:
+        parser.error(f"no section {', '.join(unknown) or 'named'}; --only list names them")
+    if not settings.keys() <= known:
+        parser.error(f"no setting {', '.join(settings.keys() - known)} in these sections")
+    found = {}
+    for name, section in chosen.items():
+        needed = inspect.signature(section).parameters.values()
+        missing = [p.name for p in needed if p.default is p.empty and p.name not in settings]
+        if missing and name in words:
+            parser.error(f"{name} needs {', '.join(f'{m}=...' for m in missing)}")
+        if not missing:
+            found[name] = called(section, settings)
+    if arguments.json:
+        text = json.dumps({**found, "machine": machine()}, indent=1, default=float)
+        arguments.json.write_text(text + "\n")
 
 
 def _asked(arguments: argparse.Namespace) -> list[str]:

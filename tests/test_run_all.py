@@ -251,7 +251,7 @@ def compared(task, sigma, name, some):
 
 #: Share by which a figure may differ where a net makes the start: processors round its single
 #: precision otherwise, and |K| has many minima. Cold solves of inputs that differ by
-#: as little end as far apart: ``python bench/hybrid.py guard``.
+#: as little end as far apart: ``python bench/run_all.py --only hybrid.guard``.
 MINIMA = {("hybrid", "loss_gc"): 0.5}
 
 

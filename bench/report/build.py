@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tno import machine
+from harness import machine
 from tqdm import tqdm
 
 from gso.io import replacing
@@ -26,7 +26,7 @@ from report.timing import Timing, pieces, timings
 from report.verdict import Loss, losses, unmeasured
 
 TITLE = "gso: quality and time, beside the paper and its peers"
-#: Packages whose versions are reported, in addition to those of ``bench/tno.py``.
+#: Packages whose versions are reported, in addition to those of ``bench/harness.py``.
 _PACKAGES = ("gso", "cvxopt", "pypardiso", "torch", "matplotlib", "pymeshlab", "vtk")
 
 

@@ -12,11 +12,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso import tasks
+from gso.constraints import Compiled
 from gso.energy.losses import Absolute, Distance, Loss, Squared
+from gso.mesh import Mesh
+from gso.tasks.base import Request
+from gso.tno.normalise import Canonical
 from gso.tno.solver.kernels import casadi_function
 from gso.tno.solver.problem import Problem
 
 Array = NDArray[np.float64]
+
+
+def last_problem(points: np.ndarray, task: str, options: str) -> tuple[Any, np.ndarray]:
+    """Return the problem of a task's last stage, and unknowns to evaluate it at."""
+    module = tasks.get(task)
+    frame = Canonical(Mesh.from_grid(points))
+    settings = module.Options.coerce(options)
+    analysis = tasks.analyse(module, frame.mesh, Compiled())
+    plan = module.plan(analysis, Request(settings, module.FORMULATIONS[0]))
+    coordinates = plan.start
+    for stage in plan.stages:
+        coordinates = stage.enter(coordinates)
+    variables = plan.stages[-1].unknowns(coordinates)
+    problem = Problem(plan.stages[-1].items, variables, plan.stages[-1].limits)
+    return problem, variables.project(coordinates)
 
 
 def residuals(problem: Problem, x: Array) -> Array:

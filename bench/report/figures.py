@@ -31,7 +31,9 @@ Array = NDArray[np.float64]
 
 #: The file with the runs of figure 5, and the command that writes it.
 GRID = BENCH / "data" / "architecture_grid.json"
-GRID_COMMAND = "python bench/net.py DIR --grid bench/data/architecture_grid.json"
+GRID_COMMAND = (
+    "python bench/run_all.py --only net.grid data=DIR file=bench/data/architecture_grid.json"
+)
 #: Methods of figure 6.
 CURVES = ("TNO jiang2020", "TNO balanced", "Net-S", "Net-C", "Net-CF", "Net", "hybrid")
 #: Percentile of all values that is the upper end of a colour scale shared by several panels.

@@ -10,7 +10,6 @@ from typing import Any
 
 import gso
 from gso import hybrid
-from gso.hybrid.prediction import STARTED
 from gso.net import tasks as net_tasks
 from gso.parametrization import rectangle
 from report.method import TASKS, Method, Solved
@@ -74,14 +73,15 @@ def _own() -> list[Method]:
         net("Net", "denoise", "denoise", "the default net; estimates the noise"),
     ]
     for task in TASKS:
+        kind = net_tasks.get(task)
         found.append(
             Method(
                 "hybrid",
                 task,
                 partial(_hybrid, task),
-                net=net_tasks.get(task).default,
+                net=kind.default,
                 note="the default net, then the optimiser",
-                refused="" if task in STARTED else "a closed form has no start to improve",
+                refused="" if kind.warm_start else "a closed form has no start to improve",
                 files=_HERE,
             )
         )

@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tno
-from tno import last_problem
 
 import gso
 from gso.mesh import Mesh
@@ -21,6 +19,7 @@ from gso.tno.normalise import Canonical
 from gso.tno.solver import minimise
 from gso.tno.solver.problem import Problem
 from report import energy
+from report.energy import last_problem
 from report.method import Array, Method, Solved
 from report.surfaces import Case
 
@@ -114,7 +113,7 @@ def _same(name: str, run: Callable[[Case], Solved], note: str) -> Method:
         peer=name in SAME_ENERGY[2:],
         pace="peer",
         note=note,
-        files=(Path(__file__), Path(energy.__file__), Path(tno.__file__)),
+        files=(Path(__file__), Path(energy.__file__)),
         solver=True,
     )
 

@@ -9,7 +9,7 @@ from gso.tno import check
 
 #: Number of vertices from which a net saves time, by the unknowns of the last stage: for one
 #: design, including the time to load PyTorch, and for one of many.
-#: ``python bench/hybrid.py sizes`` prints the times.
+#: ``python bench/run_all.py --only hybrid.sizes`` prints the times.
 _FREE = (10_000, 2_500)
 _OFFSETS = (40_000, 10_000)
 

@@ -1,23 +1,11 @@
 """Time and energy of the optimiser with a warm start from a net, against a cold start.
 
-    python bench/hybrid.py                    everything (an hour on two cores)
-    python bench/hybrid.py speed -n 16        one section, on fewer surfaces
-    python bench/hybrid.py --plot FILE        the curve of the section "anytime"
-
-Sections: "speed", cold and hybrid solves of the same surfaces, one after the other; "sizes", the
-same on finer and coarser grids, from which the thresholds of
-``gso.hybrid.time_model`` were chosen;
-"guard", the energy relative to the cold solve's on the whole splits test and hard; "general", the
-same on triangulated patches in random order, some with a hole; "anytime", quality against time.
 The surfaces are those of the test split, which no net was trained on. They are drawn again from
-the seed, or read from a set (``--data``).
+the seed, or read from a set (``data=DIR``).
 """
 
 from __future__ import annotations
 
-import argparse
-import os
-import time
 import warnings
 from collections.abc import Callable, Iterable
 from contextlib import closing
@@ -25,13 +13,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-# The default on a machine of two cores.
-os.environ.setdefault("OMP_NUM_THREADS", "2")
-
 import numpy as np
+from harness import BENCH, axes_of, progress
+from harness import timed as clocked
 from report.store import Store
 from report.surfaces import Surfaces, opened, screened
-from tno import progress as watched
 
 import gso
 from gso import hybrid
@@ -65,11 +51,18 @@ HOLES = (0.0, 0.15)
 
 def timed(function: Callable[..., Any], *given: Any, **keywords: Any) -> tuple[Any, float]:
     """Call a function and return its result and the milliseconds."""
-    start = time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", gso.ConvergenceWarning)
-        value = function(*given, **keywords)
-    return value, 1e3 * (time.perf_counter() - start)
+        value, seconds = clocked(function, *given, **keywords)
+    return value, 1e3 * seconds
+
+
+def split(name: str, data: Path | None) -> Surfaces:
+    """Return a split of a set, or of the set of the published size."""
+    out = BENCH / "out"
+    if data is None:
+        return screened(out / "surfaces", name, Store(out))
+    return opened(out / "surfaces", data, name)
 
 
 def first(surfaces: Surfaces, count: int) -> list[np.ndarray]:
@@ -139,9 +132,15 @@ def costs(found: dict[str, np.ndarray]) -> str:
     )
 
 
-def speed(test: Surfaces, count: int) -> None:
-    """Print time and energy, cold and from the net's result."""
-    chosen = first(test, count)
+def summary(found: dict[str, np.ndarray]) -> dict[str, float]:
+    """Return the medians."""
+    return {name: float(np.median(values)) for name, values in found.items()}
+
+
+def speed(n: int = 64, data: Path | None = None) -> dict[str, Any]:
+    """Print time and energy of the same surfaces, cold and from the net's result."""
+    chosen = first(split("test", data), n)
+    out = {}
     print(
         f"\nSpeed: medians over {len(chosen)} surfaces, milliseconds; energies over the cold ones"
     )
@@ -150,44 +149,54 @@ def speed(test: Surfaces, count: int) -> None:
             print(f"  {name:10s} no net comes with the package")
             continue
         compared(chosen[:2], task, keywords)  # imports and code generation of the first use
-        found = compared(watched(chosen, name), task, keywords)
+        found = compared(progress(chosen, name), task, keywords)
         print(f"  {name:10s} {costs(found)}", flush=True)
+        out[name] = summary(found)
     denoised = [timed(optimize, p, task="denoise")[1] for p in chosen]
     print(f"  denoise    cold {np.median(denoised):6.0f}, in closed form: no start can help")
+    return out
 
 
-def sizes(test: Surfaces, count: int) -> None:
-    """Print time and energy on grids of other sizes."""
-    chosen = first(test, count)
+def sizes(n: int = 4, data: Path | None = None) -> dict[str, Any]:
+    """Print time and energy on other sizes, which ``gso.hybrid.time_model`` was chosen from."""
+    chosen = first(split("test", data), n)
+    out = {}
     print(f"\nSizes: medians over {len(chosen)} surfaces, milliseconds, PyTorch loaded before")
     for side in SIZES:
         grids = [resample(np.asarray(p, float), side, side) for p in chosen]
         for preset in PRESETS:
             keywords = {"options": preset}
             timed(hybrid.solve, grids[0], **keywords)
-            found = compared(watched(grids, f"{side} {preset}"), "developable", keywords)
+            found = compared(progress(grids, f"{side} {preset}"), "developable", keywords)
             print(f"  {side:4d} x {side:<4d} {preset:9s} {costs(found)}", flush=True)
+            out[f"{side} {preset}"] = summary(found)
+    return out
 
 
-def guard(splits: dict[str, Surfaces], count: int | None) -> None:
-    """Print energies relative to the cold solve's, with the preset "balanced"."""
+def guard(n: int = 0, data: Path | None = None) -> dict[str, Any]:
+    """Print energies relative to the cold solve's, "balanced", on the splits test and hard."""
+    out = {}
     print("\nGuard: energy of the hybrid solve over that of the cold one, balanced")
-    for name, split in splits.items():
-        total = min(count or len(split), len(split))
-        designs = (split[k] for k in watched(range(total), name))
+    for name in ("test", "hard"):
+        some = split(name, data)
+        total = min(n or len(some), len(some))
+        designs = (some[k] for k in progress(range(total), name))
         found = compared(designs, "developable", {}, workers=None, stretched=True)
         print(f"  {name:6s} {total:5d} surfaces: {ratios(found['energy'])}")
         print(f"  {_STRETCHED}: {ratios(found['stretched'])}", flush=True)
+        out[name] = summary(found)
+    return out
 
 
-def general(test: Surfaces, count: int) -> None:
-    """Print energies relative to the cold solve's on meshes that are not grids."""
-    chosen = first(test, count)
+def general(n: int = 32, data: Path | None = None) -> dict[str, Any]:
+    """Print energies on triangulated patches in random order, half of them with a hole."""
+    chosen = first(split("test", data), n)
     meshes = [patch(p, HOLES[k % len(HOLES)], seed=k) for k, p in enumerate(chosen)]
-    found = compared(watched(meshes, "general"), "developable", {}, stretched=True)
+    found = compared(progress(meshes, "general"), "developable", {}, stretched=True)
     print(f"\nGeneral meshes: {len(meshes)}, triangulated in random order, half with a hole")
     print(f"  started {found['started'].mean():.0%}; energy {ratios(found['energy'])}")
     print(f"  {_STRETCHED}: {ratios(found['stretched'])}")
+    return summary(found)
 
 
 def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:
@@ -204,12 +213,12 @@ def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:
     return Mesh(whole.vertices[used], new[faces][rng.permutation(len(faces))])
 
 
-def anytime(test: Surfaces, count: int, plot: str) -> None:
+def anytime(n: int = 16, data: Path | None = None, plot: str = "anytime.png") -> dict[str, Any]:
     """Plot energy relative to the cold solve's against time, for solves that are stopped early."""
     curves: dict[str, list[tuple[float, float]]] = {"TNO": [], "hybrid": []}
-    chosen = first(test, count)
-    final = [energy(timed(optimize, p)[0]) for p in watched(chosen, "anytime")]
-    for most in watched(POINTS, "anytime"):
+    chosen = first(split("test", data), n)
+    final = [energy(timed(optimize, p)[0]) for p in progress(chosen, "anytime")]
+    for most in progress(POINTS, "anytime"):
         for name, points in curves.items():
             rows = []
             for p, last in zip(chosen, final, strict=True):
@@ -223,65 +232,13 @@ def anytime(test: Surfaces, count: int, plot: str) -> None:
     for name, points in curves.items():
         print(f"  {name:7s}" + "  ".join(f"{e:.3g} in {t:.0f} ms" for t, e in points))
     print(f"  the net alone is the first point of the hybrid; see {plot}")
-    _draw(curves, plot)
+    with axes_of(
+        plot, xlabel="milliseconds for one surface", ylabel="energy / that of the cold solve"
+    ) as axes:
+        for name, points in curves.items():
+            axes.plot(*np.array(points).T, marker=".", label=name)
+        axes.plot(*curves["hybrid"][0], "o", color="black", label="net alone")
+    return curves
 
 
-def _draw(curves: dict[str, list[tuple[float, float]]], plot: str) -> None:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(figsize=(7, 4.5), constrained_layout=True)
-    for name, points in curves.items():
-        axes.plot(*np.array(points).T, marker=".", label=name)
-    axes.plot(*curves["hybrid"][0], "o", color="black", label="net alone")
-    axes.set(
-        xlabel="milliseconds for one surface",
-        ylabel="energy / that of the cold solve",
-        yscale="log",
-    )
-    axes.legend()
-    figure.savefig(plot)
-
-
-SECTIONS = ("speed", "sizes", "guard", "general", "anytime")
-
-
-def main() -> None:
-    """Run the sections that were asked for."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("sections", nargs="*", default=SECTIONS, metavar="SECTION")
-    parser.add_argument("-n", type=int, metavar="N", help="surfaces of each section")
-    parser.add_argument("--data", type=Path, metavar="DIR", help="set that has the surfaces")
-    parser.add_argument("--out", type=Path, default=Path("bench/out"), metavar="DIR")
-    parser.add_argument("--plot", default="anytime.png", metavar="FILE")
-    arguments = parser.parse_args()
-    unknown = set(arguments.sections) - set(SECTIONS)
-    if unknown:
-        parser.error(f"no section {', '.join(sorted(unknown))}; there are {', '.join(SECTIONS)}")
-    if net_tasks.get("developable").default not in available("developable"):
-        parser.error("no net comes with the package: gso train developable, then see docs/net.rst")
-    store, n, folder = Store(arguments.out), arguments.n, arguments.out / "surfaces"
-    if arguments.data is None:
-        splits = {s: screened(folder, s, store) for s in ("test", "hard")}
-    else:
-        splits = {s: opened(folder, arguments.data, s) for s in ("test", "hard")}
-    test = splits["test"]
-    for section in arguments.sections:
-        if section == "speed":
-            speed(test, n or 64)
-        elif section == "sizes":
-            sizes(test, n or 4)
-        elif section == "guard":
-            guard(splits, n)
-        elif section == "general":
-            general(test, n or 32)
-        else:
-            anytime(test, n or 16, arguments.plot)
-
-
-if __name__ == "__main__":
-    main()
+SECTIONS = (speed, sizes, guard, general, anytime)

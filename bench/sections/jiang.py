@@ -1,32 +1,22 @@
-"""Figures of the isometric mappings of Jiang et al. 2020: developable, bend, conformal, sessions.
-
-    python bench/jiang.py                  everything (about six minutes on two cores)
-    python bench/jiang.py interactive      one section
-    python bench/jiang.py --json out.json  the figures as JSON, with machine and versions
-
-Times are medians, one process, BLAS on one thread.
-"""
+"""The isometric mappings of Jiang et al. 2020: developable, bend, conformal, sessions."""
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import numpy as np
+from harness import compared, progress, quality, reference, solver, table
 from report.peers_flatten import lscm
-from tno import progress, quality, reference, run, table, timed
 
 import gso
 from gso import metrics
 from gso.dataset import bezier
 from gso.mesh import Mesh
 
+PRESETS = ("fast", "balanced", "accurate")
 #: Frames of a drag.
 FRAMES = 40
 
@@ -53,40 +43,26 @@ SOLVES = {
     "isometry accurate": ("isometry", "accurate"),
     "curvature balanced": ("curvature", "balanced"),
 }
+_QUALITY = ("loss_gc", "worse", "K_A-r", "d_H %", "fairness")
 
 
 def developable() -> dict[str, Any]:
     """Compare the classical reference with the package's default, on the reference surfaces."""
-    surfaces, _ = reference()
-    rows, out = [], {}
-    for name, (formulation, options) in SOLVES.items():
-        figures, flat, seconds = [], [], []
-        for points in progress(surfaces, name):
-            result, spent = timed(
-                lambda p=points, f=formulation, o=options: gso.tno.optimize(
-                    p, formulation=f, options=o
-                )
-            )
-            m = result.metrics
-            figures.append(quality(points, result.grid))
-            flat.append([m.get(k, np.nan) for k in ("parallelogram_strain", "strain_mean")])
-            flat[-1].append(m.get("flipped_cells", np.nan))
-            seconds.append(spent)
-        mean, image = np.mean(figures, axis=0), np.mean(flat, axis=0)
-        time_spent = [float(np.median(seconds)), float(np.max(seconds))]
-        rows.append([name, *mean, *image[:2], image[2] * len(flat), *time_spent])
-        out[name] = dict(zip(_COLUMNS, map(float, rows[-1][1:]), strict=True))
-    table(
+
+    def rated(points: np.ndarray, result: gso.Result) -> dict[str, float]:
+        keys = ("parallelogram_strain", "strain_mean", "flipped_cells")
+        image = {k: result.metrics.get(k, np.nan) for k in keys}
+        return quality(points, result.grid) | image
+
+    return compared(
         "Developable, 24 surfaces (published: loss_gc 0.0283, K_A-r 0.8888, d_H 0.823 %, 38 s). "
         "Strains of the flat image that comes with the surface",
-        ["preset", *_COLUMNS],
-        rows,
+        {name: solver(formulation=f, options=o) for name, (f, o) in SOLVES.items()},
+        reference()[0],
+        rated,
+        [*_QUALITY, "parallelogram_strain", "strain_mean", ("flipped", "flipped_cells", np.sum)],
+        head="preset",
     )
-    return out
-
-
-_COLUMNS = ("loss_gc", "K_A-r", "d_H %", "fairness", "parallelogram strain", "strain", "flipped")
-_COLUMNS += ("median s", "max s")
 
 
 def tradeoff() -> dict[str, Any]:
@@ -95,31 +71,27 @@ def tradeoff() -> dict[str, Any]:
     The surfaces have another seed, the start is cold, and the other weights are those of
     ``jiang2020``.
     """
-    surfaces = [s.sample(64) for s in bezier.generate(8, seed=2002)]
     frozen = gso.IsometryOptions.preset("jiang2020")
-    rows, out = [], {}
-    for factor in (0.1, 0.3, 1.0, 3.0):
-        for fairness in (3e-5, 1e-4, 3e-4):
-            options = replace(
+    runs = {
+        f"isometry x {factor:g}, fairness {fairness:.0e}": solver(
+            options=replace(
                 frozen,
                 w_isometry=factor * frozen.w_isometry,
                 w_mapping=factor * frozen.w_mapping,
                 w_fairness=fairness,
             )
-            name = f"isometry x {factor:g}, fairness {fairness:.0e}"
-            figures = [
-                quality(p, gso.tno.optimize(p, options=options).grid)
-                for p in progress(surfaces, name)
-            ]
-            mean, worst = np.mean(figures, axis=0), np.max(figures, axis=0)[0]
-            rows.append([name, *mean, worst])
-            out[name] = [*map(float, mean), float(worst)]
-    table(
+        )
+        for factor in (0.1, 0.3, 1.0, 3.0)
+        for fairness in (3e-5, 1e-4, 3e-4)
+    }
+    return compared(
         "Isometry alone, 8 surfaces of seed 2002",
-        ["weights", "loss_gc", "K_A-r", "d_H %", "fairness", "worst loss_gc"],
-        rows,
+        runs,
+        [s.sample(64) for s in bezier.generate(8, seed=2002)],
+        lambda points, result: quality(points, result.grid),
+        [*_QUALITY, ("worst loss_gc", "loss_gc", np.max)],
+        head="weights",
     )
-    return out
 
 
 def interactive() -> dict[str, Any]:
@@ -213,81 +185,74 @@ def _dragged(session: gso.tno.Session, ids: Any, place: Any, steps: int) -> dict
 
 def bend() -> dict[str, Any]:
     """Roll up sheets by their ends: length errors, and the distance from the cylinder."""
-    rows, out = [], {}
+
+    def rated(given: tuple[np.ndarray, ...], result: gso.Result) -> dict[str, float]:
+        m, far = result.metrics, result.mesh.vertices - given[2]
+        return {
+            "edges": m["edge_length_error"],
+            "strain max": m["strain_max"],
+            "loss_gc": m["loss_gc"],
+            "from cylinder": np.linalg.norm(far, axis=1).max() / 2.0,
+            "iterations": float(result.iterations),
+        }
+
+    def rolled_up(preset: str) -> Callable[[Any], gso.Result]:
+        def run(given: tuple[np.ndarray, ...]) -> gso.Result:
+            points, ids, wanted = given
+            handles = [gso.Handle(ids, wanted[ids])]
+            return gso.tno.optimize(points, task="bend", options=preset, constraints=handles)
+
+        return run
+
+    found = {}
     for size in (32, 64):
-        v = sheet(size).reshape(-1, 3)
+        points = sheet(size)
         ids = np.r_[: 2 * size, size * (size - 2) : size * size]
-        for preset in ("fast", "balanced", "accurate"):
-            for turn in (0.5, 1.0, 1.6):
-                wanted = rolled(v, turn * np.pi)
-                handles = [gso.Handle(ids, wanted[ids])]
-                result, seconds = timed(
-                    lambda s=size, p=preset, h=handles: gso.tno.optimize(
-                        sheet(s), task="bend", options=p, constraints=h
-                    )
-                )
-                m = result.metrics
-                far = np.linalg.norm(result.mesh.vertices - wanted, axis=1).max()
-                rows.append(
-                    [
-                        f"{size} x {size}, {preset}, {turn * 180:.0f} degrees",
-                        m["edge_length_error"],
-                        m["strain_max"],
-                        m["loss_gc"],
-                        far / 2.0,
-                        float(result.iterations),
-                        seconds,
-                    ]
-                )
-                out[rows[-1][0]] = rows[-1][1:]
-    table(
-        "A sheet rolled up; its handles are on a smooth cylinder, whose chords are shorter",
-        ["sheet", "edges", "strain max", "loss_gc", "from cylinder", "iterations", "s"],
-        rows,
-    )
-    return out
+        for turn in (0.5, 1.0, 1.6):
+            wanted = rolled(points.reshape(-1, 3), turn * np.pi)
+            name = f"{size} x {size}, {turn * 180:.0f} degrees"
+            found |= compared(
+                f"A sheet rolled up, {name}; the handles are on a smooth cylinder, whose chords "
+                "are shorter",
+                {
+                    f"{name}, {preset}": rolled_up(preset)
+                    for preset in ("fast", "balanced", "accurate")
+                },
+                [(points, ids, wanted)],
+                rated,
+                ["edges", "strain max", "loss_gc", "from cylinder", "iterations"],
+            )
+    return found
 
 
 def conformal() -> dict[str, Any]:
     """Compare angle distortion on the 24 surfaces with libigl's least-squares conformal map."""
-    surfaces = [Mesh.from_grid(s) for s in reference()[0]]
-    rows, out = [], {}
-    for name in ("fast", "balanced", "accurate", "libigl LSCM"):
-        figures, seconds = [], []
-        for mesh in progress(surfaces, name):
-            if name == "libigl LSCM":
-                flat, spent = timed(lambda m=mesh: lscm(m))
-            else:
-                result, spent = timed(
-                    lambda m=mesh, o=name: gso.tno.optimize(m, task="conformal", options=o)
-                )
-                flat = result.flat
-            seconds.append(spent)
-            figures.append(_rated(mesh, flat))
-        rows.append([name, *np.mean(figures, axis=0), float(np.median(seconds))])
-        out[name] = rows[-1][1:]
-    table(
+    runs: dict[str, Callable[[Mesh], Any]] = {
+        preset: lambda m, o=preset: gso.tno.optimize(m, task="conformal", options=o).flat
+        for preset in PRESETS
+    }
+    return compared(
         "Conformal maps of the 24 surfaces: s1/s2 - 1 of the cells, lengths flat / surface",
-        ["map", "mean", "p99", "max", "scale min", "scale max", "flipped", "median s"],
-        rows,
+        runs | {"libigl LSCM": lscm},
+        [Mesh.from_grid(s) for s in reference()[0]],
+        _distorted,
+        ["mean", "p99", "max", "scale min", "scale max", ("flipped", "flipped", np.sum)],
+        head="map",
     )
-    return out
 
 
-def _rated(mesh: Mesh, flat: np.ndarray) -> tuple[float, ...]:
+def _distorted(mesh: Mesh, flat: np.ndarray) -> dict[str, float]:
     distortion = metrics.quasi_conformal(mesh, flat) - 1.0
     scale = np.sqrt(np.prod(metrics.stretches(mesh, flat), axis=0))
     scale /= np.sqrt((scale**2).mean())
-    return (
-        float(distortion.mean()),
-        float(np.percentile(distortion, 99)),
-        float(distortion.max()),
-        float(scale.min()),
-        float(scale.max()),
-        float(metrics.flips(mesh, flat)),
-    )
+    return {
+        "mean": distortion.mean(),
+        "p99": np.percentile(distortion, 99),
+        "max": distortion.max(),
+        "scale min": scale.min(),
+        "scale max": scale.max(),
+        "flipped": metrics.flips(mesh, flat),
+    }
 
 
-if __name__ == "__main__":
-    sections = (developable, tradeoff, bend, conformal, interactive)
-    run({section.__name__: section for section in sections}, __doc__)
+SECTIONS = (developable, tradeoff, bend, conformal, interactive)

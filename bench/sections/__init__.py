@@ -1,0 +1,19 @@
+"""Sections of ``python bench/run_all.py --only``: one file for each subject."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any
+
+#: Files with sections; each lists them as ``SECTIONS``.
+SUBJECTS = ("tno", "jiang", "hybrid", "net", "borders", "dataset")
+
+
+def sections() -> dict[str, Callable[..., dict[str, Any]]]:
+    """Return all sections by name, such as "tno.developable"."""
+    return {
+        f"{subject}.{section.__name__}": section
+        for subject in SUBJECTS
+        for section in importlib.import_module(f"sections.{subject}").SECTIONS
+    }

@@ -1,0 +1,221 @@
+"""Metrics and times of the nets on surfaces that none was trained on.
+
+Figures are means over the test split. Times are for one surface, from array to array, on the
+CPU, with OMP_NUM_THREADS threads: the smallest of several medians, because other work on a
+shared machine can only increase them.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from harness import axes_of, progress, timed
+from report.published import NETS, TABLE_3
+
+from gso import dataset, net
+from gso.cli.progress import share
+from gso.dataset.noise import LEVELS
+from gso.io import replacing
+from gso.net import catalogue, tasks, weights
+from gso.net.training import checkpoint
+from gso.net.training.config import from_dict
+from gso.net.training.curves import read
+from gso.net.training.run import CHECKPOINT
+
+OTHERS = (
+    "enneper",
+    "monkey_saddle",
+    "catenoid",
+    "helicoid",
+    "sphere",
+    "torus",
+    "teapot",
+    "terrain",
+)
+#: Array that denoising is timed on.
+TIMED = f"noisy_{LEVELS[1]:.3f}"
+#: Figure 5: blocks per level, channels, surfaces, epochs.
+BLOCKS, CHANNELS, SURFACES, EPOCHS = (2, 4, 6), (8, 16, 32), 2000, 10
+
+
+def measured(task: str, model: Any, split: Any, count: int = 0) -> dict[str, float]:
+    """Return the mean metrics of a net over a split."""
+    if not tasks.get(task).noisy:
+        found = over(task, model, split, "surface", count)
+        return {name: value for name, value in found.items() if name != "score"}
+    named = isinstance(model, str | Path)
+    card = catalogue.read_card(catalogue.chain(model, task)[-1]) if named else {}
+    low, high = card.get("config", {}).get("sigma", (0.0, 1.0))
+    return {
+        f"theta_{s:g}": over(task, model, split, f"noisy_{s:.3f}", count)["theta"]
+        for s in LEVELS
+        if low <= s <= high
+    }
+
+
+def over(task: str, model: Any, split: Any, array: str, count: int) -> dict[str, float]:
+    """Return the mean metrics over a split."""
+    figures, rows = tasks.get(task).figures, []
+    total = min(len(split), count or len(split))
+    for k in progress(range(0, total, 32), f"{model or 'default'} {split.name} {array}"):
+        block = slice(k, min(k + 32, total))
+        clean = split["surface"][block]
+        given = clean if array == "surface" else split[array][block]
+        results = net.predict(given, task=task, model=model)
+        rows += [figures(a, b) for a, b in zip(clean, results, strict=True)]
+    return {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
+
+
+def milliseconds(
+    task: str, model: Any, surface: np.ndarray, times: int = 20, rounds: int = 10
+) -> float:
+    """Return the smallest of several medians of the time for one surface, array to array."""
+    spent = np.empty((rounds, times))
+    net.predict(surface, task=task, model=model)
+    for place in np.ndindex(spent.shape):
+        spent[place] = timed(net.predict, surface, task=task, model=model)[1]
+    return 1e3 * float(np.median(spent, axis=1).min())
+
+
+def line(name: str, found: dict[str, float], published: dict[str, float]) -> str:
+    """Format one net as one line, with published figures in brackets."""
+    parts = []
+    for key, value in found.items():
+        beside = f" ({published[key]:.4g})" if key in published else ""
+        parts.append(f"{key} {value:.4g}{beside}")
+    return f"{name:16s} " + "  ".join(parts)
+
+
+def rows(
+    data: Path, model: str = "", n: int = 0, others: bool = False, cards: bool = False
+) -> dict[str, Any]:
+    """Print the table of nets; with `cards` also write it into their cards.
+
+    `others` adds the splits that are no Bezier surfaces, and `n` limits the surfaces of a split.
+    """
+    opened, out = dataset.open(data), {}
+    for name in [model] if model else net.available():
+        first = catalogue.CHAINS.get(name, (name,))[0]
+        task = catalogue.read_card(catalogue.located(first))["model"]["task"]
+        noisy = tasks.get(task).noisy
+        found = measured(task, name, opened["test"], n)
+        found["ms"] = milliseconds(task, name, opened["test"][TIMED if noisy else "surface"][0])
+        published = NETS.get(name, {})
+        if noisy:
+            published = {f"theta_{s:g}": row["theta"] for s, row in TABLE_3.items()}
+        print(line(Path(name).stem, found, published), flush=True)
+        elsewhere = {}
+        for other in (o for o in OTHERS if others and not noisy and o in opened):
+            figures = measured(task, name, opened[other], n)
+            elsewhere[other] = counted(figures, opened[other], n)
+            print(line(f"  {other}", figures, {}), flush=True)
+        out[name] = found
+        if cards:
+            path = catalogue.chain(name, task)[-1]
+            of = f" of {name}" if name in catalogue.CHAINS else ""
+            card = catalogue.read_card(path)
+            card[f"test{of}"] = counted(found, opened["test"], n)
+            if elsewhere:
+                card[f"other splits{of}"] = elsewhere
+            weights.write_card(path.with_suffix(".json"), card)
+    return out
+
+
+def counted(found: dict[str, float], split: Any, most: int) -> dict[str, float]:
+    """Add the number of surfaces that the metrics are means of."""
+    return found | {"surfaces": min(len(split), most or len(split))}
+
+
+def rounding(data: Path, run: Path, n: int = 0) -> dict[str, Any]:
+    """Print the change of every metric when the net of a run is stored in half precision."""
+    split, out = dataset.open(data)["test"], {}
+    with tempfile.TemporaryDirectory() as folder:
+        exact = weights.load(run / "model.safetensors")
+        checkpoint.load(run / CHECKPOINT, exact, exact, [])
+        halved = Path(folder) / "half.safetensors"
+        weights.save(exact, halved)
+        one, other = (measured(exact.task, m, split, n) for m in (exact, halved))
+    for name, value in one.items():
+        out[name] = change = abs(other[name] - value) / max(abs(value), 1e-12)
+        print(f"{name:18s} {value:.6g}  in half precision {other[name]:.6g}  {change:.2%}")
+    return out
+
+
+def curve(plot: str = "curves.png") -> dict[str, Any]:
+    """Plot the validation metric in the cards against the hours of training."""
+    with axes_of(plot, xlabel="hours", ylabel="validation, lower is better") as axes:
+        for name in (name for name in net.available() if name not in catalogue.CHAINS):
+            card = catalogue.read_card(catalogue.located(name))
+            seen = np.array(card["curve"]).reshape(-1, 2)
+            label = f"{card['name']}: {tasks.get(card['model']['task']).score}"
+            axes.plot(*seen.T, marker=".", label=label)
+    return {}
+
+
+def _told(show: Any, name: str, report: Any) -> None:
+    """Show the progress of training one of the nets."""
+    show(report.progress, f"{name}: {report.left / 60:.0f} min left, loss {report.loss:.4g}")
+
+
+def grid(data: Path, file: Path, stride: int = 1) -> dict[str, Any]:
+    """Train the nets of figure 5: several sizes, supervised on the optimiser's results (hours).
+
+    With ``stride=2`` it takes a quarter of the time.
+
+    Nets that are already in the file are not trained again. An interrupted net resumes from its
+    run, in a folder beside the file.
+    """
+    path = file
+    record = json.loads(path.read_text()) if path.exists() else {"stride": stride, "rows": []}
+    if record["stride"] != stride:
+        raise SystemExit(f"{path} was begun with stride= {record['stride']}")
+    table = record["rows"]
+    done = {(row["blocks"], row["channels"]) for row in table}
+    for blocks in BLOCKS:
+        for channels in CHANNELS:
+            if (blocks, channels) in done:
+                continue
+            config = from_dict(
+                {
+                    "name": f"nb{blocks}-nc{channels}",
+                    "task": "developable",
+                    "augment": "none",
+                    "steps": EPOCHS * SURFACES // 20,
+                    "limit": SURFACES,
+                    "model": {"kind": "gsonet", "channels": channels, "blocks": blocks},
+                    "phase": [{"loss": "label", "batch": 20, "rate": 1e-3, "stride": stride}],
+                    "validate_every": 1e9,
+                }
+            )
+            run = path.with_suffix("") / config.name
+            with share() as show:
+                shown = partial(_told, show, config.name)
+                card = net.train(config, data, run, show=shown)
+            losses = [r["loss"] for r in read(run) if "loss" in r]
+            row = {
+                "blocks": blocks,
+                "channels": channels,
+                "parameters": card["parameters"],
+                "loss": float(np.mean(losses[-5:])),
+                "hours": card["hours"],
+            }
+            if stride == 1:
+                row |= card["validation"]
+            table.append(row)
+            print(line(config.name, {k: v for k, v in row.items() if k[0] != "b"}, {}), flush=True)
+            record["command"] = (
+                f"python bench/run_all.py --only net.grid data=DIR file={path} stride={stride}"
+            )
+            with replacing(path) as stream:
+                stream.write((json.dumps(record, indent=1) + "\n").encode())
+            shutil.rmtree(run)
+    return record
+
+
+SECTIONS = (rows, rounding, curve, grid)
