@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from gso import Mesh, geometry, metrics
-from gso.energy import congruence, curvature, stretch
+from gso.energy import congruence, curvature, fairness, stretch
+from gso.hybrid import patch
 from gso.mesh.normals import vertex_normals
+from gso.parametrization import rectangle
 from tests.conftest import saddle
 
 MESH = Mesh.from_grid(saddle(7))
@@ -42,6 +44,12 @@ USERS = {
     ],
     "doubled_areas": [lambda: metrics.area(MESH), lambda: metrics.area_error(MESH, FLAT)],
     "signed_areas": [lambda: metrics.area_error(MESH, FLAT)],
+    "side_lengths": [
+        lambda: rectangle(MESH.grid),
+        lambda: np.concatenate([fairness.build(MESH).constants.ravel()]),
+    ],
+    "unit_rectangle": [lambda: rectangle(MESH.grid)],
+    "corner_angles": [lambda: patch._angles(MESH)],
     "quad_area_vectors": [lambda: vertex_normals(MESH)],
 }
 

@@ -7,6 +7,7 @@ import importlib
 import json
 import math
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -36,7 +37,6 @@ from report.published import NETS, TABLE_1, TABLE_2, TABLE_3  # noqa: E402
 from report.sections import SECTIONS, Section, rows  # noqa: E402
 from report.settings import Settings  # noqa: E402
 from report.store import Store  # noqa: E402
-from tno import last_problem  # noqa: E402
 
 STORED = ROOT / "bench" / "data" / "quick.json"
 TINY = Settings(
@@ -297,7 +297,7 @@ def test_peers_have_tuned_parameters_for_every_level():
 
 
 def test_other_solvers_get_the_same_objective(surfaces):
-    problem, x = last_problem(surfaces[0][::2, ::2], "developable", "balanced")
+    problem, x = energy.last_problem(surfaces[0][::2, ::2], "developable", "balanced")
     x = x + 1e-3 * np.random.default_rng(0).standard_normal(len(x))
     value, slope = energy.residuals(problem, x), energy.jacobian(problem, x)
     objective, gradient, _ = problem.linearise(x)
@@ -406,3 +406,20 @@ def test_tables_of_docs_come_from_the_figures(tiny, monkeypatch, tmp_path):
     text = pages[page].replace(".. begin measured-", ".. ")
     with pytest.raises(SystemExit, match="measured-"):
         tables.replaced({**pages, page: text})
+
+
+def test_sections_are_listed_and_take_settings(tmp_path):
+    def ran(*words):
+        command = [sys.executable, ROOT / "bench" / "run_all.py", "--only", *words]
+        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+
+    listed = ran("list").stdout
+    for name in ("tno.developable", "jiang.bend", "hybrid.speed", "net.rows", "dataset.statistics"):
+        assert name in listed
+    done = ran("borders", "kind=symmetric", "preset=fast", "--json", "figures.json")
+    assert done.returncode == 0, done.stderr
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert {"machine", "borders.borders"} == set(figures)
+    assert "no section nonsense" in ran("nonsense").stderr
+    assert "no setting nonsense" in ran("borders", "nonsense=1").stderr
+    assert "needs data=" in ran("net.rows").stderr

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gso import geometry
 from gso.energy.base import Array, Ints, Term
 from gso.mesh import Mesh, topology
 
@@ -48,7 +49,7 @@ def differences(mesh: Mesh) -> tuple[Ints, Array]:
         rows = np.stack([ids[:-2], ids[1:-1], ids[2:]], axis=-1).reshape(-1, 3)
         cols = np.stack([ids[:, :-2], ids[:, 1:-1], ids[:, 2:]], axis=-1).reshape(-1, 3)
         grid = v[ids]
-        h = _spacing(grid)
+        h = spacing(*geometry.side_lengths(tuple(np.moveaxis(grid, -1, 0))), grid.shape)
         scale = np.r_[np.full(len(rows), h[0] ** -2), np.full(len(cols), h[1] ** -2)]
         stencil = np.concatenate([rows, cols])
     else:
@@ -57,12 +58,6 @@ def differences(mesh: Mesh) -> tuple[Ints, Array]:
         h2 = (np.linalg.norm(v[a] - v[b], axis=1) ** 2).mean()
         scale = np.full(len(stencil), 1.0 / h2)
     return stencil, np.array([[1.0], [-2.0], [1.0]]) * scale
-
-
-def _spacing(grid: Array) -> tuple[float, float]:
-    """Return the spacing of the samples along both directions of a grid."""
-    side = [np.linalg.norm(np.diff(grid, axis=a), axis=-1).sum(axis=a).mean() for a in (0, 1)]
-    return spacing(side[0], side[1], grid.shape)
 
 
 def spacing(along: Any, across: Any, shape: Sequence[int]) -> tuple[Any, Any]:

@@ -87,10 +87,6 @@ def _wound(points: Array, faces: Ints, triangles: Ints, count: Ints) -> Ints:
     """Find the faces at vertices whose face angles sum to more than a full turn."""
     every = np.concatenate([triangles[:, 0], triangles[count == 2, 1]])
     face = np.r_[np.arange(len(faces)), np.flatnonzero(count == 2)]
-    turn = np.zeros(len(points))
-    for k in range(3):
-        here, ahead, behind = (points[every[:, (k + j) % 3]] for j in range(3))
-        u, v = tuple((ahead - here).T), tuple((behind - here).T)
-        angle = np.arctan2(np.abs(u[0] * v[1] - u[1] * v[0]), u[0] * v[0] + u[1] * v[1])
-        turn += np.bincount(every[:, k], angle, minlength=len(points))
+    angles = geometry.corner_angles(points, every)
+    turn = np.bincount(every.ravel(), angles.ravel(), minlength=len(points))
     return face[(turn[every] > _TURN).any(axis=1)]

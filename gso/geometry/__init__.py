@@ -32,11 +32,12 @@ from gso.geometry.shape import (
     shape_matrix,
     tangent_frame,
 )
-from gso.geometry.size import ball, box_diagonal
+from gso.geometry.size import ball, box_diagonal, side_lengths, unit_rectangle
 from gso.geometry.strain import rest_frame, singular_values, turn_and_shear
 from gso.geometry.stretches import first_form, principal_stretches
 from gso.geometry.triangle import (
     area_vectors,
+    corner_angles,
     doubled_areas,
     quad_area_vectors,
     signed_areas,
@@ -51,6 +52,7 @@ __all__ = [
     "ball",
     "box_diagonal",
     "closest_motion",
+    "corner_angles",
     "corner_area2",
     "cross",
     "determinant",
@@ -73,6 +75,7 @@ __all__ = [
     "rest_frame",
     "second_difference",
     "shape_matrix",
+    "side_lengths",
     "signed_areas",
     "singular_values",
     "smooth_gaussian_curvature",
@@ -80,4 +83,5 @@ __all__ = [
     "sub",
     "tangent_frame",
     "turn_and_shear",
+    "unit_rectangle",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.geometry.cells import corner_area2
+from gso.geometry.vector import angle
 from gso.typing import Array, Ints
 
 
@@ -33,3 +34,17 @@ def quad_area_vectors(points: Array, quads: Ints) -> Array:
     """Return the doubled area vectors (q, 3) of quads: the products of their diagonals."""
     v0, v1, v2, v3 = (points[quads[:, k]] for k in range(4))
     return np.cross(v2 - v0, v3 - v1)
+
+
+def corner_angles(points: Array, triangles: Ints) -> Array:
+    """Return the angles (t, 3) of triangles of points (n, 2 or 3), in radians.
+
+    >>> np.degrees(corner_angles(np.array([[0.0, 0], [1, 0], [0, 1]]), np.array([[0, 1, 2]])))
+    array([[90., 45., 45.]])
+    """
+    corners = [points[triangles[:, k]] for k in range(3)]
+    out = np.empty(triangles.shape)
+    for k, here in enumerate(corners):
+        a, b = ((corners[(k + step) % 3] - here).T for step in (1, 2))
+        out[:, k] = angle(tuple(a), tuple(b))
+    return out

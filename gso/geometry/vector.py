@@ -42,5 +42,6 @@ def norm(a: Vec) -> Any:
 
 
 def angle(a: Vec, b: Vec) -> Any:
-    """Return the angle between vectors in space, radians, by atan2 (acos loses digits)."""
-    return ops.atan2(norm(cross(a, b)), dot(a, b))
+    """Return the angle between vectors, from 0 to pi, by atan2 (acos loses digits)."""
+    product = cross(a, b) if len(a) == 3 else (a[0] * b[1] - a[1] * b[0],)
+    return ops.atan2(norm(product), dot(a, b))

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gso import parametrization
+from gso import geometry, parametrization
 from gso.errors import MeshError
 from gso.linalg import spd
 from gso.mesh import Mesh
-from gso.spline import clamped_knots
+from gso.spline import basis, basis_matrix, clamped_knots
 from gso.typing import Array, Ints
 
 #: Largest number of control points along each side of the spline fitted to a mesh.
@@ -155,14 +155,9 @@ def _surface_on_left(mesh: Mesh, loop: Ints) -> bool:
 
 def _angles(mesh: Mesh) -> Array:
     """Sum of the triangles' angles at every vertex, (n,)."""
-    v, t = mesh.vertices, mesh.triangles
-    total = np.zeros(len(v))
-    for k in range(3):
-        a, b = (v[t[:, (k + step) % 3]] - v[t[:, k]] for step in (1, 2))
-        sine = np.linalg.norm(np.cross(a, b), axis=1)
-        total += np.bincount(
-            t[:, k], np.arctan2(sine, np.einsum("ij,ij->i", a, b)), minlength=len(v)
-        )
+    angles = geometry.corner_angles(mesh.vertices, mesh.triangles)
+    total = np.zeros(len(mesh.vertices))
+    np.add.at(total, mesh.triangles, angles)
     return total
 
 
@@ -193,12 +188,11 @@ def _corners(turning: Array, lengths: Array) -> list[int]:
 
 def _spline(points: Array, parameters: Array, size: int) -> tuple[Array, Array]:
     """Fit a smooth bicubic spline to points; evaluate it at their parameters and on a grid."""
-    from scipy.interpolate import BSpline
     from scipy.sparse import diags, identity, kron
 
     count = int(np.clip(0.75 * np.sqrt(len(points)), 4, _CONTROLS))
     knots = clamped_knots(count)
-    u, v = (BSpline.design_matrix(x, knots, 3).tocsr() for x in parameters.T)
+    u, v = (basis_matrix(knots, count, x) for x in parameters.T)
     # Row-wise products of both bases.
     matrix = kron(u, np.ones((1, count))).multiply(kron(np.ones((1, count)), v)).tocsr()
     second = diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(count - 2, count))
@@ -208,7 +202,7 @@ def _spline(points: Array, parameters: Array, size: int) -> tuple[Array, Array]:
     centre = points.mean(axis=0)
     normal = matrix.T @ matrix / len(points) + _SMOOTH * stiffness
     net = spd(normal)(np.asarray(matrix.T @ (points - centre)) / len(points))
-    samples = BSpline.design_matrix(np.linspace(0.0, 1.0, size), knots, 3).toarray()
+    samples = basis(knots, count, np.linspace(0.0, 1.0, size))
     grid = np.einsum(
         "ia,jb,abk->ijk", samples, samples, net.reshape(count, count, 3), optimize=True
     )

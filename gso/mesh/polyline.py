@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gso import geometry
 from gso.mesh import Frame
 from gso.typing import Array, Ints
 
@@ -106,8 +107,7 @@ class Polylines:
 
 def turns(way: Array) -> Array:
     """Angle in degrees between each direction (m, dim) of a closed line and the one before."""
-    cosine = (way * np.roll(way, 1, axis=0)).sum(axis=1)
-    return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return np.degrees(geometry.angle(tuple(way.T), tuple(np.roll(way, 1, axis=0).T)))
 
 
 def _unit(vectors: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso import geometry
 from gso.typing import Array
 
 
@@ -26,6 +27,5 @@ def rectangle(grid: Array) -> Array:
     >>> rectangle(np.stack([u, 2 * v, 0 * u], axis=-1))[-1, -1]
     array([2., 6.])
     """
-    along = [np.linalg.norm(np.diff(grid, axis=k), axis=-1).sum(axis=k).mean() for k in (0, 1)]
-    sides = (np.linspace(0.0, length, n) for length, n in zip(along, grid.shape[:2], strict=True))
-    return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
+    sides = geometry.side_lengths(tuple(np.moveaxis(grid, -1, 0)))
+    return geometry.unit_rectangle(*grid.shape[:2]) * np.array(sides)

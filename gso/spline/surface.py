@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike
 from gso import geometry
 from gso.errors import MeshError, OptionError
 from gso.typing import Array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 #: Default degree of the splines, in both directions.
 DEGREE = 3
@@ -46,6 +49,13 @@ def clamped_knots(controls: int) -> Array:
     return np.r_[np.zeros(degree), inner, np.ones(degree)]
 
 
+def basis_matrix(knots: Array, controls: int, t: Array) -> csr_matrix:
+    """Evaluate the basis functions at parameters t: a sparse matrix (len(t), controls)."""
+    from scipy.interpolate import BSpline
+
+    return BSpline.design_matrix(t, knots, len(knots) - controls - 1).tocsr()
+
+
 def basis(knots: Array, controls: int, t: Array, order: int = 0) -> Array:
     """Evaluate the basis functions at parameters t, or their derivatives: (len(t), controls)."""
     from scipy.interpolate import BSpline
@@ -53,6 +63,8 @@ def basis(knots: Array, controls: int, t: Array, order: int = 0) -> Array:
     degree = len(knots) - controls - 1
     if order > degree:
         return np.zeros((len(t), controls))
+    if order == 0:
+        return basis_matrix(knots, controls, t).toarray()
     return BSpline(knots, np.eye(controls), degree)(t, nu=order)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gso.spline import clamped_knots
+from gso.spline import basis_matrix, clamped_knots
 from gso.unknowns.base import Array, Layout, Variables
 from gso.unknowns.normal import normal_offsets
 
@@ -21,11 +21,7 @@ def spline_matrix(samples: int, controls: int) -> csr_matrix:
 
     The degree falls below three when there are fewer than four control points.
     """
-    from scipy.interpolate import BSpline
-
-    knots = clamped_knots(controls)
-    degree = len(knots) - controls - 1
-    return BSpline.design_matrix(np.linspace(0.0, 1.0, samples), knots, degree).tocsr()
+    return basis_matrix(clamped_knots(controls), controls, np.linspace(0.0, 1.0, samples))
 
 
 @lru_cache(maxsize=16)

@@ -201,25 +201,11 @@ def normal_curvatures(p: Planes, frame: Frame) -> Tensor:
     return shares / torch.stack([u * u, v * v, u * v])
 
 
-def side_lengths(p: Planes) -> tuple[Tensor, Tensor]:
-    """Compute the mean polyline lengths (B,) along both grid directions."""
-    return tuple(
-        geometry.norm(tuple(torch.diff(c, dim=axis) for c in p)).sum(dim=axis).mean(dim=1)
-        for axis in (1, 2)
-    )
-
-
 def rectangle(p: Planes) -> Tensor:
     """Compute Flatten-init (B, H, W, 2): regular rectangles with the grids' mean side lengths.
 
     As :func:`gso.parametrization.rectangle`, but centred at the origin.
     """
-    along, across = side_lengths(p)
-    count, height, width = p[0].shape
-    x, y = (
-        torch.linspace(-0.5, 0.5, n, dtype=along.dtype, device=along.device)
-        for n in (height, width)
-    )
-    rows = (along[:, None] * x)[:, :, None].expand(count, height, width)
-    columns = (across[:, None] * y)[:, None, :].expand(count, height, width)
-    return torch.stack([rows, columns], dim=-1)
+    sides = torch.stack(geometry.side_lengths(p), dim=-1)
+    unit = torch.as_tensor(geometry.unit_rectangle(*p[0].shape[1:]) - 0.5).to(sides)
+    return unit * sides[:, None, None]

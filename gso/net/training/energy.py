@@ -51,7 +51,7 @@ class Developable:
         self.normals = grids.normals(p)
         k = grids.to_border(grids.absolute_curvature(p))
         self.curved = k[:, 1:-1, 1:-1].mean(dim=(1, 2))
-        self.spacing = fairness.spacing(*grids.side_lengths(p), p[0].shape[1:])
+        self.spacing = fairness.spacing(*geometry.side_lengths(p), p[0].shape[1:])
         self.lengths = [1.0 / geometry.norm(d).clamp_min(1e-9) for d in _edges(p)]
         self.bands = [_bands(d[0], axis) for d, axis in zip(_edges(p), (2, 1), strict=True)]
         own = [_second(p, axis, h) for axis, h in zip((1, 2), self.spacing, strict=True)]
