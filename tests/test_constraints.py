@@ -550,7 +550,6 @@ class Within(Part):
         return np.abs(np.linalg.norm(points[self.ids] - self.centre, axis=1) - self.radius)
 
     def items(self, block):
-        dim = len(self.centre)
         constants = np.r_[self.centre, self.radius, 0.0]
         term = Term(
             "sphere",
@@ -559,7 +558,7 @@ class Within(Part):
             weights=np.ones(len(self.ids)),
             constants=np.repeat(constants[:, None], len(self.ids), axis=1),
         )
-        return [Weighted(hardened(term, dim), STIFF)]
+        return [Weighted(hardened(term), STIFF)]
 
 
 def on_sphere(points, constants):

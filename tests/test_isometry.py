@@ -342,7 +342,7 @@ class TestNearest:
         mesh = gso.Mesh.from_grid(np.dstack([*square(9, 9), np.zeros((9, 9))]))
         term = proximity.closest(mesh, vertex_normals(mesh), tangential=0.0)
         slid = mesh.vertices * [0.5, 0.5, 1.0] + [0.2, 0.2, 0.1]
-        constants = term.refresh(slid.ravel())
+        constants = term.refresh({"surface": slid})
         residual = term.residual([tuple(slid.T)], constants)
         np.testing.assert_allclose(np.abs(residual[2]), 0.1)
         np.testing.assert_allclose(residual[:2], 0.0, atol=1e-12)

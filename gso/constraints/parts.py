@@ -304,4 +304,4 @@ def _imposed(term: Term, part: Part, block: str) -> list[Weighted]:
     """Return a term of a part, with multipliers if the part is hard."""
     if not part.hard:
         return [Weighted(term, 1.0)]
-    return [Weighted(hardened(term, 2 if block == "flat" else 3), STIFF)]
+    return [Weighted(hardened(term), STIFF)]

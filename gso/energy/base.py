@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -24,7 +24,7 @@ def _no_constants() -> Array:
 class Multipliers(Protocol):
     """Lagrange multipliers of a hard constraint that is a term (method of multipliers)."""
 
-    def update(self, coordinates: Array) -> float:
+    def update(self, blocks: Mapping[str, Array]) -> float:
         """Update the multipliers with the current residuals; return the largest (a length)."""
 
     def scale(self, factor: float) -> None:
@@ -59,8 +59,8 @@ class Term:
         vectors, the second derivative of the length is added wherever the loss derivative
         makes it positive (projected Newton).
     refresh : callable, optional
-        ``refresh(coordinates) -> constants``: new constants from the coordinate vector before
-        every linearisation, for closest points and for shifted targets.
+        ``refresh(blocks) -> constants``: new constants before every linearisation, for closest
+        points and for shifted targets. The coordinates are arrays (n, dim) by block.
     multipliers : Multipliers, optional
         For hard constraints: after each solve they shift the targets that `refresh` returns by
         the remaining residuals, so that the next solve reduces them.
@@ -73,7 +73,7 @@ class Term:
     constants: Array = field(default_factory=_no_constants)
     linear: bool = False
     vectors: Residual | None = None
-    refresh: Callable[[Array], Array] | None = None
+    refresh: Callable[[Mapping[str, Array]], Array] | None = None
     multipliers: Multipliers | None = None
 
     @property

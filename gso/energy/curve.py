@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -37,11 +37,10 @@ def build(
     The nearest point is recomputed before every linearisation, as in iterated closest points,
     and the vertex is free to move along the tangent there. Tangents are interpolated along the
     segments: with one tangent per segment, vertices would oscillate at joints. At an end of an
-    open line, or at a corner, a vertex can only slide back. The block must be the first of its
-    layout.
+    open line, or at a corner, a vertex can only slide back.
     """
     dim = lines.start.shape[1]
-    sliding = _Sliding(ids, lines)
+    sliding = _Sliding(block, ids, lines)
     term = Term(
         "curve",
         residual,
@@ -56,25 +55,22 @@ def build(
 class _Sliding:
     """Targets and directions of vertices on polylines, and their multipliers."""
 
-    def __init__(self, ids: Ints, lines: Polylines):
-        self.lines = lines
-        self.dim = lines.start.shape[1]
-        self.rows = ids[:, None] * self.dim + np.arange(self.dim)
+    def __init__(self, block: str, ids: Ints, lines: Polylines):
+        self.block, self.ids, self.lines = block, ids, lines
         #: Multipliers over the weight, (k, dim): see :mod:`gso.energy.multipliers`.
-        self.shift = np.zeros(self.rows.shape)
+        self.shift = np.zeros((len(ids), lines.start.shape[1]))
 
-    def constants(self, coordinates: Array) -> Array:
+    def constants(self, blocks: Mapping[str, Array]) -> Array:
         """Return the targets and directions from the current nearest points."""
-        target, tangent = self._targets(coordinates)
+        target, tangent = self._targets(blocks[self.block][self.ids])
         shift = self.shift - (self.shift * tangent).sum(axis=1, keepdims=True) * tangent
         return np.concatenate([(target - shift).T, tangent.T])
 
-    def update(self, coordinates: Array) -> float:
+    def update(self, blocks: Mapping[str, Array]) -> float:
         """Update the multipliers; return the largest distance from the lines."""
-        points = tuple(coordinates[self.rows].T)
-        value = np.stack(residual([points], list(self.constants(coordinates))), axis=1)
-        feet = self.lines.nearest(coordinates[self.rows])
-        left = np.linalg.norm(coordinates[self.rows] - feet.points, axis=1)
+        points = blocks[self.block][self.ids]
+        value = np.stack(residual([tuple(points.T)], list(self.constants(blocks))), axis=1)
+        left = np.linalg.norm(points - self.lines.nearest(points).points, axis=1)
         self.shift = value
         return float(left.max(initial=0.0))
 
@@ -82,9 +78,9 @@ class _Sliding:
         """Rescale the multipliers when the weights of all other terms are scaled."""
         self.shift = factor * self.shift
 
-    def _targets(self, coordinates: Array) -> tuple[Array, Array]:
+    def _targets(self, points: Array) -> tuple[Array, Array]:
         """Find the nearest points, and the directions of free sliding there, (k, dim) each."""
-        points, lines = coordinates[self.rows], self.lines
+        lines = self.lines
         target, segment, along = lines.nearest(points)
         way = lines.way[segment]
         tangent = lines.directions(segment, along)
@@ -105,6 +101,6 @@ def examples(mesh: Mesh) -> list[Term]:
     for block, dim in (("surface", 3), ("flat", 2)):
         points = mesh.vertices[[0, 5, 11], :dim]
         term = build(ids, Polylines.of(points, closed=False), block=block, weight=1.0)
-        constants = term.refresh(mesh.vertices[:, :dim].ravel() + 0.01)  # type: ignore[misc]
+        constants = term.refresh({block: mesh.vertices[:, :dim] + 0.01})  # type: ignore[misc]
         out.append(replace(term, constants=constants, refresh=None))
     return out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -22,26 +23,21 @@ class Shifts:
     Parameters
     ----------
     term : Term
-        Its last constants are the shifts, one per residual. Its only block is the first of
-        the layout.
-    dim : int
-        Components of a point of that block.
+        Its last constants are the shifts, one per residual.
     """
 
-    def __init__(self, term: Term, dim: int):
-        self._term = term
-        self._constants = term.constants.copy()
-        ((_, index),) = term.stencil
-        self._rows = [[dim * ids + d for d in range(dim)] for ids in index.T]
+    def __init__(self, term: Term):
+        self._term, self._constants, self._count = term, term.constants.copy(), 0
 
-    def constants(self, coordinates: Array) -> Array:
+    def constants(self, blocks: Mapping[str, Array]) -> Array:
         """Return the constants with the current shifts; the coordinates are ignored."""
         return self._constants
 
-    def update(self, coordinates: Array) -> float:
+    def update(self, blocks: Mapping[str, Array]) -> float:
         """Add the current residuals to the shifts; return the largest residual."""
-        points = [tuple(coordinates[row] for row in rows) for rows in self._rows]
+        points = [tuple(blocks[b][ids].T) for b, index in self._term.stencil for ids in index.T]
         value = np.stack(self._term.residual(points, self._constants))
+        self._count = len(value)
         shift = self._constants[-len(value) :]
         left = float(np.abs(value - shift).max(initial=0.0))
         shift[...] = value
@@ -49,11 +45,10 @@ class Shifts:
 
     def scale(self, factor: float) -> None:
         """Multiply the shifts, as the weights of all other terms were."""
-        rows = len(self._term.residual([(0.0,) * len(r) for r in self._rows], self._constants))
-        self._constants[-rows:] *= factor
+        self._constants[len(self._constants) - self._count :] *= factor
 
 
-def hardened(term: Term, dim: int) -> Term:
-    """Make a soft term a hard constraint with multipliers; arguments as for :class:`Shifts`."""
-    shifts = Shifts(term, dim)
+def hardened(term: Term) -> Term:
+    """Make a soft term a hard constraint with multipliers; argument as for :class:`Shifts`."""
+    shifts = Shifts(term)
     return replace(term, refresh=shifts.constants, multipliers=shifts)

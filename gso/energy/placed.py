@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -16,22 +16,17 @@ from gso.mesh import Frame
 _FRAME = 4
 
 
-def placed(
-    term: Term, frame: Frame, vertices: Ints, faces: Ints, *, count: int, share: float
-) -> Term:
+def placed(term: Term, frame: Frame, vertices: Ints, faces: Ints, *, share: float) -> Term:
     """Convert a term of a component into a term of the whole mesh.
 
     Parameters
     ----------
     term : Term
-        Built on the component in its own unit ball; without multipliers. With `refresh`, its
-        first block must be the first of the layout.
+        Built on the component in its own unit ball; without multipliers.
     frame : Frame
         Transform between that unit ball and the whole mesh's coordinates.
     vertices, faces : ndarray of int
         Indices of the component's vertices and faces in the whole mesh.
-    count : int
-        Number of vertices of the whole mesh.
     share : float
         Factor on the weights: the component's share of the whole.
     """
@@ -42,13 +37,15 @@ def placed(
     stencil = tuple((block, numbers[block][index]) for block, index in term.stencil)
     refresh = None
     if term.refresh is not None:
-        first, renew = term.stencil[0][0], term.refresh
+        renew = term.refresh
 
-        def refresh(coordinates: Array) -> Array:
-            dim = 3 if first == "surface" else 2
-            points = coordinates[: dim * count].reshape(-1, dim)[vertices]
-            points = frame.to_unit(points) if dim == 3 else points / frame.scale
-            return np.concatenate([own, renew(points.ravel())])
+        def refresh(blocks: Mapping[str, Array]) -> Array:
+            mine = {block: points[numbers[block]] for block, points in blocks.items()}
+            if "surface" in mine:
+                mine["surface"] = frame.to_unit(mine["surface"])
+            if "flat" in mine:
+                mine["flat"] = mine["flat"] / frame.scale
+            return np.concatenate([own, renew(mine)])
 
     constants = term.constants if term.constants.size else np.empty((0, term.count))
     return replace(

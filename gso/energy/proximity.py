@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -57,8 +57,7 @@ def closest(mesh: Mesh, normals: Array, *, tangential: float = 0.0) -> Term:
     """Build the proximity of the block "surface" to the surface `mesh`, with free sliding.
 
     Before every linearisation each vertex gets the closest point of the surface and the
-    tangent plane there as its target (iterated closest points; Jiang et al. 2020). The block
-    must be the first of the layout.
+    tangent plane there as its target (iterated closest points; Jiang et al. 2020).
 
     Parameters
     ----------
@@ -68,12 +67,11 @@ def closest(mesh: Mesh, normals: Array, *, tangential: float = 0.0) -> Term:
         Factor on the tangential distance to the closest point; 0 leaves only the distance to
         the tangent plane.
     """
-    count = len(mesh.vertices)
     near = Nearest(mesh, normals)
     own = build(mesh, normals, tangential=tangential)
 
-    def refresh(coordinates: Array) -> Array:
-        feet = near.feet(coordinates[: 3 * count].reshape(-1, 3))
+    def refresh(blocks: Mapping[str, Array]) -> Array:
+        feet = near.feet(blocks["surface"])
         return np.concatenate([feet.points.T, feet.normals.T, own.constants[6:]])
 
     return replace(own, name="closest", refresh=refresh)

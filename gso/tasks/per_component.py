@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 from gso.energy import Weighted
 from gso.energy.placed import placed
@@ -36,8 +35,8 @@ def objective(mesh: Mesh, make: Callable[..., list[Weighted]], *positions: Array
     for part in parts:
         frame = part.mesh.frame
         own = part.mesh.replaced(frame.to_unit(part.mesh.vertices))
-        where: dict[str, Any] = {"vertices": part.vertices, "faces": part.faces}
-        where |= {"count": len(mesh.vertices), "share": part.area / total}
         for item in make(own, *(frame.to_unit(p[part.vertices]) for p in positions)):
-            items.append(replace(item, term=placed(item.term, frame, **where)))
+            share = part.area / total
+            term = placed(item.term, frame, part.vertices, part.faces, share=share)
+            items.append(replace(item, term=term))
     return items

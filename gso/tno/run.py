@@ -204,6 +204,7 @@ class Run:
         else:
             coordinates, minimum = tighten(
                 stage.items,
+                stage.layout,
                 coordinates,
                 minimum,
                 lambda items, at: solve(at, items=items),

@@ -188,9 +188,10 @@ class Session:
             raise OptionError(f"iterations is {iterations!r}; it must be 1 or more")
         if self._stage is not None:
             self._iterate(self._stage, int(iterations), 0.0)
+            blocks = self._stage.layout.split(self._coordinates)
             for item in self._stage.items:
                 if item.term.multipliers is not None:
-                    item.term.multipliers.update(self._coordinates)
+                    item.term.multipliers.update(blocks)
         return self.vertices
 
     def settle(self) -> Result:
@@ -232,7 +233,11 @@ class Session:
             before = self._coordinates
             solve = partial(self._run.minimise, self._options, stage)
             self._coordinates, _ = tighten(
-                stage.items, before, minimum, lambda items, at: solve(at, items=items)
+                stage.items,
+                stage.layout,
+                before,
+                minimum,
+                lambda items, at: solve(at, items=items),
             )
             if self._coordinates is not before:
                 self._pose()

@@ -11,6 +11,7 @@ from gso.energy import Weighted
 from gso.status import Status
 from gso.tno.solver.minimiser import Minimum
 from gso.typing import Array
+from gso.unknowns import Layout
 
 #: Stopping threshold of the residual, in the unit ball.
 TOLERANCE = 1e-7
@@ -25,7 +26,11 @@ Solve = Callable[[Sequence[Weighted], Array], tuple[Array, Minimum]]
 
 
 def tighten(
-    items: Sequence[Weighted], coordinates: Array, solution: Minimum, solve: Solve
+    items: Sequence[Weighted],
+    layout: Layout,
+    coordinates: Array,
+    solution: Minimum,
+    solve: Solve,
 ) -> tuple[Array, Minimum]:
     """Repeat a solve, with targets shifted by the residuals, until its hard terms hold.
 
@@ -33,6 +38,8 @@ def tighten(
     ----------
     items : sequence of Weighted
         The terms just minimised; those with `multipliers` are hard.
+    layout : Layout
+        The coordinates.
     coordinates, solution : ndarray, Minimum
         The final coordinates and the solution of that solve.
     solve : callable
@@ -48,7 +55,7 @@ def tighten(
         return coordinates, solution
     before, share, end = np.inf, 1.0, solution
     for _ in range(ROUNDS):
-        left = max(m.update(coordinates) for m in hard)
+        left = max(m.update(layout.split(coordinates)) for m in hard)
         if left <= TOLERANCE:
             break
         if left > _FAST * before and share > _SOFTEST:

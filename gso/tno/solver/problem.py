@@ -32,7 +32,7 @@ class _Values:
             dim = layout.where(block)[2]
             shape += [dim] * index.shape[1]
             columns.append(layout.columns(block, index).reshape(len(index), -1))
-        self.item = item
+        self.item, self.layout = item, layout
         self.gather = np.ascontiguousarray(np.concatenate(columns, axis=1).T)
         self.constants = term.constants if term.constants.size else np.empty((0, term.count))
         self.shape = tuple(shape)
@@ -43,7 +43,7 @@ class _Values:
         if self.item.term.refresh is None:
             return self
         other = copy(self)
-        other.constants = self.item.term.refresh(coordinates)
+        other.constants = self.item.term.refresh(self.layout.split(coordinates))
         return other
 
     def with_loss(self, loss: Loss) -> Any:
