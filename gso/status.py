@@ -25,7 +25,7 @@ class Status(enum.Enum):
         return self in (Status.CONVERGED, Status.ALREADY_GOOD, Status.TARGET_REACHED)
 
     @property
-    def refuses(self) -> bool:
+    def is_failure(self) -> bool:
         """Whether the status alone makes the result unusable."""
         return self in (Status.CANCELLED, Status.TARGET_MISSED, Status.CONSTRAINTS_MISSED)
 

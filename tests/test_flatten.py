@@ -327,7 +327,9 @@ def test_orientation_limit_is_the_first_collapse():
         assert step == 1.0 or areas[1] < 1e-9
 
 
-@pytest.mark.parametrize("loss", [stretch.Spread(0.02), stretch.Spread(0.1, knee=np.inf, eps=0.03)])
+@pytest.mark.parametrize(
+    "loss", [stretch.TwoPowerLoss(0.02), stretch.TwoPowerLoss(0.1, knee=np.inf, eps=0.03)]
+)
 def test_spread_has_the_derivative_it_says(loss):
     r = np.random.default_rng(1).standard_normal((12, 5)) * 0.05
     first, second = loss.weights(r)

@@ -12,7 +12,7 @@ from gso import hybrid
 from gso.errors import MeshError, OptionError, WeightsError
 from gso.hybrid import prediction, solving
 from gso.hybrid.patch import as_patch
-from gso.hybrid.time_model import pays
+from gso.hybrid.time_model import net_saves_time
 from gso.mesh import Mesh
 from gso.mesh.topology import reverse
 from gso.tasks.developable.isometry import Options as JointOptions
@@ -659,8 +659,10 @@ def test_passes_are_left_out_where_a_whole_solve_follows(surfaces, monkeypatch, 
     ],
 )
 def test_where_a_net_pays(size, keywords, many, expected):
-    assert pays(Mesh.from_grid(saddle(size)), "developable", keywords, many=many) is expected
-    assert not pays(Mesh.from_grid(saddle(size)), "flatten", {})
+    assert (
+        net_saves_time(Mesh.from_grid(saddle(size)), "developable", keywords, many=many) is expected
+    )
+    assert not net_saves_time(Mesh.from_grid(saddle(size)), "flatten", {})
 
 
 def test_no_net_is_asked_where_it_does_not_pay(surfaces, monkeypatch):

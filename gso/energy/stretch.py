@@ -60,7 +60,7 @@ def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tupl
 
 
 @dataclass(frozen=True)
-class Spread:
+class TwoPowerLoss:
     """Loss of a corner's strain s: a low power for the mean, a high power for the peaks.
 
     ``level^2 ((2/p) u^p + (2/q) knee^(p-q) u^q)`` with ``u = s / level``. A power `p` below two

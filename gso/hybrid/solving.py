@@ -18,7 +18,7 @@ from gso.components import Component, several
 from gso.constraints import Compiled, compile_constraints, listed
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.hybrid.prediction import Prediction, predictions
-from gso.hybrid.time_model import pays
+from gso.hybrid.time_model import net_saves_time
 from gso.mesh import Mesh
 from gso.parallel import spread
 from gso.pattern import Pattern
@@ -122,7 +122,7 @@ def solve(
         result.seconds["total"] = time.perf_counter() - clock
         return result
     prediction = Prediction()
-    if not sparing or pays(design, task, keywords):
+    if not sparing or net_saves_time(design, task, keywords):
         asked = {"task": task, "net": net, "passes": _passes(polish), "alone": polish is False}
         (prediction,) = predictions([design], **asked)
     result = _finished(design, prediction, task, polish, keywords)
@@ -167,7 +167,7 @@ def solve_many(
     keywords.pop("callback", None)
     polish = _checked(task, polish, keywords)
     work = partial(_one, task, polish, keywords)
-    worth = partial(pays, task=task, keywords=keywords, many=True) if sparing else None
+    worth = partial(net_saves_time, task=task, keywords=keywords, many=True) if sparing else None
     passes, alone = _passes(polish), polish is False
     ask = partial(predictions, task=task, net=net, passes=passes, alone=alone)
     with closing(spread(work, _started(meshes, worth, ask), workers=workers)) as results:
@@ -182,7 +182,7 @@ def _pieces(design: Mesh, task: str, sparing: bool, keywords: dict[str, Any]) ->
     flat = getattr(tasks.get(task), "BLOCK", "surface") == "flat"
     compiled = compile_constraints(keywords["constraints"], design, flat=flat)
     pieces = components.parts(design, compiled)
-    if sparing and not any(pays(piece.mesh, task, keywords) for piece in pieces):
+    if sparing and not any(net_saves_time(piece.mesh, task, keywords) for piece in pieces):
         return []
     keywords["constraints"] = compiled
     return pieces

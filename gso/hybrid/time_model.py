@@ -14,7 +14,9 @@ _FREE = (10_000, 2_500)
 _OFFSETS = (40_000, 10_000)
 
 
-def pays(design: Mesh, task: str, keywords: dict[str, Any], *, many: bool = False) -> bool:
+def net_saves_time(
+    design: Mesh, task: str, keywords: dict[str, Any], *, many: bool = False
+) -> bool:
     """Return whether the task's net is expected to save time, at the same quality.
 
     It was found to only for developable solves of grids by curvature. Solves with bounds or

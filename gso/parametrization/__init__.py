@@ -4,7 +4,7 @@ from gso.parametrization.alignment import align, settle
 from gso.parametrization.arap import Relaxed, relax, strain_level
 from gso.parametrization.embedding import embed, embeddings, flattens, parts, spanned
 from gso.parametrization.grid import rectangle
-from gso.parametrization.initial import begin, flips, given, refine, strain, upward
+from gso.parametrization.initial import begin, flips, given, oriented_triangles, refine, strain
 from gso.parametrization.opening import Opened, by_rows, opened, turning
 from gso.parametrization.packing import beside, closest_motion, place, upright
 
@@ -22,6 +22,7 @@ __all__ = [
     "flips",
     "given",
     "opened",
+    "oriented_triangles",
     "parts",
     "place",
     "rectangle",
@@ -33,5 +34,4 @@ __all__ = [
     "strain_level",
     "turning",
     "upright",
-    "upward",
 ]

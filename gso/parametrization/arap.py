@@ -63,7 +63,7 @@ def relax(
     triangles: Ints,
     flat: Array,
     *,
-    upward: Ints | None = None,
+    oriented: Ints | None = None,
     iterations: int = 100,
     tolerance: float = 1e-3,
 ) -> Relaxed:
@@ -81,7 +81,7 @@ def relax(
         The surface; its triangles must have an area. Vertices of no triangle do not move.
     flat : ndarray, (n, 2)
         The initial image.
-    upward : ndarray of int, (u, 3), optional
+    oriented : ndarray of int, (u, 3), optional
         Triangles that must not be inverted, if different from `triangles`.
     iterations, tolerance : int, float
         Largest number of iterations, and relative decrease of the energy at which to stop.
@@ -95,7 +95,7 @@ def relax(
     # Translations of each component are a null space; a little damping makes it regular.
     damping = 1e-9 * laplacian.diagonal().max()
     solve = spd(laplacian + damping * identity(len(vertices)))
-    kept = triangles if upward is None else upward
+    kept = triangles if oriented is None else oriented
     limit = orientation(kept, Layout((("flat", len(vertices), 2),)))
     z = np.ascontiguousarray(flat) @ np.array([1.0, 1j])
     energy, turn, size = gradients.energy(z)

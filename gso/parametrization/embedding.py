@@ -12,15 +12,15 @@ from gso.parametrization.arap import strain_level
 from gso.typing import Array, Ints
 
 
-def embed(mesh: Mesh, triangles: Ints, upward: Ints) -> Array:
+def embed(mesh: Mesh, triangles: Ints, oriented: Ints) -> Array:
     """Compute the least strained image (n, 2) of :func:`embeddings`.
 
     Parameters and errors are the same.
     """
-    return embeddings(mesh, triangles, upward)[0]
+    return embeddings(mesh, triangles, oriented)[0]
 
 
-def embeddings(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
+def embeddings(mesh: Mesh, triangles: Ints, oriented: Ints) -> list[Array]:
     """Compute plane images (n, 2) of a mesh, the least strained first; components may overlap.
 
     Three maps are computed per component: least-squares conformal (Levy et al. 2002), harmonic
@@ -34,7 +34,7 @@ def embeddings(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
         Components with a boundary and without handles.
     triangles : ndarray of int, (t, 3)
         Triangles on which strain is measured.
-    upward : ndarray of int, (u, 3)
+    oriented : ndarray of int, (u, 3)
         Triangles that must not be inverted.
 
     Returns
@@ -54,7 +54,7 @@ def embeddings(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
         local[ids] = np.arange(len(ids))
         part = _part(mesh, ids)
         _check(part, int(ids[0]))
-        own = (local[t[local[t[:, 0]] >= 0]] for t in (triangles, upward))
+        own = (local[t[local[t[:, 0]] >= 0]] for t in (triangles, oriented))
         found.append((ids, _embed(part, *own)))
     flat = np.zeros((max(len(images) for _, images in found), len(mesh.vertices), 2))
     for ids, images in found:
@@ -90,7 +90,7 @@ def parts(mesh: Mesh) -> list[Ints]:
     return [np.flatnonzero(labels == k) for k in np.unique(labels[used])]
 
 
-def _embed(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
+def _embed(mesh: Mesh, triangles: Ints, oriented: Ints) -> list[Array]:
     outer = max(mesh.boundary_loops, key=lambda loop: _perimeter(mesh.vertices[loop]))
     circle = _circle(mesh.vertices[outer])
     images = [
@@ -103,7 +103,7 @@ def _embed(mesh: Mesh, triangles: Ints, upward: Ints) -> list[Array]:
         if image is None or not np.isfinite(image).all():
             continue
         scaled = _scaled(mesh, image)
-        flipped = int((geometry.signed_areas(scaled, upward) <= 0).sum())
+        flipped = int((geometry.signed_areas(scaled, oriented) <= 0).sum())
         rated.append((flipped, strain_level(mesh.vertices, triangles, scaled), scaled))
     rated.sort(key=lambda r: r[:2])
     return [image for flipped, _, image in rated if flipped == rated[0][0]]

@@ -23,7 +23,7 @@ _COARSE = 40
 DOUBTFUL = 0.1
 
 
-def carrying(mesh: Mesh) -> Ints:
+def strained_triangles(mesh: Mesh) -> Ints:
     """Return the corner triangles on which strain is measured.
 
     Raises
@@ -40,7 +40,7 @@ def carrying(mesh: Mesh) -> Ints:
     return np.concatenate([corner_triangles(f) for f in faces])
 
 
-def upward(mesh: Mesh) -> Ints:
+def oriented_triangles(mesh: Mesh) -> Ints:
     """Return the triangles that must not be inverted.
 
     These are the corner triangles of the cells. On meshes that are not grids a quad with a
@@ -53,12 +53,12 @@ def upward(mesh: Mesh) -> Ints:
 
 def flips(mesh: Mesh, flat: Array) -> int:
     """Count the inverted triangles of an image (n, 2)."""
-    return int((geometry.signed_areas(flat, upward(mesh)) <= 0).sum())
+    return int((geometry.signed_areas(flat, oriented_triangles(mesh)) <= 0).sum())
 
 
 def strain(mesh: Mesh, flat: Array) -> float:
     """Compute the root-mean-square strain of an image (n, 2)."""
-    return strain_level(mesh.vertices, carrying(mesh), flat)
+    return strain_level(mesh.vertices, strained_triangles(mesh), flat)
 
 
 def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> Relaxed:
@@ -83,8 +83,8 @@ def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> R
     MeshError
         A component is closed or has handles.
     """
-    strained, kept = carrying(mesh), upward(mesh)
-    relaxed = partial(relax, mesh.vertices, strained, upward=kept, iterations=iterations)
+    strained, kept = strained_triangles(mesh), oriented_triangles(mesh)
+    relaxed = partial(relax, mesh.vertices, strained, oriented=kept, iterations=iterations)
     if mesh.grid is not None:
         first = relaxed(_grid_image(mesh, mesh.grid, iterations))
         if first.level <= doubtful or max(mesh.grid.shape) > _COARSE:

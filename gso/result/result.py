@@ -137,7 +137,7 @@ class Result:
         return bool(
             all(part.usable for part in self.components)
             and not self.reasons
-            and not (self.status.refuses or self.status is Status.UNUSABLE)
+            and not (self.status.is_failure or self.status is Status.UNUSABLE)
             and np.isfinite(points).all()
             and not self.metrics.get("flipped_cells", 0)
         )

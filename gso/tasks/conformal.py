@@ -99,7 +99,7 @@ def plan(analysis: Analysis, request: Request) -> Plan:
         lambda _: free(layout),
         iterations=options.iterations,
         tolerance=options.tolerance,
-        limits=[orientation.orientation(parametrization.upward(mesh), layout)],
+        limits=[orientation.orientation(parametrization.oriented_triangles(mesh), layout)],
     )
     stages = [stage]
     if not constraints.empty:

@@ -57,7 +57,7 @@ _FAR_FROM_FLAT = 0.1
 _LARGE_STRAIN = 0.03
 #: Tolerance (relative decrease of the energy) of all stages but the last.
 _NEARLY = 1e-2
-#: Ratio of a start's strain to the level above which an "l2" stage precedes the `Spread` loss.
+#: Ratio of a start's strain to the level above which an "l2" stage precedes the other loss.
 _STRAINED = 1.5
 #: Weight of the collapse term in ``lengths``.
 _W_COLLAPSE = 3e-3
@@ -284,12 +284,12 @@ def _strain_terms(options: Options, mesh: Mesh, level: float) -> list[Weighted]:
     if options.norm == "l2":
         items += [Weighted(t, 1.0) for t in stretch.build(mesh)]
     elif options.norm == "l1":
-        loss = stretch.Spread(level, knee=np.inf, eps=0.03)
+        loss = stretch.TwoPowerLoss(level, knee=np.inf, eps=0.03)
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
     else:
-        loss = stretch.Spread(level, knee=options.knee * float(bent(np.float64(level))))
+        loss = stretch.TwoPowerLoss(level, knee=options.knee * float(bent(np.float64(level))))
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
-        # `Spread` too costs level times the strain where strains are small.
+        # `TwoPowerLoss` too costs level times the strain where strains are small.
         items.append(Weighted(edges.build(mesh), options.w_edges * level, Absolute(0.1 * level)))
     return items
 
@@ -348,7 +348,7 @@ def _stage(name: str, mesh: Mesh, items: list[Weighted]) -> Stage:
         items,
         lambda _: free(layout),
         tolerance=_NEARLY,
-        limits=[orientation.orientation(parametrization.upward(mesh), layout)],
+        limits=[orientation.orientation(parametrization.oriented_triangles(mesh), layout)],
     )
 
 

@@ -48,7 +48,7 @@ def judged(result: Result, asked: Asked) -> Result:
     result.reasons = judge(result, asked)
     said = str(result.status)
     result.notes += tuple(r for r in result.reasons if r != said and r not in result.notes)
-    if result.reasons and not result.status.refuses:
+    if result.reasons and not result.status.is_failure:
         result.status = Status.UNUSABLE
     result.seconds["verdict"] = time.perf_counter() - clock
     return result

@@ -39,7 +39,7 @@ def judge(result: Result, asked: Asked) -> tuple[str, ...]:
 
 
 def _reasons(result: Result, asked: Asked) -> Iterator[str]:
-    if result.status.refuses:
+    if result.status.is_failure:
         yield str(result.status)
     pattern = result.pattern
     for points in (result.mesh.vertices, None if pattern is None else pattern.flat):

@@ -305,7 +305,7 @@ def _stage(
         per_component.objective(mesh, make) if cut is None else make(mesh),
         partial(_unknowns, bound, mesh, layout),
         tolerance=_NEARLY,
-        limits=[orientation.orientation(parametrization.upward(sheet), layout)],
+        limits=[orientation.orientation(parametrization.oriented_triangles(sheet), layout)],
         bounds=None if bound is None else partial(_bounds, layout, len(mesh.vertices), bound),
         imposed=analysis.imposed if mesh is analysis.mesh else None,
     )

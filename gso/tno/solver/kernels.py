@@ -67,7 +67,7 @@ def casadi_function(residual: Residual, shape: tuple[int, ...], constants: int, 
 
 
 @lru_cache(maxsize=32)
-def casadi_turning(vectors: Residual, shape: tuple[int, ...], constants: int):
+def casadi_geometric_stiffness(vectors: Residual, shape: tuple[int, ...], constants: int):
     """Make the CasADi function of one element: lengths of its plane vectors, and rows h.
 
     The second derivative (geometric stiffness) of the length of a vector (u, v) that is linear
@@ -84,13 +84,13 @@ def casadi_turning(vectors: Residual, shape: tuple[int, ...], constants: int):
     length = ca.sqrt(ca.fmax(u * u + v * v, TINY))
     turn = ca.diag(u) @ ca.jacobian(v, x) - ca.diag(v) @ ca.jacobian(u, x)
     rows = ca.diag(1.0 / (length * ca.sqrt(length))) @ turn
-    return ca.Function("turning", [x, c], [length, ca.vec(ca.densify(rows).T)], {"cse": True})
+    return ca.Function("stiffness", [x, c], [length, ca.vec(ca.densify(rows).T)], {"cse": True})
 
 
 class Kernel:
     """Evaluates residuals, and optionally their Jacobian, on arrays of elements.
 
-    Made from a function of :func:`casadi_function` or :func:`casadi_turning`. Call with
+    Made from a function of :func:`casadi_function` or :func:`casadi_geometric_stiffness`. Call with
     coordinates (k, e) and constants (c, e); returns residuals (r, e) and Jacobian
     (r, k, e), which is empty without `jacobian`.
     """
@@ -125,9 +125,9 @@ def kernel(residual: Residual, shape: tuple[int, ...], constants: int, jacobian:
 
 
 @lru_cache(maxsize=32)
-def turning(vectors: Residual, shape: tuple[int, ...], constants: int) -> Kernel:
+def geometric_stiffness(vectors: Residual, shape: tuple[int, ...], constants: int) -> Kernel:
     """Return the kernel of the geometric stiffness, see :attr:`gso.energy.Term.vectors`."""
-    return Kernel(casadi_turning(vectors, shape, constants), shape, jacobian=True)
+    return Kernel(casadi_geometric_stiffness(vectors, shape, constants), shape, jacobian=True)
 
 
 def _print(function: Any) -> tuple[str, int]:

@@ -17,7 +17,7 @@ from gso.energy.base import Limit, Weighted
 from gso.energy.losses import Loss
 from gso.linalg.base import Pattern
 from gso.tno.solver.assembly import Assembly, assemble, products
-from gso.tno.solver.kernels import kernel, turning
+from gso.tno.solver.kernels import geometric_stiffness, kernel
 from gso.typing import Array, Ints
 from gso.unknowns import Layout, Variables
 
@@ -77,12 +77,12 @@ class _Elements(_Values):
         value, slope = run(coordinates[self.gather], self.constants)
         return value, self._pulled(slope)
 
-    def turning(self, coordinates: Array) -> Array | None:
+    def geometric_stiffness(self, coordinates: Array) -> Array | None:
         """Return rows h (t, q, e): ``h h^T`` is the geometric stiffness of the first residuals."""
         vectors = self.item.term.vectors
         if vectors is None:
             return None
-        run = turning(vectors, self.shape, len(self.constants))
+        run = geometric_stiffness(vectors, self.shape, len(self.constants))
         return self._pulled(run(coordinates[self.gather], self.constants)[1])
 
     def _pulled(self, slope: Array) -> Array:
@@ -245,7 +245,7 @@ class Problem:
             pulled = np.einsum("re,rqe->qe", first * factor, slope, optimize=False)
             gradient += np.bincount(element.columns.ravel(), pulled.ravel(), n + 1)[:n]
             entries = products(slope, second * factor)
-            turn = element.turning(coordinates)
+            turn = element.geometric_stiffness(coordinates)
             if turn is not None:
                 entries += products(turn, np.maximum(first[: len(turn)], 0.0) * factor)
             entries.ravel()[repeated] *= 2.0
