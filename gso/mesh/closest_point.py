@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gso import geometry
 from gso.mesh import Mesh
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 
 class Feet(NamedTuple):
@@ -42,13 +42,47 @@ class Nearest:
     """
 
     def __init__(self, mesh: Mesh, normals: Array | None = None):
+        self._build(mesh.vertices, mesh.triangles)
+        self._normals = np.zeros_like(self._vertices) if normals is None else normals
+
+    @classmethod
+    def of(cls, vertices: Array, triangles: Ints) -> Nearest:
+        """Make the tree of triangles (t, 3) of points (n, 3), which need not be a valid mesh."""
+        out = cls.__new__(cls)
+        out._build(vertices, triangles)
+        out._normals = np.zeros_like(out._vertices)
+        return out
+
+    def _build(self, vertices: Array, triangles: Ints) -> None:
         import igl
 
-        self._vertices = np.ascontiguousarray(mesh.vertices, np.float64)
-        self._triangles = np.ascontiguousarray(mesh.triangles, np.int64)
-        self._normals = np.zeros_like(self._vertices) if normals is None else normals
+        self._vertices = np.ascontiguousarray(vertices, np.float64)
+        self._triangles = np.ascontiguousarray(triangles, np.int64)
         self._tree = igl.AABB()
         self._tree.init(self._vertices, self._triangles)
+
+    def locate(self, points: Array) -> tuple[Ints, Array, Array]:
+        """Find the closest points to points (k, 3) on the triangles.
+
+        Returns
+        -------
+        triangles : ndarray of int, (k,)
+        shares : ndarray, (k, 3)
+            Barycentric coordinates.
+        feet : ndarray, (k, 3)
+        """
+        _, triangle, foot = self._query(points)
+        a, b, c = (self._vertices[self._triangles[triangle, k]] for k in range(3))
+        u, v, w = b - a, c - a, foot - a
+        uu, uv, vv, uw, vw = (
+            np.einsum("ij,ij->i", x, y) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w))
+        )
+        with np.errstate(invalid="ignore", divide="ignore"):
+            second, third = np.array([vv * uw - uv * vw, uu * vw - uv * uw]) / (uu * vv - uv * uv)
+        shares = np.nan_to_num(np.clip(np.stack([1 - second - third, second, third], axis=1), 0, 1))
+        # Triangles without area count as their first corner.
+        shares[shares.sum(axis=1) == 0] = [1.0, 0.0, 0.0]
+        return triangle, shares / shares.sum(axis=1, keepdims=True), foot
 
     def distances(self, points: Array) -> Array:
         """Return the distance of every point (k, 3) from the surface, (k,)."""

@@ -1,0 +1,83 @@
+"""A design as a function on its flat image, continued beyond the outline."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gso import geometry
+from gso.mesh import Mesh
+from gso.mesh.closest_point import Nearest
+from gso.mesh.normals import vertex_normals
+from gso.typing import Array, Ints
+
+#: Width of the continuation, relative to the diagonal of the flat image.
+_MARGIN = 0.05
+#: Distances below this share of the margin are rounding errors.
+_TINY = 1e-9
+
+
+class Domain:
+    """Positions and normals of a design as functions on the plane.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The design: a disk, possibly with holes.
+    flat : ndarray, (n, 2)
+        Its flat image, without inverted triangles.
+
+    Attributes
+    ----------
+    normals : ndarray, (n, 3)
+        Unit normals at the vertices.
+    outline : ndarray of int
+        Vertices of the outer boundary, anticlockwise in the plane.
+    margin : float
+        Width of the continuation.
+    """
+
+    def __init__(self, mesh: Mesh, flat: Array):
+        self.mesh, self.flat = mesh, flat
+        self.normals = vertex_normals(mesh)
+        self.margin = _MARGIN * geometry.box_diagonal(flat)
+        self._nearest = Nearest.of(np.pad(flat, ((0, 0), (0, 1))), mesh.triangles)
+        areas = [_enclosed(flat[loop]) for loop in mesh.boundary_loops]
+        largest = int(np.abs(areas).argmax())
+        loop = mesh.boundary_loops[largest]
+        self.outline: Ints = loop if areas[largest] > 0 else loop[::-1]
+
+    def feet(self, places: Array) -> Array:
+        """Return the nearest points (k, 2) of the flat image to places (k, 2)."""
+        return self._nearest.locate(np.pad(places, ((0, 0), (0, 1))))[2][:, :2]
+
+    def sample(self, values: Array, places: Array) -> Array:
+        """Interpolate values (n, d) of the vertices at the feet of places (k, 2), (k, d)."""
+        triangle, shares, _ = self._nearest.locate(np.pad(places, ((0, 0), (0, 1))))
+        return np.einsum("kj,kjd->kd", shares, values[self.mesh.triangles[triangle]])
+
+    def points(self, places: Array) -> Array:
+        """Return positions (k, 3); beyond the outline by quadratic extrapolation.
+
+        The parabola goes through the foot and two points at one and two margins behind it.
+        """
+        foot = self.feet(places)
+        away = places - foot
+        length = np.linalg.norm(away, axis=1, keepdims=True)
+        out = self.sample(self.mesh.vertices, foot)
+        beyond = np.flatnonzero(length > _TINY * self.margin)
+        if beyond.size:
+            back = away[beyond] / length[beyond] * self.margin
+            x = length[beyond] / self.margin
+            here = out[beyond]
+            one, two = (
+                self.sample(self.mesh.vertices, foot[beyond] - k * back) for k in (1.0, 2.0)
+            )
+            slope, bend = 0.5 * (3.0 * here - 4.0 * one + two), 0.5 * (here - 2.0 * one + two)
+            out[beyond] = here + x * slope + x * x * bend
+        return out
+
+
+def _enclosed(loop: Array) -> float:
+    """Return the signed area of a polygon (k, 2)."""
+    x, y = loop.T
+    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
