@@ -85,7 +85,7 @@ def test_strain_energy_is_the_solvers(pair):
     values, levels = strain(batch(*flats)), strain.level(strain.residuals(batch(*flats)))
     for k, (design, flat) in enumerate(zip(designs, flats, strict=True)):
         mesh, level = Mesh.from_grid(design, weld=False), float(levels[k])
-        items = flatten._strain_stage(flatten.Options(), mesh, level).items
+        items = flatten.stages.strain_stage(flatten.Options(), mesh, level).items
         solver = sum(total(items, flat.reshape(-1, 2)).values()) / level
         assert float(values[k]) == pytest.approx(solver, rel=1e-9)
 

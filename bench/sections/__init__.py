@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 #: Files with sections; each lists them as ``SECTIONS``.
-SUBJECTS = ("tno", "jiang", "hybrid", "net", "borders", "dataset")
+SUBJECTS = ("tno", "cost", "jiang", "hybrid", "net", "borders", "dataset")
 
 
 def sections() -> dict[str, Callable[..., dict[str, Any]]]:

@@ -233,11 +233,7 @@ class Session:
             before = self._coordinates
             solve = partial(self._run.minimise, self._options, stage)
             self._coordinates, _ = tighten(
-                stage.items,
-                stage.layout,
-                before,
-                minimum,
-                lambda items, at: solve(at, items=items),
+                stage.items, stage.layout, before, minimum, lambda items, at: solve(at, items=items)
             )
             if self._coordinates is not before:
                 self._pose()

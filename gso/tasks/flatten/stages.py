@@ -1,0 +1,187 @@
+"""The stages of the flatten task, by formulation and norm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from gso import parametrization
+from gso.energy import (
+    Weighted,
+    christoffel,
+    collapse,
+    congruence,
+    edges,
+    fairness,
+    isometry,
+    shear,
+    stretch,
+)
+from gso.energy.losses import Absolute
+from gso.mesh import Mesh
+from gso.parametrization import orientation
+from gso.tasks import per_component
+from gso.tasks.base import Request, Stage, same
+from gso.tasks.evaluation import parted
+from gso.tasks.flatten.options import Options
+from gso.typing import Array
+from gso.unknowns import Layout, free
+
+#: Lower bound on the strain level: smaller strains are rounding errors.
+SMALLEST_LEVEL = 1e-7
+#: Root-mean-square strain above which the user is told to cut the surface.
+FAR_FROM_FLAT = 0.1
+#: Strain level above which the knee is lowered, so that large strains cost more.
+_LARGE_STRAIN = 0.03
+#: Tolerance (relative decrease of the energy) of all stages but the last.
+_NEARLY = 1e-2
+#: Ratio of a start's strain to the level above which an "l2" stage precedes the other loss.
+STRAINED = 1.5
+#: Weight of the collapse term in ``lengths``.
+_W_COLLAPSE = 3e-3
+#: Weights of the collapse term in the stages of ``strain`` before the last, for large strains.
+_UNSQUEEZE = (1e-2, 1e-3)
+
+
+def planned_stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
+    """Plan coarse-to-fine stages, the last of which has the objective of the formulation."""
+    options, mesh = request.options, levels[-1]
+    even = options if options.norm != "l1" else replace(options, norm="mixed")
+    stages = [strain_stage(even, levels[0], level)]
+    for below, above in pairwise(levels):
+        enter = partial(refine, below, above)
+        stages.append(replace(strain_stage(even, above, level), enter=enter))
+    if request.formulation == "lengths":
+        lengths = _length_stage(options, mesh, level)
+        if len(levels) > 1:
+            # The interpolated coarser image is close enough: no strain stage on this grid.
+            lengths = replace(lengths, enter=stages.pop().enter)
+        stages.append(lengths)
+    elif request.formulation == "isometry":
+        stages.append(_isometry_stage(options, mesh))
+    elif options.norm == "l1":
+        stages.append(strain_stage(options, mesh, level))
+    # On meshes that are not grids the last stage starts farther from the minimum.
+    closer = 1.0 if levels[-1].grid_index is not None else 0.2
+    stages[-1] = replace(
+        stages[-1], iterations=options.iterations, tolerance=closer * options.tolerance
+    )
+    if request.formulation == "strain" and level > FAR_FROM_FLAT:
+        stages = [*stages[:-1], *_unsqueezing(mesh, stages[-1])]
+    return stages
+
+
+def _unsqueezing(mesh: Mesh, last: Stage) -> list[Stage]:
+    """Precede the last stage by stages with a collapse term of falling weight.
+
+    Where strain is large, the energy is lowest with some triangles collapsed. As a step ends
+    before the first triangle that would invert, the solve would stall at them without this term.
+    """
+    resistance = collapse.build(mesh)
+    before = [
+        replace(
+            last,
+            own_items=[*last.own_items, *(Weighted(t, weight) for t in resistance)],
+            enter=last.enter if k == 0 else same,
+            tolerance=_NEARLY,
+        )
+        for k, weight in enumerate(_UNSQUEEZE)
+    ]
+    return [*before, replace(last, enter=same)]
+
+
+def strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
+    alone = not parted(mesh)
+    return _stage(
+        "strain",
+        mesh,
+        per_component.objective(
+            mesh, lambda own: _strain_terms(options, own, level if alone else _level(own))
+        ),
+    )
+
+
+def _level(mesh: Mesh) -> float:
+    """Compute the typical strain of one of several components."""
+    return max(parametrization.begin(mesh).level, SMALLEST_LEVEL)
+
+
+def _strain_terms(options: Options, mesh: Mesh, level: float) -> list[Weighted]:
+    items = _fair(mesh, options.w_fairness)
+    if options.norm == "l2":
+        items += [Weighted(t, 1.0) for t in stretch.build(mesh)]
+    elif options.norm == "l1":
+        loss = stretch.TwoPowerLoss(level, knee=np.inf, eps=0.03)
+        items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
+    else:
+        loss = stretch.TwoPowerLoss(level, knee=options.knee * float(bent(np.float64(level))))
+        items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
+        # `TwoPowerLoss` too costs level times the strain where strains are small.
+        items.append(Weighted(edges.build(mesh), options.w_edges * level, Absolute(0.1 * level)))
+    return items
+
+
+def bent(level: Any) -> Any:
+    """Compute the factor on the knee: below one where the strain level is large."""
+    return ((_LARGE_STRAIN / level) ** (1 / 3)).clip(0.68, 1.0)
+
+
+def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:
+    # With several components: the mean of their cells' sizes, each in its own unit ball.
+    sizes = [isometry.typical_length(p.mesh) / p.mesh.frame.scale for p in parted(mesh)]
+    size = float(np.mean(sizes)) if sizes else isometry.typical_length(mesh)
+    eps = options.eps * size
+    items = per_component.objective(mesh, partial(_length_terms, options, level, eps))
+    stage = _stage("lengths", mesh, items)
+    if options.norm == "l2":
+        return stage
+    losses = (Absolute(10.0 * eps), Absolute(eps))
+    return replace(stage, continuation=losses, continued="isometry")
+
+
+def _length_terms(options: Options, level: float, eps: float, mesh: Mesh) -> list[Weighted]:
+    items = _fair(mesh, options.w_fairness)
+    items += [Weighted(t, options.w_shear) for t in shear.build(mesh)]
+    items += [Weighted(t, _W_COLLAPSE) for t in collapse.build(mesh)]
+    terms = isometry.build(mesh)
+    if options.norm == "l2":
+        # Dividing by the level makes it as large as with "l1", so the other weights can stay.
+        return items + [Weighted(t, 1.0 / level) for t in terms]
+    size = isometry.typical_length(mesh)
+    return items + [Weighted(t, size, Absolute(eps)) for t in terms]
+
+
+def _isometry_stage(options: Options, mesh: Mesh) -> Stage:
+    return _stage(
+        "isometry", mesh, per_component.objective(mesh, partial(_isometry_terms, options))
+    )
+
+
+def _isometry_terms(options: Options, mesh: Mesh) -> list[Weighted]:
+    items = _fair(mesh, options.w_fairness)
+    items += [Weighted(t, 1.0) for t in congruence.build(mesh, "flat")]
+    return items + [Weighted(t, options.w_mapping) for t in christoffel.build(mesh, "flat")]
+
+
+def _fair(mesh: Mesh, weight: float) -> list[Weighted]:
+    return [Weighted(fairness.build(mesh, block="flat"), weight)] if weight > 0 else []
+
+
+def _stage(name: str, mesh: Mesh, items: list[Weighted]) -> Stage:
+    layout = Layout.of(len(mesh.vertices), "flat")
+    return Stage(
+        name,
+        layout,
+        items,
+        lambda _: free(layout),
+        tolerance=_NEARLY,
+        limits=[orientation.orientation(parametrization.oriented_triangles(mesh), layout)],
+    )
+
+
+def refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
+    return parametrization.refine(coarse, fine, coordinates.reshape(-1, 2)).ravel()
