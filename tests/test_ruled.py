@@ -7,7 +7,6 @@ import pytest
 
 from gso import parametrization
 from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
 from gso.ruled import fit, strip
 from gso.ruled.chords import chords, prices, resampled, sequence
 from gso.ruled.domain import Domain
@@ -18,11 +17,6 @@ def domain(points) -> Domain:
     mesh = points if isinstance(points, Mesh) else Mesh.from_grid(points)
     mesh = mesh.replaced(mesh.vertices / mesh.diagonal)
     return Domain(mesh, parametrization.begin(mesh).flat)
-
-
-def distances(ends, points):
-    tree = Nearest.of(ends.reshape(-1, 3), strip.triangles(len(ends)))
-    return tree.distances(points)
 
 
 def bent_strip(count=9):
@@ -116,7 +110,7 @@ def test_strips_are_planar_without_crossings_and_close(kind, most):
     ends, energy = fit.solve(there, 33)
     assert np.abs(strip.planarity(ends)[0]).max() < 1e-14
     assert (strip.gaps(ends, energy.up)[0] > 0).all()
-    far = distances(ends, there.mesh.vertices)
+    far = strip.nearest_distances(ends, there.mesh.vertices)
     assert far.mean() < 0.25 * most
     assert far.max() < most
 

@@ -1,12 +1,14 @@
 """The solve for a strip of planar quads near a design; the unknowns are the ends of the rulings.
 
 The energy is the mean squared distance of the design's samples from the strip, with small
-weights on its smoothness. Quads are made planar first by a penalty, then exactly: steps are
+weights on its smoothness. A last phase lowers the largest distance: it weights the samples by
+rising powers of their distances. Quads are made planar first by a penalty, then exactly: steps are
 tangential to the planar strips, and Newton's method leads back to these.
 """
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -55,6 +57,9 @@ class Weights:
     planar: float = 0.0
 
 
+#: Powers of the distance in the last phase, the iterations of each, and the share of the weight
+#: that all samples have in common.
+_POWERS, _EACH, _COMMON = (3, 4, 5, 6, 8), 8, 0.1
 #: Phases: weights of `moved` and of `planar`, and the largest number of iterations.
 _PHASES = ((1e-4, 1.0, 15), (1e-6, 100.0, 15), (1e-7, 0.0, 25))
 
@@ -75,6 +80,7 @@ class Energy:
     def __init__(self, domain: Domain, first: Array, second: Array, samples: Array | None = None):
         ids = np.flatnonzero(domain.mesh.used) if samples is None else samples
         self.points = domain.mesh.vertices[ids]
+        self.weights = np.full(len(ids), 1.0 / len(ids))
         self.start = np.stack([domain.points(first), domain.points(second)], axis=1)
         step = np.diff(self.start, axis=0)
         self.width = float(np.linalg.norm(step, axis=2).mean())
@@ -86,6 +92,16 @@ class Energy:
         along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-300)
         #: Projections (m, 2, 3, 3) that leave out movements along the outline.
         self._across = np.eye(3) - along[..., :, None] * along[..., None, :]
+
+    def distances(self, ends: Array) -> Array:
+        """Return the distances of the samples from a strip."""
+        return strip.nearest_distances(ends, self.points)
+
+    def weighted(self, weights: Array) -> Energy:
+        """Return the energy with other weights of the samples, whose sum should be one."""
+        other = copy(self)
+        other.weights = weights
+        return other
 
     def residuals(self, ends: Array, w: Weights) -> tuple[Array, csr_matrix]:
         """Return residuals whose squared norm is the energy, and their Jacobian."""
@@ -113,8 +129,9 @@ class Energy:
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
         s, t = at.s, at.t
         share = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=1)
-        share *= 1.0 / np.sqrt(len(x))
-        away = (x - self.points) / np.sqrt(len(x))
+        root = np.sqrt(self.weights)[:, None]
+        share *= root
+        away = root * (x - self.points)
         height = (away * normal).sum(axis=1)
         slope = share[:, :, None] * normal[:, None]
         out = [(height, strip.rows(at.quad, slope, len(ends)))]
@@ -192,8 +209,23 @@ def solve(domain: Domain, count: int = 49, samples: Array | None = None) -> tupl
     for moved, planar, iterations in _PHASES:
         if not planar:
             ends = strip.planarised(ends)
-        ends = _descend(energy, ends, replace(Weights(), moved=moved, planar=planar), iterations)
-    return ends, energy
+        weights = replace(Weights(), moved=moved, planar=planar)
+        ends = _descend(energy, ends, weights, iterations)
+    return _even(energy, ends, weights), energy
+
+
+def _even(energy: Energy, ends: Array, w: Weights) -> Array:
+    """Lower the largest distance of the samples; return the best strip that was found."""
+    far = energy.distances(ends)
+    best, least = ends, far.max()
+    for power in _POWERS:
+        share = (far / far.max()) ** (power - 2)
+        share = (1.0 - _COMMON) * share / share.sum() + _COMMON / len(share)
+        ends = _descend(energy.weighted(share), ends, w, _EACH)
+        far = energy.distances(ends)
+        if far.max() < least:
+            best, least = ends, far.max()
+    return best
 
 
 def _descend(energy: Energy, ends: Array, w: Weights, iterations: int) -> Array:

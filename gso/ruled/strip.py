@@ -53,6 +53,11 @@ def triangles(count: int) -> Ints:
     return np.concatenate([k + np.array([0, 1, 3]), k + np.array([0, 3, 2])])
 
 
+def nearest_distances(ends: Array, points: Array) -> Array:
+    """Return the distances of points (k, 3) from a strip, split into triangles."""
+    return Nearest.of(ends.reshape(-1, 3), triangles(len(ends))).distances(points)
+
+
 def nearest(ends: Array, points: Array) -> tuple[Places, Array]:
     """Find the places on a strip nearest to points (k, 3), and which are on its border."""
     count = len(ends) - 1
