@@ -42,7 +42,7 @@ from report.methods import methods  # noqa: E402
 from report.quality import levels  # noqa: E402
 from report.settings import FULL, QUICK  # noqa: E402
 from report.store import Store  # noqa: E402
-from sections import sections  # noqa: E402
+from sections import SUBJECTS, sections  # noqa: E402
 
 
 def main() -> None:
@@ -85,8 +85,10 @@ def main() -> None:
 
 def _sections(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
     """Run the sections that are named, or all of the subjects that are named."""
-    every = sections()
     words = [word for word in arguments.only if "=" not in word]
+    # Other subjects are not imported: some of them load PyTorch.
+    named = {word.partition(".")[0] for word in words}
+    every = sections(s for s in SUBJECTS if s in named or words == ["list"])
     settings = dict(word.split("=", 1) for word in arguments.only if "=" in word)
     if arguments.data:
         settings["data"] = str(arguments.data)

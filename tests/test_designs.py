@@ -11,17 +11,11 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 
 import designs
+from designs import KINDS
 
 from gso import metrics
 
 SEEDS = (0, 1)
-KINDS = {
-    "holes": designs.with_holes,
-    "irregular": designs.irregular,
-    "planar": designs.planar,
-    "symmetric": designs.symmetric,
-    "curved": designs.curved,
-}
 
 
 def valences(mesh) -> np.ndarray:

@@ -14,7 +14,17 @@ from designs.irregular import irregular
 from designs.planar import planar
 from designs.symmetric import symmetric
 
+#: The functions by the name of their kind.
+KINDS = {
+    "holes": with_holes,
+    "irregular": irregular,
+    "planar": planar,
+    "symmetric": symmetric,
+    "curved": curved,
+}
+
 __all__ = [
+    "KINDS",
     "Design",
     "Symmetry",
     "curved",

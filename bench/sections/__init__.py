@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 #: Files with sections; each lists them as ``SECTIONS``.
 SUBJECTS = ("tno", "cost", "jiang", "hybrid", "net", "borders", "dataset")
 
 
-def sections() -> dict[str, Callable[..., dict[str, Any]]]:
-    """Return all sections by name, such as "tno.developable"."""
+def sections(subjects: Iterable[str] = SUBJECTS) -> dict[str, Callable[..., dict[str, Any]]]:
+    """Return the sections of some subjects by name, such as "tno.developable"."""
     return {
         f"{subject}.{section.__name__}": section
-        for subject in SUBJECTS
+        for subject in subjects
         for section in importlib.import_module(f"sections.{subject}").SECTIONS
     }

@@ -11,18 +11,11 @@ from __future__ import annotations
 from typing import Any
 
 import designs
+from designs import KINDS
 from harness import progress, solver, table, timed
 
 import gso
 from gso import metrics
-
-KINDS = {
-    "holes": designs.with_holes,
-    "irregular": designs.irregular,
-    "planar": designs.planar,
-    "symmetric": designs.symmetric,
-    "curved": designs.curved,
-}
 
 
 def _figures(design: designs.Design, after: gso.Mesh) -> dict[str, Any]:

@@ -24,8 +24,7 @@ __all__ = list(_NAMES)
 def __getattr__(name: str) -> Any:
     if name not in _NAMES:
         raise AttributeError(f"module 'gso.net' has no attribute {name!r}")
-    attribute = "add" if name == "add_task" else name
-    value = getattr(importlib.import_module(_NAMES[name]), attribute)
+    value = getattr(importlib.import_module(_NAMES[name]), name)
     globals()[name] = value
     return value
 

@@ -76,9 +76,10 @@ def prices(domain: Domain, outline: Array) -> Array:
     first, second = np.triu_indices(n, 1)
     t = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES)[:, None]
     places = (outline[first, None] * (1.0 - t) + outline[second, None] * t).reshape(-1, 2)
-    normals = domain.sample(domain.normals, places).reshape(len(first), _SAMPLES, 3)
+    normals, feet = domain.sample(domain.normals, places)
+    normals = normals.reshape(len(first), _SAMPLES, 3)
     varying = ((normals - normals.mean(axis=1, keepdims=True)) ** 2).sum(axis=2).mean(axis=1)
-    gap = np.linalg.norm(domain.feet(places) - places, axis=1).reshape(len(first), _SAMPLES)
+    gap = np.linalg.norm(feet - places, axis=1).reshape(len(first), _SAMPLES)
     outside = (gap > 1e-6 * domain.margin).mean(axis=1)
     out = np.zeros((n, n))
     out[first, second] = (varying + outside) * ((outline[first] - outline[second]) ** 2).sum(axis=1)

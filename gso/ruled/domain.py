@@ -46,31 +46,34 @@ class Domain:
         loop = mesh.boundary_loops[largest]
         self.outline: Ints = loop if areas[largest] > 0 else loop[::-1]
 
-    def feet(self, places: Array) -> Array:
-        """Return the nearest points (k, 2) of the flat image to places (k, 2)."""
-        return self._nearest.locate(np.pad(places, ((0, 0), (0, 1))))[2][:, :2]
+    def sample(self, values: Array, places: Array) -> tuple[Array, Array]:
+        """Interpolate values (n, d) of the vertices at the nearest points to places (k, 2).
 
-    def sample(self, values: Array, places: Array) -> Array:
-        """Interpolate values (n, d) of the vertices at the feet of places (k, 2), (k, d)."""
-        triangle, shares, _ = self._nearest.locate(np.pad(places, ((0, 0), (0, 1))))
-        return np.einsum("kj,kjd->kd", shares, values[self.mesh.triangles[triangle]])
+        Returns
+        -------
+        values : ndarray, (k, d)
+        feet : ndarray, (k, 2)
+            The nearest points of the flat image.
+        """
+        triangle, shares, feet = self._nearest.locate(np.pad(places, ((0, 0), (0, 1))))
+        found = np.einsum("kj,kjd->kd", shares, values[self.mesh.triangles[triangle]])
+        return found, feet[:, :2]
 
     def points(self, places: Array) -> Array:
         """Return positions (k, 3); beyond the outline by quadratic extrapolation.
 
         The parabola goes through the foot and two points at one and two margins behind it.
         """
-        foot = self.feet(places)
+        out, foot = self.sample(self.mesh.vertices, places)
         away = places - foot
         length = np.linalg.norm(away, axis=1, keepdims=True)
-        out = self.sample(self.mesh.vertices, foot)
         beyond = np.flatnonzero(length > _TINY * self.margin)
         if beyond.size:
             back = away[beyond] / length[beyond] * self.margin
             x = length[beyond] / self.margin
             here = out[beyond]
             one, two = (
-                self.sample(self.mesh.vertices, foot[beyond] - k * back) for k in (1.0, 2.0)
+                self.sample(self.mesh.vertices, foot[beyond] - k * back)[0] for k in (1.0, 2.0)
             )
             slope, bend = 0.5 * (3.0 * here - 4.0 * one + two), 0.5 * (here - 2.0 * one + two)
             out[beyond] = here + x * slope + x * x * bend

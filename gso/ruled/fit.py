@@ -84,7 +84,7 @@ class Energy:
         self.start = np.stack([domain.points(first), domain.points(second)], axis=1)
         step = np.diff(self.start, axis=0)
         self.width = float(np.linalg.norm(step, axis=2).mean())
-        up = domain.sample(domain.normals, 0.5 * (first + second))
+        up, _ = domain.sample(domain.normals, 0.5 * (first + second))
         up /= np.linalg.norm(up, axis=1, keepdims=True)
         #: Normals at the rulings, on the side from which gaps are positive.
         self.up = up if strip.gaps(self.start, up)[0].sum() > 0 else -up
@@ -258,16 +258,18 @@ def _step(
     """Return a damped Gauss-Newton step; damping grows until the step is short enough."""
     diagonal = np.diag_indices_from(normal)
     scale = normal[diagonal].mean()
+    if not w.planar:
+        value, slope = strip.planarity(ends)
+        right = np.column_stack([gradient, slope.T.toarray()])
     while True:
         matrix = normal.copy()
         matrix[diagonal] += damping.value * scale
         if w.planar:
             step = -np.linalg.solve(matrix, gradient)
         else:
-            value, slope = strip.planarity(ends)
-            inverse = np.linalg.solve(matrix, np.column_stack([gradient, slope.T.toarray()]))
-            right = value - slope @ inverse[:, 0]
-            multipliers = np.linalg.lstsq(slope @ inverse[:, 1:], right, rcond=1e-12)[0]
+            inverse = np.linalg.solve(matrix, right)
+            left = value - slope @ inverse[:, 0]
+            multipliers = np.linalg.lstsq(slope @ inverse[:, 1:], left, rcond=1e-12)[0]
             step = -inverse[:, 0] - inverse[:, 1:] @ multipliers
         if np.abs(step).max() <= _REACH * energy.width or damping.value >= _MOST:
             return step

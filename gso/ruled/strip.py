@@ -53,15 +53,19 @@ def triangles(count: int) -> Ints:
     return np.concatenate([k + np.array([0, 1, 3]), k + np.array([0, 3, 2])])
 
 
+def _tree(ends: Array) -> Nearest:
+    return Nearest.of(ends.reshape(-1, 3), triangles(len(ends)))
+
+
 def nearest_distances(ends: Array, points: Array) -> Array:
     """Return the distances of points (k, 3) from a strip, split into triangles."""
-    return Nearest.of(ends.reshape(-1, 3), triangles(len(ends))).distances(points)
+    return _tree(ends).distances(points)
 
 
 def nearest(ends: Array, points: Array) -> tuple[Places, Array]:
     """Find the places on a strip nearest to points (k, 3), and which are on its border."""
     count = len(ends) - 1
-    which, shares, _ = Nearest.of(ends.reshape(-1, 3), triangles(count + 1)).locate(points)
+    which, shares, _ = _tree(ends).locate(points)
     lower = which < count
     s = np.where(lower, shares[:, 2], shares[:, 1] + shares[:, 2])
     t = np.where(lower, shares[:, 1] + shares[:, 2], shares[:, 1])

@@ -10,7 +10,7 @@ from gso.net.tasks.base import NetTask
 from gso.registry import Registry
 from gso.spelling import choices
 
-__all__ = ["NetTask", "add", "get", "names"]
+__all__ = ["NetTask", "add_task", "get", "names"]
 
 _FILES = Registry(__name__, __path__, ("base",))
 
@@ -31,7 +31,7 @@ def get(name: Any) -> NetTask:
     return _FILES.get(name).TASK
 
 
-def add(task: NetTask) -> None:
+def add_task(task: NetTask) -> None:
     """Register a task from outside the package, for this process."""
     module = ModuleType(task.name)
     module.TASK = task  # type: ignore[attr-defined]
