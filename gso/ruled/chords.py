@@ -18,6 +18,8 @@ _COUNT, _SAMPLES = 96, 9
 _WINDOW, _EVEN = 9, 0.2
 #: Part of the sequence that is left out at each tip, where chords are very short.
 _TIP = 0.02
+#: Turning angles of sharp corners, and the largest for which offsets are lengthened.
+_SHARP, _MITRE = 0.5, 2.0
 
 
 def chords(domain: Domain, count: int) -> tuple[Array, Array]:
@@ -56,14 +58,34 @@ def _on(loop: Array, at: Array) -> Array:
 
 
 def resampled(loop: Array, count: int) -> tuple[Array, Array]:
-    """Return points at equal distances along a closed polygon (k, 2), and the outward normals."""
+    """Return points along a closed polygon (k, 2), and outward offsets of distance one.
+
+    The points are at equal distances, but the nearest ones are moved to the sharp corners. There
+    the offset is longer, so that the offset polygon has corners too.
+    """
     closed = np.vstack([loop, loop[:1]])
     along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))]
     at = np.linspace(0.0, along[-1], count, endpoint=False)
+    turn = _turning(loop)
+    for k in np.argsort(turn):
+        if turn[k] > _SHARP:
+            gap = np.abs(at - along[k])
+            at[np.minimum(gap, along[-1] - gap).argmin()] = along[k]
+    at = np.sort(at)
     points = np.stack([np.interp(at, along, c) for c in closed.T], axis=1)
     way = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     normals = np.stack([way[:, 1], -way[:, 0]], axis=1)
-    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    mitre = 1.0 / np.cos(0.5 * np.clip(_turning(points), 0.0, _MITRE))
+    return points, normals * mitre[:, None]
+
+
+def _turning(loop: Array) -> Array:
+    """Return the angles (n,) by which a closed polygon (n, 2) turns left at its corners."""
+    way = np.roll(loop, -1, axis=0) - loop
+    back = np.roll(way, 1, axis=0)
+    cross = back[:, 0] * way[:, 1] - back[:, 1] * way[:, 0]
+    return np.arctan2(cross, (back * way).sum(axis=1))
 
 
 def prices(domain: Domain, outline: Array) -> Array:

@@ -59,6 +59,26 @@ class Domain:
         found = np.einsum("kj,kjd->kd", shares, values[self.mesh.triangles[triangle]])
         return found, feet[:, :2]
 
+    def lattice(self, count: int) -> Array:
+        """Return about `count` points (k, 3) of the design, evenly spread, and its outline.
+
+        They are a square lattice on the flat image, and points on the outline at the same
+        distance from each other.
+        """
+        low, high = self.flat.min(axis=0), self.flat.max(axis=0)
+        area = abs(_enclosed(self.flat[self.outline]))
+        step = float(np.sqrt(area / count))
+        axes = [np.arange(a + 0.5 * step, b, step) for a, b in zip(low, high, strict=True)]
+        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        points, feet = self.sample(self.mesh.vertices, places)
+        inside = np.linalg.norm(feet - places, axis=1) < _TINY * self.margin
+        loop = self.flat[self.outline]
+        steps = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+        along = np.r_[0.0, np.cumsum(steps)]
+        # One vertex in each section of the outline, so that corners of coarse meshes stay.
+        chosen = np.unique(np.floor(along[:-1] / step), return_index=True)[1]
+        return np.concatenate([points[inside], self.mesh.vertices[self.outline[chosen]]])
+
     def points(self, places: Array) -> Array:
         """Return positions (k, 3); beyond the outline by quadratic extrapolation.
 

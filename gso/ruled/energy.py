@@ -1,0 +1,340 @@
+"""The energy of strips near a design: its value, gradient and second derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gso.mesh.closest_point import Nearest
+from gso.ruled.extended import Extended
+from gso.ruled.layout import Strips
+from gso.ruled.planarity import planarity
+from gso.ruled.system import System
+from gso.ruled.vectors import cross, lengths, unit
+from gso.typing import Array, Ints
+
+#: Samples across a strip, and at least across each of several.
+_SAMPLES, _LEAST = 8, 2
+#: Barycentric coordinates below this are on the opposite edge.
+_EDGE = 1e-9
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the energy, for designs whose diagonal is one.
+
+    Attributes
+    ----------
+    back : float
+        Mean squared distance of the strips from the design, beside that of the design from the
+        strips.
+    moved, bent : float
+        Second differences along the strip, of the displacement and of the position.
+    even : float
+        Second differences along the rulings, times the squared number of strips.
+    ends : float
+        Distance of the border curves from the continued outline.
+    gap : float
+        Missing distance between successive rulings.
+    least : float
+        The distance that they keep, relative to the mean.
+    planar : float
+        Squared distance between the diagonals of a quad; 0 where quads are planar exactly.
+    power : float
+        Power of the distances.
+    """
+
+    back: float = 1.0
+    moved: float = 1e-4
+    bent: float = 1e-7
+    even: float = 1e-2
+    ends: float = 1e-2
+    gap: float = 1e2
+    least: float = 0.1
+    planar: float = 0.0
+    power: float = 2.0
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What the energy depends on, at given vertices.
+
+    Attributes
+    ----------
+    triangle : ndarray of int, (p,)
+        Triangles of the strips nearest to the points of the design.
+    shares : ndarray, (p, 3)
+        Shares of their corners in the nearest points.
+    height : ndarray, (p,)
+        Signed distances of the points from the triangles' planes.
+    normal : ndarray, (t, 3)
+        Normals of all triangles.
+    beyond : ndarray of int, (b,)
+        Points beyond the border of the strips.
+    way : ndarray, (b, 3)
+        Tangential vectors from these points to the nearest points.
+    back, back_normal, back_weight : ndarray, (f, s), (f, s, 3), (f, s)
+        Signed distances of samples of the faces from the design, its normals, and weights.
+    up : ndarray, (f, 3)
+        Mean normals of the design at the faces.
+    gap, side : ndarray, (f, 2), (f, 3)
+        Signed distances between both ends of a face's rulings, and their direction.
+    off, across : ndarray, (o, 3), (o, 3, 3)
+        Offsets of the border curves from the continued outline, and projections across it.
+    """
+
+    triangle: Ints
+    shares: Array
+    height: Array
+    normal: Array
+    beyond: Ints
+    way: Array
+    back: Array
+    back_normal: Array
+    back_weight: Array
+    up: Array
+    gap: Array
+    side: Array
+    off: Array
+    across: Array
+
+
+class Energy:
+    """The energy of strips of one layout near a design.
+
+    Parameters
+    ----------
+    design : Extended
+        The design, continued beyond its outline.
+    strips : Strips
+        The layout.
+    start : ndarray, (n, 3)
+        Positions that displacements refer to.
+    points : ndarray, (p, 3)
+        Points of the design whose distances are minimised.
+    width : float, optional
+        Mean width of the faces; that of the start when not given.
+    """
+
+    def __init__(
+        self,
+        design: Extended,
+        strips: Strips,
+        start: Array,
+        points: Array,
+        width: float | None = None,
+    ):
+        self.design, self.strips, self.start, self.points = design, strips, start, points
+        self.system = System(strips)
+        count = max(_LEAST, -(-_SAMPLES // strips.count))
+        t = (np.arange(count) + 0.5) / count
+        #: Shares (s, 4) of the corners in the samples half-way between two rulings.
+        self._share = 0.5 * np.stack([1 - t, t, 1 - t, t], axis=1)
+        self._along = np.stack([t - 1, -t, 1 - t, t], axis=1)
+        if width is None:
+            a, b = start[strips.sides].transpose(1, 0, 2)
+            width = float(lengths(b - a).mean())
+        self.width = width
+        self._rulings = len(strips.index[0])
+        c = strips.corners
+        self._same = np.stack([c[:, 0] == c[:, 2], c[:, 1] == c[:, 3]], axis=1)
+        self._face_places = self.system.blocks(c)
+        self._triangle_places = self.system.blocks(strips.split[0])
+        self._outer_places = self.system.blocks(strips.outer[:, None])
+        self._second = self._constant()
+
+    # -- measures -----------------------------------------------------------------------------
+
+    def measure(self, vertices: Array) -> Measured:
+        """Find the nearest points of the strips, and those of the design."""
+        triangles, _ = self.strips.split
+        which, shares, foot = Nearest.of(vertices, triangles).locate(self.points)
+        corner = vertices[triangles]
+        normal = unit(cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
+        own = normal[which]
+        away = foot - self.points
+        height = np.einsum("kd,kd->k", away, own)
+        beyond = np.flatnonzero(((shares < _EDGE) & self.strips.open[which]).any(axis=1))
+        way = away[beyond] - height[beyond, None] * own[beyond]
+
+        corner = vertices[self.strips.corners]
+        x = self._share @ corner
+        vector = cross(self._along @ corner, 0.5 * (corner[:, 1] - corner[:, 0] + corner[:, 3] - corner[:, 2])[:, None])
+        feet, up, share = self.design.feet(x.reshape(-1, 3))
+        up = up.reshape(x.shape)
+        back = np.einsum("fsd,fsd->fs", x - feet.reshape(x.shape), up)
+        area = lengths(vector)
+        weight = area * share.reshape(area.shape)
+        weight /= max(float(weight.sum()), 1e-300)
+        mean = unit(np.einsum("fsd,fs->fd", up, area))
+        gap, side = self.gaps(vertices, mean)
+        ends = vertices[self.strips.outer]
+        near, tangent = self.design.rim_feet(ends)
+        across = np.eye(3) - tangent[:, :, None] * tangent[:, None]
+        off = np.einsum("kij,kj->ki", across, ends - near)
+        return Measured(
+            which, shares, height, normal, beyond, way, back, up, weight, mean, gap, side, off, across
+        )
+
+    def gaps(self, vertices: Array, up: Array) -> tuple[Array, Array]:
+        """Return the signed distances (f, 2) between both ends of a face's rulings.
+
+        They are measured across the rulings, in directions (f, 3) that are also returned. A
+        negative gap is a crossing. Ends that are one vertex count as far apart.
+
+        Parameters
+        ----------
+        up : ndarray, (f, 3)
+            Normals on the side from which gaps are positive.
+        """
+        p, q, p1, q1 = vertices[self.strips.corners].transpose(1, 0, 2)
+        side = unit(cross(q - p + q1 - p1, up))
+        gap = np.stack(
+            [np.einsum("fd,fd->f", p1 - p, side), np.einsum("fd,fd->f", q1 - q, side)], axis=1
+        )
+        return np.where(self._same, np.inf, gap), side
+
+    # -- value and derivatives ----------------------------------------------------------------
+
+    def value(self, vertices: Array, m: Measured, w: Weights, weight: Array, scale: float) -> float:
+        """Return the energy, with the given weights of the faces' samples."""
+        total = _sum(np.abs(m.height) / scale, w.power) / len(self.points) * scale**2
+        total += w.back * float((weight * (np.abs(m.back) / scale) ** w.power).sum()) * scale**2
+        total += 0.5 * self._linear(vertices, w)[0]
+        total += w.ends / len(m.off) * float((m.off**2).sum())
+        total += float((m.way**2).sum()) / len(self.points)
+        short = np.minimum(m.gap - w.least * self.width, 0.0)
+        total += w.gap / self._rulings * float((short**2).sum())
+        if w.planar:
+            value, _ = planarity(vertices[self.system.quads])
+            total += w.planar / self._rulings * float((value**2).sum())
+        return total
+
+    def derivatives(
+        self, vertices: Array, m: Measured, w: Weights, scale: float
+    ) -> tuple[Array, Array]:
+        """Return the gradient (n, 3) and the second derivatives in band storage.
+
+        Second derivatives of the nearest points and of planarity are left out (Gauss-Newton).
+        """
+        gradient = np.zeros_like(vertices)
+        parts = [
+            self._there(gradient, m, w, scale),
+            self._beyond(gradient, m),
+            self._faces(gradient, vertices, m, w, scale),
+        ]
+        gradient += self._linear(vertices, w)[1]
+        factor = 2.0 * w.ends / len(m.off)
+        gradient[self.strips.outer] += factor * m.off
+        parts.append((self._outer_places, factor * m.across))
+        matrix = self.system.matrix(parts)
+        for key, _, band in self._second:
+            matrix += getattr(w, key) * band
+        return gradient, matrix
+
+    def _there(self, gradient: Array, m: Measured, w: Weights, scale: float) -> tuple[Ints, Array]:
+        """Distances of the design's points from the triangles' planes."""
+        triangles, _ = self.strips.split
+        count = len(triangles)
+        first, second = _power(m.height, w.power, scale, 1.0 / len(self.points))
+        at, n = m.triangle, m.normal
+        share = np.ascontiguousarray(m.shares.T)
+        local = np.stack([np.bincount(at, first * s, count) for s in share], axis=1)
+        _add(gradient, triangles, local[:, :, None] * n[:, None])
+        moments = np.empty((count, 3, 3))
+        for i in range(3):
+            weighted = second * share[i]
+            for j in range(i, 3):
+                moments[:, i, j] = np.bincount(at, weighted * share[j], count)
+                moments[:, j, i] = moments[:, i, j]
+        return self._triangle_places, np.einsum("tij,td,te->tidje", moments, n, n)
+
+    def _beyond(self, gradient: Array, m: Measured) -> tuple[Ints, Array]:
+        """Tangential distances of points beyond the border."""
+        corners = self.strips.split[0][m.triangle[m.beyond]]
+        shares = m.shares[m.beyond]
+        factor = 2.0 / len(self.points)
+        row = (shares[:, :, None] * unit(m.way)[:, None]).reshape(len(shares), 9)
+        _add(gradient, corners, factor * shares[:, :, None] * m.way[:, None])
+        return self.system.blocks(corners), factor * row[:, :, None] * row[:, None]
+
+    def _faces(
+        self, gradient: Array, vertices: Array, m: Measured, w: Weights, scale: float
+    ) -> tuple[Ints, Array]:
+        """Distances of the faces from the design, gaps and planarity."""
+        corners = self.strips.corners
+        first, second = _power(m.back, w.power, scale, w.back * m.back_weight)
+        slope = self._share[None, :, :, None] * m.back_normal[:, :, None, :]
+        slope = slope.reshape(len(corners), len(self._share), 12)
+        local = np.matmul(first[:, None], slope)[:, 0]
+        block = np.matmul((second[:, :, None] * slope).transpose(0, 2, 1), slope)
+        short = np.minimum(m.gap - w.least * self.width, 0.0)
+        factor = 2.0 * w.gap / self._rulings
+        for end in (0, 1):
+            k = np.flatnonzero(short[:, end] < 0.0)
+            row = np.zeros((k.size, 4, 3))
+            row[:, end], row[:, 2 + end] = -m.side[k], m.side[k]
+            row = row.reshape(-1, 12)
+            local[k] += factor * short[k, end, None] * row
+            block[k] += factor * row[:, :, None] * row[:, None]
+        if w.planar:
+            quad = self.strips.quads
+            value, by = planarity(vertices[self.system.quads])
+            row = by.reshape(-1, 12)
+            factor = 2.0 * w.planar / self._rulings
+            local[quad] += factor * value[:, None] * row
+            block[quad] += factor * row[:, :, None] * row[:, None]
+        _add(gradient, corners, local.reshape(-1, 4, 3))
+        return self._face_places, block
+
+    # -- second differences -------------------------------------------------------------------
+
+    def _constant(self) -> list[tuple[str, Array, Array]]:
+        """Second differences: (name of the weight, operator, band storage of the Hessian)."""
+        from scipy.sparse import csr_matrix
+
+        out = []
+        along = 1.0 / (self._rulings * self.width**2)
+        across = self.strips.count / self._rulings
+        kinds = [("moved", self.strips.along, along), ("bent", self.strips.along, along)]
+        if len(self.strips.across):
+            kinds.append(("even", self.strips.across, across))
+        for key, triples, factor in kinds:
+            rows = np.repeat(np.arange(len(triples)), 3)
+            values = np.tile([1.0, -2.0, 1.0], len(triples))
+            matrix = csr_matrix((values, (rows, triples.ravel())), (len(triples), self.strips.size))
+            operator = 2.0 * factor * (matrix.T @ matrix).tocsr()
+            block = 2.0 * factor * np.outer([1.0, -2.0, 1.0], [1.0, -2.0, 1.0])
+            block = np.kron(block, np.eye(3))
+            places = self.system.blocks(triples)
+            values = np.broadcast_to(block, (len(triples), 9, 9))
+            out.append((key, operator, self.system.matrix([(places, values)])))
+        return out
+
+    def _linear(self, vertices: Array, w: Weights) -> tuple[float, Array]:
+        """Return twice the quadratic energy of the second differences, and its gradient."""
+        total, gradient = 0.0, np.zeros_like(vertices)
+        for key, operator, _ in self._second:
+            x = vertices - self.start if key == "moved" else vertices
+            slope = getattr(w, key) * (operator @ x)
+            total += float((x * slope).sum())
+            gradient += slope
+        return total, gradient
+
+
+def _sum(sizes: Array, power: float) -> float:
+    return float((sizes**power).sum())
+
+
+def _power(height: Array, power: float, scale: float, weight: float | Array) -> tuple[Array, Array]:
+    """Return first and second derivatives of weight * scale**2 * abs(height / scale)**power."""
+    size = weight * (np.abs(height) / scale) ** (power - 2)
+    return power * size * height, power * (power - 1) * size
+
+
+def _add(gradient: Array, ids: Ints, values: Array) -> None:
+    """Add values (k, c, 3) to the rows of vertices (k, c)."""
+    flat = ids.ravel()
+    for d in range(3):
+        gradient[:, d] += np.bincount(flat, values[:, :, d].ravel(), len(gradient))

@@ -1,0 +1,178 @@
+"""The combinatorics of strips: which vertices are the corners of which planar faces.
+
+A layout numbers the vertices of all strips; their positions (n, 3) are passed separately.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from gso.typing import Array, Flags, Ints
+
+
+def _no_faces() -> Ints:
+    return np.empty((0, 4), np.int64)
+
+
+@dataclass(frozen=True)
+class Strips:
+    """Strips of quads between successive rulings, and flat triangles between strips.
+
+    A face has four corners: both ends of its part of a ruling, then both of the next ruling.
+    Where two ends are one vertex, the face is a triangle.
+
+    Attributes
+    ----------
+    index : tuple of ndarray of int, (r, k + 1) each
+        For each sequence of rulings, the vertices of the rulings where they cross the k + 1
+        border curves and creases, which divide it into k strips side by side.
+    flats : ndarray of int, (g, 4)
+        Triangles between three sequences, whose sides are rulings; the first corner is repeated
+        as the third.
+    """
+
+    index: tuple[Ints, ...]
+    flats: Ints = field(default_factory=_no_faces)
+
+    @classmethod
+    def sequence(cls, rulings: int, strips: int = 1) -> Strips:
+        """Return the layout of strips side by side without merged vertices."""
+        return cls((np.arange(rulings * (strips + 1)).reshape(rulings, strips + 1),))
+
+    @property
+    def count(self) -> int:
+        """Number of strips side by side."""
+        return self.index[0].shape[1] - 1
+
+    @cached_property
+    def size(self) -> int:
+        """Number of vertices."""
+        return 1 + max(int(i.max()) for i in self.index)
+
+    @cached_property
+    def corners(self) -> Ints:
+        """Corners (f, 4) of the faces: of each sequence, ruling by ruling; the flats last.
+
+        Between rulings that are the same there is no face.
+        """
+        parts = []
+        for index in self.index:
+            here, ahead = index[:-1], index[1:]
+            sides = [here[:, :-1], here[:, 1:], ahead[:, :-1], ahead[:, 1:]]
+            parts.append(np.stack(sides, axis=2).reshape(-1, 4))
+        out = np.concatenate([*parts, self.flats])
+        return out[(out[:, 0] != out[:, 2]) | (out[:, 1] != out[:, 3])]
+
+    @cached_property
+    def quads(self) -> Ints:
+        """Numbers of the faces with four different corners."""
+        c = self.corners
+        return np.flatnonzero((c[:, 0] != c[:, 2]) & (c[:, 1] != c[:, 3]))
+
+    @cached_property
+    def along(self) -> Ints:
+        """Triples (s, 3) of vertices that follow each other on border curves and creases."""
+        parts = [np.stack([i[:-2], i[1:-1], i[2:]], axis=2).reshape(-1, 3) for i in self.index]
+        return _different(np.concatenate(parts))
+
+    @cached_property
+    def across(self) -> Ints:
+        """Triples (s, 3) of vertices that follow each other on rulings."""
+        parts = [
+            np.stack([i[:, :-2], i[:, 1:-1], i[:, 2:]], axis=2).reshape(-1, 3) for i in self.index
+        ]
+        return _different(np.concatenate(parts))
+
+    @cached_property
+    def sides(self) -> Ints:
+        """Vertices (e, 2) that follow each other on border curves and creases, if different."""
+        pairs = [np.stack([i[:-1], i[1:]], axis=2).reshape(-1, 2) for i in self.index]
+        out = np.concatenate(pairs)
+        return out[out[:, 0] != out[:, 1]]
+
+    @cached_property
+    def outer(self) -> Ints:
+        """Vertices on the border curves."""
+        return np.unique(np.concatenate([i[:, [0, -1]].ravel() for i in self.index]))
+
+    @cached_property
+    def split(self) -> tuple[Ints, Ints]:
+        """Triangles (t, 3) of the faces, and the number of the face of each (t,)."""
+        ids = self.corners[:, [[0, 1, 3], [0, 3, 2]]]
+        true = (ids[:, :, 0] != ids[:, :, 1]) & (ids[:, :, 0] != ids[:, :, 2])
+        true &= ids[:, :, 1] != ids[:, :, 2]
+        face, half = np.nonzero(true)
+        return ids[face, half], face
+
+    @cached_property
+    def hinges(self) -> tuple[Ints, Ints, Ints]:
+        """Pairs of faces (h,), (h,) that share a ruling, and the ends (h, 2) of the rulings."""
+        c = self.corners
+        sides = [c[:, [0, 1]], c[:, [2, 3]]]
+        face = [np.arange(len(c))] * 2
+        if len(self.flats):
+            # The third side of a flat triangle.
+            sides.append(self.flats[:, [1, 3]])
+            face.append(np.arange(len(c) - len(self.flats), len(c)))
+        return _shared(np.concatenate(sides), np.concatenate(face))
+
+    @cached_property
+    def creases(self) -> tuple[Ints, Ints, Ints]:
+        """Pairs of faces (h,), (h,) that share an edge of a crease, and its ends (h, 2)."""
+        c = self.corners[: len(self.corners) - len(self.flats)]
+        face = np.arange(len(c))
+        return _shared(np.concatenate([c[:, [0, 2]], c[:, [1, 3]]]), np.concatenate([face, face]))
+
+    @cached_property
+    def open(self) -> Flags:
+        """Whether the edges (t, 3) opposite the corners of the triangles are on the border."""
+        triangles, _ = self.split
+        pairs = triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+        key = pairs.min(axis=1) * self.size + pairs.max(axis=1)
+        _, which, count = np.unique(key, return_inverse=True, return_counts=True)
+        return (count[which] == 1).reshape(-1, 3)
+
+    def halved(self, vertices: Array) -> tuple[Strips, Array]:
+        """Halve all strips along their length; planar quads stay planar."""
+        index, parts, size = [], [vertices], len(vertices)
+        for old in self.index:
+            pairs = np.stack([old[:, :-1], old[:, 1:]], axis=2)
+            new = np.empty((len(old), 2 * old.shape[1] - 1), np.int64)
+            new[:, ::2] = old
+            distinct, which = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
+            new[:, 1::2] = (size + which).reshape(pairs.shape[:2])
+            parts.append(vertices[distinct].mean(axis=1))
+            size += len(distinct)
+            index.append(new)
+        return Strips(tuple(index), self.flats), np.concatenate(parts)
+
+    def merged(self, vertices: Array, pairs: Ints) -> tuple[Strips, Array]:
+        """Merge pairs (m, 2) of vertices, and what they are chained to, at their means."""
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
+        graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(self.size, self.size))
+        count, label = connected_components(graph, directed=False)
+        number = np.bincount(label, minlength=count)[:, None]
+        mean = np.stack([np.bincount(label, v, minlength=count) for v in vertices.T], 1) / number
+        index = tuple(label[i].astype(np.int64) for i in self.index)
+        return Strips(index, label[self.flats].astype(np.int64)), mean
+
+
+def _shared(sides: Ints, face: Ints) -> tuple[Ints, Ints, Ints]:
+    """Find the sides (s, 2) that two faces have in common."""
+    kept = sides[:, 0] != sides[:, 1]
+    sides, face = np.sort(sides[kept], axis=1), face[kept]
+    ends, which, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    which = which.ravel()
+    order = np.argsort(which, kind="stable")
+    first = np.r_[0, np.cumsum(count)[:-1]][count == 2]
+    return face[order[first]], face[order[first + 1]], ends[count == 2]
+
+
+def _different(triples: Ints) -> Ints:
+    same = (triples[:, :-1] == triples[:, 1:]).any(axis=1)
+    return triples[~same]

@@ -1,0 +1,339 @@
+"""Strips cut along the outline of the design.
+
+The outline and the holes of the design are projected to the strips, and the faces are clipped
+with them in the parameters of :mod:`gso.ruled.embedding`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gso.mesh.closest_point import Nearest
+from gso.ruled.embedding import plane
+from gso.ruled.extended import Extended
+from gso.ruled.layout import Strips
+from gso.ruled.unroll import Unrolled
+from gso.ruled.vectors import cross, lengths, unit
+from gso.typing import Array, Ints
+
+#: Barycentric coordinates below this are on the opposite edge; nodes on an edge that are closer
+#: to each other than this share of its length are one.
+_EDGE = 1e-9
+#: Number of times that the intersection of a normal with the strips is corrected, and the
+#: cosine of the angle between the normals below which it is not.
+_TURNS, _STEEP = 5, 0.2
+#: Distance of outline points from the simplified outline, relative to the diagonal.
+_STRAIGHT = 2e-4
+#: Pieces of faces below this area, relative to the squared diagonal, are left out.
+_SLIVER = 1e-10
+
+
+@dataclass(frozen=True)
+class Trimmed:
+    """Strips inside the outline of the design.
+
+    Attributes
+    ----------
+    vertices : ndarray, (n, 3)
+    faces : ndarray of int, (m, 4)
+        Quads and triangles, -1 as the fourth index of the latter.
+    face : ndarray of int, (m,)
+        Face of the untrimmed strips that each belongs to.
+    """
+
+    vertices: Array
+    faces: Ints
+    face: Ints
+
+
+def trimmed(target: Extended, strips: Strips, vertices: Array, unrolled: Unrolled) -> Trimmed:
+    """Cut strips along the boundary loops of a design.
+
+    The loops are moved to the strips along the design's normals.
+
+    Parameters
+    ----------
+    target : Extended
+        The design; its diagonal is one.
+    strips, vertices
+        Strips with planar faces.
+    unrolled : Unrolled
+        Their unrolling.
+    """
+    import shapely
+
+    place = plane(strips)
+    design, normals = target.domain.mesh, target.normals
+    triangles, _ = strips.split
+    step = float(np.median(lengths(np.diff(vertices[strips.sides], axis=1)[:, 0]))) / 3.0
+    rings = []
+    for loop in design.boundary_loops:
+        both = _dense(np.concatenate([design.vertices[loop], normals[loop]], axis=1), step)
+        which, shares = _along_normals(vertices, triangles, both[:, :3], both[:, 3:])
+        rings.append(shapely.Polygon(np.einsum("kj,kjd->kd", shares, place[triangles[which]])))
+    areas = shapely.area(rings)
+    outer = int(np.argmax(areas))
+    region = shapely.make_valid(rings[outer])
+    holes = [shapely.make_valid(ring) for k, ring in enumerate(rings) if k != outer]
+    if holes:
+        region = shapely.difference(region, shapely.union_all(holes))
+    c = strips.corners
+    cells = shapely.polygons(place[c[:, [0, 1, 3, 2]]])
+    pieces, which = shapely.get_parts(shapely.intersection(cells, region), return_index=True)
+    kept = (shapely.get_type_id(pieces) == 3) & (shapely.area(pieces) > 0)
+    nodes = _Nodes(strips, vertices, place)
+    polygons = [
+        (int(face), [nodes.ring(int(face), np.asarray(r.coords)[:-1]) for r in _rings(piece)])
+        for piece, face in zip(pieces[kept], which[kept], strict=True)
+    ]
+    return _meshed(polygons, nodes, unrolled)
+
+
+def _along_normals(
+    vertices: Array, triangles: Ints, points: Array, normals: Array
+) -> tuple[Ints, Array]:
+    """Find where lines through points along normals meet triangles.
+
+    The nearest point of the triangles is found first, and then, again and again, the nearest one
+    to the intersection of the line and the plane of the last triangle. Returns triangles and
+    barycentric coordinates; beyond the border, of the nearest points.
+    """
+    near = Nearest.of(vertices, triangles)
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    plane = unit(cross(b - a, c - a))
+    which, shares, foot = near.locate(points)
+    for _ in range(_TURNS):
+        own = plane[which]
+        slope = np.einsum("kd,kd->k", normals, own)
+        height = np.einsum("kd,kd->k", foot - points, own)
+        steep = np.abs(slope) < _STEEP
+        far = np.where(steep, 0.0, height / np.where(steep, 1.0, slope))
+        target = np.where(steep[:, None], foot, points + far[:, None] * normals)
+        which, shares, foot = near.locate(target)
+    return which, shares
+
+
+def _dense(loop: Array, step: float) -> Array:
+    """Interpolate values (n, 3 + d) at points along a closed polygon, which come first.
+
+    The distance of the points is at most a step.
+    """
+    edge = np.roll(loop, -1, axis=0) - loop
+    count = np.maximum(np.ceil(lengths(edge[:, :3]) / step), 1).astype(np.int64)
+    at = np.repeat(np.arange(len(loop)), count)
+    share = (np.arange(len(at)) - np.repeat(np.cumsum(count) - count, count)) / count[at]
+    return loop[at] + share[:, None] * edge[at]
+
+
+def _rings(piece) -> list:  # type: ignore[no-untyped-def, type-arg]
+    return [piece.exterior, *piece.interiors]
+
+
+class _Nodes:
+    """Vertices of clipped faces: corners of the strips, points of their edges, inner points."""
+
+    def __init__(self, strips: Strips, vertices: Array, place: Array):
+        self.strips, self.vertices, self.place = strips, vertices, place
+        self.points: list[Array] = []
+        self.inner: list[bool] = []
+        self._known: dict[tuple[int, int], list[tuple[float, int]]] = {}
+        self._corner: dict[int, int] = {}
+
+    def ring(self, face: int, ring: Array) -> list[int]:
+        """Return the nodes of a ring (k, 2) of a piece of a face."""
+        c = self.strips.corners[face]
+        best = np.full(len(ring), -np.inf)
+        shares = np.zeros((len(ring), 3))
+        ids = np.zeros((len(ring), 3), np.int64)
+        for three in ((0, 1, 3), (0, 3, 2)):
+            corner = c[list(three)]
+            if len(set(corner.tolist())) < 3:
+                continue
+            found = _barycentric(ring, self.place[corner])
+            better = found.min(axis=1) > best
+            best[better] = found[better].min(axis=1)
+            shares[better], ids[better] = found[better], corner
+        out: list[int] = []
+        for share, corner in zip(shares, ids, strict=True):
+            node = self._node(face, share, corner)
+            if not out or (node != out[-1] and node != out[0]):
+                out.append(node)
+        return out
+
+    def _node(self, face: int, share: Array, corner: Ints) -> int:
+        share = np.where(np.abs(share) < _EDGE, 0.0, share)
+        held = np.flatnonzero(share)
+        if held.size == 1:
+            vertex = int(corner[held[0]])
+            if vertex not in self._corner:
+                self._corner[vertex] = self._new(self.vertices[vertex], inner=False)
+            return self._corner[vertex]
+        if held.size == 2 and not self._is_diagonal(face, corner[held]):
+            (a, x), (b, y) = sorted(zip(corner[held].tolist(), share[held].tolist(), strict=True))
+            at = y / (x + y)
+            known = self._known.setdefault((a, b), [])
+            for other, node in known:
+                if abs(other - at) < _EDGE:
+                    return node
+            point = (1.0 - at) * self.vertices[a] + at * self.vertices[b]
+            known.append((at, self._new(point, inner=False)))
+            return known[-1][1]
+        share = share / share.sum()
+        return self._new(share @ self.vertices[corner], inner=True)
+
+    def _is_diagonal(self, face: int, pair: Ints) -> bool:
+        c = self.strips.corners[face]
+        quad = c[0] != c[2] and c[1] != c[3]
+        return bool(quad and set(pair.tolist()) == {int(c[0]), int(c[3])})
+
+    def _new(self, point: Array, *, inner: bool) -> int:
+        self.points.append(point)
+        self.inner.append(inner)
+        return len(self.points) - 1
+
+
+def _barycentric(points: Array, triangle: Array) -> Array:
+    a, b, c = triangle
+    u, v, w = b - a, c - a, points - a
+    det = u[0] * v[1] - u[1] * v[0]
+    second = (w[:, 0] * v[1] - w[:, 1] * v[0]) / det
+    third = (u[0] * w[:, 1] - u[1] * w[:, 0]) / det
+    return np.stack([1.0 - second - third, second, third], axis=1)
+
+
+def _meshed(
+    polygons: list[tuple[int, list[list[int]]]], nodes: _Nodes, unrolled: Unrolled
+) -> Trimmed:
+    """Divide the pieces into quads and triangles, in the plane where they are unrolled."""
+    import shapely
+
+    points, inner = np.array(nodes.points), np.array(nodes.inner)
+    faces: list[list[int]] = []
+    owner: list[int] = []
+    for face, rings in polygons:
+        every, flats = [], []
+        for ring in map(np.array, rings):
+            if len(ring) >= 3:
+                flat = unrolled.flat(np.full(len(ring), face), points[ring])
+                kept = _simplified(flat, inner[ring])
+                every.append(ring[kept])
+                flats.append(flat[kept])
+        if not every or len(every[0]) < 3 or abs(_area(flats[0])) < _SLIVER:
+            continue
+        if _area(flats[0]) < 0:
+            every[0], flats[0] = every[0][::-1], flats[0][::-1]
+        found = _divided(every, flats, inner)
+        faces += found
+        owner += [face] * len(found)
+    table = np.array(faces)
+    table, face_of = _connected(table, np.array(owner))
+    used = np.unique(table[table >= 0])
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
+    return Trimmed(points[used], np.where(table >= 0, number[table], -1), face_of)
+
+
+def _divided(rings: list[Ints], flats: list[Array], inner: Array) -> list[list[int]]:
+    """Divide a polygon with holes: a quad between its rulings if possible, and triangles."""
+    if len(rings) > 1:
+        whole = [k for k, ring in enumerate(rings) if k == 0 or len(ring) >= 3]
+        return _triangles([rings[k] for k in whole], [flats[k] for k in whole])
+    ring, flat = rings[0], flats[0]
+    if len(ring) == 3:
+        return [[*ring.tolist(), -1]]
+    ends = np.flatnonzero(~inner[ring])
+    if ends.size != 4 or not _convex(flat[ends]):
+        return _triangles(rings, flats)
+    out = [ring[ends].tolist()]
+    for a, b in zip(ends, np.roll(ends, -1), strict=True):
+        side = np.arange(a, (b if b > a else b + len(ring)) + 1) % len(ring)
+        if side.size == 2:
+            continue
+        if _area(flat[side]) < _SLIVER or not _outside(flat, side):
+            return _triangles(rings, flats)
+        out += _triangles([ring[side]], [flat[side]])
+    return out
+
+
+def _outside(flat: Array, side: Ints) -> bool:
+    """Return whether a chain of nodes stays to the right of the line between its ends."""
+    way, off = flat[side[-1]] - flat[side[0]], flat[side[1:-1]] - flat[side[0]]
+    return bool((way[0] * off[:, 1] - way[1] * off[:, 0] < 0).all())
+
+
+def _triangles(rings: list[Ints], flats: list[Array]) -> list[list[int]]:
+    """Triangulate a polygon with holes."""
+    import shapely
+
+    places = np.concatenate(flats).tolist()
+    node = {tuple(xy): k for xy, k in zip(places, np.concatenate(rings).tolist(), strict=True)}
+    out = []
+    piece = shapely.Polygon(flats[0], flats[1:])
+    for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(piece)):
+        xy = np.asarray(triangle.exterior.coords)[:3]
+        three = [node[tuple(p)] for p in xy.tolist()]
+        if abs(_area(xy)) > 1e-4 * _SLIVER:
+            out.append([*(three if _area(xy) > 0 else three[::-1]), -1])
+    return out
+
+
+def _connected(table: Ints, owner: Ints) -> tuple[Ints, Ints]:
+    """Keep the largest set of faces that are joined by edges."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    four = np.where(table >= 0, table, table[:, :1])
+    sides = np.stack([four, np.roll(four, -1, axis=1)], axis=2).reshape(-1, 2)
+    face = np.repeat(np.arange(len(table)), 4)
+    kept = sides[:, 0] != sides[:, 1]
+    low, high = sides[kept].min(axis=1), sides[kept].max(axis=1)
+    _, edge = np.unique(low * (table.max() + 1) + high, return_inverse=True)
+    shape = (len(table), int(edge.max()) + 1)
+    meets = coo_matrix((np.ones(len(edge)), (face[kept], edge)), shape=shape).tocsr()
+    _, label = connected_components(meets @ meets.T, directed=False)
+    most = label == np.bincount(label).argmax()
+    return table[most], owner[most]
+
+
+def _simplified(flat: Array, inner: Array) -> Ints:
+    """Leave out inner nodes of a ring that are on a straight line (Douglas and Peucker 1973)."""
+    n = len(flat)
+    fixed = np.flatnonzero(~inner)
+    if fixed.size == n:
+        return np.arange(n)
+    if fixed.size < 2:
+        far = int(np.abs((flat - flat[0]) @ np.array([1.0, 1j])).argmax())
+        fixed = np.unique(np.r_[fixed, 0, far])
+    kept = set(fixed.tolist())
+    todo = [(int(a), int(b)) for a, b in zip(fixed, np.roll(fixed, -1), strict=True)]
+    while todo:
+        a, b = todo.pop()
+        between = np.arange(a + 1, b if b > a else b + n)
+        if between.size == 0:
+            continue
+        way = flat[b] - flat[a]
+        off = flat[between % n] - flat[a]
+        size = float(np.hypot(*way))
+        if size > 0:
+            along = np.clip(off @ way / size**2, 0.0, 1.0)
+            off = off - along[:, None] * way
+        gap = np.hypot(off[:, 0], off[:, 1])
+        worst = int(gap.argmax())
+        if gap[worst] > _STRAIGHT:
+            at = int(between[worst] % n)
+            kept.add(at)
+            todo += [(a, at), (at, b)]
+    return np.array(sorted(kept))
+
+
+def _area(flat: Array) -> float:
+    x, y = flat.T
+    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+
+
+def _convex(flat: Array) -> bool:
+    edge = np.roll(flat, -1, axis=0) - flat
+    after = np.roll(edge, -1, axis=0)
+    return bool((edge[:, 0] * after[:, 1] - edge[:, 1] * after[:, 0] > 0).all())
