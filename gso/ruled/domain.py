@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from gso import geometry
@@ -45,6 +47,12 @@ class Domain:
         largest = int(np.abs(areas).argmax())
         loop = mesh.boundary_loops[largest]
         self.outline: Ints = loop if areas[largest] > 0 else loop[::-1]
+
+    def with_normals(self, normals: Array) -> Domain:
+        """Return the same domain with other normals (n, 3) at the vertices."""
+        other = copy(self)
+        other.normals = normals
+        return other
 
     def sample(self, values: Array, places: Array) -> tuple[Array, Array]:
         """Interpolate values (n, d) of the vertices at the nearest points to places (k, 2).

@@ -50,7 +50,7 @@ class Weights:
     bent: float = 1e-7
     even: float = 1e-2
     ends: float = 1e-2
-    gap: float = 1e2
+    gap: float = 5.0
     least: float = 0.1
     planar: float = 0.0
     power: float = 2.0

@@ -74,9 +74,9 @@ def single(job: Job, strips: Strips, start: Array) -> Fit:
     return _exact(job, _planar(job, Fit(strips, vertices, energy.width), start), _EXACT)
 
 
-def halved(job: Job, fit: Fit) -> Fit:
-    """Halve all strips along their length and fit again."""
-    strips, vertices = fit.strips.halved(fit.vertices)
+def halved(job: Job, fit: Fit, which: Ints | None = None) -> Fit:
+    """Halve strips along their length, all of them or those numbered, and fit again."""
+    strips, vertices = fit.strips.halved(fit.vertices, which)
     return _exact(job, Fit(strips, vertices, fit.width), _EXACT)
 
 

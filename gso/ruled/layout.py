@@ -67,6 +67,16 @@ class Strips:
         return out[(out[:, 0] != out[:, 2]) | (out[:, 1] != out[:, 3])]
 
     @cached_property
+    def column(self) -> Ints:
+        """Number of the strip of each face, side by side; 0 for the flats."""
+        size = sum((len(i) - 1) * self.count for i in self.index)
+        every = np.concatenate(
+            [np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, :-1], i[1:, 1:]], 2).reshape(-1, 4) for i in self.index]
+        )
+        kept = (every[:, 0] != every[:, 2]) | (every[:, 1] != every[:, 3])
+        return np.r_[(np.arange(size) % self.count)[kept], np.zeros(len(self.flats), np.int64)]
+
+    @cached_property
     def quads(self) -> Ints:
         """Numbers of the faces with four different corners."""
         c = self.corners
@@ -135,15 +145,14 @@ class Strips:
         _, which, count = np.unique(key, return_inverse=True, return_counts=True)
         return (count[which] == 1).reshape(-1, 3)
 
-    def halved(self, vertices: Array) -> tuple[Strips, Array]:
-        """Halve all strips along their length; planar quads stay planar."""
+    def halved(self, vertices: Array, which: Ints | None = None) -> tuple[Strips, Array]:
+        """Halve strips along their length, all or those numbered; planar quads stay planar."""
+        which = np.arange(self.count) if which is None else which
         index, parts, size = [], [vertices], len(vertices)
         for old in self.index:
-            pairs = np.stack([old[:, :-1], old[:, 1:]], axis=2)
-            new = np.empty((len(old), 2 * old.shape[1] - 1), np.int64)
-            new[:, ::2] = old
-            distinct, which = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
-            new[:, 1::2] = (size + which).reshape(pairs.shape[:2])
+            pairs = np.stack([old[:, which], old[:, which + 1]], axis=2)
+            distinct, number = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
+            new = np.insert(old, which + 1, size + number.reshape(pairs.shape[:2]), axis=1)
             parts.append(vertices[distinct].mean(axis=1))
             size += len(distinct)
             index.append(new)

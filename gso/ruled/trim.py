@@ -20,10 +20,14 @@ from gso.typing import Array, Ints
 
 #: Barycentric coordinates below this are on the opposite edge; nodes on an edge that are closer
 #: to each other than this share of its length are one.
-_EDGE = 1e-9
+_EDGE = 1e-5
+#: Grid of the parameters, to which intersections are rounded.
+_GRID = 1e-9
 #: Number of times that the intersection of a normal with the strips is corrected, and the
 #: cosine of the angle between the normals below which it is not.
 _TURNS, _STEEP = 5, 0.2
+#: Distance from a normal at which a point is not on it.
+_MISSED = 1e-6
 #: Distance of outline points from the simplified outline, relative to the diagonal.
 _STRAIGHT = 2e-4
 #: Pieces of faces below this area, relative to the squared diagonal, are left out.
@@ -72,16 +76,13 @@ def trimmed(target: Extended, strips: Strips, vertices: Array, unrolled: Unrolle
     for loop in design.boundary_loops:
         both = _dense(np.concatenate([design.vertices[loop], normals[loop]], axis=1), step)
         which, shares = _along_normals(vertices, triangles, both[:, :3], both[:, 3:])
-        rings.append(shapely.Polygon(np.einsum("kj,kjd->kd", shares, place[triangles[which]])))
-    areas = shapely.area(rings)
-    outer = int(np.argmax(areas))
-    region = shapely.make_valid(rings[outer])
-    holes = [shapely.make_valid(ring) for k, ring in enumerate(rings) if k != outer]
-    if holes:
-        region = shapely.difference(region, shapely.union_all(holes))
+        rings.append(_enclosed(np.einsum("kj,kjd->kd", shares, place[triangles[which]])))
+    outer = int(np.argmax(shapely.area(rings)))
+    holes = [ring for k, ring in enumerate(rings) if k != outer]
+    region = shapely.difference(rings[outer], shapely.union_all(holes)) if holes else rings[outer]
     c = strips.corners
     cells = shapely.polygons(place[c[:, [0, 1, 3, 2]]])
-    pieces, which = shapely.get_parts(shapely.intersection(cells, region), return_index=True)
+    pieces, which = shapely.get_parts(shapely.intersection(cells, region, grid_size=_GRID), return_index=True)
     kept = (shapely.get_type_id(pieces) == 3) & (shapely.area(pieces) > 0)
     nodes = _Nodes(strips, vertices, place)
     polygons = [
@@ -103,7 +104,7 @@ def _along_normals(
     near = Nearest.of(vertices, triangles)
     a, b, c = vertices[triangles].transpose(1, 0, 2)
     plane = unit(cross(b - a, c - a))
-    which, shares, foot = near.locate(points)
+    which, shares, foot = nearest = near.locate(points)
     for _ in range(_TURNS):
         own = plane[which]
         slope = np.einsum("kd,kd->k", normals, own)
@@ -112,7 +113,32 @@ def _along_normals(
         far = np.where(steep, 0.0, height / np.where(steep, 1.0, slope))
         target = np.where(steep[:, None], foot, points + far[:, None] * normals)
         which, shares, foot = near.locate(target)
+
+    def off(found: Array) -> Array:
+        return lengths(cross(found - points, normals))
+
+    # Lines that miss the triangles get the nearest points.
+    missed = off(foot) > off(nearest[2]) + _MISSED
+    which[missed], shares[missed] = nearest[0][missed], nearest[1][missed]
     return which, shares
+
+
+def _enclosed(ring: Array):  # type: ignore[no-untyped-def]
+    """Return the region around which a closed polygon (n, 2) turns, as a Shapely polygon."""
+    import shapely
+
+    simple = shapely.Polygon(ring)
+    if simple.is_valid:
+        return simple
+    parts = shapely.get_parts(shapely.polygonize([shapely.unary_union(shapely.LinearRing(ring))]))
+    z = ring @ np.array([1.0, 1j])
+    inside = []
+    for part in parts:
+        at = part.representative_point()
+        way = z - complex(at.x, at.y)
+        turns = np.angle(np.roll(way, -1) / way).sum() / (2.0 * np.pi)
+        inside.append(abs(turns) > 0.5)
+    return shapely.union_all(parts[np.array(inside, bool)])
 
 
 def _dense(loop: Array, step: float) -> Array:
@@ -137,6 +163,7 @@ class _Nodes:
     def __init__(self, strips: Strips, vertices: Array, place: Array):
         self.strips, self.vertices, self.place = strips, vertices, place
         self.points: list[Array] = []
+        self._places: list[Array] = []
         self.inner: list[bool] = []
         self._known: dict[tuple[int, int], list[tuple[float, int]]] = {}
         self._corner: dict[int, int] = {}
@@ -156,8 +183,10 @@ class _Nodes:
             best[better] = found[better].min(axis=1)
             shares[better], ids[better] = found[better], corner
         out: list[int] = []
-        for share, corner in zip(shares, ids, strict=True):
+        for xy, share, corner in zip(ring, shares, ids, strict=True):
             node = self._node(face, share, corner)
+            if node == len(self._places):
+                self._places.append(xy)
             if not out or (node != out[-1] and node != out[0]):
                 out.append(node)
         return out
@@ -182,6 +211,10 @@ class _Nodes:
             return known[-1][1]
         share = share / share.sum()
         return self._new(share @ self.vertices[corner], inner=True)
+
+    def parameters(self, ring: Ints) -> Array:
+        """Return the parameters (k, 2) of nodes."""
+        return np.array(self._places)[ring]
 
     def _is_diagonal(self, face: int, pair: Ints) -> bool:
         c = self.strips.corners[face]
@@ -213,18 +246,21 @@ def _meshed(
     faces: list[list[int]] = []
     owner: list[int] = []
     for face, rings in polygons:
-        every, flats = [], []
-        for ring in map(np.array, rings):
-            if len(ring) >= 3:
-                flat = unrolled.flat(np.full(len(ring), face), points[ring])
-                kept = _simplified(flat, inner[ring])
-                every.append(ring[kept])
-                flats.append(flat[kept])
-        if not every or len(every[0]) < 3 or abs(_area(flats[0])) < _SLIVER:
+        whole = [np.array(ring) for ring in rings if len(ring) >= 3]
+        if not whole or len(rings[0]) < 3:
+            continue
+        flat = [unrolled.flat(np.full(len(ring), face), points[ring]) for ring in whole]
+        kept = [_simplified(x, inner[ring]) for x, ring in zip(flat, whole, strict=True)]
+        every = [ring[at] for ring, at in zip(whole, kept, strict=True)]
+        flats = [x[at] for x, at in zip(flat, kept, strict=True)]
+        if len(every[0]) < 3 or abs(_area(flats[0])) < _SLIVER:
             continue
         if _area(flats[0]) < 0:
             every[0], flats[0] = every[0][::-1], flats[0][::-1]
         found = _divided(every, flats, inner)
+        if not found:
+            # Simplified, the piece intersects itself.
+            found = _triangles(whole, [nodes.parameters(ring) for ring in whole])
         faces += found
         owner += [face] * len(found)
     table = np.array(faces)
@@ -253,7 +289,10 @@ def _divided(rings: list[Ints], flats: list[Array], inner: Array) -> list[list[i
             continue
         if _area(flat[side]) < _SLIVER or not _outside(flat, side):
             return _triangles(rings, flats)
-        out += _triangles([ring[side]], [flat[side]])
+        more = _triangles([ring[side]], [flat[side]])
+        if not more:
+            return _triangles(rings, flats)
+        out += more
     return out
 
 
@@ -264,13 +303,15 @@ def _outside(flat: Array, side: Ints) -> bool:
 
 
 def _triangles(rings: list[Ints], flats: list[Array]) -> list[list[int]]:
-    """Triangulate a polygon with holes."""
+    """Triangulate a polygon with holes; nothing if it intersects itself."""
     import shapely
 
+    piece = shapely.Polygon(flats[0], flats[1:])
+    if not piece.is_valid:
+        return []
     places = np.concatenate(flats).tolist()
     node = {tuple(xy): k for xy, k in zip(places, np.concatenate(rings).tolist(), strict=True)}
     out = []
-    piece = shapely.Polygon(flats[0], flats[1:])
     for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(piece)):
         xy = np.asarray(triangle.exterior.coords)[:3]
         three = [node[tuple(p)] for p in xy.tolist()]

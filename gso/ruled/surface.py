@@ -1,0 +1,219 @@
+"""A ruled surface of planar faces, its rulings and its exact unrolling."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gso.mesh import Mesh
+from gso.mesh.closest_point import Nearest
+from gso.parametrization import beside, upright
+from gso.pattern import Pattern
+from gso.ruled.fit import Fit, Job
+from gso.ruled.layout import Strips
+from gso.ruled.trim import trimmed
+from gso.ruled.unroll import Unrolled
+from gso.ruled.vectors import lengths, unit
+from gso.typing import Array, Ints
+
+#: Largest edge of the triangles by which distances are measured, relative to the diagonal.
+_FINE, _MOST = 0.015, 5
+
+
+@dataclass(frozen=True)
+class Folds:
+    """Edges along which planar faces meet.
+
+    Attributes
+    ----------
+    edges : ndarray of int, (r, 2)
+        Their ends, as vertices of the mesh.
+    angles : ndarray, (r,)
+        Angles between the faces in radians: positive for mountain folds, which are convex on
+        the outside of the surface, negative for valley folds.
+    radii : ndarray, (r,)
+        Radius of the bend that a fold stands for, at the end where it is smaller, in the
+        mesh's unit; infinite where there is no fold.
+    """
+
+    edges: Ints
+    angles: Array
+    radii: Array
+
+    @property
+    def smallest_radius(self) -> float:
+        """The smallest radius; infinite without folds."""
+        return float(self.radii.min(initial=np.inf))
+
+    @property
+    def largest_angle(self) -> float:
+        """The largest angle, regardless of its sign, in radians."""
+        return float(np.abs(self.angles).max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class RuledSurface:
+    """An exactly developable surface: planar faces between straight rulings.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The surface. Faces between the same two rulings are coplanar.
+    strip : ndarray of int, (m,)
+        Strip that each face belongs to: strips side by side are separate parts of the pattern.
+    rulings : Folds
+        The lines to bend along, inside the outline.
+    creases : Folds
+        The edges of the curves between strips side by side; empty for a single strip.
+    pattern : Pattern
+        The exact unrolling. Creases are cut.
+    moved : ndarray, (n, 3)
+        The design's vertices, moved to the nearest points of the surface.
+    crossed : int
+        Number of pairs of successive rulings that cross.
+    """
+
+    mesh: Mesh
+    strip: Ints
+    rulings: Folds
+    creases: Folds
+    pattern: Pattern
+    moved: Array
+    crossed: int
+
+    @property
+    def strips(self) -> int:
+        """Number of strips side by side."""
+        return int(self.strip.max()) + 1
+
+    def fine(self) -> Mesh:
+        """Return the surface with its faces divided into small triangles, to measure distances."""
+        import igl
+
+        v, f = self.mesh.vertices, self.mesh.triangles
+        longest = float(lengths(v[f] - v[np.roll(f, 1, axis=1)]).max())
+        levels = int(np.ceil(np.log2(longest / (_FINE * self.mesh.diagonal))))
+        levels = min(max(levels, 0), _MOST)
+        return Mesh(*igl.upsample(np.ascontiguousarray(v), f.astype(np.int64), levels))
+
+    def transformed(self, move: Any, scale: float, back: Any) -> RuledSurface:
+        """Return the surface in another frame.
+
+        Parameters
+        ----------
+        move : callable
+            Maps points (k, 3) by a similarity transform.
+        scale : float
+            Its factor.
+        back : callable
+            Maps the rows of `moved` to another numbering.
+        """
+        return replace(
+            self,
+            mesh=self.mesh.replaced(move(self.mesh.vertices)),
+            rulings=replace(self.rulings, radii=scale * self.rulings.radii),
+            creases=replace(self.creases, radii=scale * self.creases.radii),
+            pattern=replace(self.pattern, flat=scale * self.pattern.flat),
+            moved=move(back(self.moved)),
+        )
+
+
+def built(job: Job, fit: Fit) -> RuledSurface:
+    """Trim and unroll strips."""
+    strips, vertices = fit.strips, fit.vertices
+    measured = job.energy(strips, vertices, fit.width).measure(vertices)
+    unrolled = Unrolled(strips, vertices, measured.up)
+    cut = trimmed(job.target, strips, vertices, unrolled)
+    mesh = Mesh(cut.vertices, cut.faces)
+    part = unrolled.part[cut.face]
+    place = Nearest.of(vertices, strips.split[0])
+    _, _, moved = place.locate(job.target.domain.mesh.vertices)
+    rulings, creases = _folds(strips, vertices, unrolled, mesh, cut.face)
+    return RuledSurface(
+        mesh=mesh,
+        strip=part,
+        rulings=rulings,
+        creases=creases,
+        pattern=_pattern(mesh, cut.face, part, unrolled),
+        moved=moved,
+        crossed=int((measured.gap <= 0).any(axis=1).sum()),
+    )
+
+
+def _folds(
+    strips: Strips, vertices: Array, unrolled: Unrolled, mesh: Mesh, owner: Ints
+) -> tuple[Folds, Folds]:
+    he = mesh.half_edges
+    k = np.flatnonzero((he.twin >= 0) & (he.origin < he.dest))
+    one, two = owner[he.face[k]], owner[he.face[he.twin[k]]]
+    k, one, two = k[one != two], one[one != two], two[one != two]
+    edges = np.stack([he.origin[k], he.dest[k]], axis=1)
+    n = unrolled.normals
+    sine = lengths(n[one] - n[two])
+    angle = 2.0 * np.arcsin(np.clip(0.5 * sine, 0.0, 1.0))
+    middle = vertices[strips.corners].mean(axis=1)
+    away = middle[two] - middle[one]
+    angle = np.where(np.einsum("kd,kd->k", n[two] - n[one], away) < 0, -angle, angle)
+    width = 0.5 * sum(_widths(strips, vertices, mesh.vertices[edges], face) for face in (one, two))
+    with np.errstate(divide="ignore"):
+        radius = np.asarray(width).min(axis=1) / (2.0 * np.sin(0.5 * np.abs(angle)))
+    a, b, _ = strips.creases
+    size = len(strips.corners)
+    crease = np.isin(
+        np.minimum(one, two) * size + np.maximum(one, two), np.minimum(a, b) * size + np.maximum(a, b)
+    )
+    every = [Folds(edges[at], angle[at], radius[at]) for at in (~crease, crease)]
+    return every[0], replace(every[1], radii=np.zeros(int(crease.sum())))
+
+
+def _widths(strips: Strips, vertices: Array, ends: Array, face: Ints) -> Array:
+    """Return the distances (r, 2) of the ends of rulings from the other ruling of a face."""
+    p, q, p1, q1 = vertices[strips.corners[face]].transpose(1, 0, 2)
+    found = []
+    for a, b in ((p, q), (p1, q1)):
+        way = unit(b - a)
+        off = ends - a[:, None]
+        off = off - np.einsum("red,rd->re", off, way)[:, :, None] * way[:, None]
+        found.append(lengths(off))
+    # The ruling itself is at no distance.
+    own = found[0].max(axis=1) < found[1].max(axis=1)
+    return np.where(own[:, None], found[1], found[0])
+
+
+def _pattern(mesh: Mesh, owner: Ints, part: Ints, unrolled: Unrolled) -> Pattern:
+    faces = mesh.faces
+    face, corner = np.nonzero(faces >= 0)
+    ids = faces[face, corner]
+    count = len(mesh.vertices)
+    # A vertex has one copy in each part.
+    key, first, which = np.unique(
+        part[face] * count + ids, return_index=True, return_inverse=True
+    )
+    table = np.full_like(faces, -1)
+    table[face, corner] = which.ravel()
+    flat = unrolled.flat(owner[face[first]], mesh.vertices[ids[first]])
+    label = part[face[first]]
+    pieces = [upright(flat[label == k])[:, ::-1] * [1.0, -1.0] for k in range(int(part.max()) + 1)]
+    for k, piece in enumerate(beside(pieces)):
+        flat[label == k] = piece
+    return Pattern(flat, table, key % count, _seams(mesh, table))
+
+
+def _seams(mesh: Mesh, table: Ints) -> Ints:
+    """Return the pairs of pattern edges that are one edge of the surface."""
+    he = mesh.half_edges
+    k = np.flatnonzero((he.twin >= 0) & (he.origin < he.dest))
+    ends = []
+    for half in (k, he.twin[k]):
+        rows, own = mesh.faces[he.face[half]], table[he.face[half]]
+        ends.append(
+            [
+                np.take_along_axis(own, (rows == v[:, None]).argmax(axis=1)[:, None], 1)[:, 0]
+                for v in (he.origin[k], he.dest[k])
+            ]
+        )
+    pairs = np.stack([np.stack(e, axis=1) for e in ends], axis=1)
+    return pairs[(pairs[:, 0] != pairs[:, 1]).any(axis=1)]
+
