@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from gso.tasks.denoise import Options as DenoiseOptions
     from gso.tasks.developable import Options as DevelopableOptions
     from gso.tasks.developable.isometry import Options as IsometryOptions
+    from gso.tasks.developable.ruled import Options as RuledOptions
     from gso.tasks.flatten import Options as FlattenOptions
     from gso.tasks.options import Options
 
@@ -76,6 +77,7 @@ __all__ = [
     "PlanarFaces",
     "Progress",
     "Result",
+    "RuledOptions",
     "SlidingBoundary",
     "Status",
     "SymmetryPlane",
@@ -131,6 +133,7 @@ _NAMES = {
 _OPTIONS = {
     "DevelopableOptions": "gso.tasks.developable",
     "IsometryOptions": "gso.tasks.developable.isometry",
+    "RuledOptions": "gso.tasks.developable.ruled",
     "FlattenOptions": "gso.tasks.flatten",
     "DenoiseOptions": "gso.tasks.denoise",
     "BendOptions": "gso.tasks.bend",

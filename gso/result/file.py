@@ -16,6 +16,7 @@ from gso.mesh import Mesh
 from gso.mesh.attributes import Attributes
 from gso.pattern import Pattern
 from gso.result.result import Result
+from gso.ruled.surface import RuledSurface
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
 from gso.typing import Array
@@ -55,9 +56,13 @@ def arrays(result: Result) -> dict[str, Any]:
         "vertices": result.mesh.vertices,
         "faces": result.design.faces,
     }
+    if result.ruled is not None:
+        out |= result.ruled.arrays()
+        out["vertices"] = result.ruled.moved
     if result.flat is not None:
         out["flat"] = result.flat
-    if result.pattern is not None and result.pattern.flat is not result.flat:
+    own = result.pattern is not None and result.pattern.flat is not result.flat
+    if result.pattern is not None and own and result.ruled is None:
         out |= {f"pattern_{name}": getattr(result.pattern, name) for name in _PATTERN}
     if result.cell_scale is not None:
         out["cell_scale"] = result.cell_scale
@@ -88,16 +93,20 @@ def read(path: str | PathLike[str]) -> Result:
             raise MeshError(f"{path} was written by another version (format {record['format']})")
         said = Attributes.from_arrays(data, data["faces"])
         design = Mesh(data["design"], data["faces"], attributes=said)
-        pattern = _pattern(data, design)
+        pattern = None if "ruled_faces" in data else _pattern(data, design)
         same = len(data["vertices"]) == len(design.vertices)
         result = _read(
             record,
             design,
             design.replaced(data["vertices"]) if same or pattern is None else pattern.mesh,
-            _checked(data, "flat", (len(design.vertices), 2)),
+            None if "ruled_faces" in data else _checked(data, "flat", (len(design.vertices), 2)),
             _checked(data, "cell_scale", (len(design.faces),)),
             pattern,
         )
+        result.ruled = RuledSurface.from_arrays(data, result.mesh.vertices)
+        if result.ruled is not None:
+            result.mesh, result.pattern = result.ruled.mesh, result.ruled.pattern
+            result.flat = None if result.pattern.is_cut else result.pattern.flat
         result.spline = BSplineSurface.from_arrays(data)
         label = _checked(data, "component", (len(design.vertices),))
         if label is not None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Pattern
+from gso.ruled.surface import Folds, RuledSurface
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
 from gso.typing import Array
@@ -83,6 +84,10 @@ class Result:
         solved once.
     names : ndarray of int, (n,), or None
         In the result of a component: indices of its vertices in the whole mesh.
+    ruled : RuledSurface or None
+        For the formulation "ruled": the surface with its rulings, creases and exact pattern. Then
+        `mesh` is a mesh of its own, `pattern` its unrolling, and :meth:`on_design` has the
+        design's vertices moved onto it.
     """
 
     task: str
@@ -105,6 +110,7 @@ class Result:
     pattern: Pattern | None = None
     components: list[Result] = field(default_factory=list)
     names: NDArray[np.int64] | None = None
+    ruled: RuledSurface | None = None
 
     def __post_init__(self) -> None:
         if self.pattern is None and self.flat is not None:
@@ -143,9 +149,18 @@ class Result:
         )
 
     @property
+    def rulings(self) -> Folds | None:
+        """The lines to bend along, for the formulation "ruled"; otherwise None."""
+        return None if self.ruled is None else self.ruled.rulings
+
+    def on_design(self) -> Mesh:
+        """Return the design with its vertices moved onto the result."""
+        return self.mesh if self.ruled is None else self.design.replaced(self.ruled.moved)
+
+    @property
     def grid(self) -> Array | None:
         """The result as (H, W, 3) when the input is a grid, otherwise None."""
-        return self.mesh.grid
+        return self.on_design().grid
 
     @property
     def flat_grid(self) -> Array | None:
@@ -166,6 +181,8 @@ class Result:
             areas = [area(part.design) for part in self.components]
             return combined([part.metrics for part in self.components], areas)
         module, pattern = tasks.get(self.task), self.pattern
+        if self.ruled is not None:
+            return module.ruled_metrics(self.design, self.ruled)
         if pattern is not None and getattr(module, "BLOCK", "surface") == "flat":
             if pattern.is_cut:
                 surface = pattern.surface(self.design)
@@ -205,7 +222,8 @@ class Result:
                 )
             surface = self.mesh if self.task == "developable" else self.design
             outline = self.pattern.surface(surface)
-            io.save_flat(self.pattern.flat, outline, path, unit=unit)
+            bends = () if self.ruled is None else self.ruled.bend_lines
+            io.save_flat(self.pattern.flat, outline, path, unit=unit, lines=bends)
         elif f".{suffix}" in io.SPLINE_SUFFIXES:
             if any(part.spline is not None for part in self.components):
                 raise MeshError(

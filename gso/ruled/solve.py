@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gso import metrics
 from gso.ruled.chords import chords
 from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
@@ -128,7 +127,7 @@ def _first(job: Job, normals: Array, rulings: int) -> Fit:
 
 def _found(job: Job, fit: Fit, start: str) -> Found:
     surface = built(job, fit)
-    far = metrics.surface_distance(job.target.domain.mesh, surface.fine())
+    far = surface.distances(job.target.domain.mesh)
     return Found(
         surface,
         max(far.there_mean, far.back_mean),

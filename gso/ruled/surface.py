@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from gso import metrics
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.parametrization import beside, upright
@@ -15,11 +17,14 @@ from gso.ruled.fit import Fit, Job
 from gso.ruled.layout import Strips
 from gso.ruled.trim import trimmed
 from gso.ruled.unroll import Unrolled
-from gso.ruled.vectors import lengths, unit
+from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Ints
 
-#: Largest edge of the triangles by which distances are measured, relative to the diagonal.
-_FINE, _MOST = 0.015, 5
+#: Names of the arrays in files.
+_FOLDS, _PARTS = ("rulings", "creases"), ("edges", "angles", "radii")
+_PATTERN = ("flat", "faces", "vertex", "seams")
+#: Spacing of the samples by which distances are measured, relative to the diagonal.
+_FINE = 0.012
 
 
 @dataclass(frozen=True)
@@ -88,15 +93,97 @@ class RuledSurface:
         """Number of strips side by side."""
         return int(self.strip.max()) + 1
 
-    def fine(self) -> Mesh:
-        """Return the surface with its faces divided into small triangles, to measure distances."""
-        import igl
+    @property
+    def bend_lines(self) -> list[Array]:
+        """The rulings in the pattern, (2, 2) each."""
+        pattern = self.pattern
+        inner = pattern.mesh.half_edges
+        k = np.flatnonzero((inner.twin >= 0) & (inner.origin < inner.dest))
+        ends = np.stack([inner.origin[k], inner.dest[k]], axis=1)
+        count = len(self.mesh.vertices)
+        key, rulings = (
+            np.sort(e, axis=1) @ [count, 1] for e in (pattern.vertex[ends], self.rulings.edges)
+        )
+        return list(pattern.flat[ends[np.isin(key, rulings)]])
 
+    def arrays(self) -> dict[str, Array]:
+        """Return the surface as arrays by name, except `moved`; see :meth:`from_arrays`."""
+        out: dict[str, Any] = {
+            "ruled_vertices": self.mesh.vertices,
+            "ruled_faces": self.mesh.faces,
+            "ruled_strip": self.strip,
+            "ruled_crossed": np.array(self.crossed),
+        }
+        for name in _FOLDS:
+            folds: Folds = getattr(self, name)
+            out |= {f"ruled_{name}_{part}": getattr(folds, part) for part in _PARTS}
+        return out | {f"ruled_pattern_{part}": getattr(self.pattern, part) for part in _PATTERN}
+
+    @classmethod
+    def from_arrays(cls, data: Mapping[str, Array], moved: Array) -> RuledSurface | None:
+        """Return the surface that :meth:`arrays` describes; None if there is none.
+
+        Raises
+        ------
+        KeyError, ValueError
+            Arrays are missing or do not fit each other.
+        """
+        if "ruled_faces" not in data:
+            return None
+        mesh = Mesh(data["ruled_vertices"], data["ruled_faces"])
+        pattern = Pattern(*(data[f"ruled_pattern_{part}"] for part in _PATTERN))
+        folds = [Folds(*(data[f"ruled_{name}_{part}"] for part in _PARTS)) for name in _FOLDS]
+        for ids, end in (
+            (pattern.faces, len(pattern.flat)),
+            (pattern.vertex, len(mesh.vertices)),
+            (pattern.seams, len(pattern.flat)),
+            *((fold.edges, len(mesh.vertices)) for fold in folds),
+        ):
+            if ids.dtype.kind not in "iu" or (ids.size and not -1 <= ids.min() <= ids.max() < end):
+                raise ValueError("the arrays of the ruled surface do not fit each other")
+        if pattern.faces.shape != mesh.faces.shape or len(data["ruled_strip"]) != len(mesh.faces):
+            raise ValueError("the arrays of the ruled surface do not fit each other")
+        crossed = int(data["ruled_crossed"])
+        return cls(mesh, data["ruled_strip"], folds[0], folds[1], pattern, moved, crossed)
+
+    def samples(self) -> tuple[Array, Array]:
+        """Return points (k, 3) all over the surface, and their shares (k,) of its area.
+
+        The last points, on the edges, have no share.
+        """
         v, f = self.mesh.vertices, self.mesh.triangles
-        longest = float(lengths(v[f] - v[np.roll(f, 1, axis=1)]).max())
-        levels = int(np.ceil(np.log2(longest / (_FINE * self.mesh.diagonal))))
-        levels = min(max(levels, 0), _MOST)
-        return Mesh(*igl.upsample(np.ascontiguousarray(v), f.astype(np.int64), levels))
+        step = _FINE * self.mesh.diagonal
+        a, b, c = _by_longest_side(v, f)
+        long, area = lengths(b - a), 0.5 * lengths(cross(b - a, c - a))
+        rows = np.ceil(long / step).astype(np.int64)
+        columns = np.ceil(2.0 * area / (long * step)).astype(np.int64)
+        count = rows * columns
+        at = np.repeat(np.arange(len(f)), count)
+        k = np.arange(len(at)) - np.repeat(np.cumsum(count) - count, count)
+        s, t = (k % rows[at] + 0.5) / rows[at], (k // rows[at] + 0.5) / columns[at]
+        # A square with its far side shrunk to a point; t is chosen so that areas are equal.
+        t = 1.0 - np.sqrt(1.0 - t)
+        inner = a[at] + (s * (1.0 - t))[:, None] * (b - a)[at] + t[:, None] * (c - a)[at]
+        edges = self.mesh.edges
+        parts = np.ceil(lengths(v[edges[:, 1]] - v[edges[:, 0]]) / step).astype(np.int64)
+        on = np.repeat(np.arange(len(edges)), parts)
+        share = (np.arange(len(on)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[on]
+        p, q = v[edges[on]].transpose(1, 0, 2)
+        border = p + share[:, None] * (q - p)
+        weight = np.r_[(area / count)[at], np.zeros(len(border))]
+        return np.concatenate([inner, border, v]), np.r_[weight, np.zeros(len(v))] / area.sum()
+
+    def distances(self, design: Mesh) -> metrics.Distances:
+        """Measure the distances from a design, in its unit, all over both surfaces.
+
+        "There" is from the surface to the design, "back" from the design's vertices to it.
+        """
+        points, weight = self.samples()
+        there = metrics.point_to_surface(points, design)
+        back = metrics.point_to_surface(design.vertices[design.used], self.mesh)
+        return metrics.Distances(
+            float(weight @ there), float(there.max()), float(back.mean()), float(back.max())
+        )
 
     def transformed(self, move: Any, scale: float, back: Any) -> RuledSurface:
         """Return the surface in another frame.
@@ -118,6 +205,14 @@ class RuledSurface:
             pattern=replace(self.pattern, flat=scale * self.pattern.flat),
             moved=move(back(self.moved)),
         )
+
+
+def _by_longest_side(v: Array, f: Ints) -> tuple[Array, Array, Array]:
+    """Return the corners (t, 3) of triangles, the longest side between the first two."""
+    side = lengths(v[np.roll(f, -1, axis=1)] - v[f])
+    first = side.argmax(axis=1)[:, None]
+    a, b, c = (v[np.take_along_axis(f, (first + k) % 3, axis=1)[:, 0]] for k in range(3))
+    return a, b, c
 
 
 def built(job: Job, fit: Fit) -> RuledSurface:

@@ -14,6 +14,7 @@ from gso.energy.losses import Loss
 from gso.mesh import Mesh
 from gso.mesh.cutting import Cut
 from gso.pattern import Pattern
+from gso.ruled.surface import RuledSurface
 from gso.status import Status
 from gso.tasks.imposed import Imposed
 from gso.tasks.options import Options
@@ -185,6 +186,8 @@ class Plan:
     cut : Cut, optional
         The cuts made to open the design. The flat image is then that of the cut mesh, in its
         numbering.
+    convert : callable, optional
+        Makes the result from the solution of the stages, unless the solve was cancelled.
     """
 
     layout: Layout
@@ -200,6 +203,7 @@ class Plan:
     cold_start: Callable[[], Array] | None = None
     start_refused: str = ""
     cut: Cut | None = None
+    convert: Callable[[Solution], Solution] | None = None
 
 
 @dataclass
@@ -224,6 +228,9 @@ class Solution:
         Vertices that the first spline of that stage was fitted to.
     cut : Cut, optional
         As in the plan.
+    ruled : RuledSurface, optional
+        The result as a ruled surface, where it is one; the block "surface" has the design's
+        vertices moved onto it.
     stage : Stage, optional
         The stage that was solved last; None if none was.
     coordinates : ndarray
@@ -241,6 +248,7 @@ class Solution:
     fitted: Array | None = None
     cut: Cut | None = None
     stage: Stage | None = None
+    ruled: RuledSurface | None = None
 
     @property
     def points(self) -> Array:

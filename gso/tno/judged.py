@@ -39,7 +39,8 @@ def judged(result: Result, asked: Asked) -> Result:
     `seconds` gets entries "pattern" and "verdict". If there are reasons against the result, a
     status that does not refuse it becomes ``Status.UNUSABLE``. Each reason becomes a note.
     """
-    if result.task == "developable" and np.isfinite(result.mesh.vertices).all():
+    known = result.ruled is not None
+    if result.task == "developable" and not known and np.isfinite(result.mesh.vertices).all():
         clock = time.perf_counter()
         result.pattern = lay_out(result.mesh, result.pattern)
         result.seconds["pattern"] = time.perf_counter() - clock

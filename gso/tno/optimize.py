@@ -15,7 +15,7 @@ import numpy as np
 from gso import linalg, tasks
 from gso.components import several
 from gso.constraints import TIGHT, Compiled, Constraint, compile_constraints
-from gso.errors import ConvergenceWarning, OptionError
+from gso.errors import ConvergenceWarning, MeshError, OptionError
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.result import Result
@@ -71,7 +71,8 @@ def optimize(
         `flatten` and `conformal` they apply to the flat image.
     max_deviation : float, optional
         `developable`: the largest distance between result and design, in both directions, in
-        the mesh's unit. The result is as developable as this bound allows.
+        the mesh's unit. The result is as developable as this bound allows; by "ruled" it has as
+        few strips as it allows.
     max_strain : float, optional
         `developable`: the largest principal strain, max ``|s - 1|``, of the result's flat
         pattern, such as 0.005. The displacement is the smallest that reaches it, or stays
@@ -137,6 +138,11 @@ def optimize(
         module.check_iterations(bounds)
     one = partial(_solved, asked)
     pieces = components.parts(design, whole.constraints)
+    if pieces and chosen == "ruled":
+        raise MeshError(
+            f"the formulation 'ruled' takes one surface, and this mesh has {len(pieces)} "
+            "components: solve each on its own"
+        )
     if pieces:
         result = components.solve(one, whole, pieces, callback)
     else:
@@ -301,6 +307,14 @@ def packed(
     else:
         mesh = design.replaced(np.c_[flat, np.zeros(len(design.vertices))])
     seconds = run.timings.as_dict()
+    ruled = None
+    if solution.ruled is not None:
+        seconds["strips"] = run.converting
+        ruled = solution.ruled.transformed(
+            frame.frame.to_user, frame.frame.scale, lambda rows: frame.back("surface", rows)
+        )
+        mesh, pattern = ruled.mesh, ruled.pattern
+        flat = None if pattern.is_cut else pattern.flat
     spline, details = None, dict(solution.details)
     lengths = getattr(tasks.get(task), "LENGTHS", ())
     details |= {name: details[name] * frame.frame.scale for name in lengths if name in details}
@@ -326,4 +340,5 @@ def packed(
         notes=design.notes + solution.notes,
         details=details,
         spline=spline,
+        ruled=ruled,
     )

@@ -74,6 +74,8 @@ class Run:
     ----------
     start_refused : str
         Why the start was not used; empty if it was.
+    converting : float
+        Seconds that plans took to make their results from the solutions of their stages.
     """
 
     def __init__(
@@ -99,6 +101,7 @@ class Run:
         self.history: list[Progress] = []
         self.timings = Timings()
         self.iterations = 0
+        self.converting = 0.0
 
     def __call__(self, request: Request) -> Solution:
         """Plan and solve the stages."""
@@ -113,6 +116,15 @@ class Run:
 
     def solve(self, plan: Plan, options: Options) -> Solution:
         """Solve the stages of a plan, and post-process the coordinates."""
+        solution = self._solution(plan, options)
+        if plan.convert is None or solution.status is Status.CANCELLED:
+            return solution
+        clock = time.perf_counter()
+        solution = plan.convert(solution)
+        self.converting += time.perf_counter() - clock
+        return solution
+
+    def _solution(self, plan: Plan, options: Options) -> Solution:
         if not plan.stages:
             return _finished(plan, plan.start, plan.status or Status.CONVERGED)
         reached = self.through(plan, options)

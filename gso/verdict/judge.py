@@ -10,8 +10,8 @@ import numpy as np
 from gso import tasks
 from gso.status import Status
 from gso.verdict.asked import Asked
-from gso.verdict.shape import against_pattern, against_surface
-from gso.verdict.tasks import TASKS
+from gso.verdict.shape import against_itself, against_pattern, against_surface
+from gso.verdict.tasks import TASKS, ruled
 from gso.wording import places
 
 if TYPE_CHECKING:
@@ -52,9 +52,13 @@ def _reasons(result: Result, asked: Asked) -> Iterator[str]:
         surface = result.design
     else:
         surface = result.mesh
-        if result.status is not Status.ALREADY_GOOD:
+        if result.ruled is not None:
+            yield from against_itself(surface)
+        elif result.status is not Status.ALREADY_GOOD:
             yield from against_surface(result.design, surface)
     if pattern is not None:
         yield from against_pattern(surface, pattern, lengths=result.task not in _STRETCHED)
-    if result.task in TASKS:
+    if result.ruled is not None:
+        yield from ruled(result, asked)
+    elif result.task in TASKS:
         yield from TASKS[result.task](result, asked)

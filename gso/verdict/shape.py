@@ -32,6 +32,16 @@ def against_surface(design: Mesh, surface: Mesh) -> Iterator[str]:
     yield from _collapsed(design, surface.vertices, "the surface")
 
 
+def against_itself(surface: Mesh) -> Iterator[str]:
+    """Check a surface that has not the faces of its design for folds and self-intersections."""
+    bad = faults.folded(surface)
+    if bad.size:
+        yield f"the surface is folded onto itself at {places('face', bad)}"
+    pairs = faults.crossings(surface)
+    if pairs.size:
+        yield f"the surface passes through itself at {places('face', np.unique(pairs))}"
+
+
 def against_pattern(surface: Mesh, pattern: Pattern, *, lengths: bool = True) -> Iterator[str]:
     """Check the pattern of a surface for inverted faces and overlaps.
 

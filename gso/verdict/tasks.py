@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 _SAME = 0.01
 #: Strain from which on no pattern fits a face: it is squeezed to a line, doubled or inverted.
 _WHOLE = 0.99
+#: Strain of an exactly developable surface: rounding errors.
+_EXACT = 1e-9
 #: Distance from the design, relative to the diagonal of its bounding box, beyond which a result is
 #: refused whatever limit was given. Displacement that constraints require is added.
 _FAR = 0.5
@@ -75,6 +77,28 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
         yield f"mean |K| is {after:.3g}, worse than the {before:.3g} of the input"
     elif after > (1.0 - _SAME) * before and not (strain is not None and strain <= DEVELOPABLE):
         yield f"nothing was done: mean |K| is {after:.3g}, as in the input"
+
+
+def ruled(result: Result, asked: Asked) -> Iterator[str]:
+    """Check that no rulings cross, and that the deviation is within its limit.
+
+    The measured values are stored in the result's details under "verdict".
+    """
+    surface = result.ruled
+    if surface is None:
+        return
+    far = surface.distances(result.design)
+    deviation = max(far.there_max, far.back_max)
+    found = {"deviation": deviation, **asked.limits, "strain_max": 0.0}
+    if result.pattern is not None:
+        strains = metrics.face_strains(result.pattern.surface(result.mesh), result.pattern.flat)
+        found["strain_max"] = float(np.nan_to_num(strains).max())
+    if asked.max_strain is not None or asked.max_deviation is not None:
+        found["allowed"] = asked.max_strain or _EXACT
+    result.details = {**result.details, "verdict": found}
+    if surface.crossed:
+        yield f"{surface.crossed} pairs of successive rulings cross"
+    yield from _limits(result.design.diagonal, deviation, asked)
 
 
 def _limits(diagonal: float, deviation: float, asked: Asked) -> Iterator[str]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gso.tasks.base import Plan, Request
-from gso.tasks.developable import isometry, schedule
+from gso.tasks.developable import isometry, ruled, schedule
 from gso.tasks.developable.analysis import Analysis
-from gso.tasks.developable.measures import flat_metrics, metrics
+from gso.tasks.developable.measures import flat_metrics, metrics, ruled_metrics
 from gso.tasks.developable.options import Options
 from gso.tasks.developable.search import check_bounds, check_iterations, search
 from gso.unknowns import ALONG
@@ -23,21 +23,29 @@ __all__ = [
     "flat_metrics",
     "metrics",
     "plan",
+    "ruled_metrics",
     "search",
 ]
 
-FORMULATIONS = ("curvature", "isometry")
+FORMULATIONS = ("curvature", "isometry", "ruled")
 #: The formulation that a preset belongs to.
 IMPLIES = {"jiang2020": "isometry"}
 #: Settings by formulation.
-OPTIONS = {"curvature": Options, "isometry": isometry.Options}
+OPTIONS = {"curvature": Options, "isometry": isometry.Options, "ruled": ruled.Options}
 
 
 def plan(analysis: Analysis, request: Request) -> Plan:
     """Plan the stages of the solve."""
     if request.formulation == "isometry":
         return isometry.plan(analysis, request, _before_isometry)
+    if request.formulation == "ruled":
+        return ruled.plan(analysis, request, _before_ruled)
     return schedule.plan(analysis, request)
+
+
+def _before_ruled(analysis: Analysis, request: Request) -> Plan:
+    """Plan the curvature solve whose normals the first rulings follow."""
+    return schedule.plan(analysis, replace(request, options=Options()))
 
 
 def _before_isometry(analysis: Analysis, request: Request) -> Plan:

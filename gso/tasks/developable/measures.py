@@ -6,6 +6,7 @@ import numpy as np
 
 from gso import metrics as measure
 from gso.mesh import Mesh
+from gso.ruled.surface import RuledSurface
 from gso.typing import Array
 
 
@@ -43,6 +44,30 @@ def curvature_metrics(before: Mesh, after: Mesh, scale: float) -> dict[str, floa
             "nonplanarity_max_before": float(measure.nonplanarity(before).max()),
         }
     return {name: value for name, value in found.items() if not np.isnan(value)}
+
+
+def ruled_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
+    """Compute the metrics of a ruled surface.
+
+    It has no Gaussian curvature, so there is none here. Distances are measured all over both
+    surfaces; each is the larger one of both directions.
+    """
+    true = surface.distances(design)
+    percent = 100.0 / design.diagonal
+    flat, sheet = surface.pattern.flat, surface.pattern.surface(surface.mesh)
+    return measure.strains(sheet, flat) | {
+        "distance_mean": percent * max(true.there_mean, true.back_mean),
+        "distance_max": percent * max(true.there_max, true.back_max),
+        "deviation_max": percent * true.there_max,
+        "d_H": measure.d_H(design, design.replaced(surface.moved)),
+        "fold_max": float(measure.dihedral_angles(surface.mesh).max(initial=0.0)),
+        "flipped_cells": float(measure.flips(sheet, flat)),
+        "strips": float(surface.strips),
+        "rulings": float(len(surface.rulings.edges)),
+        "rulings_crossed": float(surface.crossed),
+        "bend_radius_min": surface.rulings.smallest_radius,
+        "crease_angle_max": float(np.degrees(surface.creases.largest_angle)),
+    }
 
 
 def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict[str, float]:

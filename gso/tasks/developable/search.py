@@ -83,6 +83,9 @@ def search(
     asked = [free] if bound is None else [replace(request, max_displacement=bound), free]
     if not run.usable_start(*asked):
         request = replace(request, start=None)
+    if request.formulation == "ruled":
+        # Its own search over the number of strips; it has no strain.
+        return run(replace(request, max_displacement=bound)), request.formulation
     if target is not None:
         return reach(run, request, of_curvature(analysis, target))[0], request.formulation
     best: Any = None

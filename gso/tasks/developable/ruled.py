@@ -1,0 +1,147 @@
+"""Make a surface exactly developable: strips of planar quads between straight rulings.
+
+The mean squared distance between the design and the strips is minimised, in both directions, with
+small weights on the smoothness of the strips. See :mod:`gso.ruled`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gso import parametrization
+from gso.errors import MeshError, OptionError
+from gso.mesh.normals import vertex_normals
+from gso.status import Status
+from gso.tasks.base import Plan, Request, Solution
+from gso.tasks.developable.analysis import Analysis
+from gso.tasks.options import Options as BaseOptions
+
+#: Surfaces whose normals give first rulings.
+_STARTS = ("design", "curvature")
+
+
+@dataclass(frozen=True)
+class Options(BaseOptions):
+    """Settings of the developable task's formulation "ruled".
+
+    Attributes
+    ----------
+    strips : int, "auto" or None
+        Number of strips side by side, which share crease curves and are separate parts of the
+        pattern. "auto": as few as hold `max_deviation` and `max_crease`, at most 64. None:
+        "auto" where there is such a bound, else 1.
+    rulings : int
+        Number of rulings of a strip, some of them outside the outline.
+    max_crease : float or None
+        Largest angle at a crease between strips, in degrees.
+    starts : tuple of str
+        Surfaces whose normals give first rulings: "design", "curvature" (the result of that
+        formulation). The best result of all is kept. A warm start `x0` replaces "curvature".
+    """
+
+    PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
+        "fast": {"starts": ("design",)},
+        "balanced": {},
+        "accurate": {"rulings": 65},
+    }
+
+    strips: int | str | None = None
+    rulings: int = 33
+    max_crease: float | None = None
+    starts: tuple[str, ...] = _STARTS
+
+    def __post_init__(self) -> None:
+        from gso.ruled.solve import MOST
+
+        strips = self.strips
+        if isinstance(strips, str) or strips is None:
+            if strips not in ("auto", None):
+                raise OptionError(f"strips is {strips!r}; it must be a number, 'auto' or None")
+        elif not (isinstance(strips, int | np.integer) and 1 <= strips <= MOST):
+            raise OptionError(f"strips is {strips!r}; it must be 1 to {MOST}, 'auto' or None")
+        super().__post_init__()
+        if not 5 <= self.rulings <= 513:
+            raise OptionError(f"rulings is {self.rulings}; it must be 5 to 513")
+        if not self.starts or set(self.starts) - set(_STARTS):
+            raise OptionError(f"starts is {self.starts!r}; it must name some of {_STARTS}")
+
+
+def plan(
+    analysis: Analysis, request: Request, before: Callable[[Analysis, Request], Plan]
+) -> Plan:
+    """Plan the solve of `before` where its result is wanted, and then that for the strips.
+
+    Raises
+    ------
+    MeshError
+        The design is no disk, possibly with holes.
+    OptionError
+        There are constraints.
+    """
+    if not analysis.constraints.empty:
+        raise OptionError("the formulation 'ruled' takes no constraints yet; leave them out")
+    mesh = analysis.mesh
+    if not parametrization.flattens(mesh) or analysis.opened.cut is not None:
+        raise MeshError(
+            "the formulation 'ruled' needs a surface with a boundary that does not close around "
+            "itself and has no handles; cut it open, or take 'curvature'"
+        )
+    made = replace(request, max_displacement=None)
+    if request.start is not None:
+        first = before(analysis, replace(made, start=None))
+        first = replace(first, start=request.start.ravel(), stages=(), layout=first.layout)
+    elif "curvature" in request.options.starts:
+        first = before(analysis, made)
+    else:
+        first = replace(before(analysis, made), stages=(), start=mesh.vertices.ravel())
+    return replace(first, convert=partial(_converted, analysis, request), details={}, notes=())
+
+
+def _converted(analysis: Analysis, request: Request, before: Solution) -> Solution:
+    """Solve for the strips from the normals of the design and of another surface."""
+    from gso.ruled.domain import Domain
+    from gso.ruled.solve import Wanted, solve
+
+    options: Options = request.options
+    size = analysis.mesh.diagonal
+    mesh = analysis.mesh.replaced(analysis.mesh.vertices / size)
+    domain = Domain(mesh, parametrization.begin(mesh).flat)
+    starts = {"design": domain.normals} if "design" in options.starts else {}
+    surface = before.points
+    if not np.array_equal(surface, analysis.mesh.vertices):
+        name = "curvature" if request.start is None else "x0"
+        starts[name] = vertex_normals(analysis.mesh.replaced(surface))
+    bound = request.max_displacement
+    bounded = bound is not None or options.max_crease is not None
+    strips: Any = options.strips
+    if strips is None:
+        strips = "auto" if bounded else 1
+    wanted = Wanted(
+        None if strips == "auto" else int(strips),
+        options.rulings,
+        None if bound is None else bound / size,
+        None if options.max_crease is None else float(np.radians(options.max_crease)),
+    )
+    found, tried = solve(domain, starts or {"design": domain.normals}, wanted)
+    surface = found.surface.transformed(lambda points: size * points, size, lambda rows: rows)
+    missed = bounded and not wanted.met(found)
+    return replace(
+        before,
+        blocks={"surface": surface.moved},
+        coordinates=surface.moved.ravel(),
+        status=Status.TARGET_MISSED if missed else Status.CONVERGED,
+        energy={"distance": found.mean},
+        details={"strips": surface.strips, "rulings_from": found.start, "tried": _said(tried)},
+        ruled=surface,
+        stage=None,
+    )
+
+
+def _said(tried: dict[int, float]) -> str:
+    """Format the largest distances by number of strips."""
+    return "; ".join(f"{k}: {100 * far:.3g} %" for k, far in sorted(tried.items()))
