@@ -155,6 +155,12 @@ class Job:
 )
 @click.option("--formulation", metavar="NAME", help="Which energy; the task's own by default.")
 @click.option(
+    "--strips",
+    metavar="N",
+    help='developable by "ruled": number of strips side by side, or "auto" for as few as hold '
+    "--max-deviation. Implies --formulation ruled.",
+)
+@click.option(
     "--options",
     "preset",
     type=click.Choice(["fast", "balanced", "accurate", "jiang2020"]),
@@ -290,10 +296,19 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
     """Return keywords of :func:`gso.tno.optimize`, checked as far as possible without a mesh."""
     from gso.tno import check
 
+    if given["strips"] is not None and given["formulation"] is None:
+        given["formulation"] = "ruled"
     formulation, kind = tasks.choose(
         tasks.get(given["task"]), given["formulation"], given["preset"]
     )
     settings: Any = kind.coerce(given["preset"])
+    if given["strips"] is not None:
+        if formulation != "ruled":
+            raise OptionError(f"--strips goes with --formulation ruled, not {formulation!r}")
+        number = given["strips"]
+        settings = replace(settings, strips=int(number) if number.isdecimal() else number)
+    if formulation == "ruled" and _is_cad(out):
+        raise OptionError(f"{out}: ruled surfaces are not written to CAD files yet; write .obj")
     if given["backend"] is not None:
         settings = replace(settings, backend=given["backend"])
     # With bounds or constraints the mesh is optimised, and a spline is fitted to the result.

@@ -16,8 +16,8 @@ from gso.typing import Array, Ints
 
 #: Samples across a strip, and at least across each of several.
 _SAMPLES, _LEAST = 8, 2
-#: Barycentric coordinates below this are on the opposite edge.
-_EDGE = 1e-9
+#: Distance from the normal through the nearest point at which a point is beyond the face.
+_APART = 1e-9
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,8 @@ class Weights:
         strips.
     moved, bent : float
         Second differences along the strip, of the displacement and of the position.
+    fold : float
+        Bending: squared changes of the normal at rulings, times length over mean width.
     even : float
         Second differences along the rulings, times the squared number of strips.
     ends : float
@@ -48,6 +50,7 @@ class Weights:
     back: float = 1.0
     moved: float = 1e-4
     bent: float = 1e-7
+    fold: float = 1e-6
     even: float = 1e-2
     ends: float = 1e-2
     gap: float = 5.0
@@ -71,7 +74,7 @@ class Measured:
     normal : ndarray, (t, 3)
         Normals of all triangles.
     beyond : ndarray of int, (b,)
-        Points beyond the border of the strips.
+        Points whose nearest points are on the border of the strips, or on a ridge.
     way : ndarray, (b, 3)
         Tangential vectors from these points to the nearest points.
     back, back_normal, back_weight : ndarray, (f, s), (f, s, 3), (f, s)
@@ -82,6 +85,8 @@ class Measured:
         Signed distances between both ends of a face's rulings, and their direction.
     off, across : ndarray, (o, 3), (o, 3, 3)
         Offsets of the border curves from the continued outline, and projections across it.
+    turn, stiff : ndarray, (h, 3), (h,)
+        Changes of the normal at rulings, and the length of the rulings over the mean width.
     """
 
     triangle: Ints
@@ -98,6 +103,8 @@ class Measured:
     side: Array
     off: Array
     across: Array
+    turn: Array
+    stiff: Array
 
 
 class Energy:
@@ -141,6 +148,9 @@ class Energy:
         self._same = np.stack([c[:, 0] == c[:, 2], c[:, 1] == c[:, 3]], axis=1)
         self._face_places = self.system.blocks(c)
         self._triangle_places = self.system.blocks(strips.split[0])
+        one, two, self._rulings_ends = strips.hinges
+        self._hinge = np.stack([one, two], axis=1)
+        self._hinge_places = self.system.blocks(c[self._hinge].reshape(-1, 8))
         self._outer_places = self.system.blocks(strips.outer[:, None])
         self._second = self._constant()
 
@@ -155,8 +165,9 @@ class Energy:
         own = normal[which]
         away = foot - self.points
         height = np.einsum("kd,kd->k", away, own)
-        beyond = np.flatnonzero(((shares < _EDGE) & self.strips.open[which]).any(axis=1))
-        way = away[beyond] - height[beyond, None] * own[beyond]
+        way = away - height[:, None] * own
+        beyond = np.flatnonzero((way * way).sum(axis=1) > _APART**2)
+        way = way[beyond]
 
         corner = vertices[self.strips.corners]
         x = self._share @ corner
@@ -173,9 +184,36 @@ class Energy:
         near, tangent = self.design.rim_feet(ends)
         across = np.eye(3) - tangent[:, :, None] * tangent[:, None]
         off = np.einsum("kij,kj->ki", across, ends - near)
+        one, two = self._face_normals(vertices)[0][self._hinge].transpose(1, 0, 2)
+        ends = vertices[self._rulings_ends]
+        stiff = lengths(ends[:, 1] - ends[:, 0]) / self.width
         return Measured(
-            which, shares, height, normal, beyond, way, back, up, weight, mean, gap, side, off, across
+            which,
+            shares,
+            height,
+            normal,
+            beyond,
+            way,
+            back,
+            up,
+            weight,
+            mean,
+            gap,
+            side,
+            off,
+            across,
+            # Normals may be on either side of the faces; the smaller change counts.
+            np.where((one * two).sum(axis=1, keepdims=True) < 0, one + two, one - two),
+            stiff,
         )
+
+    def _face_normals(self, vertices: Array) -> tuple[Array, Array, Array, Array]:
+        """Return unit normals (f, 3), lengths of their cross products, and the diagonals."""
+        p, q, p1, q1 = vertices[self.strips.corners].transpose(1, 0, 2)
+        first, second = q1 - p, q - p1
+        normal = cross(first, second)
+        size = np.maximum(lengths(normal), 1e-300)
+        return normal / size[:, None], size, first, second
 
     def gaps(self, vertices: Array, up: Array) -> tuple[Array, Array]:
         """Return the signed distances (f, 2) between both ends of a face's rulings.
@@ -204,6 +242,7 @@ class Energy:
         total += 0.5 * self._linear(vertices, w)[0]
         total += w.ends / len(m.off) * float((m.off**2).sum())
         total += float((m.way**2).sum()) / len(self.points)
+        total += w.fold * float(m.stiff @ (m.turn**2).sum(axis=1))
         short = np.minimum(m.gap - w.least * self.width, 0.0)
         total += w.gap / self._rulings * float((short**2).sum())
         if w.planar:
@@ -223,6 +262,7 @@ class Energy:
             self._there(gradient, m, w, scale),
             self._beyond(gradient, m),
             self._faces(gradient, vertices, m, w, scale),
+            self._folds(gradient, vertices, m, w),
         ]
         gradient += self._linear(vertices, w)[1]
         factor = 2.0 * w.ends / len(m.off)
@@ -251,7 +291,7 @@ class Energy:
         return self._triangle_places, np.einsum("tij,td,te->tidje", moments, n, n)
 
     def _beyond(self, gradient: Array, m: Measured) -> tuple[Ints, Array]:
-        """Tangential distances of points beyond the border."""
+        """Tangential distances of points beyond the border or a ridge."""
         corners = self.strips.split[0][m.triangle[m.beyond]]
         shares = m.shares[m.beyond]
         factor = 2.0 / len(self.points)
@@ -288,6 +328,27 @@ class Energy:
         _add(gradient, corners, local.reshape(-1, 4, 3))
         return self._face_places, block
 
+    def _folds(
+        self, gradient: Array, vertices: Array, m: Measured, w: Weights
+    ) -> tuple[Ints, Array]:
+        """Changes of the normal at rulings; changes of the rulings' lengths are left out."""
+        normal, size, first, second = self._face_normals(vertices)
+        by = np.empty((len(normal), 4, 3, 3))
+        by[:, 0], by[:, 1] = _skew(second), _skew(first)
+        by[:, 3], by[:, 2] = -by[:, 0], -by[:, 1]
+        across = (np.eye(3) - normal[:, :, None] * normal[:, None]) / size[:, None, None]
+        by = np.einsum("fij,fcjk->fick", across, by).reshape(-1, 3, 12)
+        one, two = self._hinge.T
+        same = np.where((normal[one] * normal[two]).sum(axis=1) < 0, -1.0, 1.0)
+        row = np.concatenate([by[one], -same[:, None, None] * by[two]], axis=2)
+        factor = 2.0 * w.fold * m.stiff
+        local = factor[:, None] * np.einsum("hi,hik->hk", m.turn, row)
+        corners = self.strips.corners[self._hinge].reshape(-1, 8)
+        _add(gradient, corners, local.reshape(-1, 8, 3))
+        return self._hinge_places, np.matmul(
+            (factor[:, None, None] * row).transpose(0, 2, 1), row
+        )
+
     # -- second differences -------------------------------------------------------------------
 
     def _constant(self) -> list[tuple[str, Array, Array]]:
@@ -321,6 +382,13 @@ class Energy:
             total += float((x * slope).sum())
             gradient += slope
         return total, gradient
+
+
+def _skew(a: Array) -> Array:
+    """Return matrices (k, 3, 3) of the cross products with vectors (k, 3) from the left."""
+    zero = np.zeros(len(a))
+    x, y, z = a.T
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
 
 
 def _sum(sizes: Array, power: float) -> float:

@@ -50,6 +50,9 @@ class System:
         """Number vertices and quads together by reverse Cuthill-McKee."""
         q = len(self.quads)
         cliques = [self.strips.corners, self.strips.along, self.strips.across]
+        one, two, _ = self.strips.hinges
+        corners = self.strips.corners
+        cliques.append(np.concatenate([corners[one], corners[two]], axis=1))
         cliques.append(np.column_stack([self.quads, n + np.arange(q)]))
         pairs = np.concatenate(
             [np.stack(np.broadcast_arrays(c[:, :, None], c[:, None]), 3).reshape(-1, 2) for c in cliques]
