@@ -1,15 +1,22 @@
-"""Strips of planar quads: their first rulings, their planarity, and their solve."""
+"""Exactly ruled surfaces: first rulings, planarity, the solve, trimming and unrolling."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from gso import parametrization
+import gso
+from gso import faults, parametrization
 from gso.mesh import Mesh
-from gso.ruled import fit, strip
+from gso.ruled import fit
 from gso.ruled.chords import chords, prices, resampled, sequence
+from gso.ruled.descent import planarised
 from gso.ruled.domain import Domain
+from gso.ruled.energy import Weights
+from gso.ruled.extended import Extended
+from gso.ruled.layout import Strips
+from gso.ruled.planarity import planarity
+from gso.ruled.system import System
 from tests.conftest import cylinder, saddle, shuffled
 
 
@@ -20,11 +27,11 @@ def domain(points) -> Domain:
 
 
 def bent_strip(count=9):
-    """A strip that is not planar, with rulings of a helicoid."""
+    """Vertices of a strip that is not planar, with rulings of a helicoid."""
     u = np.linspace(0.0, 1.0, count)
     way = np.stack([np.cos(0.5 * u), np.sin(0.5 * u), 0.2 * u], axis=1)
     first = np.stack([0 * u, 0.3 * u, u], axis=1)
-    return np.stack([first, first + way], axis=1)
+    return np.stack([first, first + way], axis=1).reshape(-1, 3)
 
 
 def test_design_continues_beyond_its_outline():
@@ -69,64 +76,210 @@ def test_chords_do_not_depend_on_numbering():
     np.testing.assert_allclose(lengths[1], lengths[0], atol=0.05)
 
 
-def test_jacobian_of_planarity_is_that_of_differences():
-    ends = strip.planarised(bent_strip())
-    value, slope = strip.planarity(ends)
+def test_outline_keeps_its_corners():
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    points, offsets = resampled(square, 50)
+    for corner in square:
+        k = np.linalg.norm(points - corner, axis=1).argmin()
+        np.testing.assert_array_equal(points[k], corner)
+        assert np.linalg.norm(offsets[k]) == pytest.approx(np.sqrt(2.0))
+
+
+def test_derivatives_of_planarity_are_those_of_differences():
+    strips = Strips.sequence(9)
+    vertices = planarised(System(strips), bent_strip())
+    value, slope = planarity(vertices[strips.corners])
     np.testing.assert_allclose(value, 0.0, atol=1e-14)
-    numeric = np.empty(slope.shape)
-    for k in range(ends.size):
-        step = np.zeros(ends.size)
-        step[k] = 1e-6
-        two, one = (strip.planarity(ends + f * step.reshape(ends.shape))[0] for f in (1, -1))
-        numeric[:, k] = (two - one) / 2e-6
-    np.testing.assert_allclose(slope.toarray(), numeric, atol=1e-6)
+    step = 1e-6 * np.random.default_rng(0).standard_normal(vertices.shape)
+    two, one = (planarity((vertices + s * step)[strips.corners])[0] for s in (1, -1))
+    wanted = np.einsum("qcd,qcd->q", slope, step[strips.corners])
+    np.testing.assert_allclose(0.5 * (two - one), wanted, atol=1e-11)
 
 
 def test_planar_strips_are_left_alone_and_others_become_planar():
-    ends = bent_strip()
-    assert np.abs(strip.planarity(ends)[0]).max() > 1e-4
-    planar = strip.planarised(ends)
-    corners = np.concatenate(strip.corners(planar, np.arange(8)), axis=1).reshape(8, 4, 3)
+    strips = Strips.sequence(9)
+    system, vertices = System(strips), bent_strip()
+    assert np.abs(planarity(vertices[strips.corners])[0]).max() > 1e-4
+    planar = planarised(system, vertices)
+    corners = planar[strips.corners]
     volume = np.linalg.det(corners[:, 1:] - corners[:, :1])
     np.testing.assert_allclose(volume, 0.0, atol=1e-14)
-    np.testing.assert_array_equal(strip.planarised(planar), planar)
+    np.testing.assert_array_equal(planarised(system, planar), planar)
 
 
-def test_nearest_places_are_the_feet():
-    ends = strip.planarised(bent_strip())
-    rng = np.random.default_rng(0)
-    quad, s, t = rng.integers(0, 8, 50), *rng.uniform(0.05, 0.95, (2, 50))
-    x, along, across = strip.surface(ends, strip.Places(quad, s, t))
-    normal = np.cross(along, across)
-    points = x + 1e-3 * normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    at, border = strip.nearest(ends, points)
-    assert not border.any()
-    np.testing.assert_allclose(strip.surface(ends, at)[0], x, atol=1e-6)
+def test_halved_strips_stay_planar_and_merged_ends_are_triangles():
+    strips = Strips.sequence(9)
+    planar = planarised(System(strips), bent_strip())
+    more, vertices = strips.halved(planar)
+    assert more.count == 2
+    np.testing.assert_allclose(planarity(vertices[more.corners])[0], 0.0, atol=1e-14)
+    fan, there = strips.merged(planar, np.array([[0, 2], [2, 4]]))
+    assert len(fan.corners) - len(fan.quads) == 2
+    assert fan.size == len(there) == strips.size - 2
 
 
-@pytest.mark.parametrize(("kind", "most"), [("cylinder", 0.003), ("saddle", 0.08)])
-def test_strips_are_planar_without_crossings_and_close(kind, most):
-    there = domain(cylinder(33) if kind == "cylinder" else saddle(33, strength=0.25))
-    ends, energy = fit.solve(there, 33)
-    assert np.abs(strip.planarity(ends)[0]).max() < 1e-14
-    assert (strip.gaps(ends, energy.up)[0] > 0).all()
-    far = strip.nearest_distances(ends, there.mesh.vertices)
-    assert far.mean() < 0.25 * most
-    assert far.max() < most
-
-
-def test_jacobian_of_the_energy_is_that_of_differences():
+@pytest.mark.parametrize("power", [2.0, 4.0])
+def test_gradient_of_the_energy_is_that_of_differences(power):
     there = domain(saddle(17, strength=0.25))
-    first, second = chords(there, 9)
-    energy = fit.Energy(there, first, second, np.arange(289))
-    ends = strip.planarised(energy.start)
+    one, two = chords(there, 9)
+    start = np.stack([there.points(one), there.points(two)], axis=1).reshape(-1, 3)
+    strips, vertices = Strips.sequence(9).halved(start)
+    energy = fit.Job(Extended(there), there.lattice(200)).energy(strips, vertices)
     rng = np.random.default_rng(0)
-    step = 1e-7 * rng.standard_normal(ends.shape)
-    (here, slope), *_ = energy._distance(ends)
-    (there_, _), *_ = energy._distance(ends + step)
-    # Feet at the edge of two quads may change the quad.
-    error = np.abs(there_ - here - slope @ step.ravel())
-    assert np.quantile(error, 0.9) < 1e-3 * np.abs(slope @ step.ravel()).max()
-    for parts in (energy._second(ends, 1e-4), energy._outline(ends, 1e-2)):
-        value, slope = parts
-        assert value.shape == (slope.shape[0],)
+    vertices = vertices + 1e-4 * rng.standard_normal(vertices.shape)
+    w, scale = Weights(power=power, back=0.0, gap=0.0, fold=1e-6), 0.01
+    measured = energy.measure(vertices)
+    gradient, _ = energy.derivatives(vertices, measured, w, scale)
+    step = 1e-7 * rng.standard_normal(vertices.shape)
+
+    def value(at):
+        return energy.value(at, energy.measure(at), w, measured.back_weight, scale)
+
+    change = 0.5 * (value(vertices + step) - value(vertices - step))
+    assert (gradient * step).sum() == pytest.approx(change, rel=2e-3)
+
+
+def checked(result, most):
+    """Check what must hold for each ruled surface, and its largest distance in per cent."""
+    surface, pattern = result.ruled, result.pattern
+    mesh, size = surface.mesh, result.design.diagonal
+    assert result.usable, result.reasons
+    assert surface.crossed == 0
+    assert result.metrics["distance_max"] < most
+    quads = mesh.faces[mesh.faces[:, 3] >= 0]
+    corner = mesh.vertices[quads]
+    normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    gap = np.einsum("qd,qd->q", corner[:, 1] - corner[:, 0], normal)
+    assert np.abs(gap).max(initial=0.0) < 1e-12 * size
+    sheet = pattern.surface(mesh)
+    ends = sheet.edges
+    there, flat = (
+        np.linalg.norm(np.subtract(*x[ends].transpose(1, 0, 2)), axis=1)
+        for x in (sheet.vertices, pattern.flat)
+    )
+    assert np.abs(there - flat).max() < 1e-12 * size
+    assert len(faults.overlaps(sheet, pattern.flat)) == 0
+    assert len(mesh.boundary_loops) == len(result.design.boundary_loops)
+
+
+@pytest.mark.parametrize(
+    ("points", "most"),
+    [(cylinder(33, turn=0.5), 0.4), (saddle(33, strength=0.25), 6.0)],
+    ids=["cylinder", "saddle"],
+)
+def test_ruled_surfaces_are_exactly_developable(points, most):
+    result = gso.tno.optimize(points, formulation="ruled")
+    checked(result, most)
+    assert result.flat.shape == (len(result.mesh.vertices), 2)
+    assert result.ruled.strips == 1
+    assert result.on_design().faces.shape == result.design.faces.shape
+
+
+def test_rulings_of_a_cylinder_have_its_direction_and_radius():
+    result = gso.tno.optimize(cylinder(65), options=gso.RuledOptions(rulings=33))
+    a, b = result.mesh.vertices[result.rulings.edges].transpose(1, 0, 2)
+    way = (b - a) / np.linalg.norm(b - a, axis=1, keepdims=True)
+    axis = np.linalg.svd(way)[2][0]
+    inner = slice(3, -3)
+    assert np.degrees(np.arccos(np.clip(np.abs(way @ axis), 0, 1)))[inner].max() < 1.0
+    # All folds are on one side.
+    angles = result.rulings.angles
+    assert (angles > 0).all() or (angles < 0).all()
+
+
+def bowl(count=33):
+    u = np.linspace(-1.0, 1.0, count)
+    return np.stack(np.broadcast_arrays(u[:, None], u, 0.3 * u[:, None] ** 2 + 0.1 * u**2), axis=-1)
+
+
+def test_more_strips_are_closer_and_share_creases():
+    points = bowl()
+    far = []
+    for strips in (1, 2, 3):
+        result = gso.tno.optimize(points, options=gso.RuledOptions(strips=strips))
+        checked(result, 6.0)
+        assert result.ruled.strips == strips
+        far.append(result.metrics["distance_mean"])
+        assert len(result.pattern.seams) == len(result.ruled.creases.edges)
+        assert (result.flat is None) == (strips > 1)
+    assert far[0] > far[1] > far[2]
+
+
+def test_as_few_strips_as_the_bound_allows():
+    mesh = Mesh.from_grid(bowl())
+    bound = 0.01 * mesh.diagonal
+    result = gso.tno.optimize(mesh, formulation="ruled", max_deviation=bound)
+    assert result.usable, result.reasons
+    tried = dict(x.split(": ") for x in result.details["tried"].split("; "))
+    fewer = [float(v.rstrip(" %")) for k, v in tried.items() if int(k) < result.ruled.strips]
+    assert result.ruled.strips > 1
+    assert all(far > 1.0 for far in fewer)
+
+
+def test_unreachable_bounds_are_said():
+    points = saddle(17, strength=0.5)
+    options = gso.RuledOptions(strips=1)
+    with pytest.warns(gso.ConvergenceWarning):
+        result = gso.tno.optimize(points, options=options, max_deviation=1e-4)
+    assert not result.usable
+    assert result.status is gso.Status.TARGET_MISSED
+    assert any("away from the input" in reason for reason in result.reasons)
+
+
+def test_triangles_holes_and_numbering():
+    mesh = shuffled(Mesh.from_grid(saddle(25, strength=0.2)))
+    four = mesh.faces[mesh.faces[:, 3] >= 0]
+    triangles = np.concatenate([four[:, :3], four[:, [0, 2, 3]]])
+    checked(gso.tno.optimize(Mesh(mesh.vertices, triangles), formulation="ruled"), 6.0)
+    grid = Mesh.from_grid(saddle(25, strength=0.2))
+    middle = grid.vertices[grid.faces].mean(axis=1)
+    away = np.linalg.norm((middle - middle.mean(axis=0))[:, :2], axis=1)
+    holed = Mesh(grid.vertices, grid.faces[away > 0.25 * away.max()])
+    checked(gso.tno.optimize(holed, formulation="ruled"), 6.0)
+
+
+def test_unit_and_position_do_not_matter():
+    points = saddle(17, strength=0.25)
+    options = gso.RuledOptions(starts=("design",))
+    one = gso.tno.optimize(points, options=options)
+    other = gso.tno.optimize(1000.0 * points + 5000.0, options=options)
+    a, b = (r.metrics["distance_mean"] for r in (one, other))
+    assert a == pytest.approx(b, rel=0.1)
+    assert other.metrics["bend_radius_min"] > 10.0 * one.metrics["bend_radius_min"]
+
+
+def test_results_come_back_from_files(tmp_path):
+    result = gso.tno.optimize(saddle(17, strength=0.25), options=gso.RuledOptions(strips=2))
+    result.save(tmp_path / "a.npz")
+    again = gso.Result.load(tmp_path / "a.npz")
+    np.testing.assert_array_equal(again.mesh.faces, result.mesh.faces)
+    np.testing.assert_array_equal(again.pattern.flat, result.pattern.flat)
+    np.testing.assert_array_equal(again.rulings.angles, result.rulings.angles)
+    np.testing.assert_array_equal(again.on_design().vertices, result.on_design().vertices)
+    assert again.metrics == pytest.approx(result.metrics)
+    result.save(tmp_path / "a.svg")
+    assert 'id="lines"' in (tmp_path / "a.svg").read_text(encoding="utf-8")
+    result.save(tmp_path / "a.obj")
+    assert len(gso.load(tmp_path / "a.obj").faces) == len(result.mesh.faces)
+
+
+def test_what_cannot_be_ruled_is_refused():
+    t = np.linspace(0.0, 2.0 * np.pi, 33)
+    tube = np.stack(np.broadcast_arrays(np.cos(t), np.sin(t), t[:, None]), axis=-1)
+    faces = Mesh.from_grid(tube).faces
+    with pytest.raises(gso.MeshError, match="boundary"):
+        sphere = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, -1, 0.0]])
+        gso.tno.optimize(
+            Mesh(sphere, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]), formulation="ruled"
+        )
+    two = np.concatenate([tube.reshape(-1, 3), tube.reshape(-1, 3) + 9.0])
+    with pytest.raises(gso.MeshError, match="components"):
+        gso.tno.optimize(
+            Mesh(two, np.concatenate([faces, faces + tube[..., 0].size])), formulation="ruled"
+        )
+    with pytest.raises(gso.OptionError, match="constraints"):
+        gso.tno.optimize(saddle(9), formulation="ruled", constraints=[gso.FixedBoundary()])
+    for wrong in ({"strips": 0}, {"strips": "many"}, {"rulings": 3}, {"starts": ("x",)}):
+        with pytest.raises(gso.OptionError):
+            gso.RuledOptions(**wrong)

@@ -16,7 +16,6 @@ from gso.mesh import Mesh
 from gso.mesh.attributes import Attributes
 from gso.pattern import Pattern
 from gso.result.result import Result
-from gso.ruled.surface import RuledSurface
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
 from gso.typing import Array
@@ -82,6 +81,7 @@ def read(path: str | PathLike[str]) -> Result:
     """Read a result; see :meth:`gso.Result.load`."""
     from gso.io.arrays import read_arrays
     from gso.io.source import read_bytes
+    from gso.ruled.surface import RuledSurface
 
     try:
         data = read_arrays(read_bytes(path))

@@ -7,7 +7,7 @@ import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.ruled.surface import Folds, RuledSurface
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
 from gso.typing import Array
+
+if TYPE_CHECKING:
+    from gso.ruled.surface import Folds, RuledSurface
 
 
 @dataclass(repr=False)

@@ -1,6 +1,9 @@
-"""Strips of planar quads close to a design: surfaces that are developable exactly.
+"""Strips of planar quads close to a design: surfaces that are exactly developable.
 
-The parts of ``formulation="ruled"``, which is not public yet: the design over its flat image
-(:mod:`~gso.ruled.domain`), the first rulings (:mod:`~gso.ruled.chords`), the geometry of strips
-(:mod:`~gso.ruled.strip`) and their solve (:mod:`~gso.ruled.fit`).
+A design is a function on its flat image (:mod:`~gso.ruled.domain`), continued beyond its outline
+(:mod:`~gso.ruled.extended`). First rulings are chords of the flat image
+(:mod:`~gso.ruled.chords`). The solve (:mod:`~gso.ruled.fit`) minimises an energy
+(:mod:`~gso.ruled.energy`) of the strips (:mod:`~gso.ruled.layout`), which are then cut along the
+outline (:mod:`~gso.ruled.trim`) and unrolled (:mod:`~gso.ruled.unroll`).
+:func:`gso.ruled.solve.solve` does all of it; formulation "ruled" of the developable task calls it.
 """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.ruled.energy import Energy, Weights
+from gso.ruled.energy import Energy, Measured, Weights
 from gso.ruled.planarity import planarity
 from gso.ruled.system import System
 from gso.typing import Array
@@ -36,7 +36,7 @@ def planarised(system: System, vertices: Array, tolerance: float = PLANAR) -> Ar
     return vertices
 
 
-def descend(energy: Energy, vertices: Array, w: Weights, iterations: int, log=None) -> Array:
+def descend(energy: Energy, vertices: Array, w: Weights, iterations: int) -> Array:
     """Minimise the energy from given vertices; the best are returned."""
     system, damping, growth = energy.system, _DAMPING, 2.0
     diagonal = system.diagonal
@@ -59,7 +59,8 @@ def descend(energy: Energy, vertices: Array, w: Weights, iterations: int, log=No
             damped[diagonal] += damping * mean
             step = system.solve(damped, right)[system.unknowns]
             longest = float(np.abs(step).max())
-            fall, trial, there = -1.0, vertices, None
+            fall, trial = -1.0, vertices
+            there: Measured | None = None
             if longest <= _REACH * energy.width:
                 trial = vertices + step
                 if not w.planar:
@@ -68,9 +69,7 @@ def descend(energy: Energy, vertices: Array, w: Weights, iterations: int, log=No
                 if least >= min(bound, float(here.gap.min())):
                     there = energy.measure(trial)
                     fall = value - energy.value(trial, there, w, here.back_weight, scale)
-            if log is not None:
-                log.append((value, fall, damping, there is None))
-            if fall > 0:
+            if there is not None and fall > 0:
                 break
             if damping >= _MOST:
                 return vertices

@@ -70,13 +70,13 @@ class Measured:
     shares : ndarray, (p, 3)
         Shares of their corners in the nearest points.
     height : ndarray, (p,)
-        Signed distances of the points from the triangles' planes.
+        Distances of the points, signed by the triangles' normals where they are along these.
     normal : ndarray, (t, 3)
         Normals of all triangles.
     beyond : ndarray of int, (b,)
         Points whose nearest points are on the border of the strips, or on a ridge.
     way : ndarray, (b, 3)
-        Tangential vectors from these points to the nearest points.
+        Vectors from these points to the nearest points.
     back, back_normal, back_weight : ndarray, (f, s), (f, s, 3), (f, s)
         Signed distances of samples of the faces from the design, its normals, and weights.
     up : ndarray, (f, 3)
@@ -165,13 +165,16 @@ class Energy:
         own = normal[which]
         away = foot - self.points
         height = np.einsum("kd,kd->k", away, own)
-        way = away - height[:, None] * own
-        beyond = np.flatnonzero((way * way).sum(axis=1) > _APART**2)
-        way = way[beyond]
+        beyond = np.flatnonzero(lengths(away - height[:, None] * own) > _APART)
+        way = away[beyond]
+        height[beyond] = lengths(way)
 
         corner = vertices[self.strips.corners]
         x = self._share @ corner
-        vector = cross(self._along @ corner, 0.5 * (corner[:, 1] - corner[:, 0] + corner[:, 3] - corner[:, 2])[:, None])
+        vector = cross(
+            self._along @ corner,
+            0.5 * (corner[:, 1] - corner[:, 0] + corner[:, 3] - corner[:, 2])[:, None],
+        )
         feet, up, share = self.design.feet(x.reshape(-1, 3))
         up = up.reshape(x.shape)
         back = np.einsum("fsd,fsd->fs", x - feet.reshape(x.shape), up)
@@ -202,8 +205,7 @@ class Energy:
             side,
             off,
             across,
-            # Normals may be on either side of the faces; the smaller change counts.
-            np.where((one * two).sum(axis=1, keepdims=True) < 0, one + two, one - two),
+            one - two,
             stiff,
         )
 
@@ -241,7 +243,6 @@ class Energy:
         total += w.back * float((weight * (np.abs(m.back) / scale) ** w.power).sum()) * scale**2
         total += 0.5 * self._linear(vertices, w)[0]
         total += w.ends / len(m.off) * float((m.off**2).sum())
-        total += float((m.way**2).sum()) / len(self.points)
         total += w.fold * float(m.stiff @ (m.turn**2).sum(axis=1))
         short = np.minimum(m.gap - w.least * self.width, 0.0)
         total += w.gap / self._rulings * float((short**2).sum())
@@ -260,7 +261,7 @@ class Energy:
         gradient = np.zeros_like(vertices)
         parts = [
             self._there(gradient, m, w, scale),
-            self._beyond(gradient, m),
+            self._beyond(gradient, m, w, scale),
             self._faces(gradient, vertices, m, w, scale),
             self._folds(gradient, vertices, m, w),
         ]
@@ -279,6 +280,7 @@ class Energy:
         count = len(triangles)
         first, second = _power(m.height, w.power, scale, 1.0 / len(self.points))
         at, n = m.triangle, m.normal
+        first[m.beyond] = second[m.beyond] = 0.0
         share = np.ascontiguousarray(m.shares.T)
         local = np.stack([np.bincount(at, first * s, count) for s in share], axis=1)
         _add(gradient, triangles, local[:, :, None] * n[:, None])
@@ -290,14 +292,14 @@ class Energy:
                 moments[:, j, i] = moments[:, i, j]
         return self._triangle_places, np.einsum("tij,td,te->tidje", moments, n, n)
 
-    def _beyond(self, gradient: Array, m: Measured) -> tuple[Ints, Array]:
-        """Tangential distances of points beyond the border or a ridge."""
+    def _beyond(self, gradient: Array, m: Measured, w: Weights, scale: float) -> tuple[Ints, Array]:
+        """Distances of points beyond the border or a ridge."""
         corners = self.strips.split[0][m.triangle[m.beyond]]
-        shares = m.shares[m.beyond]
-        factor = 2.0 / len(self.points)
-        row = (shares[:, :, None] * unit(m.way)[:, None]).reshape(len(shares), 9)
-        _add(gradient, corners, factor * shares[:, :, None] * m.way[:, None])
-        return self.system.blocks(corners), factor * row[:, :, None] * row[:, None]
+        first, second = _power(m.height[m.beyond], w.power, scale, 1.0 / len(self.points))
+        row = m.shares[m.beyond][:, :, None] * unit(m.way)[:, None]
+        _add(gradient, corners, first[:, None, None] * row)
+        row = row.reshape(len(corners), 9)
+        return self.system.blocks(corners), second[:, None, None] * row[:, :, None] * row[:, None]
 
     def _faces(
         self, gradient: Array, vertices: Array, m: Measured, w: Weights, scale: float
@@ -313,9 +315,9 @@ class Energy:
         factor = 2.0 * w.gap / self._rulings
         for end in (0, 1):
             k = np.flatnonzero(short[:, end] < 0.0)
-            row = np.zeros((k.size, 4, 3))
-            row[:, end], row[:, 2 + end] = -m.side[k], m.side[k]
-            row = row.reshape(-1, 12)
+            by = np.zeros((k.size, 4, 3))
+            by[:, end], by[:, 2 + end] = -m.side[k], m.side[k]
+            row = by.reshape(-1, 12)
             local[k] += factor * short[k, end, None] * row
             block[k] += factor * row[:, :, None] * row[:, None]
         if w.planar:
@@ -339,15 +341,12 @@ class Energy:
         across = (np.eye(3) - normal[:, :, None] * normal[:, None]) / size[:, None, None]
         by = np.einsum("fij,fcjk->fick", across, by).reshape(-1, 3, 12)
         one, two = self._hinge.T
-        same = np.where((normal[one] * normal[two]).sum(axis=1) < 0, -1.0, 1.0)
-        row = np.concatenate([by[one], -same[:, None, None] * by[two]], axis=2)
+        row = np.concatenate([by[one], -by[two]], axis=2)
         factor = 2.0 * w.fold * m.stiff
         local = factor[:, None] * np.einsum("hi,hik->hk", m.turn, row)
         corners = self.strips.corners[self._hinge].reshape(-1, 8)
         _add(gradient, corners, local.reshape(-1, 8, 3))
-        return self._hinge_places, np.matmul(
-            (factor[:, None, None] * row).transpose(0, 2, 1), row
-        )
+        return self._hinge_places, np.matmul((factor[:, None, None] * row).transpose(0, 2, 1), row)
 
     # -- second differences -------------------------------------------------------------------
 
@@ -363,14 +362,14 @@ class Energy:
             kinds.append(("even", self.strips.across, across))
         for key, triples, factor in kinds:
             rows = np.repeat(np.arange(len(triples)), 3)
-            values = np.tile([1.0, -2.0, 1.0], len(triples))
-            matrix = csr_matrix((values, (rows, triples.ravel())), (len(triples), self.strips.size))
+            ones = np.tile([1.0, -2.0, 1.0], len(triples))
+            matrix = csr_matrix((ones, (rows, triples.ravel())), (len(triples), self.strips.size))
             operator = 2.0 * factor * (matrix.T @ matrix).tocsr()
             block = 2.0 * factor * np.outer([1.0, -2.0, 1.0], [1.0, -2.0, 1.0])
-            block = np.kron(block, np.eye(3))
+            block = np.kron(block, np.eye(3)).astype(np.float64)
             places = self.system.blocks(triples)
-            values = np.broadcast_to(block, (len(triples), 9, 9))
-            out.append((key, operator, self.system.matrix([(places, values)])))
+            every = np.broadcast_to(block, (len(triples), 9, 9))
+            out.append((key, operator, self.system.matrix([(places, every)])))
         return out
 
     def _linear(self, vertices: Array, w: Weights) -> tuple[float, Array]:

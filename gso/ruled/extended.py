@@ -41,7 +41,11 @@ class Extended:
         middle = places[triangles].mean(axis=1)
         away = np.linalg.norm(domain.sample(domain.normals, middle)[1] - middle, axis=1)
         triangles = triangles[(away > 1e-3 * domain.margin) & (away < _RINGS[-1] * domain.margin)]
-        ids = np.where(kept < len(domain.outline), domain.outline[np.minimum(kept, len(domain.outline) - 1)], -1)
+        ids = np.where(
+            kept < len(domain.outline),
+            domain.outline[np.minimum(kept, len(domain.outline) - 1)],
+            -1,
+        )
         new = np.flatnonzero(ids < 0)
         n = len(domain.mesh.vertices)
         ids[new] = n + np.arange(len(new))
@@ -53,11 +57,15 @@ class Extended:
         every = np.concatenate([domain.mesh.triangles, triangles])
         self.weights = np.r_[np.ones(n), np.full(len(new), _WEIGHT)]
         area = geometry.area_vectors(vertices, every)
-        total = np.stack([np.bincount(every.ravel(), np.repeat(area[:, d], 3), len(vertices)) for d in range(3)], 1)
+        total = np.stack(
+            [np.bincount(every.ravel(), np.repeat(area[:, d], 3), len(vertices)) for d in range(3)],
+            1,
+        )
         normal = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
-        normal[:n][domain.mesh.used] = domain.normals[domain.mesh.used] * np.sign(
-            (normal[:n] * domain.normals).sum(axis=1)
-        )[domain.mesh.used, None]
+        normal[:n][domain.mesh.used] = (
+            domain.normals[domain.mesh.used]
+            * np.sign((normal[:n] * domain.normals).sum(axis=1))[domain.mesh.used, None]
+        )
         self.vertices, self.triangles, self.normals, self.flat = vertices, every, normal, flat
         self._near = Nearest.of(vertices, every)
         rim = domain.points(outline + domain.margin * normals)

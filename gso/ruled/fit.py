@@ -7,7 +7,7 @@ Ends of rulings that are close to each other are merged. A last phase lowers the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -53,12 +53,11 @@ class Fit:
 
 
 class Job(NamedTuple):
-    """What all phases share: the target, points of the design, a hook for progress."""
+    """What all phases share: the target, points of the design, weights."""
 
     target: Extended
     points: Array
     weights: Weights = Weights()
-    tick: Callable[[], bool] | None = None
 
     def energy(self, strips: Strips, start: Array, width: float | None = None) -> Energy:
         """Make the energy of a layout."""
@@ -102,7 +101,8 @@ def _planar(job: Job, fit: Fit, start: Array) -> Fit:
         least = factor * job.weights.least * fit.width
         pairs = close(energy, fit.vertices, least)
         if len(pairs):
-            fit = replace(fit, **dict(zip(("strips", "vertices"), fit.strips.merged(fit.vertices, pairs), strict=True)))
+            strips, vertices = fit.strips.merged(fit.vertices, pairs)
+            fit = Fit(strips, vertices, fit.width)
             energy = job.energy(fit.strips, fit.vertices, fit.width)
         elif not factor:
             break

@@ -71,7 +71,10 @@ class Strips:
         """Number of the strip of each face, side by side; 0 for the flats."""
         size = sum((len(i) - 1) * self.count for i in self.index)
         every = np.concatenate(
-            [np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, :-1], i[1:, 1:]], 2).reshape(-1, 4) for i in self.index]
+            [
+                np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, :-1], i[1:, 1:]], 2).reshape(-1, 4)
+                for i in self.index
+            ]
         )
         kept = (every[:, 0] != every[:, 2]) | (every[:, 1] != every[:, 3])
         return np.r_[(np.arange(size) % self.count)[kept], np.zeros(len(self.flats), np.int64)]

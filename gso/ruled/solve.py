@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from gso.ruled.extended import Extended
 from gso.ruled.fit import Fit, Job, evened, halved, single
 from gso.ruled.layout import Strips
 from gso.ruled.surface import RuledSurface, built
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 #: Points of the design in the solve for one strip and for several.
 _POINTS = (500, 1000)
@@ -79,10 +79,7 @@ class Found:
 
 
 def solve(
-    domain: Domain,
-    starts: dict[str, Array],
-    wanted: Wanted,
-    tick: Callable[[], bool] | None = None,
+    domain: Domain, starts: dict[str, Array], wanted: Wanted
 ) -> tuple[Found, dict[int, float]]:
     """Fit a ruled surface to a design with a diagonal of one.
 
@@ -95,8 +92,6 @@ def solve(
         the best result counts.
     wanted : Wanted
         Strips, rulings and bounds.
-    tick : callable, optional
-        Called before each phase; the solve ends early when it returns False.
 
     Returns
     -------
@@ -105,7 +100,7 @@ def solve(
         Largest distance by number of strips, for all numbers that were tried.
     """
     target = Extended(domain)
-    jobs = [Job(target, domain.lattice(count), tick=tick) for count in _POINTS]
+    jobs = [Job(target, domain.lattice(count)) for count in _POINTS]
     first = {name: _first(jobs[0], normals, wanted.rulings) for name, normals in starts.items()}
     if wanted.strips == 1:
         found = min((_found(jobs[0], evened(jobs[0], f), n) for n, f in first.items()), key=_order)
@@ -177,7 +172,7 @@ def _fewest(
     return results[high]
 
 
-def _worst(job: Job, fit: Fit, count: int) -> Array | None:
+def _worst(job: Job, fit: Fit, count: int) -> Ints | None:
     """Return the numbers of the strips with the largest distances; None for all of them."""
     if count >= fit.strips.count:
         return None

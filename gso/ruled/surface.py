@@ -120,7 +120,7 @@ class RuledSurface:
         return out | {f"ruled_pattern_{part}": getattr(self.pattern, part) for part in _PATTERN}
 
     @classmethod
-    def from_arrays(cls, data: Mapping[str, Array], moved: Array) -> RuledSurface | None:
+    def from_arrays(cls, data: Mapping[str, Any], moved: Array) -> RuledSurface | None:
         """Return the surface that :meth:`arrays` describes; None if there is none.
 
         Raises
@@ -257,7 +257,8 @@ def _folds(
     a, b, _ = strips.creases
     size = len(strips.corners)
     crease = np.isin(
-        np.minimum(one, two) * size + np.maximum(one, two), np.minimum(a, b) * size + np.maximum(a, b)
+        np.minimum(one, two) * size + np.maximum(one, two),
+        np.minimum(a, b) * size + np.maximum(a, b),
     )
     every = [Folds(edges[at], angle[at], radius[at]) for at in (~crease, crease)]
     return every[0], replace(every[1], radii=np.zeros(int(crease.sum())))
@@ -283,9 +284,7 @@ def _pattern(mesh: Mesh, owner: Ints, part: Ints, unrolled: Unrolled) -> Pattern
     ids = faces[face, corner]
     count = len(mesh.vertices)
     # A vertex has one copy in each part.
-    key, first, which = np.unique(
-        part[face] * count + ids, return_index=True, return_inverse=True
-    )
+    key, first, which = np.unique(part[face] * count + ids, return_index=True, return_inverse=True)
     table = np.full_like(faces, -1)
     table[face, corner] = which.ravel()
     flat = unrolled.flat(owner[face[first]], mesh.vertices[ids[first]])
@@ -311,4 +310,3 @@ def _seams(mesh: Mesh, table: Ints) -> Ints:
         )
     pairs = np.stack([np.stack(e, axis=1) for e in ends], axis=1)
     return pairs[(pairs[:, 0] != pairs[:, 1]).any(axis=1)]
-

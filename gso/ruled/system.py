@@ -55,7 +55,10 @@ class System:
         cliques.append(np.concatenate([corners[one], corners[two]], axis=1))
         cliques.append(np.column_stack([self.quads, n + np.arange(q)]))
         pairs = np.concatenate(
-            [np.stack(np.broadcast_arrays(c[:, :, None], c[:, None]), 3).reshape(-1, 2) for c in cliques]
+            [
+                np.stack(np.broadcast_arrays(c[:, :, None], c[:, None]), 3).reshape(-1, 2)
+                for c in cliques
+            ]
         )
         graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(n + q, n + q)).tocsr()
         order = reverse_cuthill_mckee(graph, symmetric_mode=True)

@@ -7,6 +7,7 @@ with them in the parameters of :mod:`gso.ruled.embedding`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from gso.ruled.extended import Extended
 from gso.ruled.layout import Strips
 from gso.ruled.unroll import Unrolled
 from gso.ruled.vectors import cross, lengths, unit
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Barycentric coordinates below this are on the opposite edge; nodes on an edge that are closer
 #: to each other than this share of its length are one.
@@ -82,7 +83,9 @@ def trimmed(target: Extended, strips: Strips, vertices: Array, unrolled: Unrolle
     region = shapely.difference(rings[outer], shapely.union_all(holes)) if holes else rings[outer]
     c = strips.corners
     cells = shapely.polygons(place[c[:, [0, 1, 3, 2]]])
-    pieces, which = shapely.get_parts(shapely.intersection(cells, region, grid_size=_GRID), return_index=True)
+    pieces, which = shapely.get_parts(
+        shapely.intersection(cells, region, grid_size=_GRID), return_index=True
+    )
     kept = (shapely.get_type_id(pieces) == 3) & (shapely.area(pieces) > 0)
     nodes = _Nodes(strips, vertices, place)
     polygons = [
@@ -123,7 +126,7 @@ def _along_normals(
     return which, shares
 
 
-def _enclosed(ring: Array):  # type: ignore[no-untyped-def]
+def _enclosed(ring: Array) -> Any:
     """Return the region around which a closed polygon (n, 2) turns, as a Shapely polygon."""
     import shapely
 
@@ -153,7 +156,7 @@ def _dense(loop: Array, step: float) -> Array:
     return loop[at] + share[:, None] * edge[at]
 
 
-def _rings(piece) -> list:  # type: ignore[no-untyped-def, type-arg]
+def _rings(piece: Any) -> list[Any]:
     return [piece.exterior, *piece.interiors]
 
 
@@ -240,8 +243,6 @@ def _meshed(
     polygons: list[tuple[int, list[list[int]]]], nodes: _Nodes, unrolled: Unrolled
 ) -> Trimmed:
     """Divide the pieces into quads and triangles, in the plane where they are unrolled."""
-    import shapely
-
     points, inner = np.array(nodes.points), np.array(nodes.inner)
     faces: list[list[int]] = []
     owner: list[int] = []
@@ -271,7 +272,7 @@ def _meshed(
     return Trimmed(points[used], np.where(table >= 0, number[table], -1), face_of)
 
 
-def _divided(rings: list[Ints], flats: list[Array], inner: Array) -> list[list[int]]:
+def _divided(rings: list[Ints], flats: list[Array], inner: Flags) -> list[list[int]]:
     """Divide a polygon with holes: a quad between its rulings if possible, and triangles."""
     if len(rings) > 1:
         whole = [k for k, ring in enumerate(rings) if k == 0 or len(ring) >= 3]
@@ -338,7 +339,7 @@ def _connected(table: Ints, owner: Ints) -> tuple[Ints, Ints]:
     return table[most], owner[most]
 
 
-def _simplified(flat: Array, inner: Array) -> Ints:
+def _simplified(flat: Array, inner: Flags) -> Ints:
     """Leave out inner nodes of a ring that are on a straight line (Douglas and Peucker 1973)."""
     n = len(flat)
     fixed = np.flatnonzero(~inner)

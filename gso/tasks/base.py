@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from gso import parametrization
 from gso.constraints import Compiled
@@ -14,12 +14,14 @@ from gso.energy.losses import Loss
 from gso.mesh import Mesh
 from gso.mesh.cutting import Cut
 from gso.pattern import Pattern
-from gso.ruled.surface import RuledSurface
 from gso.status import Status
 from gso.tasks.imposed import Imposed
 from gso.tasks.options import Options
 from gso.typing import Array
 from gso.unknowns import Layout, Variables
+
+if TYPE_CHECKING:
+    from gso.ruled.surface import RuledSurface
 
 
 def same(coordinates: Array) -> Array:

@@ -79,6 +79,8 @@ def _check_number(name: str, kind: str, value: Any) -> None:
     wanted = kind.split(" | ")
     if value is None and "None" in wanted:
         return
+    if isinstance(value, str) and "str" in wanted:
+        return
     if "int" in wanted:
         good, what = isinstance(value, int | np.integer) and value >= 0, "an integer"
     elif "float" in wanted:

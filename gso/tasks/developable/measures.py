@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from gso import metrics as measure
 from gso.mesh import Mesh
-from gso.ruled.surface import RuledSurface
 from gso.typing import Array
+
+if TYPE_CHECKING:
+    from gso.ruled.surface import RuledSurface
 
 
 def flat_metrics(surface: Mesh, flat: Array) -> dict[str, float]:

@@ -71,9 +71,7 @@ class Options(BaseOptions):
             raise OptionError(f"starts is {self.starts!r}; it must name some of {_STARTS}")
 
 
-def plan(
-    analysis: Analysis, request: Request, before: Callable[[Analysis, Request], Plan]
-) -> Plan:
+def plan(analysis: Analysis, request: Request, before: Callable[[Analysis, Request], Plan]) -> Plan:
     """Plan the solve of `before` where its result is wanted, and then that for the strips.
 
     Raises
@@ -112,10 +110,9 @@ def _converted(analysis: Analysis, request: Request, before: Solution) -> Soluti
     mesh = analysis.mesh.replaced(analysis.mesh.vertices / size)
     domain = Domain(mesh, parametrization.begin(mesh).flat)
     starts = {"design": domain.normals} if "design" in options.starts else {}
-    surface = before.points
-    if not np.array_equal(surface, analysis.mesh.vertices):
+    if not np.array_equal(before.points, analysis.mesh.vertices):
         name = "curvature" if request.start is None else "x0"
-        starts[name] = vertex_normals(analysis.mesh.replaced(surface))
+        starts[name] = vertex_normals(analysis.mesh.replaced(before.points))
     bound = request.max_displacement
     bounded = bound is not None or options.max_crease is not None
     strips: Any = options.strips
