@@ -17,7 +17,7 @@ from gso.ruled.extended import Extended
 from gso.ruled.layout import Strips
 from gso.ruled.planarity import planarity
 from gso.ruled.system import System
-from tests.conftest import cylinder, saddle, shuffled
+from tests.conftest import cylinder, rotation, saddle, shuffled
 
 
 def domain(points) -> Domain:
@@ -239,14 +239,20 @@ def test_triangles_holes_and_numbering():
     checked(gso.tno.optimize(holed, formulation="ruled"), 6.0)
 
 
-def test_unit_and_position_do_not_matter():
-    points = saddle(17, strength=0.25)
-    options = gso.RuledOptions(starts=("design",))
-    one = gso.tno.optimize(points, options=options)
-    other = gso.tno.optimize(1000.0 * points + 5000.0, options=options)
-    a, b = (r.metrics["distance_mean"] for r in (one, other))
-    assert a == pytest.approx(b, rel=0.1)
-    assert other.metrics["bend_radius_min"] > 10.0 * one.metrics["bend_radius_min"]
+def test_unit_position_and_numbering_do_not_matter_much():
+    """Rounding errors may lead to another local minimum, whose distance is similar."""
+    mesh = Mesh.from_grid(bowl(17))
+    moved = mesh.replaced(1000.0 * mesh.vertices @ rotation(3).T + 5000.0)
+    results = [
+        gso.tno.optimize(m, options=gso.RuledOptions(starts=("design",)))
+        for m in (mesh, moved, shuffled(mesh))
+    ]
+    one, two, three = (r.metrics["distance_mean"] for r in results)
+    assert two == pytest.approx(one, rel=0.5)
+    assert three == pytest.approx(one, rel=0.5)
+    assert all(r.usable for r in results)
+    radius = [r.metrics["bend_radius_min"] for r in results]
+    assert 100.0 * radius[0] < radius[1] < 10000.0 * radius[0]
 
 
 def test_results_come_back_from_files(tmp_path):

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gso.errors import MeshError
 from gso.ruled.descent import descend, planarised
 from gso.ruled.energy import Energy, Weights
 from gso.ruled.extended import Extended
@@ -102,6 +103,11 @@ def _planar(job: Job, fit: Fit, start: Array) -> Fit:
         pairs = close(energy, fit.vertices, least)
         if len(pairs):
             strips, vertices = fit.strips.merged(fit.vertices, pairs)
+            if not len(strips.corners):
+                raise MeshError(
+                    "no rulings were found on this surface, as they all run into each other; it "
+                    "may be folded or too irregular for the formulation 'ruled': take 'curvature'"
+                )
             fit = Fit(strips, vertices, fit.width)
             energy = job.energy(fit.strips, fit.vertices, fit.width)
         elif not factor:

@@ -14,6 +14,8 @@ CASES = [
     for task in tasks.names()
     for formulation in tasks.get(task).FORMULATIONS
 ]
+#: Without ruled surfaces, which have vertices of their own: see tests/test_ruled.py.
+ON_DESIGN = [case for case in CASES if case.values[1] != "ruled"]
 DESIGN = gso.Mesh.from_grid(saddle(9, 8))
 
 
@@ -34,7 +36,7 @@ def shape(result: gso.Result) -> np.ndarray:
     return np.linalg.norm(points[:, None] - points[None], axis=2)
 
 
-@pytest.mark.parametrize(("task", "formulation"), CASES)
+@pytest.mark.parametrize(("task", "formulation"), ON_DESIGN)
 @pytest.mark.parametrize("factor", [1.0, 1000.0])
 def test_unit_position_and_rotation_do_not_matter(task, formulation, factor):
     here = solve(DESIGN, task, formulation)
@@ -47,7 +49,7 @@ def test_unit_position_and_rotation_do_not_matter(task, formulation, factor):
     )
 
 
-@pytest.mark.parametrize(("task", "formulation"), CASES)
+@pytest.mark.parametrize(("task", "formulation"), ON_DESIGN)
 def test_numbering_does_not_matter(task, formulation):
     if task == "bend":
         pytest.skip("handles are given by number")
