@@ -18,12 +18,12 @@ _DAMPING, _MOST = 1e-2, 1e4
 _TOLERANCE = 1e-4
 #: Distance between diagonals that counts as zero in the result and on the way; largest number
 #: of steps towards it.
-PLANAR, _NEARLY, _STEPS = 1e-15, 1e-9, 8
+_PLANAR, _NEARLY, _STEPS = 1e-15, 1e-9, 8
 #: Gaps must not fall below this share of the bound that the energy keeps.
 _CROSSED = 0.02
 
 
-def planarised(system: System, vertices: Array, tolerance: float = PLANAR) -> Array:
+def planarised(system: System, vertices: Array, tolerance: float = _PLANAR) -> Array:
     """Make the quads planar by Newton steps of least norm."""
     for _ in range(_STEPS):
         value, slope = planarity(vertices[system.quads])

@@ -10,6 +10,7 @@ from gso import geometry
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.mesh.normals import vertex_normals
+from gso.ruled.vectors import enclosed_area
 from gso.typing import Array, Ints
 
 #: Width of the continuation, relative to the diagonal of the flat image.
@@ -43,7 +44,7 @@ class Domain:
         self.normals = vertex_normals(mesh)
         self.margin = _MARGIN * geometry.box_diagonal(flat)
         self._nearest = Nearest.of(np.pad(flat, ((0, 0), (0, 1))), mesh.triangles)
-        areas = [_enclosed(flat[loop]) for loop in mesh.boundary_loops]
+        areas = [enclosed_area(flat[loop]) for loop in mesh.boundary_loops]
         largest = int(np.abs(areas).argmax())
         loop = mesh.boundary_loops[largest]
         self.outline: Ints = loop if areas[largest] > 0 else loop[::-1]
@@ -74,7 +75,7 @@ class Domain:
         distance from each other.
         """
         low, high = self.flat.min(axis=0), self.flat.max(axis=0)
-        area = abs(_enclosed(self.flat[self.outline]))
+        area = abs(enclosed_area(self.flat[self.outline]))
         step = float(np.sqrt(area / count))
         axes = [np.arange(a + 0.5 * step, b, step) for a, b in zip(low, high, strict=True)]
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -106,9 +107,3 @@ class Domain:
             slope, bend = 0.5 * (3.0 * here - 4.0 * one + two), 0.5 * (here - 2.0 * one + two)
             out[beyond] = here + x * slope + x * x * bend
         return out
-
-
-def _enclosed(loop: Array) -> float:
-    """Return the signed area of a polygon (k, 2)."""
-    x, y = loop.T
-    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())

@@ -239,7 +239,7 @@ class Energy:
 
     def value(self, vertices: Array, m: Measured, w: Weights, weight: Array, scale: float) -> float:
         """Return the energy, with the given weights of the faces' samples."""
-        total = _sum(np.abs(m.height) / scale, w.power) / len(self.points) * scale**2
+        total = float(((np.abs(m.height) / scale) ** w.power).sum()) / len(self.points) * scale**2
         total += w.back * float((weight * (np.abs(m.back) / scale) ** w.power).sum()) * scale**2
         total += 0.5 * self._linear(vertices, w)[0]
         total += w.ends / len(m.off) * float((m.off**2).sum())
@@ -388,10 +388,6 @@ def _skew(a: Array) -> Array:
     zero = np.zeros(len(a))
     x, y, z = a.T
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
-
-
-def _sum(sizes: Array, power: float) -> float:
-    return float((sizes**power).sum())
 
 
 def _power(height: Array, power: float, scale: float, weight: float | Array) -> tuple[Array, Array]:

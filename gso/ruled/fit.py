@@ -7,7 +7,6 @@ Ends of rulings that are close to each other are merged. A last phase lowers the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -80,10 +79,10 @@ def halved(job: Job, fit: Fit, which: Ints | None = None) -> Fit:
     return _exact(job, Fit(strips, vertices, fit.width), _EXACT)
 
 
-def evened(job: Job, fit: Fit, powers: Sequence[float] | None = None) -> Fit:
+def evened(job: Job, fit: Fit) -> Fit:
     """Lower the largest distance: minimise higher powers of the distances."""
     energy, vertices = job.energy(fit.strips, fit.vertices, fit.width), fit.vertices
-    for power in _POWERS[fit.strips.count == 1] if powers is None else powers:
+    for power in _POWERS[fit.strips.count == 1]:
         w = replace(job.weights, moved=0.0, even=_EVEN, power=power)
         vertices = descend(energy, vertices, w, _EACH)
     return replace(fit, vertices=planarised(energy.system, vertices))

@@ -53,31 +53,31 @@ class Strips:
         return 1 + max(int(i.max()) for i in self.index)
 
     @cached_property
-    def corners(self) -> Ints:
-        """Corners (f, 4) of the faces: of each sequence, ruling by ruling; the flats last.
-
-        Between rulings that are the same there is no face.
-        """
+    def _faces(self) -> tuple[Ints, Ints]:
+        """Corners (f, 4) of the faces, and the number of the strip of each, side by side."""
         parts = []
         for index in self.index:
             here, ahead = index[:-1], index[1:]
             sides = [here[:, :-1], here[:, 1:], ahead[:, :-1], ahead[:, 1:]]
             parts.append(np.stack(sides, axis=2).reshape(-1, 4))
-        out = np.concatenate([*parts, self.flats])
-        return out[(out[:, 0] != out[:, 2]) | (out[:, 1] != out[:, 3])]
+        column = [np.arange(len(part)) % self.count for part in parts]
+        corners = np.concatenate([*parts, self.flats])
+        strip = np.concatenate([*column, np.zeros(len(self.flats), np.int64)])
+        kept = (corners[:, 0] != corners[:, 2]) | (corners[:, 1] != corners[:, 3])
+        return corners[kept], strip[kept]
 
-    @cached_property
+    @property
+    def corners(self) -> Ints:
+        """Corners (f, 4) of the faces: of each sequence, ruling by ruling; the flats last.
+
+        Between rulings that are the same there is no face.
+        """
+        return self._faces[0]
+
+    @property
     def column(self) -> Ints:
         """Number of the strip of each face, side by side; 0 for the flats."""
-        size = sum((len(i) - 1) * self.count for i in self.index)
-        every = np.concatenate(
-            [
-                np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, :-1], i[1:, 1:]], 2).reshape(-1, 4)
-                for i in self.index
-            ]
-        )
-        kept = (every[:, 0] != every[:, 2]) | (every[:, 1] != every[:, 3])
-        return np.r_[(np.arange(size) % self.count)[kept], np.zeros(len(self.flats), np.int64)]
+        return self._faces[1]
 
     @cached_property
     def quads(self) -> Ints:

@@ -16,7 +16,7 @@ from gso.ruled.embedding import plane
 from gso.ruled.extended import Extended
 from gso.ruled.layout import Strips
 from gso.ruled.unroll import Unrolled
-from gso.ruled.vectors import cross, lengths, unit
+from gso.ruled.vectors import cross, enclosed_area, lengths, unit
 from gso.typing import Array, Flags, Ints
 
 #: Barycentric coordinates below this are on the opposite edge; nodes on an edge that are closer
@@ -254,9 +254,9 @@ def _meshed(
         kept = [_simplified(x, inner[ring]) for x, ring in zip(flat, whole, strict=True)]
         every = [ring[at] for ring, at in zip(whole, kept, strict=True)]
         flats = [x[at] for x, at in zip(flat, kept, strict=True)]
-        if len(every[0]) < 3 or abs(_area(flats[0])) < _SLIVER:
+        if len(every[0]) < 3 or abs(enclosed_area(flats[0])) < _SLIVER:
             continue
-        if _area(flats[0]) < 0:
+        if enclosed_area(flats[0]) < 0:
             every[0], flats[0] = every[0][::-1], flats[0][::-1]
         found = _divided(every, flats, inner)
         if not found:
@@ -288,7 +288,7 @@ def _divided(rings: list[Ints], flats: list[Array], inner: Flags) -> list[list[i
         side = np.arange(a, (b if b > a else b + len(ring)) + 1) % len(ring)
         if side.size == 2:
             continue
-        if _area(flat[side]) < _SLIVER or not _outside(flat, side):
+        if enclosed_area(flat[side]) < _SLIVER or not _outside(flat, side):
             return _triangles(rings, flats)
         more = _triangles([ring[side]], [flat[side]])
         if not more:
@@ -316,8 +316,8 @@ def _triangles(rings: list[Ints], flats: list[Array]) -> list[list[int]]:
     for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(piece)):
         xy = np.asarray(triangle.exterior.coords)[:3]
         three = [node[tuple(p)] for p in xy.tolist()]
-        if abs(_area(xy)) > 1e-4 * _SLIVER:
-            out.append([*(three if _area(xy) > 0 else three[::-1]), -1])
+        if abs(enclosed_area(xy)) > 1e-4 * _SLIVER:
+            out.append([*(three if enclosed_area(xy) > 0 else three[::-1]), -1])
     return out
 
 
@@ -368,11 +368,6 @@ def _simplified(flat: Array, inner: Flags) -> Ints:
             kept.add(at)
             todo += [(a, at), (at, b)]
     return np.array(sorted(kept))
-
-
-def _area(flat: Array) -> float:
-    x, y = flat.T
-    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
 
 
 def _convex(flat: Array) -> bool:

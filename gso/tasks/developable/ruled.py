@@ -92,7 +92,7 @@ def plan(analysis: Analysis, request: Request, before: Callable[[Analysis, Reque
     made = replace(request, max_displacement=None)
     if request.start is not None:
         first = before(analysis, replace(made, start=None))
-        first = replace(first, start=request.start.ravel(), stages=(), layout=first.layout)
+        first = replace(first, start=request.start.ravel(), stages=())
     elif "curvature" in request.options.starts:
         first = before(analysis, made)
     else:
