@@ -27,7 +27,14 @@ from gso.metrics.curvature import (
     mean_abs_K,
     worst_curvature,
 )
-from gso.metrics.distance import Distances, d_H, displacement, point_to_surface, surface_distance
+from gso.metrics.distance import (
+    Distances,
+    boundary_distance,
+    d_H,
+    displacement,
+    point_to_surface,
+    surface_distance,
+)
 from gso.metrics.fairness import edge_ratios, fairness, fairness_ratio, loop_ratios, nonplanarity
 from gso.metrics.info import INFO, Info
 from gso.metrics.isometry import edge_length_error, isometry_defect, isometry_energy, loss_iso_cell
@@ -53,6 +60,7 @@ __all__ = [
     "Strains",
     "area",
     "area_error",
+    "boundary_distance",
     "components",
     "corner_areas",
     "corner_strains",

@@ -50,6 +50,44 @@ def surface_distance(before: Any, after: Any) -> Distances:
     return Distances(float(there.mean()), float(there.max()), float(back.mean()), float(back.max()))
 
 
+def boundary_distance(before: Any, after: Any) -> tuple[float, float]:
+    """Measure the largest distances between boundary curves, in the surfaces' unit.
+
+    A slit in the output, which no distance between the surfaces shows, is seen here.
+
+    Returns
+    -------
+    there, back : float
+        From the boundary vertices of the output to the boundary of the input, and back;
+        infinite where only the other surface has a boundary.
+
+    Examples
+    --------
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> boundary_distance(grid, grid + [0.0, 0.0, 0.1])
+    (0.1, 0.1)
+    """
+    from gso.mesh.polyline import Polylines
+
+    points, lines = [], []
+    for mesh in (mesh_of(before), mesh_of(after)):
+        loops = [mesh.vertices[loop] for loop in mesh.boundary_loops]
+        points.append(np.concatenate([np.empty((0, 3)), *loops]))
+        lines.append(
+            Polylines.join([Polylines.of(x, closed=True) for x in loops]) if loops else None
+        )
+
+    def far(k: int) -> float:
+        line = lines[1 - k]
+        if not len(points[k]):
+            return 0.0
+        if line is None:
+            return float("inf")
+        return float(np.linalg.norm(line.nearest(points[k]).points - points[k], axis=1).max())
+
+    return far(1), far(0)
+
+
 def displacement(before: Any, after: Any) -> tuple[float, float]:
     """Return the root mean square and largest vertex displacement, percent of the diagonal.
 

@@ -41,6 +41,7 @@ def descend(energy: Energy, vertices: Array, w: Weights, iterations: int) -> Arr
     system, damping, growth = energy.system, _DAMPING, 2.0
     diagonal = system.diagonal
     here = energy.measure(vertices)
+    tangled = int(energy.strips.tangled(vertices).sum())
     bound = _CROSSED * w.least * energy.width
     for _ in range(iterations):
         scale = max(float(np.abs(here.height).max()), 1e-12)
@@ -59,14 +60,15 @@ def descend(energy: Energy, vertices: Array, w: Weights, iterations: int) -> Arr
             damped[diagonal] += damping * mean
             step = system.solve(damped, right)[system.unknowns]
             longest = float(np.abs(step).max())
-            fall, trial = -1.0, vertices
+            fall, trial, knots = -1.0, vertices, 0
             there: Measured | None = None
             if longest <= _REACH * energy.width:
                 trial = vertices + step
                 if not w.planar:
                     trial = planarised(system, trial, _NEARLY)
                 least = float(energy.gaps(trial, here.up)[0].min())
-                if least >= min(bound, float(here.gap.min())):
+                knots = int(energy.strips.tangled(trial).sum())
+                if least >= min(bound, float(here.gap.min())) and knots <= tangled:
                     there = energy.measure(trial)
                     fall = value - energy.value(trial, there, w, here.back_weight, scale)
             if there is not None and fall > 0:
@@ -81,7 +83,7 @@ def descend(energy: Energy, vertices: Array, w: Weights, iterations: int) -> Arr
         ratio = fall / max(predicted, 1e-300)
         damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * min(ratio, 1.5) - 1.0) ** 3), 1e-9)
         growth = 2.0
-        vertices, here = trial, there
+        vertices, here, tangled = trial, there, knots
         if fall < _TOLERANCE * value:
             break
     return vertices

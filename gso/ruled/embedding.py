@@ -24,8 +24,8 @@ def border(triangles: Ints) -> Ints:
     return np.array(out)
 
 
-def plane(strips: Strips) -> Array:
-    """Return parameters (n, 2) of the vertices of strips (Tutte's embedding).
+def plane(strips: Strips, triangles: Ints) -> Array:
+    """Return parameters (n, 2) of the vertices of strips in triangles (t, 3): Tutte's embedding.
 
     The border is on a circle, and all other vertices are the means of their neighbours, so that
     no face is inverted.
@@ -33,7 +33,6 @@ def plane(strips: Strips) -> Array:
     from scipy.sparse import csr_matrix
     from scipy.sparse.linalg import spsolve
 
-    triangles, _ = strips.split
     loop = border(triangles)
     angle = 2.0 * np.pi * np.arange(len(loop)) / len(loop)
     out = np.zeros((strips.size, 2))

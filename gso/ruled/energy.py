@@ -16,6 +16,9 @@ from gso.typing import Array, Ints
 
 #: Samples across a strip, and at least across each of several.
 _SAMPLES, _LEAST = 8, 2
+#: Distance of the continued outline from the ends of rulings up to which these count as outside
+#: the design, relative to the margin.
+_OUTSIDE = 0.8
 #: Distance from the normal through the nearest point at which a point is beyond the face.
 _APART = 1e-9
 
@@ -37,6 +40,8 @@ class Weights:
         Second differences along the rulings, times the squared number of strips.
     ends : float
         Distance of the border curves from the continued outline.
+    inside : float
+        Squared depth of the ends of rulings inside the design.
     gap : float
         Missing distance between successive rulings.
     least : float
@@ -52,7 +57,8 @@ class Weights:
     bent: float = 1e-7
     fold: float = 1e-6
     even: float = 1e-2
-    ends: float = 1e-2
+    ends: float = 1e-3
+    inside: float = 10.0
     gap: float = 5.0
     least: float = 0.1
     planar: float = 0.0
@@ -85,6 +91,8 @@ class Measured:
         Signed distances between both ends of a face's rulings, and their direction.
     off, across : ndarray, (o, 3), (o, 3, 3)
         Offsets of the border curves from the continued outline, and projections across it.
+    deep, out : ndarray, (o,), (o, 3)
+        Depths of the ends of rulings inside the design, and the directions out of it.
     turn, stiff : ndarray, (h, 3), (h,)
         Changes of the normal at rulings, and the length of the rulings over the mean width.
     """
@@ -103,6 +111,8 @@ class Measured:
     side: Array
     off: Array
     across: Array
+    deep: Array
+    out: Array
     turn: Array
     stiff: Array
 
@@ -184,7 +194,10 @@ class Energy:
         mean = unit(np.einsum("fsd,fs->fd", up, area))
         gap, side = self.gaps(vertices, mean)
         ends = vertices[self.strips.outer]
-        near, tangent = self.design.rim_feet(ends)
+        near, tangent, out = self.design.rim_feet(ends)
+        margin = lengths(out)
+        depth = np.einsum("kd,kd->k", near - ends, out) / np.maximum(margin, 1e-300)
+        deep = np.maximum(depth - _OUTSIDE * margin, 0.0)
         across = np.eye(3) - tangent[:, :, None] * tangent[:, None]
         off = np.einsum("kij,kj->ki", across, ends - near)
         one, two = self._face_normals(vertices)[0][self._hinge].transpose(1, 0, 2)
@@ -205,6 +218,8 @@ class Energy:
             side,
             off,
             across,
+            deep,
+            unit(out),
             one - two,
             stiff,
         )
@@ -229,7 +244,7 @@ class Energy:
             Normals on the side from which gaps are positive.
         """
         p, q, p1, q1 = vertices[self.strips.corners].transpose(1, 0, 2)
-        side = unit(cross(q - p + q1 - p1, up))
+        side = unit(cross(unit(q - p) + unit(q1 - p1), up))
         gap = np.stack(
             [np.einsum("fd,fd->f", p1 - p, side), np.einsum("fd,fd->f", q1 - q, side)], axis=1
         )
@@ -243,6 +258,7 @@ class Energy:
         total += w.back * float((weight * (np.abs(m.back) / scale) ** w.power).sum()) * scale**2
         total += 0.5 * self._linear(vertices, w)[0]
         total += w.ends / len(m.off) * float((m.off**2).sum())
+        total += w.inside / len(m.off) * float(m.deep @ m.deep)
         total += w.fold * float(m.stiff @ (m.turn**2).sum(axis=1))
         short = np.minimum(m.gap - w.least * self.width, 0.0)
         total += w.gap / self._rulings * float((short**2).sum())
@@ -268,7 +284,11 @@ class Energy:
         gradient += self._linear(vertices, w)[1]
         factor = 2.0 * w.ends / len(m.off)
         gradient[self.strips.outer] += factor * m.off
-        parts.append((self._outer_places, factor * m.across))
+        block = factor * m.across
+        factor = 2.0 * w.inside / len(m.off)
+        gradient[self.strips.outer] -= factor * m.deep[:, None] * m.out
+        block = block + factor * (m.deep > 0)[:, None, None] * m.out[:, :, None] * m.out[:, None]
+        parts.append((self._outer_places, block))
         matrix = self.system.matrix(parts)
         for key, _, band in self._second:
             matrix += getattr(w, key) * band

@@ -70,6 +70,7 @@ class Extended:
         self._near = Nearest.of(vertices, every)
         rim = domain.points(outline + domain.margin * normals)
         self._rim = rim
+        self._out = rim - domain.sample(domain.mesh.vertices, outline)[0]
         self._step = np.roll(rim, -1, axis=0) - rim
         self._length = np.maximum(lengths(self._step), 1e-300)
 
@@ -80,12 +81,16 @@ class Extended:
         normal = np.einsum("kj,kjd->kd", shares, self.normals[ids])
         return foot, unit(normal), (shares * self.weights[ids]).sum(axis=1)
 
-    def rim_feet(self, points: Array) -> tuple[Array, Array]:
-        """Return the nearest points of the continued outline to points (k, 3), and tangents."""
+    def rim_feet(self, points: Array) -> tuple[Array, Array, Array]:
+        """Return the nearest points of the continued outline to points (k, 3).
+
+        Also returned are its tangents there, and the vectors from the outline to it.
+        """
         away = points[:, None] - self._rim
         s = np.einsum("kld,ld->kl", away, self._step) / self._length**2
         s = np.minimum(np.maximum(s, 0.0), 1.0)
         off = away - s[:, :, None] * self._step
         at = np.einsum("kld,kld->kl", off, off).argmin(axis=1)
         s = s[np.arange(len(points)), at, None]
-        return self._rim[at] + s * self._step[at], self._step[at] / self._length[at, None]
+        out = (1.0 - s) * self._out[at] + s * self._out[(at + 1) % len(self._out)]
+        return self._rim[at] + s * self._step[at], self._step[at] / self._length[at, None], out

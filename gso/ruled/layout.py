@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
+from gso.ruled.vectors import cross
 from gso.typing import Array, Flags, Ints
 
 
@@ -114,11 +115,45 @@ class Strips:
     @cached_property
     def split(self) -> tuple[Ints, Ints]:
         """Triangles (t, 3) of the faces, and the number of the face of each (t,)."""
+        return _true(self.corners[:, [[0, 1, 3], [0, 3, 2]]])
+
+    def other_diagonal(self, vertices: Array) -> Flags:
+        """Return whether faces (f,) have to be divided between their second and third corner.
+
+        These are quads with a reflex corner there; the diagonal between the first and the last
+        corner, which :attr:`split` takes, is outside of them.
+        """
+        p, q, p1, q1 = vertices[self.corners].transpose(1, 0, 2)
+        normal = cross(q1 - p, q - p1)
+        own = [cross(q1 - q, p - q), cross(p - p1, q1 - p1)]
+        turns = [np.einsum("fd,fd->f", normal, n) for n in own]
+        return (turns[0] > 0) | (turns[1] > 0)
+
+    def tangled(self, vertices: Array) -> Flags:
+        """Return whether the outlines of planar faces (f,) cross themselves.
+
+        Such a quad has two reflex corners.
+        """
+        c = self.corners[self.quads]
+        p, q, p1, q1 = vertices[c].transpose(1, 0, 2)
+        normal = cross(q1 - p, q - p1)
+        own = [
+            cross(q1 - q, p - q),
+            cross(p - p1, q1 - p1),
+            cross(q - p, p1 - p),
+            cross(p1 - q1, q - q1),
+        ]
+        reflex = sum((np.einsum("fd,fd->f", normal, n) > 0).astype(int) for n in own)
+        out = np.zeros(len(self.corners), bool)
+        out[self.quads] = np.asarray(reflex) > 1
+        return out
+
+    def divided(self, vertices: Array) -> tuple[Ints, Ints]:
+        """Return triangles (t, 3) of planar faces, and the number of the face of each (t,)."""
         ids = self.corners[:, [[0, 1, 3], [0, 3, 2]]]
-        true = (ids[:, :, 0] != ids[:, :, 1]) & (ids[:, :, 0] != ids[:, :, 2])
-        true &= ids[:, :, 1] != ids[:, :, 2]
-        face, half = np.nonzero(true)
-        return ids[face, half], face
+        other = self.other_diagonal(vertices)
+        ids[other] = self.corners[other][:, [[0, 1, 2], [1, 3, 2]]]
+        return _true(ids)
 
     @cached_property
     def hinges(self) -> tuple[Ints, Ints, Ints]:
@@ -172,6 +207,14 @@ class Strips:
         mean = np.stack([np.bincount(label, v, minlength=count) for v in vertices.T], 1) / number
         index = tuple(label[i].astype(np.int64) for i in self.index)
         return Strips(index, label[self.flats].astype(np.int64)), mean
+
+
+def _true(ids: Ints) -> tuple[Ints, Ints]:
+    """Keep the triangles (f, 2, 3) of faces that have three different corners."""
+    true = (ids[:, :, 0] != ids[:, :, 1]) & (ids[:, :, 0] != ids[:, :, 2])
+    true &= ids[:, :, 1] != ids[:, :, 2]
+    face, half = np.nonzero(true)
+    return ids[face, half], face
 
 
 def _shared(sides: Ints, face: Ints) -> tuple[Ints, Ints, Ints]:

@@ -176,13 +176,19 @@ class RuledSurface:
     def distances(self, design: Mesh) -> metrics.Distances:
         """Measure the distances from a design, in its unit, all over both surfaces.
 
-        "There" is from the surface to the design, "back" from the design's vertices to it.
+        "There" is from the surface to the design, "back" from the design's vertices to it. The
+        largest distances include those between the boundary curves, so that a slit counts with
+        its depth.
         """
         points, weight = self.samples()
         there = metrics.point_to_surface(points, design)
         back = metrics.point_to_surface(design.vertices[design.used], self.mesh)
+        rim_there, rim_back = metrics.boundary_distance(design, self.mesh)
         return metrics.Distances(
-            float(weight @ there), float(there.max()), float(back.mean()), float(back.max())
+            float(weight @ there),
+            max(float(there.max()), rim_there),
+            float(back.mean()),
+            max(float(back.max()), rim_back),
         )
 
     def transformed(self, move: Any, scale: float, back: Any) -> RuledSurface:
@@ -223,7 +229,7 @@ def built(job: Job, fit: Fit) -> RuledSurface:
     cut = trimmed(job.target, strips, vertices, unrolled)
     mesh = Mesh(cut.vertices, cut.faces)
     part = unrolled.part[cut.face]
-    place = Nearest.of(vertices, strips.split[0])
+    place = Nearest.of(vertices, strips.divided(vertices)[0])
     _, _, moved = place.locate(job.target.domain.mesh.vertices)
     rulings, creases = _folds(strips, vertices, unrolled, mesh, cut.face)
     return RuledSurface(
@@ -233,7 +239,7 @@ def built(job: Job, fit: Fit) -> RuledSurface:
         creases=creases,
         pattern=_pattern(mesh, cut.face, part, unrolled),
         moved=moved,
-        crossed=int((measured.gap <= 0).any(axis=1).sum()),
+        crossed=int(((measured.gap <= 0).any(axis=1) | strips.tangled(vertices)).sum()),
     )
 
 

@@ -34,6 +34,9 @@ _STRAIGHT = 2e-4
 #: Pieces of faces below this area, relative to the squared diagonal, are left out.
 _SLIVER = 1e-10
 
+#: Corners of the triangles of a face; of one that is divided along its other diagonal.
+_HALVES = {False: ((0, 1, 3), (0, 3, 2)), True: ((0, 1, 2), (1, 3, 2))}
+
 
 @dataclass(frozen=True)
 class Trimmed:
@@ -69,9 +72,9 @@ def trimmed(target: Extended, strips: Strips, vertices: Array, unrolled: Unrolle
     """
     import shapely
 
-    place = plane(strips)
+    triangles, _ = strips.divided(vertices)
+    place = plane(strips, triangles)
     design, normals = target.domain.mesh, target.normals
-    triangles, _ = strips.split
     step = float(np.median(lengths(np.diff(vertices[strips.sides], axis=1)[:, 0]))) / 3.0
     rings = []
     for loop in design.boundary_loops:
@@ -170,6 +173,7 @@ class _Nodes:
         self.inner: list[bool] = []
         self._known: dict[tuple[int, int], list[tuple[float, int]]] = {}
         self._corner: dict[int, int] = {}
+        self._other = strips.other_diagonal(vertices)
 
     def ring(self, face: int, ring: Array) -> list[int]:
         """Return the nodes of a ring (k, 2) of a piece of a face."""
@@ -177,7 +181,7 @@ class _Nodes:
         best = np.full(len(ring), -np.inf)
         shares = np.zeros((len(ring), 3))
         ids = np.zeros((len(ring), 3), np.int64)
-        for three in ((0, 1, 3), (0, 3, 2)):
+        for three in _HALVES[bool(self._other[face])]:
             corner = c[list(three)]
             if len(set(corner.tolist())) < 3:
                 continue
@@ -222,7 +226,8 @@ class _Nodes:
     def _is_diagonal(self, face: int, pair: Ints) -> bool:
         c = self.strips.corners[face]
         quad = c[0] != c[2] and c[1] != c[3]
-        return bool(quad and set(pair.tolist()) == {int(c[0]), int(c[3])})
+        ends = c[[1, 2]] if self._other[face] else c[[0, 3]]
+        return bool(quad and set(pair.tolist()) == set(ends.tolist()))
 
     def _new(self, point: Array, *, inner: bool) -> int:
         self.points.append(point)
