@@ -9,13 +9,14 @@ import gso
 from gso import faults, parametrization
 from gso.mesh import Mesh
 from gso.ruled import fit
-from gso.ruled.chords import chords, prices, resampled, sequence
+from gso.ruled.chords import chords, prices, sequence
 from gso.ruled.descent import planarised
 from gso.ruled.domain import Domain
 from gso.ruled.energy import Weights
 from gso.ruled.extended import Extended
 from gso.ruled.layout import Strips
 from gso.ruled.planarity import planarity
+from gso.ruled.polygon import resampled
 from gso.ruled.system import System
 from tests.conftest import cylinder, rotation, saddle, shuffled
 

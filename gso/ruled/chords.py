@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.ruled.domain import Domain
+from gso.ruled.polygon import resampled
 from gso.typing import Array, Ints
 
 #: Points on the outline, and samples along a chord.
@@ -18,8 +19,12 @@ _COUNT, _SAMPLES = 96, 9
 _WINDOW, _EVEN = 9, 0.2
 #: Part of the sequence that is left out at each tip, where chords are very short.
 _TIP = 0.02
-#: Turning angles of sharp corners, and the largest for which offsets are lengthened.
-_SHARP, _MITRE = 0.5, 2.0
+#: Largest turns of chords, in points of the outline, one round after the other; number of turns
+#: that are tried in each; weight of the changes of the turn, relative to the mean price.
+_TURNS, _CHOICES, _STEADY = (6.0, 1.5, 0.4), 13, 0.05
+#: Least distance of ends on the offset polygon, relative to their mean distance, and the largest
+#: number of points by which they move for the sake of a straight continuation.
+_APART, _FAR = 0.2, 8.0
 
 
 def chords(domain: Domain, count: int) -> tuple[Array, Array]:
@@ -39,7 +44,45 @@ def chords(domain: Domain, count: int) -> tuple[Array, Array]:
     beyond = outline + domain.margin * normals
     at = np.linspace(_TIP, 1.0 - _TIP, count)
     one, other = (np.interp(at, np.linspace(0.0, 1.0, len(x)), _even(x)) for x in (first, second))
+    for reach in _TURNS:
+        one, other = turned(domain, outline, one, other, reach)
+    one, other = _continued(outline, beyond, one, other)
     return _on(beyond, one), _on(beyond, other)
+
+
+def _continued(outline: Array, beyond: Array, one: Array, other: Array) -> tuple[Array, Array]:
+    """Continue chords as straight lines to an offset polygon, where they do not cross there.
+
+    Returns
+    -------
+    one, other : ndarray, (k,)
+        The ends as numbers of points of the offset polygon.
+    """
+    n, wide = len(outline), _APART * (one[-1] - one[0]) / len(one)
+    ends = _on(outline, one), _on(outline, other)
+    found = []
+    for at, start, stop, sign in ((one, *ends[::-1], 1.0), (other, *ends, -1.0)):
+        way = stop - start
+        off = beyond - start[:, None]
+        side = way[:, :1] * off[:, :, 1] - way[:, 1:] * off[:, :, 0]
+        along = np.einsum("kd,knd->kn", way, off) / (way**2).sum(axis=1)[:, None]
+        after, ahead = np.roll(side, -1, axis=1), np.roll(along, -1, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = side / (side - after)
+        share = np.where((side > 0) != (after > 0), share, 0.0)
+        there = np.where((side > 0) != (after > 0), along + share * (ahead - along), np.inf)
+        there[there < 1.0] = np.inf
+        k = there.argmin(axis=1)
+        row = np.arange(len(k))
+        move = (k + share[row, k] - at + 0.5 * n) % n - 0.5 * n
+        move[~np.isfinite(there[row, k]) | (np.abs(move) > _FAR)] = 0.0
+        rising = sign * (at + move)
+        steps = wide * np.arange(len(k))
+        # Both running extrema keep the order; their mean shares out what is moved.
+        low = np.maximum.accumulate(rising - steps) + steps
+        high = np.minimum.accumulate((rising - steps)[::-1])[::-1] + steps
+        found.append(sign * 0.5 * (low + high))
+    return found[0], found[1]
 
 
 def _even(ends: Ints) -> Array:
@@ -57,37 +100,6 @@ def _on(loop: Array, at: Array) -> Array:
     return np.stack([np.interp(at % n, np.arange(n + 1), np.append(c, c[0])) for c in loop.T], 1)
 
 
-def resampled(loop: Array, count: int) -> tuple[Array, Array]:
-    """Return points along a closed polygon (k, 2), and outward offsets of distance one.
-
-    The points are at equal distances, but the nearest ones are moved to the sharp corners. There
-    the offset is longer, so that the offset polygon has corners too.
-    """
-    closed = np.vstack([loop, loop[:1]])
-    along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))]
-    at = np.linspace(0.0, along[-1], count, endpoint=False)
-    turn = _turning(loop)
-    for k in np.argsort(turn):
-        if turn[k] > _SHARP:
-            gap = np.abs(at - along[k])
-            at[np.minimum(gap, along[-1] - gap).argmin()] = along[k]
-    at = np.sort(at)
-    points = np.stack([np.interp(at, along, c) for c in closed.T], axis=1)
-    way = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
-    normals = np.stack([way[:, 1], -way[:, 0]], axis=1)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    mitre = 1.0 / np.cos(0.5 * np.clip(_turning(points), 0.0, _MITRE))
-    return points, normals * mitre[:, None]
-
-
-def _turning(loop: Array) -> Array:
-    """Return the angles (n,) by which a closed polygon (n, 2) turns left at its corners."""
-    way = np.roll(loop, -1, axis=0) - loop
-    back = np.roll(way, 1, axis=0)
-    cross = back[:, 0] * way[:, 1] - back[:, 1] * way[:, 0]
-    return np.arctan2(cross, (back * way).sum(axis=1))
-
-
 def prices(domain: Domain, outline: Array) -> Array:
     """Return the price (n, n) of the chords between points (n, 2) of the outline.
 
@@ -96,16 +108,53 @@ def prices(domain: Domain, outline: Array) -> Array:
     """
     n = len(outline)
     first, second = np.triu_indices(n, 1)
-    t = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES)[:, None]
-    places = (outline[first, None] * (1.0 - t) + outline[second, None] * t).reshape(-1, 2)
-    normals, feet = domain.sample(domain.normals, places)
-    normals = normals.reshape(len(first), _SAMPLES, 3)
-    varying = ((normals - normals.mean(axis=1, keepdims=True)) ** 2).sum(axis=2).mean(axis=1)
-    gap = np.linalg.norm(feet - places, axis=1).reshape(len(first), _SAMPLES)
-    outside = (gap > 1e-6 * domain.margin).mean(axis=1)
     out = np.zeros((n, n))
-    out[first, second] = (varying + outside) * ((outline[first] - outline[second]) ** 2).sum(axis=1)
+    out[first, second] = _price(domain, outline[first], outline[second])
     return out + out.T
+
+
+def _price(domain: Domain, one: Array, other: Array) -> Array:
+    """Return the price (k,) of chords with ends (k, 2), (k, 2)."""
+    t = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES)[:, None]
+    places = (one[:, None] * (1.0 - t) + other[:, None] * t).reshape(-1, 2)
+    normals, feet = domain.sample(domain.normals, places)
+    normals = normals.reshape(len(one), _SAMPLES, 3)
+    varying = ((normals - normals.mean(axis=1, keepdims=True)) ** 2).sum(axis=2).mean(axis=1)
+    gap = np.linalg.norm(feet - places, axis=1).reshape(len(one), _SAMPLES)
+    outside = (gap > 1e-6 * domain.margin).mean(axis=1)
+    return np.asarray((varying + outside) * ((one - other) ** 2).sum(axis=1))
+
+
+def turned(
+    domain: Domain, outline: Array, one: Array, other: Array, reach: float
+) -> tuple[Array, Array]:
+    """Turn successive chords so that their prices fall; they do not cross.
+
+    Both ends move by the same number of points along the outline, at most by `reach`.
+
+    Parameters
+    ----------
+    one, other : ndarray, (k,)
+        Ends of the chords, as numbers of points of the outline: `one` rises, `other` falls.
+    """
+    move = reach * np.linspace(-1.0, 1.0, _CHOICES)
+    first, second = one[:, None] + move, other[:, None] + move
+    ends = (_on(outline, x.ravel()) for x in (first, second))
+    price = _price(domain, *ends).reshape(first.shape)
+    bend = _STEADY * price.mean() * ((move[:, None] - move) / reach) ** 2
+    total, choice = price[0], []
+    for k in range(1, len(one)):
+        ahead = (first[k] > first[k - 1][:, None]) & (second[k] < second[k - 1][:, None])
+        step = total[:, None] + np.where(ahead, bend, np.inf)
+        choice.append(step.argmin(axis=0))
+        total = step.min(axis=0) + price[k]
+    if not np.isfinite(total.min()):
+        return one, other
+    way = [int(total.argmin())]
+    for before in reversed(choice):
+        way.append(int(before[way[-1]]))
+    found = move[way[::-1]]
+    return one + found, other + found
 
 
 def sequence(outline: Array, price: Array) -> tuple[Ints, Ints]:

@@ -36,7 +36,9 @@ def planarised(system: System, vertices: Array, tolerance: float = _PLANAR) -> A
     return vertices
 
 
-def descend(energy: Energy, vertices: Array, w: Weights, iterations: int) -> Array:
+def descend(
+    energy: Energy, vertices: Array, w: Weights, iterations: int, tolerance: float = _TOLERANCE
+) -> Array:
     """Minimise the energy from given vertices; the best are returned."""
     system, damping, growth = energy.system, _DAMPING, 2.0
     diagonal = system.diagonal
@@ -84,6 +86,6 @@ def descend(energy: Energy, vertices: Array, w: Weights, iterations: int) -> Arr
         damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * min(ratio, 1.5) - 1.0) ** 3), 1e-9)
         growth = 2.0
         vertices, here, tangled = trial, there, knots
-        if fall < _TOLERANCE * value:
+        if fall < tolerance * value:
             break
     return vertices

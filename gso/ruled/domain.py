@@ -10,7 +10,8 @@ from gso import geometry
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.mesh.normals import vertex_normals
-from gso.ruled.vectors import enclosed_area
+from gso.ruled.polygon import enclosed_area, resampled
+from gso.ruled.vectors import lengths
 from gso.typing import Array, Ints
 
 #: Width of the continuation, relative to the diagonal of the flat image.
@@ -72,7 +73,7 @@ class Domain:
         """Return about `count` points (k, 3) of the design, evenly spread, and its outline.
 
         They are a square lattice on the flat image, and points on the outline at the same
-        distance from each other.
+        distance from each other, its sharp corners among them.
         """
         low, high = self.flat.min(axis=0), self.flat.max(axis=0)
         area = abs(enclosed_area(self.flat[self.outline]))
@@ -82,11 +83,9 @@ class Domain:
         points, feet = self.sample(self.mesh.vertices, places)
         inside = np.linalg.norm(feet - places, axis=1) < _TINY * self.margin
         loop = self.flat[self.outline]
-        steps = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
-        along = np.r_[0.0, np.cumsum(steps)]
-        # One vertex in each section of the outline, so that corners of coarse meshes stay.
-        chosen = np.unique(np.floor(along[:-1] / step), return_index=True)[1]
-        return np.concatenate([points[inside], self.mesh.vertices[self.outline[chosen]]])
+        around = float(lengths(np.roll(loop, -1, axis=0) - loop).sum())
+        on, _ = resampled(loop, max(int(around / step), 8))
+        return np.concatenate([points[inside], self.sample(self.mesh.vertices, on)[0]])
 
     def points(self, places: Array) -> Array:
         """Return positions (k, 3); beyond the outline by quadratic extrapolation.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,6 +63,11 @@ class Weights:
     least: float = 0.1
     planar: float = 0.0
     power: float = 2.0
+
+    def scaled(self, share: float) -> Weights:
+        """Return other weights for all terms that a design which is ruled does not minimise."""
+        names = ("bent", "fold", "even", "ends")
+        return replace(self, **{name: share * getattr(self, name) for name in names})
 
 
 @dataclass(frozen=True)

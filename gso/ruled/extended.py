@@ -6,8 +6,8 @@ import numpy as np
 
 from gso import geometry
 from gso.mesh.closest_point import Nearest
-from gso.ruled.chords import resampled
 from gso.ruled.domain import Domain
+from gso.ruled.polygon import resampled
 from gso.ruled.vectors import lengths, unit
 from gso.typing import Array
 

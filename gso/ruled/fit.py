@@ -29,6 +29,9 @@ _PENALISED, _EXACT, _EACH = 6, 15, 8
 _POWERS = {True: (4.0, 8.0), False: (4.0,)}
 #: Ends of rulings are merged when their gap is below this multiple of the least one.
 _MERGED = 1.7
+#: Root mean square distance below which other terms lose weight; rounds of that, the largest
+#: number of iterations in each, and the relative decrease of the energy at which it ends.
+_CLOSE, _ROUNDS, _POLISH, _TIGHT = 1.4e-3, 6, 20, 1e-8
 #: Weights that differ from the usual ones when there are several strips.
 _EVEN = 1e-4
 
@@ -80,11 +83,23 @@ def halved(job: Job, fit: Fit, which: Ints | None = None) -> Fit:
 
 
 def evened(job: Job, fit: Fit) -> Fit:
-    """Lower the largest distance: minimise higher powers of the distances."""
+    """Lower the largest distance: minimise higher powers of the distances.
+
+    Where strips are close to the design already, other terms get less weight before: a design
+    that is ruled is reproduced up to the width of the faces.
+    """
     energy, vertices = job.energy(fit.strips, fit.vertices, fit.width), fit.vertices
+    full = replace(job.weights, moved=0.0, even=_EVEN)
+    w, share = full, 1.0
+    for _ in range(_ROUNDS):
+        less = float((energy.measure(vertices).height ** 2).mean()) / _CLOSE**2
+        if less > 0.5 * share:
+            break
+        share = less
+        w = full.scaled(share)
+        vertices = descend(energy, vertices, w, _POLISH, _TIGHT)
     for power in _POWERS[fit.strips.count == 1]:
-        w = replace(job.weights, moved=0.0, even=_EVEN, power=power)
-        vertices = descend(energy, vertices, w, _EACH)
+        vertices = descend(energy, vertices, replace(w, power=power), _EACH)
     return replace(fit, vertices=planarised(energy.system, vertices))
 
 

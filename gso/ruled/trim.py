@@ -15,8 +15,9 @@ from gso.mesh.closest_point import Nearest
 from gso.ruled.embedding import plane
 from gso.ruled.extended import Extended
 from gso.ruled.layout import Strips
+from gso.ruled.polygon import enclosed_area
 from gso.ruled.unroll import Unrolled
-from gso.ruled.vectors import cross, enclosed_area, lengths, unit
+from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Flags, Ints
 
 #: Barycentric coordinates below this are on the opposite edge; nodes on an edge that are closer

@@ -14,12 +14,6 @@ def cross(a: Array, b: Array) -> Array:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
-def enclosed_area(loop: Array) -> float:
-    """Return the signed area of a polygon (k, 2)."""
-    x, y = loop.T
-    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
-
-
 def lengths(a: Array) -> Array:
     """Return the lengths of vectors along the last axis."""
     return np.sqrt(np.einsum("...d,...d->...", a, a))
