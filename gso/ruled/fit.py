@@ -17,6 +17,7 @@ from gso.ruled.descent import descend, planarised
 from gso.ruled.energy import Energy, Weights
 from gso.ruled.extended import Extended
 from gso.ruled.layout import Strips
+from gso.ruled.vectors import lengths
 from gso.typing import Array, Ints
 
 #: Phases of a single strip: weights of `moved` and `planar`.
@@ -32,6 +33,8 @@ _MERGED = 1.7
 #: Root mean square distance below which other terms lose weight; rounds of that, the largest
 #: number of iterations in each, and the relative decrease of the energy at which it ends.
 _CLOSE, _ROUNDS, _POLISH, _TIGHT = 1.4e-3, 6, 20, 1e-8
+#: Rounds of merging ends of rulings that cross.
+_MENDED = 3
 #: Weights that differ from the usual ones when there are several strips.
 _EVEN = 1e-4
 
@@ -100,39 +103,63 @@ def evened(job: Job, fit: Fit) -> Fit:
         vertices = descend(energy, vertices, w, _POLISH, _TIGHT)
     for power in _POWERS[fit.strips.count == 1]:
         vertices = descend(energy, vertices, replace(w, power=power), _EACH)
-    return replace(fit, vertices=planarised(energy.system, vertices))
+    return _uncrossed(job, replace(fit, vertices=planarised(energy.system, vertices)))
 
 
 def _exact(job: Job, fit: Fit, iterations: int) -> Fit:
     energy = job.energy(fit.strips, fit.vertices, fit.width)
     w = replace(job.weights, moved=_MOVED, even=_EVEN)
-    return replace(fit, vertices=descend(energy, fit.vertices, w, iterations))
+    found = replace(fit, vertices=descend(energy, fit.vertices, w, iterations))
+    return _uncrossed(job, found)
 
 
 def _planar(job: Job, fit: Fit, start: Array) -> Fit:
     """Make the quads planar, and merge ends of rulings that are close to each other."""
     energy = job.energy(fit.strips, start, fit.width)
-    for factor in (_MERGED, 0.0, 0.0):
-        least = factor * job.weights.least * fit.width
-        pairs = close(energy, fit.vertices, least)
-        if len(pairs):
-            strips, vertices = fit.strips.merged(fit.vertices, pairs)
-            if not len(strips.corners):
-                raise MeshError(
-                    "no rulings were found on this surface, as they all run into each other; it "
-                    "may be folded or too irregular for the formulation 'ruled': take 'curvature'"
-                )
-            fit = Fit(strips, vertices, fit.width)
-            energy = job.energy(fit.strips, fit.vertices, fit.width)
-        elif not factor:
+    least = _MERGED * job.weights.least * fit.width
+    fit = _merged(fit, close(energy, fit.vertices, least))
+    energy = job.energy(fit.strips, fit.vertices, fit.width)
+    fit = replace(fit, vertices=planarised(energy.system, fit.vertices))
+    return _uncrossed(job, fit)
+
+
+def _uncrossed(job: Job, fit: Fit) -> Fit:
+    """Merge ends of planar rulings that cross, until none do."""
+    for _ in range(_MENDED):
+        energy = job.energy(fit.strips, fit.vertices, fit.width)
+        pairs = close(energy, fit.vertices, 0.0)
+        if not len(pairs):
             break
+        fit = _merged(fit, pairs)
+        energy = job.energy(fit.strips, fit.vertices, fit.width)
         fit = replace(fit, vertices=planarised(energy.system, fit.vertices))
     return fit
 
 
+def _merged(fit: Fit, pairs: Ints) -> Fit:
+    if not len(pairs):
+        return fit
+    strips, vertices = fit.strips.merged(fit.vertices, pairs)
+    if not len(strips.corners):
+        raise MeshError(
+            "no rulings were found on this surface, as they all run into each other; it "
+            "may be folded or too irregular for the formulation 'ruled': take 'curvature'"
+        )
+    return Fit(strips, vertices, fit.width)
+
+
 def close(energy: Energy, vertices: Array, least: float) -> Ints:
-    """Return pairs (m, 2) of ends of successive rulings whose gap is below a bound."""
+    """Return pairs (m, 2) of ends of successive rulings whose gap is below a bound.
+
+    Of faces whose outlines cross themselves, the ends with the smaller distance are taken.
+    """
     gap = energy.measure(vertices).gap
     corners = energy.strips.corners
-    pairs = [corners[gap[:, end] < least][:, [end, 2 + end]] for end in (0, 1)]
+    knot = energy.strips.tangled(vertices)
+    apart = lengths(vertices[corners[:, 2:]] - vertices[corners[:, :2]])
+    nearer = apart.argmin(axis=1)
+    pairs = [
+        corners[(gap[:, end] < least) | (knot & (nearer == end))][:, [end, 2 + end]]
+        for end in (0, 1)
+    ]
     return np.concatenate(pairs)

@@ -288,17 +288,48 @@ def _pattern(mesh: Mesh, owner: Ints, part: Ints, unrolled: Unrolled) -> Pattern
     faces = mesh.faces
     face, corner = np.nonzero(faces >= 0)
     ids = faces[face, corner]
-    count = len(mesh.vertices)
-    # A vertex has one copy in each part.
-    key, first, which = np.unique(part[face] * count + ids, return_index=True, return_inverse=True)
+    first, which = _copies(mesh, part)
     table = np.full_like(faces, -1)
-    table[face, corner] = which.ravel()
+    table[face, corner] = which
     flat = unrolled.flat(owner[face[first]], mesh.vertices[ids[first]])
     label = part[face[first]]
     pieces = [upright(flat[label == k])[:, ::-1] * [1.0, -1.0] for k in range(int(part.max()) + 1)]
     for k, piece in enumerate(beside(pieces)):
         flat[label == k] = piece
-    return Pattern(flat, table, key % count, _seams(mesh, table))
+    return Pattern(flat, table, ids[first], _seams(mesh, table))
+
+
+def _copies(mesh: Mesh, part: Ints) -> tuple[Ints, Ints]:
+    """Number copies of the vertices: corners have the same one if inner edges join their faces.
+
+    Returns
+    -------
+    first, which : ndarray of int, (n,), (c,)
+        A corner of each copy, and the copy of each corner; corners are in the order of the faces.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    faces = mesh.faces
+    number = np.full(faces.shape, -1)
+    number[faces >= 0] = np.arange(int((faces >= 0).sum()))
+
+    def corners(face: Ints, vertex: Ints) -> Ints:
+        at = (faces[face] == vertex[:, None]).argmax(axis=1)
+        return np.asarray(number[face, at])
+
+    he = mesh.half_edges
+    k = np.flatnonzero((he.twin >= 0) & (he.origin < he.dest))
+    one, two = he.face[k], he.face[he.twin[k]]
+    same = part[one] == part[two]
+    k, one, two = k[same], one[same], two[same]
+    ends = [(corners(one, v), corners(two, v)) for v in (he.origin[k], he.dest[k])]
+    i, j = (np.concatenate(x) for x in zip(*ends, strict=True))
+    size = int(number.max()) + 1
+    graph = coo_matrix((np.ones(len(i)), (i, j)), shape=(size, size))
+    _, which = connected_components(graph, directed=False)
+    _, first = np.unique(which, return_index=True)
+    return first, which.astype(np.int64)
 
 
 def _seams(mesh: Mesh, table: Ints) -> Ints:

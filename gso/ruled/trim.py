@@ -34,6 +34,8 @@ _MISSED = 1e-6
 _STRAIGHT = 2e-4
 #: Pieces of faces below this area, relative to the squared diagonal, are left out.
 _SLIVER = 1e-10
+#: Area, relative to the squared diagonal, of faces whose corners are on a line.
+_EMPTY = 1e-14
 
 #: Corners of the triangles of a face; of one that is divided along its other diagonal.
 _HALVES = {False: ((0, 1, 3), (0, 3, 2)), True: ((0, 1, 2), (1, 3, 2))}
@@ -267,15 +269,26 @@ def _meshed(
         found = _divided(every, flats, inner)
         if not found:
             # Simplified, the piece intersects itself.
-            found = _triangles(whole, [nodes.parameters(ring) for ring in whole])
+            plane = [unrolled.flat(np.full(len(ring), face), points[ring]) for ring in whole]
+            found = _triangles(whole, plane)
+            found = found or _triangles(whole, [nodes.parameters(ring) for ring in whole])
         faces += found
         owner += [face] * len(found)
     table = np.array(faces)
     table, face_of = _connected(table, np.array(owner))
+    large = _areas(points, table) > _EMPTY
+    table, face_of = table[large], face_of[large]
     used = np.unique(table[table >= 0])
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
     return Trimmed(points[used], np.where(table >= 0, number[table], -1), face_of)
+
+
+def _areas(points: Array, table: Ints) -> Array:
+    """Return the areas (m,) of planar faces."""
+    a, b, c = points[table[:, :3].T]
+    d = np.where((table[:, 3] >= 0)[:, None], points[table[:, 3]], a)
+    return 0.5 * lengths(cross(c - a, d - b))
 
 
 def _divided(rings: list[Ints], flats: list[Array], inner: Flags) -> list[list[int]]:
