@@ -10,12 +10,14 @@ from gso import geometry
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.mesh.normals import vertex_normals
-from gso.ruled.polygon import enclosed_area, resampled
-from gso.ruled.vectors import lengths
+from gso.ruled.polygon import enclosed_area, resampled, turning
+from gso.ruled.vectors import lengths, unit
 from gso.typing import Array, Ints
 
 #: Width of the continuation, relative to the diagonal of the flat image.
 _MARGIN = 0.05
+#: Turning angles that differ by less are the same.
+_ALIKE = 1e-3
 #: Distances below this share of the margin are rounding errors.
 _TINY = 1e-9
 
@@ -35,7 +37,7 @@ class Domain:
     normals : ndarray, (n, 3)
         Unit normals at the vertices.
     outline : ndarray of int
-        Vertices of the outer boundary, anticlockwise in the plane.
+        Vertices of the outer boundary, anticlockwise in the plane, from its sharpest corner.
     margin : float
         Width of the continuation.
     """
@@ -48,7 +50,8 @@ class Domain:
         areas = [enclosed_area(flat[loop]) for loop in mesh.boundary_loops]
         largest = int(np.abs(areas).argmax())
         loop = mesh.boundary_loops[largest]
-        self.outline: Ints = loop if areas[largest] > 0 else loop[::-1]
+        loop = loop if areas[largest] > 0 else loop[::-1]
+        self.outline: Ints = np.roll(loop, -_start(flat[loop]))
 
     def with_normals(self, normals: Array) -> Domain:
         """Return the same domain with other normals (n, 3) at the vertices."""
@@ -75,14 +78,18 @@ class Domain:
         They are a square lattice on the flat image, and points on the outline at the same
         distance from each other, its sharp corners among them.
         """
-        low, high = self.flat.min(axis=0), self.flat.max(axis=0)
+        # The axes do not depend on how the flat image is turned.
+        loop = self.flat[self.outline]
+        x, y = unit(loop[0] - loop.mean(axis=0))
+        frame = np.array([[x, -y], [y, x]])
+        turned = self.flat @ frame
+        low, high = turned.min(axis=0), turned.max(axis=0)
         area = abs(enclosed_area(self.flat[self.outline]))
         step = float(np.sqrt(area / count))
         axes = [np.arange(a + 0.5 * step, b, step) for a, b in zip(low, high, strict=True)]
-        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2) @ frame.T
         points, feet = self.sample(self.mesh.vertices, places)
         inside = np.linalg.norm(feet - places, axis=1) < _TINY * self.margin
-        loop = self.flat[self.outline]
         around = float(lengths(np.roll(loop, -1, axis=0) - loop).sum())
         on, _ = resampled(loop, max(int(around / step), 8))
         return np.concatenate([points[inside], self.sample(self.mesh.vertices, on)[0]])
@@ -106,3 +113,10 @@ class Domain:
             slope, bend = 0.5 * (3.0 * here - 4.0 * one + two), 0.5 * (here - 2.0 * one + two)
             out[beyond] = here + x * slope + x * x * bend
         return out
+
+
+def _start(loop: Array) -> int:
+    """Return the number of the sharpest corner of a polygon, or of the farthest of several."""
+    turn = turning(loop)
+    far = lengths(loop - loop.mean(axis=0))
+    return int(np.where(turn > turn.max() - _ALIKE, far, 0.0).argmax())

@@ -25,7 +25,7 @@ def resampled(loop: Array, count: int) -> tuple[Array, Array]:
     closed = np.vstack([loop, loop[:1]])
     along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))]
     at = np.linspace(0.0, along[-1], count, endpoint=False)
-    turn = _turning(loop)
+    turn = turning(loop)
     for k in np.argsort(turn):
         if turn[k] > _SHARP:
             gap = np.abs(at - along[k])
@@ -35,11 +35,11 @@ def resampled(loop: Array, count: int) -> tuple[Array, Array]:
     way = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     normals = np.stack([way[:, 1], -way[:, 0]], axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    mitre = 1.0 / np.cos(0.5 * np.clip(_turning(points), 0.0, _MITRE))
+    mitre = 1.0 / np.cos(0.5 * np.clip(turning(points), 0.0, _MITRE))
     return points, normals * mitre[:, None]
 
 
-def _turning(loop: Array) -> Array:
+def turning(loop: Array) -> Array:
     """Return the angles (n,) by which a closed polygon (n, 2) turns left at its corners."""
     way = np.roll(loop, -1, axis=0) - loop
     back = np.roll(way, 1, axis=0)

@@ -329,7 +329,12 @@ def _copies(mesh: Mesh, part: Ints) -> tuple[Ints, Ints]:
     graph = coo_matrix((np.ones(len(i)), (i, j)), shape=(size, size))
     _, which = connected_components(graph, directed=False)
     _, first = np.unique(which, return_index=True)
-    return first, which.astype(np.int64)
+    # In the order of the parts, and of the vertices in each.
+    face, corner = np.nonzero(faces >= 0)
+    order = np.lexsort((faces[face, corner][first], part[face][first]))
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    return first[order], rank[which]
 
 
 def _seams(mesh: Mesh, table: Ints) -> Ints:
