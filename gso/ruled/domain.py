@@ -6,7 +6,6 @@ from copy import copy
 
 import numpy as np
 
-from gso import geometry
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.mesh.normals import vertex_normals
@@ -14,8 +13,8 @@ from gso.ruled.polygon import enclosed_area, resampled, turning
 from gso.ruled.vectors import lengths, unit
 from gso.typing import Array, Ints
 
-#: Width of the continuation, relative to the diagonal of the flat image.
-_MARGIN = 0.05
+#: Width of the continuation, relative to the length of the outline.
+_MARGIN = 0.018
 #: Turning angles that differ by less are the same.
 _ALIKE = 1e-3
 #: Distances below this share of the margin are rounding errors.
@@ -45,13 +44,14 @@ class Domain:
     def __init__(self, mesh: Mesh, flat: Array):
         self.mesh, self.flat = mesh, flat
         self.normals = vertex_normals(mesh)
-        self.margin = _MARGIN * geometry.box_diagonal(flat)
         self._nearest = Nearest.of(np.pad(flat, ((0, 0), (0, 1))), mesh.triangles)
         areas = [enclosed_area(flat[loop]) for loop in mesh.boundary_loops]
         largest = int(np.abs(areas).argmax())
         loop = mesh.boundary_loops[largest]
         loop = loop if areas[largest] > 0 else loop[::-1]
         self.outline: Ints = np.roll(loop, -_start(flat[loop]))
+        way = np.roll(flat[loop], -1, axis=0) - flat[loop]
+        self.margin = _MARGIN * float(lengths(way).sum())
 
     def with_normals(self, normals: Array) -> Domain:
         """Return the same domain with other normals (n, 3) at the vertices."""
