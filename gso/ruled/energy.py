@@ -158,7 +158,7 @@ class Energy:
             a, b = start[strips.sides].transpose(1, 0, 2)
             width = float(lengths(b - a).mean())
         self.width = width
-        self._rulings = len(strips.index[0])
+        self._rulings = sum(len(i) for i in strips.index)
         c = strips.corners
         self._same = np.stack([c[:, 0] == c[:, 2], c[:, 1] == c[:, 3]], axis=1)
         self._face_places = self.system.blocks(c)

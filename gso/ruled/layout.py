@@ -196,6 +196,13 @@ class Strips:
             index.append(new)
         return Strips(tuple(index), self.flats), np.concatenate(parts)
 
+    def compact(self, vertices: Array) -> tuple[Strips, Array]:
+        """Leave out vertices that no ruling and no flat uses."""
+        used = np.unique(np.concatenate([i.ravel() for i in (*self.index, self.flats)]))
+        number = np.full(len(vertices), -1)
+        number[used] = np.arange(len(used))
+        return Strips(tuple(number[i] for i in self.index), number[self.flats]), vertices[used]
+
     def merged(self, vertices: Array, pairs: Ints) -> tuple[Strips, Array]:
         """Merge pairs (m, 2) of vertices, and what they are chained to, at their means."""
         from scipy.sparse import coo_matrix
@@ -206,7 +213,9 @@ class Strips:
         number = np.bincount(label, minlength=count)[:, None]
         mean = np.stack([np.bincount(label, v, minlength=count) for v in vertices.T], 1) / number
         index = tuple(label[i].astype(np.int64) for i in self.index)
-        return Strips(index, label[self.flats].astype(np.int64)), mean
+        flats = label[self.flats].astype(np.int64)
+        a, b, c = flats[:, [0, 1, 3]].T
+        return Strips(index, flats[(a != b) & (b != c) & (a != c)]), mean
 
 
 def _true(ids: Ints) -> tuple[Ints, Ints]:

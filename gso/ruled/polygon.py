@@ -45,3 +45,9 @@ def turning(loop: Array) -> Array:
     back = np.roll(way, 1, axis=0)
     cross = back[:, 0] * way[:, 1] - back[:, 1] * way[:, 0]
     return np.arctan2(cross, (back * way).sum(axis=1))
+
+
+def on(loop: Array, at: Array) -> Array:
+    """Interpolate a closed polygon (n, 2) at numbers of its points, modulo n."""
+    n = len(loop)
+    return np.stack([np.interp(at % n, np.arange(n + 1), np.append(c, c[0])) for c in loop.T], 1)

@@ -11,7 +11,6 @@ from gso.ruled.chords import chords
 from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
 from gso.ruled.fit import Fit, Job, evened, halved, single
-from gso.ruled.layout import Strips
 from gso.ruled.surface import RuledSurface, built
 from gso.typing import Array, Ints
 
@@ -115,9 +114,8 @@ def _order(found: Found) -> tuple[bool, float]:
 def _first(job: Job, normals: Array, rulings: int) -> Fit:
     """Fit a single strip, before its largest distance is lowered."""
     domain = job.target.domain
-    one, two = chords(domain.with_normals(normals), rulings)
-    start = np.stack([domain.points(one), domain.points(two)], axis=1).reshape(-1, 3)
-    return single(job, Strips.sequence(rulings), start)
+    strips, places = chords(domain.with_normals(normals), rulings)
+    return single(job, strips, domain.points(places))
 
 
 def _found(job: Job, fit: Fit, start: str) -> Found:
