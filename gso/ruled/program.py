@@ -130,7 +130,8 @@ def _triangles(outline: Array, price: Array, normal: Array, a: Ints, b: Ints, c:
     """Return the costs of flat triangles."""
     pairs = ((a, b), (b, c), (a, c))
     mean = sum(price[p, q] for p, q in pairs) / 3.0
-    longest = np.max([((outline[p] - outline[q]) ** 2).sum(axis=-1) for p, q in pairs], axis=0)
+    one, two, three = (((outline[p] - outline[q]) ** 2).sum(axis=-1) for p, q in pairs)
+    longest = np.maximum(np.maximum(one, two), three)
     own = [normal[p, q] for p, q in pairs]
     middle = sum(own) / 3.0
     varying = sum(((v - middle) ** 2).sum(axis=-1) for v in own) / 3.0
