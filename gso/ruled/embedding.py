@@ -19,8 +19,6 @@ def border(triangles: Ints) -> Ints:
     out = [first]
     while (at := follow[out[-1]]) != first:
         out.append(at)
-        if len(out) > len(follow):
-            raise ValueError("the strips are no disk")
     return np.array(out)
 
 

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gso.errors import MeshError
 from gso.ruled.descent import descend, planarised
 from gso.ruled.energy import Energy, Weights
 from gso.ruled.extended import Extended
@@ -85,6 +84,12 @@ def halved(job: Job, fit: Fit, which: Ints | None = None) -> Fit:
     return _exact(job, Fit(strips, vertices, fit.width), _EXACT)
 
 
+def refined(job: Job, fit: Fit) -> Fit:
+    """Insert rulings half-way between those of a fit, and fit again."""
+    strips, vertices = fit.strips.refined(fit.vertices)
+    return _exact(job, Fit(strips, vertices, 0.5 * fit.width), _EXACT)
+
+
 def evened(job: Job, fit: Fit) -> Fit:
     """Lower the largest distance: minimise higher powers of the distances.
 
@@ -140,12 +145,8 @@ def _merged(fit: Fit, pairs: Ints) -> Fit:
     if not len(pairs):
         return fit
     strips, vertices = fit.strips.merged(fit.vertices, pairs)
-    if not len(strips.corners):
-        raise MeshError(
-            "no rulings were found on this surface, as they all run into each other; it "
-            "may be folded or too irregular for the formulation 'ruled': take 'curvature'"
-        )
-    return Fit(strips, vertices, fit.width)
+    # Rulings that all run into each other cannot be merged.
+    return Fit(strips, vertices, fit.width) if strips.is_disk else fit
 
 
 def close(energy: Energy, vertices: Array, least: float) -> Ints:

@@ -175,6 +175,26 @@ class Strips:
         return _shared(np.concatenate([c[:, [0, 2]], c[:, [1, 3]]]), np.concatenate([face, face]))
 
     @cached_property
+    def is_disk(self) -> bool:
+        """Whether the faces are a disk: one border, without points where it touches itself."""
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
+        triangles, _ = self.split
+        if not len(triangles):
+            return False
+        start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+        key, other = start * self.size + end, end * self.size + start
+        rim = ~np.isin(key, other)
+        if len(np.unique(key)) < len(key) or len(np.unique(start[rim])) < int(rim.sum()):
+            return False
+        graph = coo_matrix(
+            (np.ones(int(rim.sum())), (start[rim], end[rim])), shape=(self.size, self.size)
+        )
+        _, label = connected_components(graph, directed=False)
+        return len(np.unique(label[start[rim]])) == 1
+
+    @cached_property
     def open(self) -> Flags:
         """Whether the edges (t, 3) opposite the corners of the triangles are on the border."""
         triangles, _ = self.split
@@ -195,6 +215,25 @@ class Strips:
             size += len(distinct)
             index.append(new)
         return Strips(tuple(index), self.flats), np.concatenate(parts)
+
+    def refined(self, vertices: Array) -> tuple[Strips, Array]:
+        """Insert a ruling half-way between successive ones; planar quads stay planar."""
+        pairs = np.concatenate(
+            [np.stack([i[:-1], i[1:]], axis=2).reshape(-1, 2) for i in self.index]
+        )
+        distinct, number = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
+        same = distinct[:, 0] == distinct[:, 1]
+        ids = np.where(same, distinct[:, 0], len(vertices) + np.cumsum(~same) - 1)
+        middle = ids[number.ravel()]
+        index, at = [], 0
+        for old in self.index:
+            new = np.empty((2 * len(old) - 1, old.shape[1]), np.int64)
+            count = old[1:].size
+            new[::2], new[1::2] = old, middle[at : at + count].reshape(-1, old.shape[1])
+            at += count
+            index.append(new)
+        inserted = vertices[distinct[~same]].mean(axis=1)
+        return Strips(tuple(index), self.flats), np.concatenate([vertices, inserted])
 
     def compact(self, vertices: Array) -> tuple[Strips, Array]:
         """Leave out vertices that no ruling and no flat uses."""

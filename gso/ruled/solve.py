@@ -10,12 +10,14 @@ import numpy as np
 from gso.ruled.chords import chords
 from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
-from gso.ruled.fit import Fit, Job, evened, halved, single
+from gso.ruled.fit import Fit, Job, evened, halved, refined, single
 from gso.ruled.surface import RuledSurface, built
 from gso.typing import Array, Ints
 
 #: Points of the design in the solve for one strip and for several.
 _POINTS = (500, 1000)
+#: Number of quads of a strip in the first solve.
+_COARSE = 16
 #: Largest number of strips that are tried.
 MOST = 64
 #: Relative tolerance of a bound on the distance.
@@ -114,8 +116,12 @@ def _order(found: Found) -> tuple[bool, float]:
 def _first(job: Job, normals: Array, rulings: int) -> Fit:
     """Fit a single strip, before its largest distance is lowered."""
     domain = job.target.domain
-    strips, places = chords(domain.with_normals(normals), rulings)
-    return single(job, strips, domain.points(places))
+    rounds = max(int(np.ceil(np.log2((rulings - 1) / _COARSE))), 0)
+    strips, places = chords(domain.with_normals(normals), round((rulings - 1) / 2**rounds) + 1)
+    fit = single(job, strips, domain.points(places))
+    for _ in range(rounds):
+        fit = refined(job, fit)
+    return fit
 
 
 def _found(job: Job, fit: Fit, start: str) -> Found:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gso import metrics
+from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.parametrization import beside, upright
@@ -224,6 +225,11 @@ def _by_longest_side(v: Array, f: Ints) -> tuple[Array, Array, Array]:
 def built(job: Job, fit: Fit) -> RuledSurface:
     """Trim and unroll strips."""
     strips, vertices = fit.strips, fit.vertices
+    if not strips.is_disk:
+        raise MeshError(
+            "no rulings were found on this surface, as they all run into each other; it may be "
+            "folded or too irregular for the formulation 'ruled': take 'curvature'"
+        )
     measured = job.energy(strips, vertices, fit.width).measure(vertices)
     unrolled = Unrolled(strips, vertices, measured.up)
     cut = trimmed(job.target, strips, vertices, unrolled)
