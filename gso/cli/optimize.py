@@ -161,6 +161,11 @@ class Job:
     "--max-deviation. Implies --formulation ruled.",
 )
 @click.option(
+    "--flats",
+    is_flag=True,
+    help='Developable by "ruled": the strip may branch at flat triangles.',
+)
+@click.option(
     "--options",
     "preset",
     type=click.Choice(["fast", "balanced", "accurate", "jiang2020"]),
@@ -296,17 +301,19 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
     """Return keywords of :func:`gso.tno.optimize`, checked as far as possible without a mesh."""
     from gso.tno import check
 
-    if given["strips"] is not None and given["formulation"] is None:
+    strips = given["strips"]
+    if (strips is not None or given["flats"]) and given["formulation"] is None:
         given["formulation"] = "ruled"
     formulation, kind = tasks.choose(
         tasks.get(given["task"]), given["formulation"], given["preset"]
     )
     settings: Any = kind.coerce(given["preset"])
-    if given["strips"] is not None:
+    if strips is not None or given["flats"]:
         if formulation != "ruled":
-            raise OptionError(f"--strips goes with --formulation ruled, not {formulation!r}")
-        number = given["strips"]
-        settings = replace(settings, strips=int(number) if number.isdecimal() else number)
+            name = "--flats" if strips is None else "--strips"
+            raise OptionError(f"{name} goes with --formulation ruled, not {formulation!r}")
+        number = int(strips) if strips is not None and strips.isdecimal() else strips
+        settings = replace(settings, strips=number, flats=given["flats"])
     if formulation == "ruled" and _is_cad(out):
         raise OptionError(f"{out}: ruled surfaces are not written to CAD files yet; write .obj")
     if given["backend"] is not None:

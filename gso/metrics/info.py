@@ -53,6 +53,7 @@ INFO: dict[str, Info] = {
     "area_error": Info("", True, "mean |A'/A - 1| over corner triangles"),
     "flipped_cells": Info("", True, "inverted cells (of grids: with an inverted corner)", "sum"),
     "strips": Info("", None, "strips side by side, parts of the pattern", "sum"),
+    "flats": Info("", None, "faces of flat regions where strips meet", "sum"),
     "rulings": Info("", None, "lines to bend along", "sum"),
     "rulings_crossed": Info("", True, "pairs of successive rulings that cross", "sum"),
     "bend_radius_min": Info("size", False, "smallest radius at a ruling, mesh's unit", "min"),

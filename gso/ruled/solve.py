@@ -18,8 +18,12 @@ from gso.typing import Array, Ints
 _POINTS = (500, 1000)
 #: Number of quads of a strip in the first solve.
 _COARSE = 16
+#: Cost of a flat triangle in the first rulings.
+_FLAT = 1e-5
 #: Largest number of strips that are tried.
 MOST = 64
+#: Number of strips from which doubling has to lower the largest distance, to this share of it.
+_PAYING, _LESS = 8, 0.95
 #: Relative tolerance of a bound on the distance.
 _TIGHT = 1e-6
 
@@ -34,6 +38,8 @@ class Wanted:
         Number of strips side by side; None for as few as meet the bounds.
     rulings : int
         Rulings of a strip, beyond the outline included.
+    flats : bool
+        Whether a single strip may branch at flat triangles.
     max_deviation : float or None
         Largest distance between design and surface, in both directions.
     max_crease : float or None
@@ -42,14 +48,15 @@ class Wanted:
 
     strips: int | None = 1
     rulings: int = 33
+    flats: bool = False
     max_deviation: float | None = None
     max_crease: float | None = None
 
     def met(self, found: Found) -> bool:
-        """Return whether a surface meets the bounds, without crossed rulings."""
+        """Return whether a surface is sound and meets the bounds."""
         far, turn = self.max_deviation, self.max_crease
         return (
-            not found.surface.crossed
+            found.surface.sound
             and (far is None or found.deviation <= far * (1.0 + _TIGHT))
             and (turn is None or found.surface.creases.largest_angle <= turn)
         )
@@ -75,8 +82,8 @@ class Found:
 
     @property
     def order(self) -> tuple[bool, float]:
-        """Sort key: surfaces without crossed rulings first, then by distance."""
-        return bool(self.surface.crossed), self.mean + 0.2 * self.deviation
+        """Sort key: sound surfaces first, then by distance."""
+        return not self.surface.sound, self.mean + 0.2 * self.deviation
 
 
 def solve(
@@ -102,7 +109,7 @@ def solve(
     """
     target = Extended(domain)
     jobs = [Job(target, domain.lattice(count)) for count in _POINTS]
-    first = {name: _first(jobs[0], normals, wanted.rulings) for name, normals in starts.items()}
+    first = {name: _first(jobs[0], normals, wanted) for name, normals in starts.items()}
     if wanted.strips == 1:
         found = min((_found(jobs[0], evened(jobs[0], f), n) for n, f in first.items()), key=_order)
         return found, {1: found.deviation}
@@ -113,11 +120,13 @@ def _order(found: Found) -> tuple[bool, float]:
     return found.order
 
 
-def _first(job: Job, normals: Array, rulings: int) -> Fit:
+def _first(job: Job, normals: Array, wanted: Wanted) -> Fit:
     """Fit a single strip, before its largest distance is lowered."""
     domain = job.target.domain
-    rounds = max(int(np.ceil(np.log2((rulings - 1) / _COARSE))), 0)
-    strips, places = chords(domain.with_normals(normals), round((rulings - 1) / 2**rounds) + 1)
+    quads = wanted.rulings - 1
+    rounds = max(int(np.ceil(np.log2(quads / _COARSE))), 0)
+    flat = _FLAT if wanted.flats else None
+    strips, places = chords(domain.with_normals(normals), round(quads / 2**rounds) + 1, flat)
     fit = single(job, strips, domain.points(places))
     for _ in range(rounds):
         fit = refined(job, fit)
@@ -151,11 +160,15 @@ def _several(
         count = more
         if wanted.strips is None or count == most:
             results[count] = _found(job, evened(job, fits[count]), name)
+        half = results.get(count // 2)
+        if wanted.strips is None and count > _PAYING and half is not None:
+            if results[count].deviation > _LESS * half.deviation:
+                break
     best = results[count]
     if wanted.strips is None and wanted.met(best):
         best = _fewest(job, fits, results, count, wanted, name)
     elif wanted.strips is None:
-        best = min(results.values(), key=lambda f: (bool(f.surface.crossed), f.deviation))
+        best = min(results.values(), key=lambda f: (not f.surface.sound, f.deviation))
     return best, {k: f.deviation for k, f in results.items()}
 
 

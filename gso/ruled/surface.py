@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from gso import metrics
+from gso import faults, metrics
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
@@ -19,7 +20,7 @@ from gso.ruled.layout import Strips
 from gso.ruled.trim import trimmed
 from gso.ruled.unroll import Unrolled
 from gso.ruled.vectors import cross, lengths, unit
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Names of the arrays in files.
 _FOLDS, _PARTS = ("rulings", "creases"), ("edges", "angles", "radii")
@@ -69,6 +70,8 @@ class RuledSurface:
         The surface. Faces between the same two rulings are coplanar.
     strip : ndarray of int, (m,)
         Strip that each face belongs to: strips side by side are separate parts of the pattern.
+    flat : ndarray of bool, (m,)
+        Whether each face belongs to a flat triangle between three strips.
     rulings : Folds
         The lines to bend along, inside the outline.
     creases : Folds
@@ -83,6 +86,7 @@ class RuledSurface:
 
     mesh: Mesh
     strip: Ints
+    flat: Flags
     rulings: Folds
     creases: Folds
     pattern: Pattern
@@ -93,6 +97,18 @@ class RuledSurface:
     def strips(self) -> int:
         """Number of strips side by side."""
         return int(self.strip.max()) + 1
+
+    @cached_property
+    def sound(self) -> bool:
+        """Whether neither surface nor pattern is folded or meets itself, and no rulings cross."""
+        sheet = self.pattern.surface(self.mesh)
+        return not (
+            self.crossed
+            or faults.folded(self.mesh).size
+            or metrics.flipped_faces(sheet, self.pattern.flat).size
+            or faults.overlaps(sheet, self.pattern.flat).size
+            or faults.crossings(self.mesh).size
+        )
 
     @property
     def bend_lines(self) -> list[Array]:
@@ -113,6 +129,7 @@ class RuledSurface:
             "ruled_vertices": self.mesh.vertices,
             "ruled_faces": self.mesh.faces,
             "ruled_strip": self.strip,
+            "ruled_flat": self.flat.astype(np.uint8),
             "ruled_crossed": np.array(self.crossed),
         }
         for name in _FOLDS:
@@ -142,10 +159,13 @@ class RuledSurface:
         ):
             if ids.dtype.kind not in "iu" or (ids.size and not -1 <= ids.min() <= ids.max() < end):
                 raise ValueError("the arrays of the ruled surface do not fit each other")
-        if pattern.faces.shape != mesh.faces.shape or len(data["ruled_strip"]) != len(mesh.faces):
+        if pattern.faces.shape != mesh.faces.shape or any(
+            len(data[f"ruled_{name}"]) != len(mesh.faces) for name in ("strip", "flat")
+        ):
             raise ValueError("the arrays of the ruled surface do not fit each other")
         crossed = int(data["ruled_crossed"])
-        return cls(mesh, data["ruled_strip"], folds[0], folds[1], pattern, moved, crossed)
+        flat = np.asarray(data["ruled_flat"], bool)
+        return cls(mesh, data["ruled_strip"], flat, *folds, pattern, moved, crossed)
 
     def samples(self) -> tuple[Array, Array]:
         """Return points (k, 3) all over the surface, and their shares (k,) of its area.
@@ -241,6 +261,7 @@ def built(job: Job, fit: Fit) -> RuledSurface:
     return RuledSurface(
         mesh=mesh,
         strip=part,
+        flat=cut.face >= len(strips.corners) - len(strips.flats),
         rulings=rulings,
         creases=creases,
         pattern=_pattern(mesh, cut.face, part, unrolled),

@@ -68,6 +68,7 @@ def ruled_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
         "flipped_cells": float(measure.flips(sheet, flat)),
         "strips": float(surface.strips),
         "rulings": float(len(surface.rulings.edges)),
+        "flats": float(np.count_nonzero(surface.flat)),
         "rulings_crossed": float(surface.crossed),
         "bend_radius_min": surface.rulings.smallest_radius,
         "crease_angle_max": float(np.degrees(surface.creases.largest_angle)),

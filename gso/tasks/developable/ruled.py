@@ -37,6 +37,9 @@ class Options(BaseOptions):
         "auto" where there is such a bound, else 1.
     rulings : int
         Number of rulings of a strip, some of them outside the outline.
+    flats : bool
+        Whether the strip may branch at flat triangles: a tree of strips, still one sheet. Only
+        for a single strip.
     max_crease : float or None
         Largest angle at a crease between strips, in degrees.
     starts : tuple of str
@@ -52,6 +55,7 @@ class Options(BaseOptions):
 
     strips: int | str | None = None
     rulings: int = 33
+    flats: bool = False
     max_crease: float | None = None
     starts: tuple[str, ...] = _STARTS
 
@@ -64,6 +68,10 @@ class Options(BaseOptions):
                 raise OptionError(f"strips is {strips!r}; it must be a number, 'auto' or None")
         elif not (isinstance(strips, int | np.integer) and 1 <= strips <= MOST):
             raise OptionError(f"strips is {strips!r}; it must be 1 to {MOST}, 'auto' or None")
+        if self.flats and strips not in (1, None):
+            raise OptionError(
+                f"flats=True is for a single strip, but strips is {strips!r}; leave one of them out"
+            )
         super().__post_init__()
         if not 5 <= self.rulings <= 513:
             raise OptionError(f"rulings is {self.rulings}; it must be 5 to 513")
@@ -117,10 +125,11 @@ def _converted(analysis: Analysis, request: Request, before: Solution) -> Soluti
     bounded = bound is not None or options.max_crease is not None
     strips: Any = options.strips
     if strips is None:
-        strips = "auto" if bounded else 1
+        strips = "auto" if bounded and not options.flats else 1
     wanted = Wanted(
         None if strips == "auto" else int(strips),
         options.rulings,
+        options.flats,
         None if bound is None else bound / size,
         None if options.max_crease is None else float(np.radians(options.max_crease)),
     )
