@@ -31,6 +31,11 @@ def main() -> None:
     together = gso.tno.optimize(panel, formulation="isometry")
     draw("isometry", plot_result(together))
     draw("rulings", plot_rulings(together.mesh, before=panel))
+    for name, options in (
+        ("strip", gso.RuledOptions(flats=True)),
+        ("strips", gso.RuledOptions(strips=4)),
+    ):
+        draw(name, plot_result(gso.tno.optimize(panel, options=options)))
     noise = np.random.default_rng(0).standard_normal(panel.vertices.shape)
     noisy = panel.replaced(panel.vertices + 0.005 * panel.frame.scale * noise)
     draw("denoise", plot_result(gso.tno.optimize(noisy, task="denoise")))

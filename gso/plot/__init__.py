@@ -26,6 +26,7 @@ from gso.pattern import Pattern
 from gso.plot.draw import GRAZING, SUFFIXES, Panel, draw, write
 from gso.plot.heat import curvatures, distance, numbers, scales, strain, stretch
 from gso.plot.rulings import gauss, ruled
+from gso.plot.strips import strips
 from gso.plot.view import View
 from gso.result import Result
 from gso.spelling import choices, known_keywords
@@ -152,8 +153,9 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
     """Draw a result beside its design.
 
     `developable`: the curvature before and after in one colour scale, the distance between the
-    two, and the strain of the flat pattern if there is one. `bend`: the same with the stretch
-    instead of the distance. `flatten`: the strain on the surface and on the flat pattern.
+    two, and the strain of the flat pattern if there is one. A ruled surface: its strips with
+    rulings, creases and flat regions, and the pattern with its bend lines. `bend`: curvature and
+    strain, with the stretch instead of the distance. `flatten`: the strain on the surface and on the flat pattern.
     `conformal`: the scale of the faces on both. `denoise`: both surfaces in grazing light, and
     the distance between the two.
 
@@ -177,6 +179,8 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
     """
     require()
     design, mesh = result.design, result.mesh
+    if result.ruled is not None:
+        return write(draw(strips(design, result.ruled)), path)
     surface_too = result.task == "developable"
     if result.pattern is not None and not surface_too:
         return write(draw(_flattened(design, result.pattern, result.cell_scale)), path)

@@ -65,6 +65,8 @@ class Panel:
         Text above.
     heat : Heat, optional
         Values that colour the faces.
+    tint : ndarray, (m, 3), optional
+        Colours of the faces, where there are no values.
     light : ndarray, (3,)
         Direction to the light.
     shaded : bool
@@ -79,6 +81,7 @@ class Panel:
     faces: NDArray[np.int64]
     title: str = ""
     heat: Heat | None = None
+    tint: Array | None = None
     light: Array = field(default_factory=lambda: LIGHT)
     shaded: bool = True
     lines: Sequence[Array] = ()
@@ -185,7 +188,7 @@ def _polygons(panel: Panel, colours: Array) -> PolyCollection:
 def _colours(panel: Panel) -> tuple[Array, ScalarMappable | None]:
     """Compute the colour of every face (m, 3), and the mappable of the colour bar."""
     mappable = None
-    colours = np.tile(_PLAIN, (len(panel.faces), 1))
+    colours = np.tile(_PLAIN, (len(panel.faces), 1)) if panel.tint is None else panel.tint
     if panel.heat is not None:
         from matplotlib import colormaps
         from matplotlib.cm import ScalarMappable

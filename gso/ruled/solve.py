@@ -160,16 +160,19 @@ def _several(
         count = more
         if wanted.strips is None or count == most:
             results[count] = _found(job, evened(job, fits[count]), name)
-        half = results.get(count // 2)
-        if wanted.strips is None and count > _PAYING and half is not None:
-            if results[count].deviation > _LESS * half.deviation:
-                break
+        if wanted.strips is None and count > _PAYING and _useless(results, count):
+            break
     best = results[count]
     if wanted.strips is None and wanted.met(best):
         best = _fewest(job, fits, results, count, wanted, name)
     elif wanted.strips is None:
         best = min(results.values(), key=lambda f: (not f.surface.sound, f.deviation))
     return best, {k: f.deviation for k, f in results.items()}
+
+
+def _useless(results: dict[int, Found], count: int) -> bool:
+    """Return whether twice as many strips did not lower the largest distance."""
+    return results[count].deviation > _LESS * results[count // 2].deviation
 
 
 def _fewest(
