@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,25 @@ from gso.typing import Array, Ints
 
 def _no_seams() -> Ints:
     return np.empty((0, 2, 2), np.int64)
+
+
+class Bend(NamedTuple):
+    """A straight line to bend along.
+
+    Attributes
+    ----------
+    line : ndarray, (2, 2)
+        Its ends in the pattern.
+    angle : float
+        Angle between the faces in radians: positive for mountain folds, negative for valley
+        folds, zero where nothing is bent.
+    radius : float
+        Radius of the bend, in the mesh's unit; infinite where nothing is bent.
+    """
+
+    line: Array
+    angle: float
+    radius: float
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gso
-from gso import faults, parametrization
+from gso import faults, metrics, parametrization
 from gso.mesh import Mesh
 from gso.ruled import fit
 from gso.ruled.chords import chords
@@ -274,9 +274,56 @@ def test_results_come_back_from_files(tmp_path):
     np.testing.assert_array_equal(again.on_design().vertices, result.on_design().vertices)
     assert again.metrics == pytest.approx(result.metrics)
     result.save(tmp_path / "a.svg")
-    assert 'id="lines"' in (tmp_path / "a.svg").read_text(encoding="utf-8")
+    drawing = (tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert drawing.count("degrees, radius") == np.count_nonzero(result.rulings.angles)
     result.save(tmp_path / "a.obj")
     assert len(gso.load(tmp_path / "a.obj").faces) == len(result.mesh.faces)
+
+
+def test_cad_files_have_faces_that_share_edges(tmp_path):
+    pytest.importorskip("OCP")
+    rhino = pytest.importorskip("rhino3dm")
+    result = gso.tno.optimize(saddle(17, strength=0.25), options=gso.RuledOptions(strips=2))
+    for suffix in ("step", "iges", "3dm"):
+        result.save(tmp_path / f"a.{suffix}", unit="cm")
+    text = (tmp_path / "a.step").read_text(encoding="utf-8")
+    assert text.count("ADVANCED_FACE") == len(result.mesh.faces)
+    assert text.count("EDGE_CURVE") == len(result.mesh.edges)
+    model = rhino.File3dm.Read(str(tmp_path / "a.3dm"))
+    assert len(model.Objects) == len(result.mesh.faces)
+
+
+def test_trees_have_flat_regions_and_one_sheet():
+    points = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, 33)] * 2, indexing="ij"), axis=-1)
+    x, y = points[..., 0], points[..., 1]
+    # Three ridges that meet: a single family of rulings does not fit.
+    design = np.dstack([x, y, 0.1 * (x**3 - 3.0 * x * y**2)])
+    options = {"starts": ("design",)}
+    one, tree = (
+        gso.tno.optimize(design, options=gso.RuledOptions(flats=f, **options)) for f in (0, 1)
+    )
+    checked(tree, 8.0)
+    assert tree.ruled.strips == 1
+    assert tree.ruled.flat.any()
+    assert not one.ruled.flat.any()
+    assert tree.metrics["distance_mean"] < one.metrics["distance_mean"]
+    with pytest.raises(gso.OptionError, match="single strip"):
+        gso.RuledOptions(flats=True, strips=2)
+
+
+def test_slits_count_with_their_depth():
+    flat = np.dstack([*np.mgrid[:9.0, :9.0], np.zeros((9, 9))])
+    mesh = Mesh.from_grid(flat)
+    copy = np.arange(81).reshape(9, 9)
+    faces = mesh.faces.copy()
+    slit = np.isin(faces, copy[4, 5:]) & (np.arange(64) >= 32)[:, None]
+    faces[slit] += 81
+    points = np.concatenate([mesh.vertices, mesh.vertices])
+    used = np.unique(faces)
+    opened = Mesh(points[used], np.searchsorted(used, faces))
+    there, back = metrics.boundary_distance(mesh, opened)
+    assert there == pytest.approx(3.0)
+    assert back == 0.0
 
 
 def test_what_cannot_be_ruled_is_refused():

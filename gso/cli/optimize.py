@@ -119,7 +119,7 @@ class Job:
 
     def write(self, result: Result, out: str, plot: str | None = None) -> None:
         """Write a result and its picture."""
-        if _is_cad(out) and result.spline is None:
+        if _is_cad(out) and result.spline is None and result.ruled is None:
             from gso.spline.fit import fit_spline
 
             result.spline = fit_spline(result.mesh)
@@ -314,14 +314,12 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
             raise OptionError(f"{name} goes with --formulation ruled, not {formulation!r}")
         number = int(strips) if strips is not None and strips.isdecimal() else strips
         settings = replace(settings, strips=number, flats=given["flats"])
-    if formulation == "ruled" and _is_cad(out):
-        raise OptionError(f"{out}: ruled surfaces are not written to CAD files yet; write .obj")
     if given["backend"] is not None:
         settings = replace(settings, backend=given["backend"])
     # With bounds or constraints the mesh is optimised, and a spline is fitted to the result.
     apart = given["max_deviation"] is not None or given["fix_boundary"]
     apart |= given["max_strain"] is not None
-    apart |= given["constraints"] is not None
+    apart |= given["constraints"] is not None or formulation == "ruled"
     if _is_cad(out) and given["task"] == "developable" and not apart:
         settings = replace(settings, variables="surface")
     questions = {k: given[k] for k in ("max_deviation", "max_strain", "target_curvature")}

@@ -1,4 +1,4 @@
-"""Writers of B-spline surfaces as CAD files."""
+"""Writers of CAD files: B-spline surfaces, and planar faces that share their edges."""
 
 from __future__ import annotations
 
@@ -10,22 +10,24 @@ from typing import Any, NamedTuple
 from gso.errors import GSOError, MeshError, OptionError
 from gso.io.atomic import check_writable, replacing
 from gso.io.svg import MILLIMETRES
+from gso.mesh import Mesh
 from gso.spelling import choices
 from gso.spline import BSplineSurface
 
 
 class _Format(NamedTuple):
-    """Module and function that write a format, and the package that they need."""
+    """Module and functions that write a format, and the package that they need."""
 
     module: str
     write: str
+    faces: str
     package: str
     name: str
 
 
-_STEP = _Format("opencascade", "step", "OCP", "OpenCASCADE (cadquery-ocp-novtk)")
-_IGES = _STEP._replace(write="iges")
-_RHINO = _Format("rhino", "write", "rhino3dm", "rhino3dm")
+_STEP = _Format("opencascade", "step", "step_faces", "OCP", "OpenCASCADE (cadquery-ocp-novtk)")
+_IGES = _STEP._replace(write="iges", faces="iges_faces")
+_RHINO = _Format("rhino", "write", "write_faces", "rhino3dm", "rhino3dm")
 _FORMATS = {".step": _STEP, ".stp": _STEP, ".iges": _IGES, ".igs": _IGES, ".3dm": _RHINO}
 
 SPLINE_SUFFIXES = tuple(_FORMATS)
@@ -100,12 +102,44 @@ def save_spline(spline: BSplineSurface, path: str | PathLike[str], *, unit: str 
         raise OptionError(
             f"a spline is needed, not {type(spline).__name__}; gso.fit_spline makes one of a grid"
         )
+    _write(path, unit, "write", spline)
+
+
+def save_faces(mesh: Mesh, path: str | PathLike[str], *, unit: str = "mm") -> None:
+    """Write the planar faces of a mesh to a CAD file, as faces that share their edges.
+
+    An existing file is replaced only when the new one is complete.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        A mesh of planar faces, such as that of a ruled surface.
+    path : str or PathLike
+        A .step, .stp, .iges, .igs or .3dm file.
+    unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
+        Unit of the coordinates, as in :func:`save_spline`.
+
+    Raises
+    ------
+    MeshError
+        Unknown suffix, a path that cannot be written, or a face that is not planar. The message
+        names the file.
+    OptionError
+        Unknown unit.
+    GSOError
+        The package that writes the format is not installed: ``pip install ".[cad]"`` in the
+        folder of gso.
+    """
+    _write(path, unit, "faces", mesh)
+
+
+def _write(path: str | PathLike[str], unit: str, kind: str, content: Any) -> None:
     check_spline(path, unit)
     form = _FORMATS[_suffix(path)]
-    write: Any = getattr(importlib.import_module(f"gso.io.{form.module}"), form.write)
+    write: Any = getattr(importlib.import_module(f"gso.io.{form.module}"), getattr(form, kind))
     with replacing(path) as file:
         try:
-            file.write(write(spline, unit))
+            file.write(write(content, unit))
         except MeshError as error:
             raise MeshError(f"{os.fsdecode(path)}: {error}") from None
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from gso.errors import MeshError
 from gso.io.svg import MILLIMETRES
+from gso.mesh import Mesh
 from gso.spline import BSplineSurface
 
 #: OpenCASCADE's names of the units that both formats know; IGES has another one for inches.
@@ -27,24 +28,80 @@ _TOLERANCE = 1e-7
 def step(spline: BSplineSurface, unit: str) -> bytes:
     """Return the contents of a STEP file with one face, bounded by the edges of the surface."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
-    from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
-    from OCP.StepData import StepData_StepWriter
 
-    kind = STEPControl_StepModelType.STEPControl_ShellBasedSurfaceModel
     surface, name = _converted(spline, unit)
-    with _quiet(), _settings({"write.step.unit": name, "xstep.cascade.unit": name}):
-        session = STEPControl_Writer()
-        session.Transfer(BRepBuilderAPI_MakeFace(surface, _TOLERANCE).Shape(), kind)
-        writer = StepData_StepWriter(session.Model())
-        writer.FloatWriter().SetFormat(_FORMAT, True)
-        writer.SendModel(session.WS().Protocol())
-    content = _printed(writer)
+    content = _step(BRepBuilderAPI_MakeFace(surface, _TOLERANCE).Shape(), name)
     if b"B_SPLINE_SURFACE_WITH_KNOTS" not in content:
         raise MeshError(
             f"the surface has a side shorter than {_TOLERANCE:g} {unit}, which STEP takes for a "
             "point; is the unit right?"
         )
     return content
+
+
+def step_faces(mesh: Mesh, unit: str) -> bytes:
+    """Return the contents of a STEP file with a shell of planar faces that share their edges."""
+    shell, name = _shell(mesh, unit)
+    return _step(shell, name)
+
+
+def iges_faces(mesh: Mesh, unit: str) -> bytes:
+    """Return the contents of an IGES file with planar faces."""
+    from OCP.IGESControl import IGESControl_Writer
+    from OCP.IGESData import IGESData_IGESWriter
+    from OCP.IGESSelect import IGESSelect_WorkLibrary
+
+    shell, name = _shell(mesh, unit)
+    with _quiet():
+        session = IGESControl_Writer("IN" if name == "INCH" else name, 1)
+        session.AddShape(shell)
+        writer = IGESData_IGESWriter(session.Model())
+        writer.FloatWriter().SetFormat(_FORMAT, True)
+        writer.SendModel(IGESSelect_WorkLibrary.DefineProtocol_s())
+    return _printed(writer)
+
+
+def _step(shape: Any, name: str) -> bytes:
+    """Return the contents of a STEP file of a shape in a unit."""
+    from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
+    from OCP.StepData import StepData_StepWriter
+
+    kind = STEPControl_StepModelType.STEPControl_ShellBasedSurfaceModel
+    with _quiet(), _settings({"write.step.unit": name, "xstep.cascade.unit": name}):
+        session = STEPControl_Writer()
+        session.Transfer(shape, kind)
+        writer = StepData_StepWriter(session.Model())
+        writer.FloatWriter().SetFormat(_FORMAT, True)
+        writer.SendModel(session.WS().Protocol())
+    return _printed(writer)
+
+
+def _shell(mesh: Mesh, unit: str) -> tuple[Any, str]:
+    """Return a shell of planar faces, and the name of its unit."""
+    from OCP.BRepBuilderAPI import (
+        BRepBuilderAPI_MakeFace,
+        BRepBuilderAPI_MakePolygon,
+        BRepBuilderAPI_Sewing,
+    )
+    from OCP.gp import gp_Pnt
+
+    known = unit in _UNITS
+    points = mesh.vertices if known else mesh.vertices * MILLIMETRES[unit]
+    sewing = BRepBuilderAPI_Sewing(_TOLERANCE)
+    for k, face in enumerate(mesh.faces):
+        polygon = BRepBuilderAPI_MakePolygon()
+        for point in points[face[face >= 0]].tolist():
+            polygon.Add(gp_Pnt(*point))
+        polygon.Close()
+        made = BRepBuilderAPI_MakeFace(polygon.Wire(), True) if polygon.IsDone() else None
+        if made is None or not made.IsDone():
+            raise MeshError(
+                f"face {k} is not planar, or has a side shorter than {_TOLERANCE:g} {unit}, which "
+                "OpenCASCADE takes for a point; is the unit right?"
+            )
+        sewing.Add(made.Shape())
+    sewing.Perform()
+    return sewing.SewedShape(), _UNITS[unit if known else "mm"]
 
 
 def iges(spline: BSplineSurface, unit: str) -> bytes:

@@ -6,6 +6,7 @@ import base64
 from typing import Any
 
 from gso.errors import MeshError
+from gso.mesh import Mesh
 from gso.spline import BSplineSurface
 
 _UNITS = {
@@ -42,9 +43,37 @@ def write(spline: BSplineSurface, unit: str) -> bytes:
         surface.KnotsV[k] = knot
     if not surface.IsValid:
         raise MeshError(f"is no valid surface to openNURBS: {surface.IsValidWithLog[1]}")
+    model = _model(rhino, unit, spline.size)
+    model.Objects.AddSurface(surface)
+    return base64.b64decode(model.Encode())
+
+
+def write_faces(mesh: Mesh, unit: str) -> bytes:
+    """Return the contents of a .3dm file with a ruled surface of degree one for each face.
+
+    Their corners are the same points, so that they can be joined; rhino3dm cannot join them.
+    """
+    import rhino3dm
+
+    rhino: Any = rhino3dm
+    model = _model(rhino, unit, mesh.diagonal)
+    for k, face in enumerate(mesh.faces.tolist()):
+        # A triangle has a side without length.
+        a, b, c, d = [v for v in face if v >= 0] + [face[2]] * (4 - sum(v >= 0 for v in face))
+        surface = rhino.NurbsSurface.Create(3, False, 2, 2, 2, 2)
+        for (i, j), vertex in zip(((0, 0), (1, 0), (1, 1), (0, 1)), (a, b, c, d), strict=True):
+            surface.Points[i, j] = rhino.Point4d(*mesh.vertices[vertex].tolist(), 1.0)
+        for end in (0, 1):
+            surface.KnotsU[end] = surface.KnotsV[end] = float(end)
+        if not surface.IsValid:
+            raise MeshError(f"face {k} is no valid surface to openNURBS")
+        model.Objects.AddSurface(surface)
+    return base64.b64decode(model.Encode())
+
+
+def _model(rhino: Any, unit: str, size: float) -> Any:
     model = rhino.File3dm()
     model.ApplicationName = "gso"
     model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, _UNITS[unit])
-    model.Settings.ModelAbsoluteTolerance = _TOLERANCE * spline.size
-    model.Objects.AddSurface(surface)
-    return base64.b64decode(model.Encode())
+    model.Settings.ModelAbsoluteTolerance = _TOLERANCE * size
+    return model

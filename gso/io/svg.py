@@ -15,6 +15,7 @@ from gso.io.atomic import check_writable, replacing
 from gso.io.lines import polyline
 from gso.io.source import Array, Ints
 from gso.mesh import Mesh
+from gso.pattern import Bend
 from gso.spelling import choices, known_keywords
 
 MILLIMETRES = {
@@ -43,13 +44,15 @@ def save_flat(
     unit: str = "mm",
     mesh_lines: bool = False,
     lines: Sequence[Any] = (),
+    bends: Sequence[Bend] = (),
 ) -> None:
     """Write a flat pattern as an SVG drawing at the scale 1:1.
 
     The pattern is drawn as seen from positive z, with x to the right and y up, so that
     faces which are anticlockwise in `flat` are anticlockwise on paper. The layer `outline`
     has one closed path per boundary loop, holes included. The layer `mesh` has the inner
-    edges, and the layer `lines` has the given polylines.
+    edges, and the layer `lines` has the given polylines. The layers `mountain` and `valley`
+    have the lines to bend along; each has its angle and radius as its title.
 
     Parameters
     ----------
@@ -64,7 +67,9 @@ def save_flat(
     mesh_lines : bool
         Also draw the inner edges.
     lines : sequence of array_like (k, 2)
-        Polylines to add, in the coordinates of `flat`, such as the rulings to bend along.
+        Polylines to add, in the coordinates of `flat`.
+    bends : sequence of Bend
+        Lines to bend along, in the same coordinates.
 
     Raises
     ------
@@ -99,13 +104,20 @@ def save_flat(
     if not np.isfinite(points[used]).all():
         raise MeshError("the flat pattern has coordinates that are not finite")
     extra = [MILLIMETRES[unit] * polyline(line, k, 2) for k, line in enumerate(lines)]
-    text = _drawing(points, used, loops, mesh.edges if mesh_lines else None, extra)
+    scale = MILLIMETRES[unit]
+    folds = [Bend(scale * np.asarray(b.line), b.angle, scale * b.radius) for b in bends]
+    text = _drawing(points, used, loops, mesh.edges if mesh_lines else None, extra, folds)
     with replacing(path) as file:
         file.write(text.encode("utf-8"))
 
 
 def _drawing(
-    points: Array, used: Ints, loops: list[Ints], edges: Ints | None, lines: Sequence[Array]
+    points: Array,
+    used: Ints,
+    loops: list[Ints],
+    edges: Ints | None,
+    lines: Sequence[Array],
+    bends: Sequence[Bend],
 ) -> str:
     """Return the SVG text of a pattern; `points` are in millimetres with y up."""
     import svgwrite
@@ -146,6 +158,15 @@ def _drawing(
         inside = layer("lines", "#0050a0")
         for given in lines:
             inside.add(drawing.path(d=_path(on_paper(given))))
+    for name, sign, colour in (("mountain", 1.0, "#c02020"), ("valley", -1.0, "#2040c0")):
+        chosen = [bend for bend in bends if sign * bend.angle > 0]
+        if chosen:
+            folds = layer(name, colour)
+            for bend in chosen:
+                drawn = drawing.path(d=_path(on_paper(bend.line)))
+                angle = abs(np.degrees(bend.angle))
+                drawn.set_desc(title=f"{name}, {angle:.2f} degrees, radius {bend.radius:.4g} mm")
+                folds.add(drawn)
     outline = layer("outline", "#000000")
     for loop in loops:
         outline.add(drawing.path(d=_path(paper[loop]) + "Z"))

@@ -155,7 +155,8 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
     `developable`: the curvature before and after in one colour scale, the distance between the
     two, and the strain of the flat pattern if there is one. A ruled surface: its strips with
     rulings, creases and flat regions, and the pattern with its bend lines. `bend`: curvature and
-    strain, with the stretch instead of the distance. `flatten`: the strain on the surface and on the flat pattern.
+    strain, with the stretch instead of the distance. `flatten`: the strain on the surface and on
+    the flat pattern.
     `conformal`: the scale of the faces on both. `denoise`: both surfaces in grazing light, and
     the distance between the two.
 

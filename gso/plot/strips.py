@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from gso.mesh import Mesh
@@ -39,9 +37,10 @@ def strips(design: Mesh, surface: RuledSurface) -> list[Panel]:
     points = _placed(flat, turn) / design.frame.scale
     sheet = Panel(points, surface.pattern.faces, shaded=False, tint=tint)
     sheet.title = "exact pattern with its bend lines"
-    lines: Sequence[Array] = surface.bend_lines
     middle = flat.mean(axis=0)
-    sheet.lines = [_placed(line - middle, turn, fixed=True) / design.frame.scale for line in lines]
+    sheet.lines = [
+        _placed(bend.line - middle, turn, fixed=True) / design.frame.scale for bend in surface.bends
+    ]
     return [before, after, sheet]
 
 

@@ -204,7 +204,8 @@ class Result:
 
         ``.npz`` stores the whole result, to be read by :meth:`load`. ``.svg`` is the flat
         pattern at scale 1:1, where `unit` is the unit of the mesh's coordinates. ``.step``,
-        ``.iges`` and ``.3dm`` are the spline in that unit (see :func:`gso.save_spline`). Any
+        ``.iges`` and ``.3dm`` are the spline in that unit (see :func:`gso.save_spline`), and for
+        a ruled surface its planar faces, which share their edges. Any
         other suffix of :func:`gso.save` is the surface (for `flatten` the pattern at z = 0).
         Labels, materials and texture coordinates that the format cannot store are listed in
         the notes.
@@ -224,8 +225,10 @@ class Result:
                 )
             surface = self.mesh if self.task == "developable" else self.design
             outline = self.pattern.surface(surface)
-            bends = () if self.ruled is None else self.ruled.bend_lines
-            io.save_flat(self.pattern.flat, outline, path, unit=unit, lines=bends)
+            bends = () if self.ruled is None else self.ruled.bends
+            io.save_flat(self.pattern.flat, outline, path, unit=unit, bends=bends)
+        elif f".{suffix}" in io.SPLINE_SUFFIXES and self.ruled is not None:
+            io.save_faces(self.mesh, path, unit=unit)
         elif f".{suffix}" in io.SPLINE_SUFFIXES:
             if any(part.spline is not None for part in self.components):
                 raise MeshError(

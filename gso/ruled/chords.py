@@ -174,8 +174,8 @@ def turned(
     first, second = one[:, None] + move, other[:, None] + move
     ends = (on(outline, x.ravel()) for x in (first, second))
     price = along(domain, *ends)[0].reshape(first.shape)
-    for k in np.flatnonzero(held):
-        price[-k] = np.where(move == 0.0, price[-k], np.inf)
+    for end in np.flatnonzero(held):
+        price[-end] = np.where(move == 0.0, price[-end], np.inf)
     bend = _STEADY * price[np.isfinite(price)].mean() * ((move[:, None] - move) / reach) ** 2
     total, choice = price[0], []
     for k in range(1, len(one)):

@@ -14,7 +14,7 @@ from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.parametrization import beside, upright
-from gso.pattern import Pattern
+from gso.pattern import Bend, Pattern
 from gso.ruled.fit import Fit, Job
 from gso.ruled.layout import Strips
 from gso.ruled.trim import trimmed
@@ -111,8 +111,8 @@ class RuledSurface:
         )
 
     @property
-    def bend_lines(self) -> list[Array]:
-        """The rulings in the pattern, (2, 2) each."""
+    def bends(self) -> list[Bend]:
+        """The rulings in the pattern."""
         pattern = self.pattern
         inner = pattern.mesh.half_edges
         k = np.flatnonzero((inner.twin >= 0) & (inner.origin < inner.dest))
@@ -121,7 +121,14 @@ class RuledSurface:
         key, rulings = (
             np.sort(e, axis=1) @ [count, 1] for e in (pattern.vertex[ends], self.rulings.edges)
         )
-        return list(pattern.flat[ends[np.isin(key, rulings)]])
+        order = np.argsort(rulings)
+        at = order[np.minimum(np.searchsorted(rulings[order], key), len(order) - 1)]
+        lines = pattern.flat[ends]
+        angles, radii = self.rulings.angles.tolist(), self.rulings.radii.tolist()
+        return [
+            Bend(lines[n], angles[at[n]], radii[at[n]])
+            for n in np.flatnonzero(np.isin(key, rulings))
+        ]
 
     def arrays(self) -> dict[str, Array]:
         """Return the surface as arrays by name, except `moved`; see :meth:`from_arrays`."""
@@ -165,7 +172,8 @@ class RuledSurface:
             raise ValueError("the arrays of the ruled surface do not fit each other")
         crossed = int(data["ruled_crossed"])
         flat = np.asarray(data["ruled_flat"], bool)
-        return cls(mesh, data["ruled_strip"], flat, *folds, pattern, moved, crossed)
+        rulings, creases = folds
+        return cls(mesh, data["ruled_strip"], flat, rulings, creases, pattern, moved, crossed)
 
     def samples(self) -> tuple[Array, Array]:
         """Return points (k, 3) all over the surface, and their shares (k,) of its area.

@@ -145,7 +145,7 @@ def _enclosed(ring: Array) -> Any:
     for part in parts:
         at = part.representative_point()
         way = z - complex(at.x, at.y)
-        turns = np.angle(np.roll(way, -1) / way).sum() / (2.0 * np.pi)
+        turns = np.angle(np.roll(way, -1) * way.conj()).sum() / (2.0 * np.pi)
         inside.append(abs(turns) > 0.5)
     return shapely.union_all(parts[np.array(inside, bool)])
 
