@@ -12,9 +12,9 @@ from gso.ruled import fit
 from gso.ruled.chords import chords
 from gso.ruled.descent import planarised
 from gso.ruled.domain import Domain
-from gso.ruled.energy import Weights
 from gso.ruled.extended import Extended
 from gso.ruled.layout import Strips
+from gso.ruled.measured import Weights
 from gso.ruled.planarity import planarity
 from gso.ruled.polygon import resampled
 from gso.ruled.prices import prices

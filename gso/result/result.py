@@ -20,7 +20,8 @@ from gso.status import Progress, Status
 from gso.typing import Array
 
 if TYPE_CHECKING:
-    from gso.ruled.surface import Folds, RuledSurface
+    from gso.ruled.folds import Folds
+    from gso.ruled.surface import RuledSurface
 
 
 @dataclass(repr=False)

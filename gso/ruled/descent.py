@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.ruled.energy import Energy, Measured, Weights
+from gso.ruled.energy import Energy
+from gso.ruled.measured import Measured, Weights
 from gso.ruled.planarity import planarity
 from gso.ruled.system import System
 from gso.typing import Array

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gso.ruled.descent import descend, planarised
-from gso.ruled.energy import Energy, Weights
+from gso.ruled.energy import Energy
 from gso.ruled.extended import Extended
 from gso.ruled.layout import Strips
+from gso.ruled.measured import Weights
 from gso.ruled.vectors import lengths
 from gso.typing import Array, Ints
 

@@ -13,13 +13,13 @@ from gso import faults, metrics
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
-from gso.parametrization import beside, upright
 from gso.pattern import Bend, Pattern
 from gso.ruled.fit import Fit, Job
-from gso.ruled.layout import Strips
+from gso.ruled.folds import Folds, folds
+from gso.ruled.sheet import unrolled_pattern
 from gso.ruled.trim import trimmed
 from gso.ruled.unroll import Unrolled
-from gso.ruled.vectors import cross, lengths, unit
+from gso.ruled.vectors import cross, lengths
 from gso.typing import Array, Flags, Ints
 
 #: Names of the arrays in files.
@@ -27,37 +27,6 @@ _FOLDS, _PARTS = ("rulings", "creases"), ("edges", "angles", "radii")
 _PATTERN = ("flat", "faces", "vertex", "seams")
 #: Spacing of the samples by which distances are measured, relative to the diagonal.
 _FINE = 0.012
-
-
-@dataclass(frozen=True)
-class Folds:
-    """Edges along which planar faces meet.
-
-    Attributes
-    ----------
-    edges : ndarray of int, (r, 2)
-        Their ends, as vertices of the mesh.
-    angles : ndarray, (r,)
-        Angles between the faces in radians: positive for mountain folds, which are convex on
-        the outside of the surface, negative for valley folds.
-    radii : ndarray, (r,)
-        Radius of the bend that a fold stands for, at the end where it is smaller, in the
-        mesh's unit; infinite where there is no fold.
-    """
-
-    edges: Ints
-    angles: Array
-    radii: Array
-
-    @property
-    def smallest_radius(self) -> float:
-        """The smallest radius; infinite without folds."""
-        return float(self.radii.min(initial=np.inf))
-
-    @property
-    def largest_angle(self) -> float:
-        """The largest angle, regardless of its sign, in radians."""
-        return float(np.abs(self.angles).max(initial=0.0))
 
 
 @dataclass(frozen=True)
@@ -265,125 +234,14 @@ def built(job: Job, fit: Fit) -> RuledSurface:
     part = unrolled.part[cut.face]
     place = Nearest.of(vertices, strips.divided(vertices)[0])
     _, _, moved = place.locate(job.target.domain.mesh.vertices)
-    rulings, creases = _folds(strips, vertices, unrolled, mesh, cut.face)
+    rulings, creases = folds(strips, vertices, unrolled, mesh, cut.face)
     return RuledSurface(
         mesh=mesh,
         strip=part,
         flat=cut.face >= len(strips.corners) - len(strips.flats),
         rulings=rulings,
         creases=creases,
-        pattern=_pattern(mesh, cut.face, part, unrolled),
+        pattern=unrolled_pattern(mesh, cut.face, part, unrolled),
         moved=moved,
         crossed=int(((measured.gap <= 0).any(axis=1) | strips.tangled(vertices)).sum()),
     )
-
-
-def _folds(
-    strips: Strips, vertices: Array, unrolled: Unrolled, mesh: Mesh, owner: Ints
-) -> tuple[Folds, Folds]:
-    he = mesh.half_edges
-    k = np.flatnonzero((he.twin >= 0) & (he.origin < he.dest))
-    one, two = owner[he.face[k]], owner[he.face[he.twin[k]]]
-    k, one, two = k[one != two], one[one != two], two[one != two]
-    edges = np.stack([he.origin[k], he.dest[k]], axis=1)
-    n = unrolled.normals
-    sine = lengths(n[one] - n[two])
-    angle = 2.0 * np.arcsin(np.clip(0.5 * sine, 0.0, 1.0))
-    middle = vertices[strips.corners].mean(axis=1)
-    away = middle[two] - middle[one]
-    angle = np.where(np.einsum("kd,kd->k", n[two] - n[one], away) < 0, -angle, angle)
-    width = 0.5 * sum(_widths(strips, vertices, mesh.vertices[edges], face) for face in (one, two))
-    with np.errstate(divide="ignore"):
-        radius = np.asarray(width).min(axis=1) / (2.0 * np.sin(0.5 * np.abs(angle)))
-    a, b, _ = strips.creases
-    size = len(strips.corners)
-    crease = np.isin(
-        np.minimum(one, two) * size + np.maximum(one, two),
-        np.minimum(a, b) * size + np.maximum(a, b),
-    )
-    every = [Folds(edges[at], angle[at], radius[at]) for at in (~crease, crease)]
-    return every[0], replace(every[1], radii=np.zeros(int(crease.sum())))
-
-
-def _widths(strips: Strips, vertices: Array, ends: Array, face: Ints) -> Array:
-    """Return the distances (r, 2) of the ends of rulings from the other ruling of a face."""
-    p, q, p1, q1 = vertices[strips.corners[face]].transpose(1, 0, 2)
-    found = []
-    for a, b in ((p, q), (p1, q1)):
-        way = unit(b - a)
-        off = ends - a[:, None]
-        off = off - np.einsum("red,rd->re", off, way)[:, :, None] * way[:, None]
-        found.append(lengths(off))
-    # The ruling itself is at no distance.
-    own = found[0].max(axis=1) < found[1].max(axis=1)
-    return np.where(own[:, None], found[1], found[0])
-
-
-def _pattern(mesh: Mesh, owner: Ints, part: Ints, unrolled: Unrolled) -> Pattern:
-    faces = mesh.faces
-    face, corner = np.nonzero(faces >= 0)
-    ids = faces[face, corner]
-    first, which = _copies(mesh, part)
-    table = np.full_like(faces, -1)
-    table[face, corner] = which
-    flat = unrolled.flat(owner[face[first]], mesh.vertices[ids[first]])
-    label = part[face[first]]
-    pieces = [upright(flat[label == k])[:, ::-1] * [1.0, -1.0] for k in range(int(part.max()) + 1)]
-    for k, piece in enumerate(beside(pieces)):
-        flat[label == k] = piece
-    return Pattern(flat, table, ids[first], _seams(mesh, table))
-
-
-def _copies(mesh: Mesh, part: Ints) -> tuple[Ints, Ints]:
-    """Number copies of the vertices: corners have the same one if inner edges join their faces.
-
-    Returns
-    -------
-    first, which : ndarray of int, (n,), (c,)
-        A corner of each copy, and the copy of each corner; corners are in the order of the faces.
-    """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    faces = mesh.faces
-    number = np.full(faces.shape, -1)
-    number[faces >= 0] = np.arange(int((faces >= 0).sum()))
-
-    def corners(face: Ints, vertex: Ints) -> Ints:
-        at = (faces[face] == vertex[:, None]).argmax(axis=1)
-        return np.asarray(number[face, at])
-
-    he = mesh.half_edges
-    k = np.flatnonzero((he.twin >= 0) & (he.origin < he.dest))
-    one, two = he.face[k], he.face[he.twin[k]]
-    same = part[one] == part[two]
-    k, one, two = k[same], one[same], two[same]
-    ends = [(corners(one, v), corners(two, v)) for v in (he.origin[k], he.dest[k])]
-    i, j = (np.concatenate(x) for x in zip(*ends, strict=True))
-    size = int(number.max()) + 1
-    graph = coo_matrix((np.ones(len(i)), (i, j)), shape=(size, size))
-    _, which = connected_components(graph, directed=False)
-    _, first = np.unique(which, return_index=True)
-    # In the order of the parts, and of the vertices in each.
-    face, corner = np.nonzero(faces >= 0)
-    order = np.lexsort((faces[face, corner][first], part[face][first]))
-    rank = np.empty(len(order), np.int64)
-    rank[order] = np.arange(len(order))
-    return first[order], rank[which]
-
-
-def _seams(mesh: Mesh, table: Ints) -> Ints:
-    """Return the pairs of pattern edges that are one edge of the surface."""
-    he = mesh.half_edges
-    k = np.flatnonzero((he.twin >= 0) & (he.origin < he.dest))
-    ends = []
-    for half in (k, he.twin[k]):
-        rows, own = mesh.faces[he.face[half]], table[he.face[half]]
-        ends.append(
-            [
-                np.take_along_axis(own, (rows == v[:, None]).argmax(axis=1)[:, None], 1)[:, 0]
-                for v in (he.origin[k], he.dest[k])
-            ]
-        )
-    pairs = np.stack([np.stack(e, axis=1) for e in ends], axis=1)
-    return pairs[(pairs[:, 0] != pairs[:, 1]).any(axis=1)]
