@@ -280,6 +280,29 @@ def test_results_come_back_from_files(tmp_path):
     assert len(gso.load(tmp_path / "a.obj").faces) == len(result.mesh.faces)
 
 
+def test_strips_report_their_progress_and_can_be_stopped():
+    names = []
+
+    def watch(progress):
+        names.append(progress.name)
+        return "strips: 2" not in names
+
+    points = saddle(17, strength=0.25)
+    with pytest.warns(gso.ConvergenceWarning):
+        result = gso.tno.optimize(points, options=gso.RuledOptions(strips=4), callback=watch)
+    assert names[-1] == "strips: 2"
+    assert "strips: 1" in names
+    assert result.status is gso.Status.CANCELLED
+    # The single strip that was there already.
+    assert result.ruled.strips == 1
+    with pytest.warns(gso.ConvergenceWarning):
+        result = gso.tno.optimize(
+            points, formulation="ruled", callback=lambda p: not p.name.startswith("strips")
+        )
+    assert result.status is gso.Status.CANCELLED
+    assert result.ruled is None
+
+
 def test_cad_files_have_faces_that_share_edges(tmp_path):
     pytest.importorskip("OCP")
     rhino = pytest.importorskip("rhino3dm")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from gso.ruled.energy import Energy
@@ -37,18 +39,40 @@ def planarised(system: System, vertices: Array, tolerance: float = _PLANAR) -> A
     return vertices
 
 
+class Stopped(Exception):
+    """The caller does not want the solve to go on."""
+
+
+#: Gets the number of an iteration, the largest number of them, the energy, and the number of
+#: strips; returns whether to go on.
+Tell = Callable[[int, int, float, int], bool]
+
+
 def descend(
-    energy: Energy, vertices: Array, w: Weights, iterations: int, tolerance: float = _TOLERANCE
+    energy: Energy,
+    vertices: Array,
+    w: Weights,
+    iterations: int,
+    tolerance: float = _TOLERANCE,
+    tell: Tell | None = None,
 ) -> Array:
-    """Minimise the energy from given vertices; the best are returned."""
+    """Minimise the energy from given vertices; the best are returned.
+
+    Raises
+    ------
+    Stopped
+        `tell` returned False.
+    """
     system, damping, growth = energy.system, _DAMPING, 2.0
     diagonal = system.diagonal
     here = energy.measure(vertices)
     tangled = int(energy.strips.tangled(vertices).sum())
     bound = _CROSSED * w.least * energy.width
-    for _ in range(iterations):
+    for iteration in range(iterations):
         scale = max(float(np.abs(here.height).max()), 1e-12)
         value = energy.value(vertices, here, w, here.back_weight, scale)
+        if tell is not None and not tell(iteration, iterations, value, energy.strips.count):
+            raise Stopped
         gradient, matrix = energy.derivatives(vertices, here, w, scale)
         mean = float(matrix[diagonal].mean())
         right = np.zeros(system.size)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gso.ruled.descent import descend, planarised
+from gso.ruled.descent import Tell, descend, planarised
 from gso.ruled.energy import Energy
 from gso.ruled.extended import Extended
 from gso.ruled.layout import Strips
@@ -59,11 +59,12 @@ class Fit:
 
 
 class Job(NamedTuple):
-    """What all phases share: the target, points of the design, weights."""
+    """What all phases share: the target, points of the design, weights, and who is told."""
 
     target: Extended
     points: Array
     weights: Weights = Weights()
+    tell: Tell | None = None
 
     def energy(self, strips: Strips, start: Array, width: float | None = None) -> Energy:
         """Make the energy of a layout."""
@@ -75,7 +76,7 @@ def single(job: Job, strips: Strips, start: Array) -> Fit:
     energy, vertices = job.energy(strips, start), start
     for moved, planar in _PENALTIES:
         w = replace(job.weights, moved=moved, planar=planar)
-        vertices = descend(energy, vertices, w, _PENALISED)
+        vertices = descend(energy, vertices, w, _PENALISED, tell=job.tell)
     return _exact(job, _planar(job, Fit(strips, vertices, energy.width), start), _EXACT)
 
 
@@ -106,17 +107,17 @@ def evened(job: Job, fit: Fit) -> Fit:
             break
         share = less
         w = full.scaled(share)
-        vertices = descend(energy, vertices, w, _POLISH, _TIGHT)
+        vertices = descend(energy, vertices, w, _POLISH, _TIGHT, job.tell)
     for power in _POWERS[fit.strips.count == 1]:
-        vertices = descend(energy, vertices, replace(w, power=power), _EACH)
+        vertices = descend(energy, vertices, replace(w, power=power), _EACH, tell=job.tell)
     return _uncrossed(job, replace(fit, vertices=planarised(energy.system, vertices)))
 
 
 def _exact(job: Job, fit: Fit, iterations: int) -> Fit:
     energy = job.energy(fit.strips, fit.vertices, fit.width)
     w = replace(job.weights, moved=_MOVED, even=_EVEN)
-    found = replace(fit, vertices=descend(energy, fit.vertices, w, iterations))
-    return _uncrossed(job, found)
+    vertices = descend(energy, fit.vertices, w, iterations, tell=job.tell)
+    return _uncrossed(job, replace(fit, vertices=vertices))
 
 
 def _planar(job: Job, fit: Fit, start: Array) -> Fit:

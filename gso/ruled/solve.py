@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from gso.ruled.chords import chords
+from gso.ruled.descent import Stopped, Tell
 from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
 from gso.ruled.fit import Fit, Job, evened, halved, refined, single
@@ -87,8 +89,8 @@ class Found:
 
 
 def solve(
-    domain: Domain, starts: dict[str, Array], wanted: Wanted
-) -> tuple[Found, dict[int, float]]:
+    domain: Domain, starts: dict[str, Array], wanted: Wanted, tell: Tell | None = None
+) -> tuple[Found | None, dict[int, float]]:
     """Fit a ruled surface to a design with a diagonal of one.
 
     Parameters
@@ -100,24 +102,96 @@ def solve(
         the best result counts.
     wanted : Wanted
         Strips, rulings and bounds.
+    tell : callable, optional
+        Told each iteration; see :class:`~gso.ruled.fit.Job`.
 
     Returns
     -------
-    found : Found
+    found : Found or None
+        None if `tell` ended the solve before there was a surface.
     tried : dict of int to float
         Largest distance by number of strips, for all numbers that were tried.
     """
     target = Extended(domain)
-    jobs = [Job(target, domain.lattice(count)) for count in _POINTS]
-    first = {name: _first(jobs[0], normals, wanted) for name, normals in starts.items()}
-    if wanted.strips == 1:
-        found = min((_found(jobs[0], evened(jobs[0], f), n) for n, f in first.items()), key=_order)
-        return found, {1: found.deviation}
-    return _several(jobs, first, wanted)
+    jobs = [Job(target, domain.lattice(count), tell=tell) for count in _POINTS]
+    search = _Search(jobs, wanted)
+    with contextlib.suppress(Stopped):
+        search.run(starts)
+    return search.best, {k: f.deviation for k, f in search.results.items()}
 
 
-def _order(found: Found) -> tuple[bool, float]:
-    return found.order
+class _Search:
+    """The fits, and the surfaces made of them, by number of strips."""
+
+    def __init__(self, jobs: Sequence[Job], wanted: Wanted):
+        self.jobs, self.wanted = jobs, wanted
+        self.fits: dict[int, Fit] = {}
+        self.results: dict[int, Found] = {}
+        self.start = ""
+
+    @property
+    def best(self) -> Found | None:
+        """The wanted number of strips, the smallest that meets the bounds, or the nearest."""
+        results, wanted = self.results, self.wanted
+        met = [k for k in sorted(results) if wanted.met(results[k])]
+        if wanted.strips in results:
+            return results[wanted.strips]
+        if wanted.strips is None and met:
+            return results[met[0]]
+        every = results.values()
+        return min(every, key=lambda f: (not f.surface.sound, f.deviation), default=None)
+
+    def run(self, starts: dict[str, Array]) -> None:
+        """Fit one strip from each start, and halve strips until the bounds are met."""
+        wanted, (one, job) = self.wanted, self.jobs
+        for name, normals in starts.items():
+            fit = _first(one, normals, wanted)
+            found = self._found(one, fit, name)
+            if 1 not in self.results or found.order < self.results[1].order:
+                self.fits[1], self.results[1], self.start = fit, found, name
+        count, most = 1, wanted.strips or MOST
+        while count < most and not self._enough(count):
+            more = min(2 * count, most)
+            fit = self.fits[count]
+            self.fits[more] = halved(job, fit, _worst(job, fit, more - count))
+            count = more
+            if wanted.strips is None or count == most:
+                self.results[count] = self._found(job, self.fits[count], self.start)
+        if wanted.strips is None and wanted.met(self.results[count]):
+            self._bisect(job, count)
+
+    def _enough(self, count: int) -> bool:
+        """Return whether there are enough strips, or more of them are of no use."""
+        if self.wanted.strips is not None:
+            return False
+        found = self.results[count]
+        return self.wanted.met(found) or (
+            count > _PAYING and found.deviation > _LESS * self.results[count // 2].deviation
+        )
+
+    def _bisect(self, job: Job, count: int) -> None:
+        """Bisect between half a number of strips, which was too few, and that number."""
+        base = low = count // 2
+        high = count
+        while high - low > 1:
+            middle = (low + high) // 2
+            fit = halved(job, self.fits[base], _worst(job, self.fits[base], middle - base))
+            self.results[middle] = self._found(job, fit, self.start)
+            if self.wanted.met(self.results[middle]):
+                high = middle
+            else:
+                low = middle
+
+    def _found(self, job: Job, fit: Fit, start: str) -> Found:
+        """Lower the largest distance of a fit, and measure the surface that it is."""
+        surface = built(job, evened(job, fit))
+        far = surface.distances(job.target.domain.mesh)
+        return Found(
+            surface,
+            max(far.there_mean, far.back_mean),
+            max(far.there_max, far.back_max),
+            start,
+        )
 
 
 def _first(job: Job, normals: Array, wanted: Wanted) -> Fit:
@@ -131,65 +205,6 @@ def _first(job: Job, normals: Array, wanted: Wanted) -> Fit:
     for _ in range(rounds):
         fit = refined(job, fit)
     return fit
-
-
-def _found(job: Job, fit: Fit, start: str) -> Found:
-    surface = built(job, fit)
-    far = surface.distances(job.target.domain.mesh)
-    return Found(
-        surface,
-        max(far.there_mean, far.back_mean),
-        max(far.there_max, far.back_max),
-        start,
-    )
-
-
-def _several(
-    jobs: Sequence[Job], first: dict[str, Fit], wanted: Wanted
-) -> tuple[Found, dict[int, float]]:
-    """Halve strips until their number, or the bounds, are reached."""
-    one, job = jobs
-    ranked = {name: _found(one, evened(one, fit), name) for name, fit in first.items()}
-    name = min(ranked, key=lambda n: ranked[n].order)
-    fits, results = {1: first[name]}, {1: ranked[name]}
-    count = 1
-    most = wanted.strips or MOST
-    while count < most and not (wanted.strips is None and wanted.met(results[count])):
-        more = min(2 * count, most)
-        fits[more] = halved(job, fits[count], _worst(job, fits[count], more - count))
-        count = more
-        if wanted.strips is None or count == most:
-            results[count] = _found(job, evened(job, fits[count]), name)
-        if wanted.strips is None and count > _PAYING and _useless(results, count):
-            break
-    best = results[count]
-    if wanted.strips is None and wanted.met(best):
-        best = _fewest(job, fits, results, count, wanted, name)
-    elif wanted.strips is None:
-        best = min(results.values(), key=lambda f: (not f.surface.sound, f.deviation))
-    return best, {k: f.deviation for k, f in results.items()}
-
-
-def _useless(results: dict[int, Found], count: int) -> bool:
-    """Return whether twice as many strips did not lower the largest distance."""
-    return results[count].deviation > _LESS * results[count // 2].deviation
-
-
-def _fewest(
-    job: Job, fits: dict[int, Fit], results: dict[int, Found], count: int, wanted: Wanted, name: str
-) -> Found:
-    """Bisect between half a number of strips, which was too few, and that number."""
-    base = low = count // 2
-    high = count
-    while high - low > 1:
-        middle = (low + high) // 2
-        fit = halved(job, fits[base], _worst(job, fits[base], middle - base))
-        results[middle] = _found(job, evened(job, fit), name)
-        if wanted.met(results[middle]):
-            high = middle
-        else:
-            low = middle
-    return results[high]
 
 
 def _worst(job: Job, fit: Fit, count: int) -> Ints | None:

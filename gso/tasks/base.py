@@ -14,7 +14,7 @@ from gso.energy.losses import Loss
 from gso.mesh import Mesh
 from gso.mesh.cutting import Cut
 from gso.pattern import Pattern
-from gso.status import Status
+from gso.status import Progress, Status
 from gso.tasks.imposed import Imposed
 from gso.tasks.options import Options
 from gso.typing import Array
@@ -189,7 +189,8 @@ class Plan:
         The cuts made to open the design. The flat image is then that of the cut mesh, in its
         numbering.
     convert : callable, optional
-        Makes the result from the solution of the stages, unless the solve was cancelled.
+        Makes the result from the solution of the stages, unless the solve was cancelled. Its
+        second argument is told each iteration, and returns whether to go on.
     """
 
     layout: Layout
@@ -205,7 +206,7 @@ class Plan:
     cold_start: Callable[[], Array] | None = None
     start_refused: str = ""
     cut: Cut | None = None
-    convert: Callable[[Solution], Solution] | None = None
+    convert: Callable[[Solution, Callable[[Progress], bool]], Solution] | None = None
 
 
 @dataclass

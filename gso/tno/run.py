@@ -17,6 +17,7 @@ from gso.status import Progress, Status
 from gso.tasks.base import Options, Plan, Request, Solution, Stage, same
 from gso.tno.solver import Callback, Minimum, Timings, minimise
 from gso.tno.solver.augmented_lagrangian import tighten
+from gso.tno.solver.minimiser import says_no
 from gso.tno.solver.problem import Problem, energies
 from gso.typing import Array
 from gso.unknowns import control_points
@@ -120,9 +121,13 @@ class Run:
         if plan.convert is None or solution.status is Status.CANCELLED:
             return solution
         clock = time.perf_counter()
-        solution = plan.convert(solution)
+        solution = plan.convert(solution, self._told)
         self.converting += time.perf_counter() - clock
         return solution
+
+    def _told(self, progress: Progress) -> bool:
+        """Report an iteration of a conversion; return whether to go on."""
+        return self.callback is None or not says_no(self.callback(progress))
 
     def _solution(self, plan: Plan, options: Options) -> Solution:
         if not plan.stages:

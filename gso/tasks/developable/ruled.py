@@ -16,7 +16,7 @@ import numpy as np
 from gso import parametrization
 from gso.errors import MeshError, OptionError
 from gso.mesh.normals import vertex_normals
-from gso.status import Status
+from gso.status import Progress, Status
 from gso.tasks.base import Plan, Request, Solution
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.options import Options as BaseOptions
@@ -108,7 +108,9 @@ def plan(analysis: Analysis, request: Request, before: Callable[[Analysis, Reque
     return replace(first, convert=partial(_converted, analysis, request), details={}, notes=())
 
 
-def _converted(analysis: Analysis, request: Request, before: Solution) -> Solution:
+def _converted(
+    analysis: Analysis, request: Request, before: Solution, tell: Callable[[Progress], bool]
+) -> Solution:
     """Solve for the strips from the normals of the design and of another surface."""
     from gso.ruled.domain import Domain
     from gso.ruled.solve import Wanted, solve
@@ -133,14 +135,25 @@ def _converted(analysis: Analysis, request: Request, before: Solution) -> Soluti
         None if bound is None else bound / size,
         None if options.max_crease is None else float(np.radians(options.max_crease)),
     )
-    found, tried = solve(domain, starts or {"design": domain.normals}, wanted)
+    stopped = False
+
+    def told(iteration: int, iterations: int, energy: float, count: int) -> bool:
+        nonlocal stopped
+        progress = Progress(0, 1, iteration, iterations, energy, {}, 1.0, f"strips: {count}")
+        stopped = not tell(progress)
+        return not stopped
+
+    found, tried = solve(domain, starts or {"design": domain.normals}, wanted, told)
+    if found is None:
+        return replace(before, status=Status.CANCELLED)
     surface = found.surface.transformed(lambda points: size * points, size, lambda rows: rows)
     missed = bounded and not wanted.met(found)
+    status = Status.TARGET_MISSED if missed else Status.CONVERGED
     return replace(
         before,
         blocks={"surface": surface.moved},
         coordinates=surface.moved.ravel(),
-        status=Status.TARGET_MISSED if missed else Status.CONVERGED,
+        status=Status.CANCELLED if stopped else status,
         energy={"distance": found.mean},
         details={"strips": surface.strips, "rulings_from": found.start, "tried": _said(tried)},
         ruled=surface,

@@ -123,7 +123,7 @@ def minimise(
         by_term = current.by_term(x) if callback is not None else {}
         progress = Progress(*stage, iteration, iterations, energy, by_term, step, name)
         history.append(progress)
-        if callback is not None and _says_no(callback(progress)):
+        if callback is not None and says_no(callback(progress)):
             raise Cancelled
 
     def continued_to(problem: Problem, iteration: int) -> Problem:
@@ -187,7 +187,7 @@ def minimise(
 _STIFF = 1e6
 
 
-def _says_no(answer: object) -> bool:
+def says_no(answer: object) -> bool:
     return isinstance(answer, bool | np.bool_) and not answer
 
 
