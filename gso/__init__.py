@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from gso.io import as_mesh, load, save, save_spline
     from gso.mesh import Mesh, topology
     from gso.result import Result
+    from gso.ruled.loft import loft
     from gso.spline import BSplineSurface
     from gso.spline.fit import fit_spline
     from gso.status import Progress, Status
@@ -90,6 +91,7 @@ __all__ = [
     "hybrid",
     "io",
     "load",
+    "loft",
     "metrics",
     "net",
     "plot",
@@ -120,6 +122,7 @@ _NAMES = {
     "DatasetError": "gso.errors",
     "ConvergenceWarning": "gso.errors",
     "Options": "gso.tasks.options",
+    "loft": "gso.ruled.loft",
     "Fixed": "gso.constraints",
     "FixedBoundary": "gso.constraints",
     "FixedLengths": "gso.constraints",

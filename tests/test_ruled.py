@@ -14,6 +14,7 @@ from gso.ruled.descent import planarised
 from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
 from gso.ruled.layout import Strips
+from gso.ruled.loft import loft
 from gso.ruled.measured import Weights
 from gso.ruled.planarity import planarity
 from gso.ruled.polygon import resampled
@@ -301,6 +302,51 @@ def test_strips_report_their_progress_and_can_be_stopped():
         )
     assert result.status is gso.Status.CANCELLED
     assert result.ruled is None
+
+
+def rails():
+    """Two curves of a hull: the chine and the deck."""
+    t = np.linspace(0.0, 1.0, 40)
+    deck = np.stack([4.0 * t, 0.6 * np.sin(0.5 * np.pi * t) - 0.2, 0.5 + 0.6 * t**2], axis=1)
+    chine = np.stack([4.2 * t, 0.8 * np.sin(0.5 * np.pi * t), 0.2 * t**2], axis=1)
+    return deck, chine
+
+
+def test_lofts_are_planar_between_rails():
+    curves = rails()
+    strip = loft(*curves)
+    assert strip.sound
+    off = np.linalg.norm(strip.moved - np.concatenate(curves), axis=1)
+    assert off.max() < 1e-3
+    mesh, flat = strip.mesh, strip.pattern.flat
+    quads = mesh.faces[mesh.faces[:, 3] >= 0]
+    volume = np.linalg.det(mesh.vertices[quads[:, 1:]] - mesh.vertices[quads[:, :1]])
+    assert np.abs(volume).max() < 1e-12
+    a, b = mesh.edges.T
+    there, here = (np.linalg.norm(x[a] - x[b], axis=1) for x in (mesh.vertices, flat))
+    np.testing.assert_allclose(here, there, atol=1e-12)
+    # Twice as many rulings: a quarter of the distance.
+    finer = loft(*curves, rulings=65)
+    less = np.linalg.norm(finer.moved - np.concatenate(curves), axis=1)
+    assert less.max() < 0.35 * off.max()
+
+
+def test_lofts_of_cones_are_cones_and_impossible_ones_are_not_sound():
+    t = np.linspace(0.0, 1.0, 50)
+    circle = np.stack([np.cos(t), np.sin(t), 0.0 * t], axis=1)
+    cone = loft(circle, 2.0 * circle + [0.0, 0.0, 1.0])
+    a, b = cone.mesh.vertices[cone.rulings.edges].transpose(1, 0, 2)
+    apex = np.array([0.0, 0.0, -1.0])
+    way, true = b - a, 0.5 * (a + b) - apex
+    sine = np.linalg.norm(np.cross(way, true), axis=1)
+    sine /= np.linalg.norm(way, axis=1) * np.linalg.norm(true, axis=1)
+    assert np.degrees(sine.max()) < 0.05
+    wave = np.stack([4.0 * t, 1.0 + 0.4 * np.sin(3.0 * t), 0.3 * np.cos(4.0 * t)], axis=1)
+    assert not loft(rails()[0], wave).sound
+    with pytest.raises(gso.MeshError, match="curve `other`"):
+        loft(circle, circle[:2])
+    with pytest.raises(gso.OptionError, match="rulings"):
+        loft(circle, circle + 1.0, rulings=2)
 
 
 def test_cad_files_have_faces_that_share_edges(tmp_path):
