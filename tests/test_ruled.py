@@ -349,6 +349,21 @@ def test_lofts_of_cones_are_cones_and_impossible_ones_are_not_sound():
         loft(circle, circle + 1.0, rulings=2)
 
 
+@pytest.mark.parametrize("strips", [1, 2])
+def test_strips_pass_through_fixed_vertices_and_handles(strips):
+    mesh = Mesh.from_grid(saddle(25, strength=0.2))
+    middle = len(mesh.vertices) // 2
+    lifted = mesh.vertices[middle] + [0.0, 0.0, 0.02 * mesh.diagonal]
+    for constraint in (gso.Fixed([0, middle]), gso.Handle(middle, lifted)):
+        options = gso.RuledOptions(strips=strips)
+        result = gso.tno.optimize(mesh, options=options, constraints=[constraint])
+        assert result.usable, result.reasons
+        (missed,) = result.details["constraints"].values()
+        assert missed < 1e-7 * mesh.diagonal
+    off = metrics.point_to_surface(lifted[None], result.mesh)
+    assert off.max() < 1e-7 * mesh.diagonal
+
+
 def test_cad_files_have_faces_that_share_edges(tmp_path):
     pytest.importorskip("OCP")
     rhino = pytest.importorskip("rhino3dm")
@@ -409,8 +424,9 @@ def test_what_cannot_be_ruled_is_refused():
         gso.tno.optimize(
             Mesh(two, np.concatenate([faces, faces + tube[..., 0].size])), formulation="ruled"
         )
-    with pytest.raises(gso.OptionError, match="constraints"):
-        gso.tno.optimize(saddle(9), formulation="ruled", constraints=[gso.FixedBoundary()])
+    with pytest.raises(gso.OptionError, match="positions of vertices"):
+        planar = gso.PlanarFaces()
+        gso.tno.optimize(saddle(9), formulation="ruled", constraints=[planar])
     for wrong in ({"strips": 0}, {"strips": "many"}, {"rulings": 3}, {"starts": ("x",)}):
         with pytest.raises(gso.OptionError):
             gso.RuledOptions(**wrong)

@@ -13,7 +13,7 @@ import warnings
 from typing import Any
 
 import numpy as np
-from harness import ROOT, progress, reference, table
+from harness import ROOT, progress, reference, table, timed
 
 import gso
 from gso import metrics
@@ -194,10 +194,46 @@ def general(start: str = "design") -> dict[str, Any]:
     return out
 
 
+def peers() -> dict[str, Any]:
+    """Compare ruled surfaces with other results, flattened with strain.
+
+    No other installable package makes strips of planar faces near a surface; those that there are
+    flatten, or need rulings that are given.
+    """
+    methods = {
+        "curvature": {},
+        "isometry": {"formulation": "isometry"},
+        **{f"ruled, {name}": {"options": gso.RuledOptions(**o)} for name, o in STRIPS.items()},
+    }
+    out, rows = {}, []
+    for name, given in methods.items():
+        found = []
+        for surface in progress(_references(), name):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", gso.ConvergenceWarning)
+                result, spent = timed(gso.tno.optimize, surface, **given)
+            m = result.metrics
+            wobble = 0.0
+            if result.ruled is None:
+                wobble = gso.rulings.trace(result.mesh).straightness.mean()
+            strain = m.get("strain_max", np.nan)
+            row = (m["distance_mean"], m["distance_max"], strain, wobble, result.usable, spent)
+            found.append(row)
+        every = np.array(found, float)
+        mean, far, strain, wobble, usable, seconds = every.T
+        row = [np.median(mean), np.median(far), np.quantile(far, 0.9), 100 * np.nanmedian(strain)]
+        row += [100 * np.median(wobble), int(usable.sum()), np.median(seconds)]
+        out[name] = row
+        rows.append([name, *row])
+    columns = ["method", "mean %", "max %", "90 %", "strain %", "off straight %", "usable", "s"]
+    table("Largest strain of the pattern, and how far rulings are off straight", columns, rows)
+    return out
+
+
 def _cap(n: int = 33, angle: float = 0.5) -> np.ndarray:
     """Return a square piece of a sphere around its pole."""
     u, v = np.meshgrid(*[np.linspace(-angle, angle, n)] * 2, indexing="ij")
     return np.stack([np.sin(u) * np.cos(v), np.sin(v), np.cos(u) * np.cos(v)], axis=-1)
 
 
-SECTIONS = (strips, convergence, bounds, general)
+SECTIONS = (strips, convergence, bounds, general, peers)

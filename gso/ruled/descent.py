@@ -69,7 +69,7 @@ def descend(
     tangled = int(energy.strips.tangled(vertices).sum())
     bound = _CROSSED * w.least * energy.width
     for iteration in range(iterations):
-        scale = max(float(np.abs(here.height).max()), 1e-12)
+        scale = max(float(np.abs(here.height[: energy.count]).max()), 1e-12)
         value = energy.value(vertices, here, w, here.back_weight, scale)
         if tell is not None and not tell(iteration, iterations, value, energy.strips.count):
             raise Stopped

@@ -37,6 +37,8 @@ class Energy:
         Points of the design whose distances are minimised.
     width : float, optional
         Mean width of the faces; that of the start when not given.
+    held : ndarray, (h, 3), optional
+        Points that the strips have to pass through.
     """
 
     def __init__(
@@ -46,8 +48,12 @@ class Energy:
         start: Array,
         points: Array,
         width: float | None = None,
+        held: Array | None = None,
     ):
-        self.design, self.strips, self.start, self.points = design, strips, start, points
+        self.design, self.strips, self.start = design, strips, start
+        #: Number of the design's points; those that are held follow them.
+        self.count = len(points)
+        self.points = points if held is None else np.concatenate([points, held])
         self.system = System(strips)
         count = max(_LEAST, -(-_SAMPLES // strips.count))
         t = (np.arange(count) + 0.5) / count
@@ -159,7 +165,9 @@ class Energy:
 
     def value(self, vertices: Array, m: Measured, w: Weights, weight: Array, scale: float) -> float:
         """Return the energy, with the given weights of the faces' samples."""
-        total = float(((np.abs(m.height) / scale) ** w.power).sum()) / len(self.points) * scale**2
+        far, held = m.height[: self.count], m.height[self.count :]
+        total = float(((np.abs(far) / scale) ** w.power).sum()) / self.count * scale**2
+        total += w.hold * float(held @ held)
         total += w.back * float((weight * (np.abs(m.back) / scale) ** w.power).sum()) * scale**2
         total += 0.5 * self._linear(vertices, w)[0]
         total += w.ends / len(m.off) * float((m.off**2).sum())
@@ -203,7 +211,7 @@ class Energy:
         """Distances of the design's points from the triangles' planes."""
         triangles, _ = self.strips.split
         count = len(triangles)
-        first, second = _power(m.height, w.power, scale, 1.0 / len(self.points))
+        first, second = self._pulls(m, w, scale)
         at, n = m.triangle, m.normal
         first[m.beyond] = second[m.beyond] = 0.0
         share = np.ascontiguousarray(m.shares.T)
@@ -217,10 +225,19 @@ class Energy:
                 moments[:, j, i] = moments[:, i, j]
         return self._triangle_places, np.einsum("tij,td,te->tidje", moments, n, n)
 
+    def _pulls(self, m: Measured, w: Weights, scale: float) -> tuple[Array, Array]:
+        """Return first and second derivatives by the distances of all points."""
+        first, second = _power(m.height, w.power, scale, 1.0 / self.count)
+        first[self.count :], second[self.count :] = (
+            2.0 * w.hold * m.height[self.count :],
+            2.0 * w.hold,
+        )
+        return first, second
+
     def _beyond(self, gradient: Array, m: Measured, w: Weights, scale: float) -> tuple[Ints, Array]:
         """Distances of points beyond the border or a ridge."""
         corners = self.strips.split[0][m.triangle[m.beyond]]
-        first, second = _power(m.height[m.beyond], w.power, scale, 1.0 / len(self.points))
+        first, second = (x[m.beyond] for x in self._pulls(m, w, scale))
         row = m.shares[m.beyond][:, :, None] * unit(m.way)[:, None]
         _add(gradient, corners, first[:, None, None] * row)
         row = row.reshape(len(corners), 9)

@@ -28,6 +28,8 @@ _MOVED = 1e-7
 _PENALISED, _EXACT, _EACH = 6, 15, 8
 #: Powers of the distance in the last phase, for one strip and for several.
 _POWERS = {True: (4.0, 8.0), False: (4.0,)}
+#: Weights by which points that strips pass through are met in the end.
+_HOLDS = (1e5, 1e7)
 #: Ends of rulings are merged when their gap is below this multiple of the least one.
 _MERGED = 1.7
 #: Root mean square distance below which other terms lose weight; rounds of that, the largest
@@ -59,16 +61,19 @@ class Fit:
 
 
 class Job(NamedTuple):
-    """What all phases share: the target, points of the design, weights, and who is told."""
+    """What all phases share: the target, points of the design, weights, who is told,
+    and points that the strips pass through.
+    """
 
     target: Extended
     points: Array
     weights: Weights = Weights()
     tell: Tell | None = None
+    held: Array | None = None
 
     def energy(self, strips: Strips, start: Array, width: float | None = None) -> Energy:
         """Make the energy of a layout."""
-        return Energy(self.target, strips, start, self.points, width)
+        return Energy(self.target, strips, start, self.points, width, self.held)
 
 
 def single(job: Job, strips: Strips, start: Array) -> Fit:
@@ -110,6 +115,9 @@ def evened(job: Job, fit: Fit) -> Fit:
         vertices = descend(energy, vertices, w, _POLISH, _TIGHT, job.tell)
     for power in _POWERS[fit.strips.count == 1]:
         vertices = descend(energy, vertices, replace(w, power=power), _EACH, tell=job.tell)
+    for hold in _HOLDS if job.held is not None else ():
+        closing = replace(w, power=power, hold=hold)
+        vertices = descend(energy, vertices, closing, _EACH, 0.0, job.tell)
     return _uncrossed(job, replace(fit, vertices=planarised(energy.system, vertices)))
 
 

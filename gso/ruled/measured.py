@@ -30,6 +30,8 @@ class Weights:
         Missing distance between successive rulings.
     least : float
         The distance that they keep, relative to the mean.
+    hold : float
+        Squared distances of points that the strips have to pass through.
     planar : float
         Squared distance between the diagonals of a quad; 0 where quads are planar exactly.
     power : float
@@ -45,6 +47,7 @@ class Weights:
     inside: float = 10.0
     gap: float = 5.0
     least: float = 0.1
+    hold: float = 1e3
     planar: float = 0.0
     power: float = 2.0
 

@@ -89,7 +89,11 @@ class Found:
 
 
 def solve(
-    domain: Domain, starts: dict[str, Array], wanted: Wanted, tell: Tell | None = None
+    domain: Domain,
+    starts: dict[str, Array],
+    wanted: Wanted,
+    tell: Tell | None = None,
+    held: Array | None = None,
 ) -> tuple[Found | None, dict[int, float]]:
     """Fit a ruled surface to a design with a diagonal of one.
 
@@ -103,7 +107,9 @@ def solve(
     wanted : Wanted
         Strips, rulings and bounds.
     tell : callable, optional
-        Told each iteration; see :class:`~gso.ruled.fit.Job`.
+        Told each iteration; see :data:`gso.ruled.descent.Tell`.
+    held : ndarray, (h, 3), optional
+        Points that the surface has to pass through.
 
     Returns
     -------
@@ -113,7 +119,7 @@ def solve(
         Largest distance by number of strips, for all numbers that were tried.
     """
     target = Extended(domain)
-    jobs = [Job(target, domain.lattice(count), tell=tell) for count in _POINTS]
+    jobs = [Job(target, domain.lattice(count), tell=tell, held=held) for count in _POINTS]
     search = _Search(jobs, wanted)
     with contextlib.suppress(Stopped):
         search.run(starts)

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gso import parametrization
+from gso.constraints.parts import Pins
 from gso.errors import MeshError, OptionError
 from gso.mesh.normals import vertex_normals
 from gso.status import Progress, Status
@@ -23,6 +24,8 @@ from gso.tasks.options import Options as BaseOptions
 
 #: Surfaces whose normals give first rulings.
 _STARTS = ("design", "curvature")
+#: Distance of vertices from their places, relative to the diagonal, that counts as zero.
+_SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -87,10 +90,14 @@ def plan(analysis: Analysis, request: Request, before: Callable[[Analysis, Reque
     MeshError
         The design is no disk, possibly with holes.
     OptionError
-        There are constraints.
+        There are constraints other than positions.
     """
-    if not analysis.constraints.empty:
-        raise OptionError("the formulation 'ruled' takes no constraints yet; leave them out")
+    compiled = analysis.constraints
+    if compiled.flat or not all(isinstance(part, Pins) for part in compiled.parts):
+        raise OptionError(
+            "the formulation 'ruled' takes constraints on the positions of vertices only: Fixed, "
+            "FixedBoundary and Handle; leave the others out, or take 'curvature'"
+        )
     mesh = analysis.mesh
     if not parametrization.flattens(mesh) or analysis.opened.cut is not None:
         raise MeshError(
@@ -101,7 +108,7 @@ def plan(analysis: Analysis, request: Request, before: Callable[[Analysis, Reque
     if request.start is not None:
         first = before(analysis, replace(made, start=None))
         first = replace(first, start=request.start.ravel(), stages=())
-    elif "curvature" in request.options.starts:
+    elif "curvature" in request.options.starts or not compiled.empty:
         first = before(analysis, made)
     else:
         first = replace(before(analysis, made), stages=(), start=mesh.vertices.ravel())
@@ -117,10 +124,14 @@ def _converted(
 
     options: Options = request.options
     size = analysis.mesh.diagonal
-    mesh = analysis.mesh.replaced(analysis.mesh.vertices / size)
+    pins, targets = analysis.constraints.positions
+    # Where constraints move vertices, the surface that meets them is the design.
+    same = np.abs(targets - analysis.mesh.vertices[pins]).max(initial=0.0) <= _SAME * size
+    near = analysis.mesh.vertices if same else before.points
+    mesh = analysis.mesh.replaced(near / size)
     domain = Domain(mesh, parametrization.begin(mesh).flat)
     starts = {"design": domain.normals} if "design" in options.starts else {}
-    if not np.array_equal(before.points, analysis.mesh.vertices):
+    if not np.array_equal(before.points, near):
         name = "curvature" if request.start is None else "x0"
         starts[name] = vertex_normals(analysis.mesh.replaced(before.points))
     bound = request.max_displacement
@@ -143,7 +154,13 @@ def _converted(
         stopped = not tell(progress)
         return not stopped
 
-    found, tried = solve(domain, starts or {"design": domain.normals}, wanted, told)
+    found, tried = solve(
+        domain,
+        starts or {"design": domain.normals},
+        wanted,
+        told,
+        targets / size if len(pins) else None,
+    )
     if found is None:
         return replace(before, status=Status.CANCELLED)
     surface = found.surface.transformed(lambda points: size * points, size, lambda rows: rows)
