@@ -35,6 +35,9 @@ _MERGED = 1.7
 #: Root mean square distance below which other terms lose weight; rounds of that, the largest
 #: number of iterations in each, and the relative decrease of the energy at which it ends.
 _CLOSE, _ROUNDS, _POLISH, _TIGHT = 1.4e-3, 6, 20, 1e-8
+#: Number of times that strips are fitted again after ends were merged, and the gap at which these
+#: block the way, relative to the least one.
+_AGAIN, _TOUCHING = 3, 0.3
 #: Rounds of merging ends of rulings that cross.
 _MENDED = 3
 #: Weights that differ from the usual ones when there are several strips.
@@ -122,10 +125,16 @@ def evened(job: Job, fit: Fit) -> Fit:
 
 
 def _exact(job: Job, fit: Fit, iterations: int) -> Fit:
-    energy = job.energy(fit.strips, fit.vertices, fit.width)
     w = replace(job.weights, moved=_MOVED, even=_EVEN)
-    vertices = descend(energy, fit.vertices, w, iterations, tell=job.tell)
-    return _uncrossed(job, replace(fit, vertices=vertices))
+    for _ in range(_AGAIN):
+        energy = job.energy(fit.strips, fit.vertices, fit.width)
+        vertices = descend(energy, fit.vertices, w, iterations, tell=job.tell)
+        fit = replace(fit, vertices=vertices)
+        merged = _uncrossed(job, fit, _TOUCHING)
+        if merged is fit:
+            break
+        fit = merged
+    return fit
 
 
 def _planar(job: Job, fit: Fit, start: Array) -> Fit:
@@ -138,11 +147,14 @@ def _planar(job: Job, fit: Fit, start: Array) -> Fit:
     return _uncrossed(job, fit)
 
 
-def _uncrossed(job: Job, fit: Fit) -> Fit:
-    """Merge ends of planar rulings that cross, until none do."""
+def _uncrossed(job: Job, fit: Fit, share: float = 0.0) -> Fit:
+    """Merge ends of planar rulings that cross, until none do.
+
+    With a `share`, also those whose gap is below this share of the least one: they block the way.
+    """
     for _ in range(_MENDED):
         energy = job.energy(fit.strips, fit.vertices, fit.width)
-        pairs = close(energy, fit.vertices, 0.0)
+        pairs = close(energy, fit.vertices, share * job.weights.least * fit.width)
         if not len(pairs):
             break
         fit = _merged(fit, pairs)
