@@ -66,7 +66,8 @@ def descend(
     system, damping, growth = energy.system, _DAMPING, 2.0
     diagonal = system.diagonal
     here = energy.measure(vertices)
-    tangled = int(energy.strips.tangled(vertices).sum())
+    # With a penalty, faces may be far from planar, and their outlines then have no meaning.
+    tangled = 0 if w.planar else int(energy.strips.tangled(vertices).sum())
     bound = _CROSSED * w.least * energy.width
     for iteration in range(iterations):
         scale = max(float(np.abs(here.height[: energy.count]).max()), 1e-12)
@@ -94,7 +95,7 @@ def descend(
                 if not w.planar:
                     trial = planarised(system, trial, _NEARLY)
                 least = float(energy.gaps(trial, here.up)[0].min())
-                knots = int(energy.strips.tangled(trial).sum())
+                knots = 0 if w.planar else int(energy.strips.tangled(trial).sum())
                 if least >= min(bound, float(here.gap.min())) and knots <= tangled:
                     there = energy.measure(trial)
                     fall = value - energy.value(trial, there, w, here.back_weight, scale)
