@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from gso.tasks.base import Plan, Request
 from gso.tasks.developable import isometry, ruled, schedule
@@ -27,7 +29,6 @@ __all__ = [
     "search",
 ]
 
-FORMULATIONS = ("curvature", "isometry", "ruled")
 #: The formulation that a preset belongs to.
 IMPLIES = {"jiang2020": "isometry"}
 #: Settings by formulation.
@@ -36,11 +37,7 @@ OPTIONS = {"curvature": Options, "isometry": isometry.Options, "ruled": ruled.Op
 
 def plan(analysis: Analysis, request: Request) -> Plan:
     """Plan the stages of the solve."""
-    if request.formulation == "isometry":
-        return isometry.plan(analysis, request, _before_isometry)
-    if request.formulation == "ruled":
-        return ruled.plan(analysis, request, _before_ruled)
-    return schedule.plan(analysis, request)
+    return _PLANS[request.formulation](analysis, request)
 
 
 def _before_ruled(analysis: Analysis, request: Request) -> Plan:
@@ -54,3 +51,12 @@ def _before_isometry(analysis: Analysis, request: Request) -> Plan:
     # The box bounds of the solve by isometry cover only part of the ball around a vertex.
     bound = None if bound is None else 0.99 * ALONG * bound
     return schedule.plan(analysis, replace(request, options=Options(), max_displacement=bound))
+
+
+#: How each formulation is planned; the first is the default.
+_PLANS: dict[str, Callable[[Analysis, Request], Plan]] = {
+    "curvature": schedule.plan,
+    "isometry": partial(isometry.plan, curvature=_before_isometry),
+    "ruled": partial(ruled.plan, before=_before_ruled),
+}
+FORMULATIONS = tuple(_PLANS)
