@@ -10,7 +10,7 @@ import numpy as np
 
 from gso.ruled.domain import Domain
 from gso.ruled.layout import Strips
-from gso.ruled.polygon import on, resampled
+from gso.ruled.polygon import corners, on, resampled
 from gso.ruled.prices import along, prices
 from gso.ruled.program import Branch, sequences
 from gso.typing import Array, Ints
@@ -56,8 +56,8 @@ def chords(domain: Domain, count: int, flat: float | None = None) -> tuple[Strip
     found, triangles = sequences(outline, price, None if flat is None else normal, flat or 0.0)
     steps = sum(len(b.first) - 1 for b in found)
     index, places = [], []
-    corners, which = np.unique(triangles, return_inverse=True)
-    size = len(corners)
+    shared, which = np.unique(triangles, return_inverse=True)
+    size = len(shared)
     for branch in found:
         share = (len(branch.first) - 1) / steps
         if share == 0.0:
@@ -67,13 +67,13 @@ def chords(domain: Domain, count: int, flat: float | None = None) -> tuple[Strip
         own = size + np.arange(2 * number).reshape(number, 2)
         for at in np.flatnonzero(branch.held):
             ends = [branch.first[-at] % _COUNT, branch.second[-at] % _COUNT]
-            own[-at] = np.searchsorted(corners, ends)
+            own[-at] = np.searchsorted(shared, ends)
         index.append(own)
         places.append(np.stack([on(beyond, one), on(beyond, other)], axis=1).reshape(-1, 2))
         size += 2 * number
     # The faces of strips are clockwise in the plane.
     flats = which.reshape(-1, 3)[:, [0, 2, 0, 1]]
-    return Strips(tuple(index), flats).compact(np.concatenate([beyond[corners], *places]))
+    return Strips(tuple(index), flats).compact(np.concatenate([beyond[shared], *places]))
 
 
 def _spread(
@@ -90,7 +90,9 @@ def _spread(
     )
     for reach in _TURNS:
         one, other = turned(domain, outline, one, other, reach, branch.held)
-    return _continued(outline, beyond, one, other, branch.held)
+    one, other = _continued(outline, beyond, one, other, branch.held)
+    sharp = corners(outline)
+    return _cornered(one, sharp), _cornered(other, sharp)
 
 
 def _continued(
@@ -126,11 +128,29 @@ def _continued(
     return found[0], found[1]
 
 
+def _cornered(at: Array, sharp: Ints) -> Array:
+    """Move the nearest of ordered numbers to each sharp corner that they pass.
+
+    Otherwise the line between two of them would cut off the corner.
+    """
+    out = at.copy()
+    low, high = min(at[0], at[-1]), max(at[0], at[-1])
+    rounds = np.arange(int(low // _COUNT), int(high // _COUNT) + 1) * _COUNT
+    for corner in (sharp + rounds[:, None]).ravel().tolist():
+        if low < corner < high:
+            k = int(np.abs(at[1:-1] - corner).argmin()) + 1
+            out[k] = corner
+    return out
+
+
 def _ordered(at: Array, move: Array, held: tuple[bool, bool]) -> Array:
-    """Move rising numbers so that they keep their order, and some distance."""
+    """Move rising numbers so that they keep their order, and some distance.
+
+    The first and the last one stay: outside the design, so that its corners are covered.
+    """
     k = np.arange(len(at))
     wide = _APART * (at[-1] - at[0]) / len(at)
-    rising = at + np.where((k == 0) & held[0] | (k == k[-1]) & held[1], 0.0, move)
+    rising = at + np.where((k == 0) | (k == k[-1]), 0.0, move)
     level = rising - wide * k
     if held[0]:
         level = np.maximum(level, level[0])

@@ -60,8 +60,9 @@ def folds(
     away = middle[two] - middle[one]
     angle = np.where(np.einsum("kd,kd->k", n[two] - n[one], away) < 0, -angle, angle)
     width = 0.5 * sum(_widths(strips, vertices, mesh.vertices[edges], face) for face in (one, two))
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         radius = np.asarray(width).min(axis=1) / (2.0 * np.sin(0.5 * np.abs(angle)))
+    radius[angle == 0.0] = np.inf
     a, b, _ = strips.creases
     size = len(strips.corners)
     crease = np.isin(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 #: Turning angles of sharp corners, and the largest for which offsets are lengthened.
 _SHARP, _MITRE = 0.5, 2.0
@@ -37,6 +37,11 @@ def resampled(loop: Array, count: int) -> tuple[Array, Array]:
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     mitre = 1.0 / np.cos(0.5 * np.clip(turning(points), 0.0, _MITRE))
     return points, normals * mitre[:, None]
+
+
+def corners(loop: Array) -> Ints:
+    """Return the numbers of the sharp corners of a polygon (n, 2)."""
+    return np.flatnonzero(turning(loop) > _SHARP)
 
 
 def turning(loop: Array) -> Array:

@@ -21,10 +21,12 @@ from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Ints
 
 #: Grid of the parameters, to which intersections are rounded.
-_GRID = 1e-9
+_GRID = 1e-12
 #: Number of times that the intersection of a normal with the strips is corrected, and the
 #: cosine of the angle between the normals below which it is not.
 _TURNS, _STEEP = 5, 0.2
+#: Length of the outline's segments that cross edges of the strips, relative to the diagonal.
+_SHORT = 1e-4
 #: Distance from a normal at which a point is not on it.
 _MISSED = 1e-6
 
@@ -45,14 +47,14 @@ def trimmed(target: Extended, strips: Strips, vertices: Array, unrolled: Unrolle
     """
     import shapely
 
-    triangles, _ = strips.divided(vertices)
+    triangles, face = strips.divided(vertices)
     place = plane(strips, triangles)
     design, normals = target.domain.mesh, target.normals
     step = float(np.median(lengths(np.diff(vertices[strips.sides], axis=1)[:, 0]))) / 3.0
     rings = []
     for loop in design.boundary_loops:
         both = _dense(np.concatenate([design.vertices[loop], normals[loop]], axis=1), step)
-        which, shares = _along_normals(vertices, triangles, both[:, :3], both[:, 3:])
+        which, shares = _traced(vertices, triangles, face, both)
         rings.append(_enclosed(np.einsum("kj,kjd->kd", shares, place[triangles[which]])))
     outer = int(np.argmax(shapely.area(rings)))
     holes = [ring for k, ring in enumerate(rings) if k != outer]
@@ -69,6 +71,25 @@ def trimmed(target: Extended, strips: Strips, vertices: Array, unrolled: Unrolle
         for piece, face in zip(pieces[kept], which[kept], strict=True)
     ]
     return meshed(polygons, nodes, unrolled)
+
+
+def _traced(vertices: Array, triangles: Ints, face: Ints, line: Array) -> tuple[Ints, Array]:
+    """Find where a closed polygon of points and normals (n, 6) meets triangles along the normals.
+
+    Segments between different faces are halved until they are short, as the parameters are not
+    linear across edges.
+    """
+    which, shares = _along_normals(vertices, triangles, line[:, :3], line[:, 3:])
+    while True:
+        after = np.roll(line, -1, axis=0)
+        apart = face[which] != face[np.roll(which, -1)]
+        k = np.flatnonzero(apart & (lengths((after - line)[:, :3]) > _SHORT))
+        if not k.size:
+            return which, shares
+        middle = 0.5 * (line[k] + after[k])
+        more = _along_normals(vertices, triangles, middle[:, :3], middle[:, 3:])
+        line = np.insert(line, k + 1, middle, axis=0)
+        which, shares = (np.insert(x, k + 1, y, axis=0) for x, y in zip((which, shares), more))
 
 
 def _along_normals(
