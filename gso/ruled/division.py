@@ -13,7 +13,7 @@ from gso.ruled.vectors import cross, lengths
 from gso.typing import Array, Flags, Ints
 
 #: Distance of outline points from the simplified outline, relative to the diagonal.
-_STRAIGHT = 2e-4
+_STRAIGHT = 1e-4
 #: Pieces of faces below this area, relative to the squared diagonal, are left out.
 _SLIVER = 1e-10
 #: Area, relative to the squared diagonal, of faces whose corners are on a line.

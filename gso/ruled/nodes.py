@@ -9,7 +9,7 @@ from gso.typing import Array, Ints
 
 #: Barycentric coordinates below this are on the opposite edge; nodes on an edge that are closer
 #: to each other than this share of its length are one.
-_EDGE = 1e-5
+_EDGE = 1e-7
 #: Corners of the triangles of a face; of one that is divided along its other diagonal.
 _HALVES = {False: ((0, 1, 3), (0, 3, 2)), True: ((0, 1, 2), (1, 3, 2))}
 

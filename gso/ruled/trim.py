@@ -26,7 +26,7 @@ _GRID = 1e-12
 #: cosine of the angle between the normals below which it is not.
 _TURNS, _STEEP = 5, 0.2
 #: Length of the outline's segments that cross edges of the strips, relative to the diagonal.
-_SHORT = 1e-4
+_SHORT = 2e-5
 #: Distance from a normal at which a point is not on it.
 _MISSED = 1e-6
 
