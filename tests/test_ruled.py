@@ -304,6 +304,17 @@ def test_strips_report_their_progress_and_can_be_stopped():
     assert result.ruled is None
 
 
+@pytest.mark.parametrize("settings", [{"strips": 1}, {"strips": 4}, {"flats": True}])
+def test_flat_sheets_stay_flat_and_whole(settings):
+    sheet = np.dstack([*np.mgrid[:9.0, :17.0], np.zeros((9, 17))])
+    result = gso.tno.optimize(sheet, options=gso.RuledOptions(**settings))
+    assert result.usable, result.reasons
+    assert result.metrics["distance_max"] < 0.02
+    assert np.abs(result.rulings.angles).max() < 1e-6
+    assert result.rulings.smallest_radius > 1e6
+    assert metrics.area(result.mesh) == pytest.approx(128.0, rel=1e-4)
+
+
 def rails():
     """Two curves of a hull: the chine and the deck."""
     t = np.linspace(0.0, 1.0, 40)

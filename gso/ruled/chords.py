@@ -136,7 +136,7 @@ def _cornered(at: Array, sharp: Ints) -> Array:
     out = at.copy()
     low, high = min(at[0], at[-1]), max(at[0], at[-1])
     rounds = np.arange(int(low // _COUNT), int(high // _COUNT) + 1) * _COUNT
-    for corner in (sharp + rounds[:, None]).ravel().tolist():
+    for corner in (sharp + rounds[:, None]).ravel().tolist() if len(at) > 2 else ():
         if low < corner < high:
             k = int(np.abs(at[1:-1] - corner).argmin()) + 1
             out[k] = corner
