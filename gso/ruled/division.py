@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso.errors import MeshError
 from gso.ruled.nodes import Nodes
 from gso.ruled.polygon import enclosed_area
 from gso.ruled.unroll import Unrolled
@@ -65,6 +66,11 @@ def meshed(
             found = found or _triangles(whole, [nodes.parameters(ring) for ring in whole])
         faces += found
         owner += [face] * len(found)
+    if not faces:
+        raise MeshError(
+            "the strips and the surface have no part in common; it may be folded or too irregular "
+            "for the formulation 'ruled': take 'curvature'"
+        )
     table = np.array(faces)
     table, face_of = _connected(table, np.array(owner))
     large = _areas(points, table) > _EMPTY
