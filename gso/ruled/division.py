@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gso.errors import MeshError
+from gso.ruled.copies import with_copies
 from gso.ruled.nodes import Nodes
 from gso.ruled.polygon import enclosed_area
 from gso.ruled.unroll import Unrolled
@@ -75,10 +76,8 @@ def meshed(
     table, face_of = _connected(table, np.array(owner))
     large = _areas(points, table) > _EMPTY
     table, face_of = table[large], face_of[large]
-    used = np.unique(table[table >= 0])
-    number = np.full(len(points), -1)
-    number[used] = np.arange(len(used))
-    return Trimmed(points[used], np.where(table >= 0, number[table], -1), face_of)
+    vertices, table = with_copies(points, table)
+    return Trimmed(vertices, table, face_of)
 
 
 def _areas(points: Array, table: Ints) -> Array:

@@ -231,7 +231,8 @@ def built(job: Job, fit: Fit) -> RuledSurface:
     unrolled = Unrolled(strips, vertices, measured.up)
     cut = trimmed(job.target, strips, vertices, unrolled)
     mesh = Mesh(cut.vertices, cut.faces)
-    part = unrolled.part[cut.face]
+    # Strips that are wholly outside the outline have no part.
+    _, part = np.unique(unrolled.part[cut.face], return_inverse=True)
     place = Nearest.of(vertices, strips.divided(vertices)[0])
     _, _, moved = place.locate(job.target.domain.mesh.vertices)
     rulings, creases = folds(strips, vertices, unrolled, mesh, cut.face)

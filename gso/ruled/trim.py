@@ -20,8 +20,8 @@ from gso.ruled.unroll import Unrolled
 from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Ints
 
-#: Grid of the parameters, to which intersections are rounded.
-_GRID = 1e-12
+#: Grids of the parameters, to which intersections are rounded; coarser ones are more robust.
+_GRIDS = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8)
 #: Number of times that the intersection of a normal with the strips is corrected, and the
 #: cosine of the angle between the normals below which it is not.
 _TURNS, _STEEP = 5, 0.2
@@ -61,9 +61,7 @@ def trimmed(target: Extended, strips: Strips, vertices: Array, unrolled: Unrolle
     region = shapely.difference(rings[outer], shapely.union_all(holes)) if holes else rings[outer]
     c = strips.corners
     cells = shapely.polygons(place[c[:, [0, 1, 3, 2]]])
-    pieces, which = shapely.get_parts(
-        shapely.intersection(cells, region, grid_size=_GRID), return_index=True
-    )
+    pieces, which = shapely.get_parts(_clipped(cells, region), return_index=True)
     kept = (shapely.get_type_id(pieces) == 3) & (shapely.area(pieces) > 0)
     nodes = Nodes(strips, vertices, place)
     polygons = [
@@ -71,6 +69,18 @@ def trimmed(target: Extended, strips: Strips, vertices: Array, unrolled: Unrolle
         for piece, face in zip(pieces[kept], which[kept], strict=True)
     ]
     return meshed(polygons, nodes, unrolled)
+
+
+def _clipped(cells: Any, region: Any) -> Any:
+    """Return the intersections of polygons with a region, on the finest grid that works."""
+    import shapely
+
+    for grid in _GRIDS[:-1]:
+        try:
+            return shapely.intersection(cells, region, grid_size=grid)
+        except shapely.GEOSException:
+            continue
+    return shapely.intersection(cells, region, grid_size=_GRIDS[-1])
 
 
 def _traced(vertices: Array, triangles: Ints, face: Ints, line: Array) -> tuple[Ints, Array]:
@@ -130,7 +140,8 @@ def _enclosed(ring: Array) -> Any:
     simple = shapely.Polygon(ring)
     if simple.is_valid:
         return simple
-    parts = shapely.get_parts(shapely.polygonize([shapely.unary_union(shapely.LinearRing(ring))]))
+    noded = shapely.unary_union(shapely.LinearRing(ring), grid_size=_GRIDS[2])
+    parts = shapely.get_parts(shapely.polygonize([noded]))
     z = ring @ np.array([1.0, 1j])
     inside = []
     for part in parts:
