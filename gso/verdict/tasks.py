@@ -23,6 +23,8 @@ _EXACT = 1e-9
 #: Distance from the design, relative to the diagonal of its bounding box, beyond which a result is
 #: refused whatever limit was given. Displacement that constraints require is added.
 _FAR = 0.5
+#: The same for ruled surfaces, where more strips are the remedy.
+_RULED = 0.1
 
 
 def developable(result: Result, asked: Asked) -> Iterator[str]:
@@ -98,16 +100,16 @@ def ruled(result: Result, asked: Asked) -> Iterator[str]:
     result.details = {**result.details, "verdict": found}
     if surface.crossed:
         yield f"{surface.crossed} pairs of successive rulings cross"
-    yield from _limits(result.design.diagonal, deviation, asked)
+    yield from _limits(result.design.diagonal, deviation, asked, _RULED)
 
 
-def _limits(diagonal: float, deviation: float, asked: Asked) -> Iterator[str]:
-    """Check the distance to the design."""
+def _limits(diagonal: float, deviation: float, asked: Asked, far: float = _FAR) -> Iterator[str]:
+    """Check the distance to the design, where no limit was given by a share of the diagonal."""
     most = asked.max_deviation
     # Far from the origin, distances are only known up to the rounding of the coordinates.
     if most is not None and deviation > most * (1.0 + TIGHT) + 1e-12 * diagonal:
         yield f"the result is {length(deviation)} away from the input, more than {most:g}"
-    elif deviation > _FAR * diagonal + asked.moved:
+    elif deviation > far * diagonal + asked.moved:
         share = percent(deviation / diagonal)
         yield f"the result is {length(deviation)} away from the input, {share} of its diagonal"
 
