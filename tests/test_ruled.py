@@ -10,6 +10,7 @@ from gso import faults, metrics, parametrization
 from gso.mesh import Mesh
 from gso.ruled import fit
 from gso.ruled.chords import chords
+from gso.ruled.copies import copies, with_copies
 from gso.ruled.descent import planarised
 from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
@@ -441,3 +442,19 @@ def test_what_cannot_be_ruled_is_refused():
     for wrong in ({"strips": 0}, {"strips": "many"}, {"rulings": 3}, {"starts": ("x",)}):
         with pytest.raises(gso.OptionError):
             gso.RuledOptions(**wrong)
+
+
+def test_parts_that_touch_in_a_point_get_vertices_of_their_own():
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], float)
+    faces = np.array([[0, 1, 2, -1], [0, 3, 4, -1]])
+    found, table = with_copies(points, faces)
+    assert len(found) == 6
+    assert len(np.intersect1d(table[0], table[1][:3])) == 0
+    for row, own in zip(faces, table, strict=True):
+        np.testing.assert_array_equal(found[own[:3]], points[row[:3]])
+    # Two triangles that share an edge share its ends, unless they are different parts.
+    pair = np.array([[0, 1, 2, -1], [0, 2, 3, -1]])
+    assert len(copies(pair, np.array([0, 0]))[0]) == 4
+    vertex, table = copies(pair, np.array([0, 1]))
+    np.testing.assert_array_equal(vertex, [0, 1, 2, 0, 2, 3])
+    np.testing.assert_array_equal(table, [[0, 1, 2, -1], [3, 4, 5, -1]])
