@@ -13,7 +13,7 @@ from gso.cli import progress, report
 from gso.errors import GSOError, MeshError, OptionError
 
 if TYPE_CHECKING:
-    from gso.cli.optimize import Job
+    from gso.cli.job import Job
 
 
 def many(
