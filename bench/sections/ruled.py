@@ -80,10 +80,15 @@ def _others(seed: int, count: int) -> list[Any]:
     return [points for points in every if metrics.loss_gc(points) <= _MOST][:count]
 
 
-def _measured(surface: Any, options: gso.RuledOptions) -> dict[str, float]:
+def _optimised(surface: Any, **given: Any) -> gso.Result:
+    """Optimise without warnings: results that are not usable are counted."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", gso.ConvergenceWarning)
-        result = gso.tno.optimize(surface, options=options)
+        return gso.tno.optimize(surface, **given)
+
+
+def _measured(surface: Any, options: gso.RuledOptions) -> dict[str, float]:
+    result = _optimised(surface, options=options)
     found = result.metrics
     return {
         "mean": found["distance_mean"],
@@ -138,10 +143,8 @@ def bounds(seed: str = "", start: str = "design", count: int = 24) -> dict[str, 
         numbers, refused, seconds = [], [], []
         for surface in progress(surfaces, f"{percent} %"):
             mesh = surface if isinstance(surface, gso.Mesh) else gso.Mesh.from_grid(surface)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", gso.ConvergenceWarning)
-                most = 0.01 * percent * mesh.diagonal
-                result = gso.tno.optimize(mesh, options=options, max_deviation=most)
+            most = 0.01 * percent * mesh.diagonal
+            result = _optimised(mesh, options=options, max_deviation=most)
             seconds.append(result.seconds["strips"])
             if result.usable:
                 numbers.append(result.ruled.strips)
@@ -209,9 +212,7 @@ def peers() -> dict[str, Any]:
     for name, given in methods.items():
         found = []
         for surface in progress(_references(), name):
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", gso.ConvergenceWarning)
-                result, spent = timed(gso.tno.optimize, surface, **given)
+            result, spent = timed(_optimised, surface, **given)
             m = result.metrics
             wobble = 0.0
             if result.ruled is None:

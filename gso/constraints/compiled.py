@@ -83,11 +83,6 @@ class Compiled:
         """Vertices with a hard or soft position, each once, and the positions (k, dim)."""
         return self._pins(True, False)
 
-    @property
-    def positions(self) -> tuple[Ints, Array]:
-        """Vertices with a hard or a soft position, each once, and their positions (k, dim)."""
-        return self._pins(True, False)
-
     def _pins(self, *hard: bool) -> tuple[Ints, Array]:
         pins = [p for kind in hard for p in self.of(Pins, hard=kind)]
         if not pins:

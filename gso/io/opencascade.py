@@ -48,17 +48,12 @@ def step_faces(mesh: Mesh, unit: str) -> bytes:
 def iges_faces(mesh: Mesh, unit: str) -> bytes:
     """Return the contents of an IGES file with planar faces."""
     from OCP.IGESControl import IGESControl_Writer
-    from OCP.IGESData import IGESData_IGESWriter
-    from OCP.IGESSelect import IGESSelect_WorkLibrary
 
     shell, name = _shell(mesh, unit)
     with _quiet():
         session = IGESControl_Writer("IN" if name == "INCH" else name, 1)
         session.AddShape(shell)
-        writer = IGESData_IGESWriter(session.Model())
-        writer.FloatWriter().SetFormat(_FORMAT, True)
-        writer.SendModel(IGESSelect_WorkLibrary.DefineProtocol_s())
-    return _printed(writer)
+        return _iges(session)
 
 
 def _step(shape: Any, name: str) -> bytes:
@@ -73,6 +68,17 @@ def _step(shape: Any, name: str) -> bytes:
         writer = StepData_StepWriter(session.Model())
         writer.FloatWriter().SetFormat(_FORMAT, True)
         writer.SendModel(session.WS().Protocol())
+    return _printed(writer)
+
+
+def _iges(session: Any) -> bytes:
+    """Return the contents of the IGES file of a session."""
+    from OCP.IGESData import IGESData_IGESWriter
+    from OCP.IGESSelect import IGESSelect_WorkLibrary
+
+    writer = IGESData_IGESWriter(session.Model())
+    writer.FloatWriter().SetFormat(_FORMAT, True)
+    writer.SendModel(IGESSelect_WorkLibrary.DefineProtocol_s())
     return _printed(writer)
 
 
@@ -108,8 +114,6 @@ def iges(spline: BSplineSurface, unit: str) -> bytes:
     """Return the contents of an IGES file with one B-spline surface (entity 128)."""
     from OCP.GeomToIGES import GeomToIGES_GeomSurface
     from OCP.IGESControl import IGESControl_Writer
-    from OCP.IGESData import IGESData_IGESWriter
-    from OCP.IGESSelect import IGESSelect_WorkLibrary
 
     surface, name = _converted(spline, unit)
     with _quiet():
@@ -119,10 +123,7 @@ def iges(spline: BSplineSurface, unit: str) -> bytes:
         maker.SetUnit(1.0)
         ends = [k[i] for k in (spline.knots_u, spline.knots_v) for i in (0, -1)]
         session.AddEntity(maker.TransferSurface(surface, *ends))
-        writer = IGESData_IGESWriter(session.Model())
-        writer.FloatWriter().SetFormat(_FORMAT, True)
-        writer.SendModel(IGESSelect_WorkLibrary.DefineProtocol_s())
-    return _printed(writer)
+        return _iges(session)
 
 
 def _converted(spline: BSplineSurface, unit: str) -> tuple[Any, str]:

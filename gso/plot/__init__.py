@@ -23,7 +23,7 @@ from gso.errors import GSOError, OptionError
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.plot.draw import GRAZING, SUFFIXES, Panel, draw, write
+from gso.plot.draw import GRAZING, SUFFIXES, Panel, draw, facing, write
 from gso.plot.heat import curvatures, distance, numbers, scales, strain, stretch
 from gso.plot.rulings import gauss, ruled
 from gso.plot.strips import strips
@@ -140,10 +140,9 @@ def _flattened(design: Mesh, pattern: Pattern, scale: np.ndarray | None = None) 
     heat = strain(opened, flat) if scale is None else scales(opened, flat, scale)
     surface = _plain([design])[0]
     surface.title, surface.heat = "surface", heat
-    seen = surface.points[pattern.vertex]
-    z, w = (p[:, 0] + 1j * p[:, 1] for p in (flat - flat.mean(axis=0), seen))
-    turned = z * np.exp(1j * np.angle((np.conj(z) * (w - w.mean())).sum()))
-    points = np.stack([turned.real, turned.imag, np.zeros(len(z))], axis=1)
+    turned = (flat - flat.mean(axis=0)) @ np.array([1.0, 1j])
+    turned = turned * facing(flat, surface.points[pattern.vertex])
+    points = np.stack([turned.real, turned.imag, np.zeros(len(turned))], axis=1)
     sheet = Panel(points / design.frame.scale, pattern.faces, shaded=False, heat=heat)
     sheet.title = "flat pattern: " + heat.summary
     return [surface, sheet]

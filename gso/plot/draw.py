@@ -129,6 +129,18 @@ def draw(panels: Sequence[Panel]) -> Figure:
     return figure
 
 
+def facing(flat: Array, seen: Array) -> complex:
+    """Return the rotation, as a complex number, that turns a pattern like a view of its surface.
+
+    Parameters
+    ----------
+    flat, seen : ndarray, (n, 2), (n, 3)
+        Vertices of the pattern, and of the surface in the coordinates of a panel.
+    """
+    z, w = (p[:, 0] + 1j * p[:, 1] for p in (flat - flat.mean(axis=0), seen))
+    return complex(np.exp(1j * np.angle((np.conj(z) * (w - w.mean())).sum())))
+
+
 def _seen(panel: Panel) -> Array:
     if panel.circle:
         return panel.circle * np.array([(-1.0, -1.0), (1.0, 1.0)])

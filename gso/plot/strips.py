@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.mesh import Mesh
-from gso.plot.draw import GRAZING, Panel
+from gso.plot.draw import GRAZING, Panel, facing
 from gso.plot.view import View
 from gso.ruled.surface import RuledSurface
 from gso.typing import Array
@@ -33,7 +33,7 @@ def strips(design: Mesh, surface: RuledSurface) -> list[Panel]:
     after.lines = list(after.points[edges])
     flat = surface.pattern.flat
     seen = after.points[surface.pattern.vertex]
-    turn = _turn(flat, seen) if parts == 1 else 1.0
+    turn = facing(flat, seen) if parts == 1 else 1.0
     points = _placed(flat, turn) / design.frame.scale
     sheet = Panel(points, surface.pattern.faces, shaded=False, tint=tint)
     sheet.title = "exact pattern with its bend lines"
@@ -42,12 +42,6 @@ def strips(design: Mesh, surface: RuledSurface) -> list[Panel]:
         _placed(bend.line - middle, turn, fixed=True) / design.frame.scale for bend in surface.bends
     ]
     return [before, after, sheet]
-
-
-def _turn(flat: Array, seen: Array) -> complex:
-    """Return the rotation, as a complex number, that turns a pattern like the surface's view."""
-    z, w = (p[:, :2] @ np.array([1.0, 1j]) for p in (flat - flat.mean(axis=0), seen))
-    return complex(np.exp(1j * np.angle((np.conj(z) * (w - w.mean())).sum())))
 
 
 def _placed(flat: Array, turn: complex, *, fixed: bool = False) -> Array:

@@ -65,6 +65,7 @@ def chords(domain: Domain, count: int, flat: float | None = None) -> tuple[Strip
         number = count if len(found) == 1 else max(round(count * share), 2)
         one, other = _spread(domain, outline, beyond, branch, number)
         own = size + np.arange(2 * number).reshape(number, 2)
+        # Number 0 is the first chord, -1 the last.
         for at in np.flatnonzero(branch.held):
             ends = [branch.first[-at] % _COUNT, branch.second[-at] % _COUNT]
             own[-at] = np.searchsorted(shared, ends)

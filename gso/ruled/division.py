@@ -6,12 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso import geometry
 from gso.errors import MeshError
+from gso.mesh import topology
 from gso.ruled.copies import with_copies
 from gso.ruled.nodes import Nodes
 from gso.ruled.polygon import enclosed_area
 from gso.ruled.unroll import Unrolled
-from gso.ruled.vectors import cross, lengths
+from gso.ruled.vectors import lengths
 from gso.typing import Array, Flags, Ints
 
 #: Distance of outline points from the simplified outline, relative to the diagonal.
@@ -62,8 +64,7 @@ def meshed(
         found = _divided(every, flats, inner)
         if not found:
             # Simplified, the piece intersects itself.
-            plane = [unrolled.flat(np.full(len(ring), face), points[ring]) for ring in whole]
-            found = _triangles(whole, plane)
+            found = _triangles(whole, flat)
             found = found or _triangles(whole, [nodes.parameters(ring) for ring in whole])
         faces += found
         owner += [face] * len(found)
@@ -74,17 +75,11 @@ def meshed(
         )
     table = np.array(faces)
     table, face_of = _connected(table, np.array(owner))
-    large = _areas(points, table) > _EMPTY
+    vectors = geometry.quad_area_vectors(points, topology.four_corners(table))
+    large = 0.5 * lengths(vectors) > _EMPTY
     table, face_of = table[large], face_of[large]
     vertices, table = with_copies(points, table)
     return Trimmed(vertices, table, face_of)
-
-
-def _areas(points: Array, table: Ints) -> Array:
-    """Return the areas (m,) of planar faces."""
-    a, b, c = points[table[:, :3].T]
-    d = np.where((table[:, 3] >= 0)[:, None], points[table[:, 3]], a)
-    return 0.5 * lengths(cross(c - a, d - b))
 
 
 def _divided(rings: list[Ints], flats: list[Array], inner: Flags) -> list[list[int]]:
@@ -141,7 +136,7 @@ def _connected(table: Ints, owner: Ints) -> tuple[Ints, Ints]:
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    four = np.where(table >= 0, table, table[:, :1])
+    four = topology.four_corners(table)
     sides = np.stack([four, np.roll(four, -1, axis=1)], axis=2).reshape(-1, 2)
     face = np.repeat(np.arange(len(table)), 4)
     kept = sides[:, 0] != sides[:, 1]

@@ -121,7 +121,7 @@ def evened(job: Job, fit: Fit) -> Fit:
     for hold in _HOLDS if job.held is not None else ():
         closing = replace(w, power=power, hold=hold)
         vertices = descend(energy, vertices, closing, _EACH, 0.0, job.tell)
-    return _uncrossed(job, replace(fit, vertices=planarised(energy.system, vertices)))
+    return _uncrossed(job, energy, replace(fit, vertices=planarised(energy.system, vertices)))
 
 
 def _exact(job: Job, fit: Fit, iterations: int) -> Fit:
@@ -130,7 +130,7 @@ def _exact(job: Job, fit: Fit, iterations: int) -> Fit:
         energy = job.energy(fit.strips, fit.vertices, fit.width)
         vertices = descend(energy, fit.vertices, w, iterations, tell=job.tell)
         fit = replace(fit, vertices=vertices)
-        merged = _uncrossed(job, fit, _TOUCHING)
+        merged = _uncrossed(job, energy, fit, _TOUCHING)
         if merged is fit:
             break
         fit = merged
@@ -144,16 +144,15 @@ def _planar(job: Job, fit: Fit, start: Array) -> Fit:
     fit = _merged(fit, close(energy, fit.vertices, least))
     energy = job.energy(fit.strips, fit.vertices, fit.width)
     fit = replace(fit, vertices=planarised(energy.system, fit.vertices))
-    return _uncrossed(job, fit)
+    return _uncrossed(job, energy, fit)
 
 
-def _uncrossed(job: Job, fit: Fit, share: float = 0.0) -> Fit:
-    """Merge ends of planar rulings that cross, until none do.
+def _uncrossed(job: Job, energy: Energy, fit: Fit, share: float = 0.0) -> Fit:
+    """Merge ends of planar rulings that cross, until none do; the energy is that of the layout.
 
     With a `share`, also those whose gap is below this share of the least one: they block the way.
     """
     for _ in range(_MENDED):
-        energy = job.energy(fit.strips, fit.vertices, fit.width)
         pairs = close(energy, fit.vertices, share * job.weights.least * fit.width)
         if not len(pairs):
             break

@@ -117,35 +117,33 @@ class Strips:
         """Triangles (t, 3) of the faces, and the number of the face of each (t,)."""
         return _true(self.corners[:, [[0, 1, 3], [0, 3, 2]]])
 
+    def _reflex(self, vertices: Array) -> Flags:
+        """Return whether the corners (f, 4) of planar faces are reflex."""
+        p, q, p1, q1 = vertices[self.corners].transpose(1, 0, 2)
+        normal = cross(q1 - p, q - p1)
+        own = [
+            cross(q - p, p1 - p),
+            cross(q1 - q, p - q),
+            cross(p - p1, q1 - p1),
+            cross(p1 - q1, q - q1),
+        ]
+        return np.stack([np.einsum("fd,fd->f", normal, n) > 0 for n in own], axis=1)
+
     def other_diagonal(self, vertices: Array) -> Flags:
         """Return whether faces (f,) have to be divided between their second and third corner.
 
         These are quads with a reflex corner there; the diagonal between the first and the last
         corner, which :attr:`split` takes, is outside of them.
         """
-        p, q, p1, q1 = vertices[self.corners].transpose(1, 0, 2)
-        normal = cross(q1 - p, q - p1)
-        own = [cross(q1 - q, p - q), cross(p - p1, q1 - p1)]
-        turns = [np.einsum("fd,fd->f", normal, n) for n in own]
-        return (turns[0] > 0) | (turns[1] > 0)
+        return np.asarray(self._reflex(vertices)[:, 1:3].any(axis=1))
 
     def tangled(self, vertices: Array) -> Flags:
         """Return whether the outlines of planar faces (f,) cross themselves.
 
         Such a quad has two reflex corners.
         """
-        c = self.corners[self.quads]
-        p, q, p1, q1 = vertices[c].transpose(1, 0, 2)
-        normal = cross(q1 - p, q - p1)
-        own = [
-            cross(q1 - q, p - q),
-            cross(p - p1, q1 - p1),
-            cross(q - p, p1 - p),
-            cross(p1 - q1, q - q1),
-        ]
-        reflex = sum((np.einsum("fd,fd->f", normal, n) > 0).astype(int) for n in own)
         out = np.zeros(len(self.corners), bool)
-        out[self.quads] = np.asarray(reflex) > 1
+        out[self.quads] = self._reflex(vertices)[self.quads].sum(axis=1) > 1
         return out
 
     def divided(self, vertices: Array) -> tuple[Ints, Ints]:
@@ -193,15 +191,6 @@ class Strips:
         )
         _, label = connected_components(graph, directed=False)
         return len(np.unique(label[start[rim]])) == 1
-
-    @cached_property
-    def open(self) -> Flags:
-        """Whether the edges (t, 3) opposite the corners of the triangles are on the border."""
-        triangles, _ = self.split
-        pairs = triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
-        key = pairs.min(axis=1) * self.size + pairs.max(axis=1)
-        _, which, count = np.unique(key, return_inverse=True, return_counts=True)
-        return (count[which] == 1).reshape(-1, 3)
 
     def halved(self, vertices: Array, which: Ints | None = None) -> tuple[Strips, Array]:
         """Halve strips along their length, all or those numbered; planar quads stay planar."""

@@ -124,7 +124,7 @@ def _converted(
 
     options: Options = request.options
     size = analysis.mesh.diagonal
-    pins, targets = analysis.constraints.positions
+    pins, targets = analysis.constraints.pinned_positions
     # Where constraints move vertices, the surface that meets them is the design.
     same = np.abs(targets - analysis.mesh.vertices[pins]).max(initial=0.0) <= _SAME * size
     near = analysis.mesh.vertices if same else before.points

@@ -188,6 +188,7 @@ _STIFF = 1e6
 
 
 def says_no(answer: object) -> bool:
+    """Return whether a callback's answer ends the solve: only False does, None does not."""
     return isinstance(answer, bool | np.bool_) and not answer
 
 
