@@ -16,6 +16,7 @@ from gso.ruled.sheet import unrolled_pattern
 from gso.ruled.surface import RuledSurface
 from gso.ruled.system import System
 from gso.ruled.unroll import Unrolled
+from gso.ruled.untrimmed import Untrimmed
 from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Ints
 
@@ -247,6 +248,7 @@ def _built(strips: Strips, vertices: Array, points: Array) -> RuledSurface:
         pattern=unrolled_pattern(mesh, owner, part, unrolled),
         moved=Nearest.of(vertices, strips.divided(vertices)[0]).locate(points)[2],
         crossed=int(strips.tangled(vertices).sum()),
+        untrimmed=Untrimmed(strips, vertices, owner),
     )
 
 

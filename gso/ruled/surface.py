@@ -19,6 +19,7 @@ from gso.ruled.folds import Folds, folds
 from gso.ruled.sheet import unrolled_pattern
 from gso.ruled.trim import trimmed
 from gso.ruled.unroll import Unrolled
+from gso.ruled.untrimmed import Untrimmed
 from gso.ruled.vectors import cross, lengths
 from gso.typing import Array, Flags, Ints
 
@@ -51,6 +52,8 @@ class RuledSurface:
         The design's vertices, moved to the nearest points of the surface.
     crossed : int
         Number of pairs of successive rulings that cross.
+    untrimmed : Untrimmed or None
+        The strips that it was cut out of; None in files of earlier versions.
     """
 
     mesh: Mesh
@@ -61,6 +64,7 @@ class RuledSurface:
     pattern: Pattern
     moved: Array
     crossed: int
+    untrimmed: Untrimmed | None = None
 
     @property
     def strips(self) -> int:
@@ -111,6 +115,8 @@ class RuledSurface:
         for name in _FOLDS:
             folds: Folds = getattr(self, name)
             out |= {f"ruled_{name}_{part}": getattr(folds, part) for part in _PARTS}
+        if self.untrimmed is not None:
+            out |= {f"ruled_strips_{k}": x for k, x in self.untrimmed.arrays().items()}
         return out | {f"ruled_pattern_{part}": getattr(self.pattern, part) for part in _PATTERN}
 
     @classmethod
@@ -142,7 +148,13 @@ class RuledSurface:
         crossed = int(data["ruled_crossed"])
         flat = np.asarray(data["ruled_flat"], bool)
         rulings, creases = folds
-        return cls(mesh, data["ruled_strip"], flat, rulings, creases, pattern, moved, crossed)
+        strips, source = data["ruled_strip"], None
+        named = {k[13:]: x for k, x in data.items() if k.startswith("ruled_strips_")}
+        if named:
+            source = Untrimmed.from_arrays(named)
+            if source.owner.shape != (len(mesh.faces),):
+                raise ValueError("the arrays of the ruled surface do not fit each other")
+        return cls(mesh, strips, flat, rulings, creases, pattern, moved, crossed, source)
 
     def samples(self) -> tuple[Array, Array]:
         """Return points (k, 3) all over the surface, and their shares (k,) of its area.
@@ -208,6 +220,7 @@ class RuledSurface:
             creases=replace(self.creases, radii=scale * self.creases.radii),
             pattern=replace(self.pattern, flat=scale * self.pattern.flat),
             moved=move(back(self.moved)),
+            untrimmed=None if self.untrimmed is None else self.untrimmed.transformed(move),
         )
 
 
@@ -245,4 +258,5 @@ def built(job: Job, fit: Fit) -> RuledSurface:
         pattern=unrolled_pattern(mesh, cut.face, part, unrolled),
         moved=moved,
         crossed=int(((measured.gap <= 0).any(axis=1) | strips.tangled(vertices)).sum()),
+        untrimmed=Untrimmed(strips, vertices, cut.face),
     )

@@ -1,0 +1,167 @@
+"""A ruled surface as trimmed B-splines, with measures of how good it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gso.errors import MeshError
+from gso.mesh import Mesh
+from gso.mesh.closest_point import Nearest
+from gso.ruled.smooth.fit import Fitter, Smooth
+from gso.ruled.smooth.patches import Patch, bends, patches
+from gso.ruled.smooth.trim import trimmed
+from gso.ruled.surface import RuledSurface
+from gso.ruled.vectors import cross, lengths
+from gso.typing import Array
+
+#: Rulings at which a patch is measured, and points of each.
+_RULINGS, _ACROSS = 400, 5
+#: Turning of the normal along a ruling, in radians, up to which no other fit is tried, and the
+#: largest number of fits.
+_TORSAL, _ATTEMPTS = np.radians(0.1), 3
+#: Relative speed below which the end of a ruling stays where it is.
+_STILL = 1e-9
+
+
+@dataclass(frozen=True)
+class SmoothSurface:
+    """Smooth strips close to a ruled surface: trimmed B-spline patches that share their edges.
+
+    Attributes
+    ----------
+    patches : tuple of Patch
+        Splines of degree three along a strip and one along its rulings, and flat triangles, with
+        the outlines of the parts inside the design.
+    turning : float
+        Largest angle between the surface's normals at the two ends of a ruling, inside the
+        outline, in degrees; zero for a torsal surface, which is developable.
+    break_ : float
+        Largest angle between the tangent planes of two patches of one strip, at the middle of
+        their common ruling, in degrees. At the creases between strips side by side the angle is
+        meant, and not counted.
+    distances : tuple of float
+        Mean and largest distance to the surface of planar faces, in its unit.
+    """
+
+    patches: tuple[Patch, ...]
+    turning: float
+    break_: float
+    distances: tuple[float, float]
+
+
+def smooth(surface: RuledSurface) -> SmoothSurface:
+    """Replace the planar faces of a ruled surface by smooth strips with straight rulings.
+
+    Parameters
+    ----------
+    surface : RuledSurface
+        The `ruled` of a result, or what :func:`gso.loft` returns.
+
+    Returns
+    -------
+    SmoothSurface
+
+    Raises
+    ------
+    MeshError
+        The surface was read from a file of an earlier version, or its outline cannot be carried
+        over.
+
+    Examples
+    --------
+    >>> import gso, numpy as np
+    >>> t = np.linspace(0.0, 1.0, 50)
+    >>> arc = np.stack([np.cos(t), np.sin(t), 0.0 * t], axis=1)
+    >>> found = gso.smooth_strips(gso.loft(arc, 2.0 * arc + [0.0, 0.1, 1.0]))
+    >>> found.turning < 0.1
+    True
+    >>> found.patches[0].spline.degrees
+    (3, 1)
+    """
+    source, mesh = surface.untrimmed, surface.mesh
+    if source is None:
+        raise MeshError("the surface is from a file of an earlier version; solve again")
+    size = mesh.diagonal
+    middle = mesh.vertices.mean(axis=0)
+    unit_mesh = mesh.replaced((mesh.vertices - middle) / size)
+    face, corner = np.nonzero(mesh.faces >= 0)
+    points = unit_mesh.vertices[mesh.faces[face, corner]]
+    unit_source = source.transformed(lambda x: (x - middle) / size)
+    fitter = Fitter(unit_source)
+    found = fitter.first(points, source.owner[face])
+    for attempt in range(_ATTEMPTS):
+        parts = trimmed(patches(found.curves), unit_mesh)
+        turn, samples = _measured(parts)
+        if turn <= _TORSAL or attempt == _ATTEMPTS - 1:
+            break
+        found = fitter.again(Smooth(found.curves, _widened(found, parts)))
+    far = Nearest(unit_mesh).distances(samples)
+    break_ = max((bends(a, b) for a, b in _pairs(parts)), default=0.0)
+    return SmoothSurface(
+        tuple(part.moved(size, middle) for part in parts),
+        float(np.degrees(turn)),
+        float(np.degrees(break_)),
+        (size * float(far.mean()), size * float(far.max())),
+    )
+
+
+def _widened(found: Smooth, parts: Sequence[Patch]) -> Array:
+    """Return the ranges of the spans, widened to what is inside the outlines of the patches."""
+    spans, ranges = found.curves.spans, found.ranges.copy()
+    for part in parts:
+        if part.is_flat:
+            continue
+        for at, low, high in _rulings(part):
+            knots = found.curves.knots[part.sequence]
+            row = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2)
+            own = np.flatnonzero((spans.sequence == part.sequence) & (spans.column == part.strip))
+            which = own[np.searchsorted(spans.row[own], row)]
+            np.minimum.at(ranges[:, 0], which, low)
+            np.maximum.at(ranges[:, 1], which, high)
+    return ranges
+
+
+def _pairs(parts: Sequence[Patch]) -> Iterator[tuple[Patch, Patch]]:
+    """Yield the pairs of patches."""
+    for k, one in enumerate(parts):
+        for other in parts[k + 1 :]:
+            yield one, other
+
+
+def _measured(parts: Sequence[Patch]) -> tuple[float, Array]:
+    """Return the largest turning of the normal along a ruling, and points inside the outline."""
+    worst, points = 0.0, []
+    for part in parts:
+        for at, low, high in _rulings(part):
+            if not part.is_flat:
+                one, two = (part.normals(np.stack([at, v], axis=1)) for v in (low, high))
+                angle = np.arctan2(lengths(cross(one, two)), np.einsum("kd,kd->k", one, two))
+                # A point where all rulings meet has no normal.
+                speed = [lengths(part.spline.evaluate(at, v, du=1)) for v in (low, high)]
+                angle[np.minimum(*speed) < _STILL * np.maximum(*speed)] = 0.0
+                worst = max(worst, float(angle.max(initial=0.0)))
+            for share in np.linspace(0.0, 1.0, _ACROSS):
+                v = low + share * (high - low)
+                points.append(part.points(np.stack([at, v], axis=1)))
+    return worst, np.concatenate(points)
+
+
+def _rulings(part: Patch) -> Iterator[tuple[Array, Array, Array]]:
+    """Yield parameters (k,) of rulings of each outer outline, and their ends inside it."""
+    import shapely
+
+    for chain in part.rings:
+        ring = np.concatenate([curve[:-1] for curve in chain])
+        outline = shapely.Polygon(ring)
+        if not shapely.is_ccw(outline.exterior):
+            continue
+        low, high = ring.min(axis=0), ring.max(axis=0)
+        at = low[0] + (np.arange(_RULINGS) + 0.5) / _RULINGS * (high[0] - low[0])
+        ends = np.stack([np.stack([at, np.full_like(at, v)], axis=1) for v in (-1.0, 2.0)], axis=1)
+        inside = shapely.intersection(shapely.linestrings(ends), outline)
+        box = shapely.bounds(inside)
+        kept = np.isfinite(box[:, 0])
+        yield at[kept], box[kept, 1], box[kept, 3]
