@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from gso.mesh import Mesh, topology
     from gso.result import Result
     from gso.ruled.loft import loft
+    from gso.ruled.smooth.surface import smooth_strips
     from gso.spline import BSplineSurface
     from gso.spline.fit import fit_spline
     from gso.status import Progress, Status
@@ -98,6 +99,7 @@ __all__ = [
     "rulings",
     "save",
     "save_spline",
+    "smooth_strips",
     "tno",
     "topology",
     "verdict",
@@ -123,6 +125,7 @@ _NAMES = {
     "ConvergenceWarning": "gso.errors",
     "Options": "gso.tasks.options",
     "loft": "gso.ruled.loft",
+    "smooth_strips": "gso.ruled.smooth.surface",
     "Fixed": "gso.constraints",
     "FixedBoundary": "gso.constraints",
     "FixedLengths": "gso.constraints",
@@ -130,6 +133,7 @@ _NAMES = {
     "Handle": "gso.constraints",
     "OnCurve": "gso.constraints",
     "PlanarFaces": "gso.constraints",
+    "Ruling": "gso.constraints",
     "SlidingBoundary": "gso.constraints",
     "SymmetryPlane": "gso.constraints",
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,10 +12,12 @@ from gso import faults, metrics, parametrization
 from gso.mesh import Mesh
 from gso.ruled import fit
 from gso.ruled.chords import chords
+from gso.ruled.conditions import Conditions
 from gso.ruled.copies import copies, with_copies
 from gso.ruled.descent import planarised
 from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
+from gso.ruled.folds import Folds
 from gso.ruled.layout import Strips
 from gso.ruled.loft import loft
 from gso.ruled.measured import Weights
@@ -23,6 +27,8 @@ from gso.ruled.prices import prices
 from gso.ruled.program import sequences
 from gso.ruled.system import System
 from tests.conftest import cylinder, rotation, saddle, shuffled
+
+ROOT = Path(__file__).resolve().parents[1]
 
 
 def domain(points) -> Domain:
@@ -131,14 +137,18 @@ def test_halved_strips_stay_planar_and_merged_ends_are_triangles():
 
 
 @pytest.mark.parametrize("power", [2.0, 4.0])
-def test_gradient_of_the_energy_is_that_of_differences(power):
+@pytest.mark.parametrize("conditions", [False, True])
+def test_gradient_of_the_energy_is_that_of_differences(power, conditions):
     there = domain(saddle(17, strength=0.25))
     first, places = chords(there, 9)
     strips, vertices = first.halved(there.points(places))
-    energy = fit.Job(Extended(there), there.lattice(200)).energy(strips, vertices)
+    lines = there.mesh.vertices[[[0, 288]]] + [0.0, 0.0, 0.1]
+    wanted = Conditions(points=lines[0], lines=lines, radius=2.0) if conditions else Conditions()
+    job = fit.Job(Extended(there), there.lattice(200), conditions=wanted)
+    energy = job.energy(strips, vertices)
     rng = np.random.default_rng(0)
     vertices = vertices + 1e-4 * rng.standard_normal(vertices.shape)
-    w, scale = Weights(power=power, back=0.0, gap=0.0, fold=1e-6), 0.01
+    w, scale = Weights(power=power, back=0.0, gap=0.0, fold=1e-6, hold=1.0, radius=1e-3), 0.01
     measured = energy.measure(vertices)
     gradient, _ = energy.derivatives(vertices, measured, w, scale)
     step = 1e-7 * rng.standard_normal(vertices.shape)
@@ -376,17 +386,83 @@ def test_strips_pass_through_fixed_vertices_and_handles(strips):
     assert off.max() < 1e-7 * mesh.diagonal
 
 
-def test_cad_files_have_faces_that_share_edges(tmp_path):
+@pytest.mark.parametrize("strips", [1, 2])
+def test_beams_are_rulings(strips):
+    u, v = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
+    mesh = Mesh.from_grid(np.stack([u, v, 0.2 * u * u - 0.05 * v], axis=-1))
+    # One beam along the rulings of the cylinder, one across them at an angle.
+    for ends in ([5 * 17, 5 * 17 + 16], [5 * 17, 8 * 17 + 16]):
+        options = gso.RuledOptions(strips=strips)
+        result = gso.tno.optimize(mesh, options=options, constraints=[gso.Ruling(ends)])
+        assert result.usable, result.reasons
+        a, b = mesh.vertices[ends]
+        p, q = result.mesh.vertices[result.rulings.edges].transpose(1, 0, 2)
+        way = (b - a) / np.linalg.norm(b - a)
+        off = [np.linalg.norm(np.cross(x - a, way), axis=1) for x in (p, q)]
+        on = np.maximum(*off) < 1e-7
+        # Its pieces, one for each strip, cover the beam inside the outline.
+        covered = np.abs((q - p)[on] @ way).sum()
+        assert covered == pytest.approx(np.linalg.norm(b - a), rel=0.02)
+
+
+@pytest.mark.parametrize("strips", [1, 2, 3])
+def test_results_are_symmetric(strips):
+    u, v = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
+    design = np.stack([u, v, 0.3 * u * u * v + 0.2 * u * u], axis=-1)
+    mirror = gso.SymmetryPlane([0, 0, 0], [1, 0, 0])
+    options = gso.RuledOptions(strips=strips, starts=("design",))
+    result = gso.tno.optimize(design, options=options, constraints=[mirror])
+    assert result.usable, result.reasons
+    ends = result.ruled.untrimmed.vertices
+    image = ends * [-1.0, 1.0, 1.0]
+    apart = np.linalg.norm(image[:, None] - ends, axis=2).min(axis=1)
+    assert apart.max() < 1e-9
+    with pytest.raises(gso.OptionError, match="flats=True"):
+        gso.tno.optimize(design, options=gso.RuledOptions(flats=True), constraints=[mirror])
+
+
+def test_bends_keep_the_smallest_radius():
+    u, v = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
+    design = 10.0 * np.stack([u, v, 0.3 * u * u * v + 0.2 * u * u], axis=-1)
+    for least, kept in ((6.0, True), (200.0, False)):
+        options = gso.RuledOptions(starts=("design",), min_radius=least)
+        result = gso.tno.optimize(design, options=options)
+        assert result.usable is kept
+        assert (result.rulings.smallest_radius >= least) is kept
+    assert result.status is gso.Status.TARGET_MISSED
+
+
+def test_chords_follow_given_lines():
+    there = domain(saddle(17, strength=0.25))
+    given = np.array([there.flat[[3, 287]]])
+    strips, places = chords(there, 17, given=given)
+    p, q = places[strips.index[0]].transpose(1, 0, 2)
+    way = (q - p) / np.linalg.norm(q - p, axis=1, keepdims=True)
+    off = [np.abs((x - p)[:, 0] * way[:, 1] - (x - p)[:, 1] * way[:, 0]) for x in given[0]]
+    assert np.maximum(*off).min() < 1e-9
+
+
+def test_planar_faces_in_cad_files_share_edges(tmp_path):
     pytest.importorskip("OCP")
     rhino = pytest.importorskip("rhino3dm")
     result = gso.tno.optimize(saddle(17, strength=0.25), options=gso.RuledOptions(strips=2))
     for suffix in ("step", "iges", "3dm"):
-        result.save(tmp_path / f"a.{suffix}", unit="cm")
+        gso.io.save_faces(result.mesh, tmp_path / f"a.{suffix}", unit="cm")
     text = (tmp_path / "a.step").read_text(encoding="utf-8")
     assert text.count("ADVANCED_FACE") == len(result.mesh.faces)
     assert text.count("EDGE_CURVE") == len(result.mesh.edges)
     model = rhino.File3dm.Read(str(tmp_path / "a.3dm"))
     assert len(model.Objects) == len(result.mesh.faces)
+
+
+def test_creases_do_not_zigzag():
+    panel = gso.load(ROOT / "examples" / "panel.obj")
+    result = gso.tno.optimize(panel, options=gso.RuledOptions(strips=4, starts=("design",)))
+    assert result.metrics["crease_turn_max"] < 20.0
+    edges = np.array([[0, 1], [1, 2], [3, 4]])
+    corner = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 0, 0], [1, 0, 0]])
+    turns = Folds(edges, np.zeros(3), np.zeros(3)).turns(corner)
+    np.testing.assert_allclose(turns, [0.5 * np.pi], atol=1e-12)
 
 
 def test_trees_have_flat_regions_and_one_sheet():
@@ -436,7 +512,7 @@ def test_what_cannot_be_ruled_is_refused():
         gso.tno.optimize(
             Mesh(two, np.concatenate([faces, faces + tube[..., 0].size])), formulation="ruled"
         )
-    with pytest.raises(gso.OptionError, match="positions of vertices"):
+    with pytest.raises(gso.OptionError, match=r"takes Fixed.*Ruling"):
         planar = gso.PlanarFaces()
         gso.tno.optimize(saddle(9), formulation="ruled", constraints=[planar])
     for wrong in ({"strips": 0}, {"strips": "many"}, {"rulings": 3}, {"starts": ("x",)}):

@@ -71,6 +71,30 @@ def strips(seed: str = "", start: str = "design", count: int = 24) -> dict[str, 
     return out
 
 
+def cad(seed: str = "", count: int = 24) -> dict[str, Any]:
+    """Measure smooth strips: how torsal they are, and their distance from the planar faces."""
+    surfaces = _others(int(seed), count) if seed else _references()
+    out, rows = {}, []
+    for number in ("1", "tree", "4"):
+        found = []
+        for surface in progress(surfaces, f"smooth strips: {number}"):
+            options = gso.RuledOptions(starts=("design",), **STRIPS[number])
+            result = _optimised(surface, options=options)
+            strips, seconds = timed(gso.smooth_strips, result.ruled, result.design)
+            percent = 100.0 / result.design.diagonal
+            far = [percent * x for x in strips.distances]
+            faces = sum(len(p.faces) for p in strips.patches)
+            found.append([strips.turning, strips.break_, strips.is_torsal, *far, faces, seconds])
+        every = np.array(found, float)
+        out[number] = every.tolist()
+        turn, lean, torsal, mean, largest, faces, seconds = every.T
+        row = [np.median(turn), turn.max(), int((lean <= 0.1).sum()), int(torsal.sum())]
+        rows.append([number, *row, *(np.median(x) for x in (mean, largest, faces, seconds))])
+    columns = ["strips", "turn deg", "worst", "no break", "torsal", "mean %", "max %", "faces", "s"]
+    table(f"Smooth strips of {len(surfaces)} surfaces", columns, rows)
+    return out
+
+
 def _references() -> list[Any]:
     return [*reference()[0], gso.load(ROOT / "examples" / "panel.obj")]
 
@@ -237,4 +261,4 @@ def _cap(n: int = 33, angle: float = 0.5) -> np.ndarray:
     return np.stack([np.sin(u) * np.cos(v), np.sin(v), np.cos(u) * np.cos(v)], axis=-1)
 
 
-SECTIONS = (strips, convergence, bounds, general, peers)
+SECTIONS = (strips, convergence, bounds, general, peers, cad)

@@ -54,6 +54,12 @@ UNITS = ("um", "mm", "cm", "dm", "m", "in", "ft", "yd")
     help='Developable by "ruled": the strip may branch at flat triangles.',
 )
 @click.option(
+    "--min-radius",
+    type=float,
+    metavar="LENGTH",
+    help='Developable by "ruled": smallest radius of the bends, in the mesh\'s unit.',
+)
+@click.option(
     "--options",
     "preset",
     type=click.Choice(["fast", "balanced", "accurate", "jiang2020"]),
@@ -182,19 +188,21 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
     """Return keywords of :func:`gso.tno.optimize`, checked as far as possible without a mesh."""
     from gso.tno import check
 
-    strips = given["strips"]
-    if (strips is not None or given["flats"]) and given["formulation"] is None:
+    strips, number = given["strips"], None
+    if strips is not None:
+        number = int(strips) if strips.isdecimal() else strips
+    ruled = {"strips": number, "flats": given["flats"] or None, "min_radius": given["min_radius"]}
+    ruled = {name: value for name, value in ruled.items() if value is not None}
+    if ruled and given["formulation"] is None:
         given["formulation"] = "ruled"
     formulation, kind = tasks.choose(
         tasks.get(given["task"]), given["formulation"], given["preset"]
     )
     settings: Any = kind.coerce(given["preset"])
-    if strips is not None or given["flats"]:
-        if formulation != "ruled":
-            name = "--flats" if strips is None else "--strips"
-            raise OptionError(f"{name} goes with --formulation ruled, not {formulation!r}")
-        number = int(strips) if strips is not None and strips.isdecimal() else strips
-        settings = replace(settings, strips=number, flats=given["flats"])
+    if ruled and formulation != "ruled":
+        name = "--" + next(iter(ruled)).replace("_", "-")
+        raise OptionError(f"{name} goes with --formulation ruled, not {formulation!r}")
+    settings = replace(settings, **ruled)
     if given["backend"] is not None:
         settings = replace(settings, backend=given["backend"])
     # With bounds or constraints the mesh is optimised, and a spline is fitted to the result.

@@ -5,9 +5,19 @@ from gso.constraints.compiled import TIGHT, Compiled, compile_constraints, liste
 from gso.constraints.curve import OnCurve, SlidingBoundary
 from gso.constraints.glue import Glue
 from gso.constraints.linear import Reduction
-from gso.constraints.parts import Lengths, OnLines, OnPlane, Part, Pins, Planar, Relations
+from gso.constraints.parts import (
+    Lengths,
+    OnLines,
+    OnPlane,
+    Part,
+    Pins,
+    Planar,
+    Relations,
+    Straight,
+)
 from gso.constraints.positions import Fixed, FixedBoundary, Handle
 from gso.constraints.read import add, read_constraints
+from gso.constraints.ruling import Ruling
 from gso.constraints.shape import FixedLengths, PlanarFaces
 from gso.constraints.symmetry import SymmetryPlane
 
@@ -30,7 +40,9 @@ __all__ = [
     "PlanarFaces",
     "Reduction",
     "Relations",
+    "Ruling",
     "SlidingBoundary",
+    "Straight",
     "SymmetryPlane",
     "add",
     "compile_constraints",

@@ -187,6 +187,11 @@ class OnPlane(Part):
     def mapped(self, frame: Frame, order: Ints) -> OnPlane:
         return replace(self, ids=order[self.ids], anchor=frame.to_unit(self.anchor))
 
+    @property
+    def offset(self) -> float:
+        """The value of ``normal . x`` on the plane."""
+        return float(self.anchor @ self.normal)
+
     def kept(self, rows: NDArray[np.bool_]) -> OnPlane:
         return replace(self, ids=self.ids[rows])
 
@@ -234,6 +239,16 @@ class OnLines(Part):
 
     def targets(self, points: Array) -> tuple[Ints, Array]:
         return self.ids, self.lines.nearest(points[self.ids]).points
+
+
+@dataclass(frozen=True)
+class Straight(OnLines):
+    """Vertices `ids` lie on a line segment, which is straight on the surface: a ruling."""
+
+    @property
+    def ends(self) -> Array:
+        """Both ends of the segment, (2, dim)."""
+        return np.stack([self.lines.start[0], self.lines.end[-1]])
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from gso.constraints.base import Constraint
 from gso.constraints.curve import OnCurve, SlidingBoundary
 from gso.constraints.glue import Glue
 from gso.constraints.positions import Fixed, FixedBoundary, Handle
+from gso.constraints.ruling import Ruling
 from gso.constraints.shape import FixedLengths, PlanarFaces
 from gso.constraints.symmetry import SymmetryPlane
 from gso.errors import OptionError
@@ -26,6 +27,7 @@ KINDS: dict[str, type[Constraint]] = {
         Handle,
         OnCurve,
         PlanarFaces,
+        Ruling,
         SlidingBoundary,
         SymmetryPlane,
     )

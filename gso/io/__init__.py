@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from gso.errors import MeshError, OptionError
 from gso.io.atomic import check_writable, replacing
-from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_faces, save_spline
+from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_faces, save_patches, save_spline
 from gso.io.convert import Unwelded, as_mesh
 from gso.io.lines import save_lines
 from gso.io.source import read_bytes
@@ -47,6 +47,7 @@ __all__ = [
     "save_faces",
     "save_flat",
     "save_lines",
+    "save_patches",
     "save_spline",
     "welded",
     "write",

@@ -1,9 +1,10 @@
-"""Writers of CAD files: B-spline surfaces, and planar faces that share their edges."""
+"""Writers of CAD files: B-spline surfaces, whole and trimmed, and planar faces."""
 
 from __future__ import annotations
 
 import importlib
 import os
+from collections.abc import Sequence
 from os import PathLike
 from typing import Any, NamedTuple
 
@@ -12,7 +13,7 @@ from gso.io.atomic import check_writable, replacing
 from gso.io.svg import MILLIMETRES
 from gso.mesh import Mesh
 from gso.spelling import choices
-from gso.spline import BSplineSurface
+from gso.spline import BSplineSurface, TrimmedSpline
 
 
 class _Format(NamedTuple):
@@ -21,13 +22,15 @@ class _Format(NamedTuple):
     module: str
     write: str
     faces: str
+    trimmed: str
     package: str
     name: str
 
 
-_STEP = _Format("opencascade", "step", "step_faces", "OCP", "OpenCASCADE (cadquery-ocp-novtk)")
-_IGES = _STEP._replace(write="iges", faces="iges_faces")
-_RHINO = _Format("rhino", "write", "write_faces", "rhino3dm", "rhino3dm")
+_CASCADE = "OpenCASCADE (cadquery-ocp-novtk)"
+_STEP = _Format("opencascade", "step", "step_faces", "step_trimmed", "OCP", _CASCADE)
+_IGES = _STEP._replace(write="iges", faces="iges_faces", trimmed="iges_trimmed")
+_RHINO = _Format("rhino", "write", "write_faces", "write_trimmed", "rhino3dm", "rhino3dm")
 _FORMATS = {".step": _STEP, ".stp": _STEP, ".iges": _IGES, ".igs": _IGES, ".3dm": _RHINO}
 
 SPLINE_SUFFIXES = tuple(_FORMATS)
@@ -131,6 +134,37 @@ def save_faces(mesh: Mesh, path: str | PathLike[str], *, unit: str = "mm") -> No
         folder of gso.
     """
     _write(path, unit, "faces", mesh)
+
+
+def save_patches(
+    patches: Sequence[TrimmedSpline], path: str | PathLike[str], *, unit: str = "mm"
+) -> None:
+    """Write trimmed splines to a CAD file, such as those of :func:`gso.smooth_strips`.
+
+    In STEP files they share their edges. In 3DM files the surfaces are whole, and their
+    outlines are on a layer of their own. An existing file is replaced only when the new one is
+    complete.
+
+    Parameters
+    ----------
+    patches : sequence of TrimmedSpline
+    path : str or PathLike
+        A .step, .stp, .iges, .igs or .3dm file.
+    unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
+        Unit of the coordinates, as in :func:`save_spline`.
+
+    Raises
+    ------
+    MeshError
+        Unknown suffix, a path that cannot be written, or a surface that the format cannot
+        store. The message names the file.
+    OptionError
+        Unknown unit.
+    GSOError
+        The package that writes the format is not installed: ``pip install ".[cad]"`` in the
+        folder of gso.
+    """
+    _write(path, unit, "trimmed", patches)
 
 
 def _write(path: str | PathLike[str], unit: str, kind: str, content: Any) -> None:

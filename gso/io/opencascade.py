@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,9 @@ import numpy as np
 from gso.errors import MeshError
 from gso.io.svg import MILLIMETRES
 from gso.mesh import Mesh
-from gso.spline import BSplineSurface
+from gso.spline import BSplineSurface, TrimmedSpline
+from gso.spline.trimmed import Loop
+from gso.typing import Array
 
 #: OpenCASCADE's names of the units that both formats know; IGES has another one for inches.
 _UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
@@ -23,6 +26,9 @@ _FORMAT = "%.16E"
 
 #: OpenCASCADE's smallest distance between points, in the unit of the file.
 _TOLERANCE = 1e-7
+
+#: Distance, relative to the size of the largest patch, within which edges are joined.
+_SEWN = 1e-5
 
 
 def step(spline: BSplineSurface, unit: str) -> bytes:
@@ -41,15 +47,18 @@ def step(spline: BSplineSurface, unit: str) -> bytes:
 
 def step_faces(mesh: Mesh, unit: str) -> bytes:
     """Return the contents of a STEP file with a shell of planar faces that share their edges."""
-    shell, name = _shell(mesh, unit)
-    return _step(shell, name)
+    return _step(*_shell(mesh, unit))
 
 
 def iges_faces(mesh: Mesh, unit: str) -> bytes:
     """Return the contents of an IGES file with planar faces."""
+    return _iges_shell(*_shell(mesh, unit))
+
+
+def _iges_shell(shell: Any, name: str) -> bytes:
+    """Return the contents of an IGES file of a shell in a unit."""
     from OCP.IGESControl import IGESControl_Writer
 
-    shell, name = _shell(mesh, unit)
     with _quiet():
         session = IGESControl_Writer("IN" if name == "INCH" else name, 1)
         session.AddShape(shell)
@@ -108,6 +117,85 @@ def _shell(mesh: Mesh, unit: str) -> tuple[Any, str]:
         sewing.Add(made.Shape())
     sewing.Perform()
     return sewing.SewedShape(), _UNITS[unit if known else "mm"]
+
+
+def step_trimmed(patches: Sequence[TrimmedSpline], unit: str) -> bytes:
+    """Return the contents of a STEP file with a shell of trimmed splines that share edges."""
+    return _step(*_trimmed_shell(patches, unit))
+
+
+def iges_trimmed(patches: Sequence[TrimmedSpline], unit: str) -> bytes:
+    """Return the contents of an IGES file with trimmed splines."""
+    return _iges_shell(*_trimmed_shell(patches, unit))
+
+
+def _trimmed_shell(patches: Sequence[TrimmedSpline], unit: str) -> tuple[Any, str]:
+    """Return a shell of trimmed splines, and the name of its unit."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
+
+    size = max(patch.spline.size for patch in patches)
+    name = _UNITS["mm"]
+    sewing = None
+    for patch in patches:
+        surface, name = _converted(patch.spline, unit)
+        if sewing is None:
+            factor = 1.0 if unit in _UNITS else MILLIMETRES[unit]
+            sewing = BRepBuilderAPI_Sewing(_SEWN * size * factor)
+        for loops in patch.faces:
+            sewing.Add(_trimmed_face(surface, loops))
+    if sewing is None:
+        raise MeshError("there are no surfaces to write")
+    sewing.Perform()
+    return sewing.SewedShape(), name
+
+
+def _trimmed_face(surface: Any, loops: Sequence[Loop]) -> Any:
+    """Return a face of a surface inside loops of its parameters.
+
+    Where smooth curves through the points of the loops cross each other, their chords are taken.
+    """
+    from OCP.BRepBuilderAPI import (
+        BRepBuilderAPI_MakeEdge,
+        BRepBuilderAPI_MakeFace,
+        BRepBuilderAPI_MakeWire,
+    )
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.BRepLib import BRepLib
+
+    for degree in (3, 1):
+        wires = []
+        for loop in loops:
+            wire = BRepBuilderAPI_MakeWire()
+            for curve in loop:
+                for points in [curve] if degree > 1 else pairwise(curve):
+                    edge = BRepBuilderAPI_MakeEdge(_plane_curve(np.array(points)), surface)
+                    wire.Add(edge.Edge())
+            BRepLib.BuildCurves3d_s(wire.Wire())
+            wires.append(wire.Wire())
+        face = BRepBuilderAPI_MakeFace(surface, wires[0], True)
+        for hole in wires[1:]:
+            face.Add(hole)
+        if BRepCheck_Analyzer(face.Face()).IsValid():
+            break
+    return face.Face()
+
+
+def _plane_curve(points: Array) -> Any:
+    """Return the curve through points (k, 2) of the parameters of a surface."""
+    from OCP import collections
+    from OCP.Geom2d import Geom2d_BSplineCurve
+    from OCP.gp import gp_Pnt2d
+    from scipy.interpolate import make_interp_spline
+
+    step = np.hypot(*np.diff(points, axis=0).T)
+    along = np.r_[0.0, np.cumsum(step)]
+    spline = make_interp_spline(along / along[-1], points, k=min(3, len(points) - 1))
+    poles = collections.Array1_gp_Pnt2d(1, len(spline.c))
+    for k, point in enumerate(spline.c.tolist(), 1):
+        poles.SetValue(k, gp_Pnt2d(*point))
+    knots, times = np.unique(spline.t, return_counts=True)
+    arrays = _array(collections.Array1_double, knots), _array(collections.Array1_int, times)
+    return Geom2d_BSplineCurve(poles, *arrays, spline.k)
 
 
 def iges(spline: BSplineSurface, unit: str) -> bytes:

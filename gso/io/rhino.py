@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Sequence
 from typing import Any
 
 from gso.errors import MeshError
 from gso.mesh import Mesh
-from gso.spline import BSplineSurface
+from gso.spline import BSplineSurface, TrimmedSpline
 
 _UNITS = {
     "um": "Microns",
@@ -30,6 +31,37 @@ def write(spline: BSplineSurface, unit: str) -> bytes:
 
     # The type stubs of rhino3dm lack some setters.
     rhino: Any = rhino3dm
+    model = _model(rhino, unit, spline.size)
+    model.Objects.AddSurface(_surface(rhino, spline))
+    return base64.b64decode(model.Encode())
+
+
+def write_trimmed(patches: Sequence[TrimmedSpline], unit: str) -> bytes:
+    """Return the contents of a .3dm file with whole splines and the outlines to trim them by.
+
+    rhino3dm cannot make trimmed surfaces. The layer "surfaces" has the splines, and the layer
+    "outlines" closed polylines on them.
+    """
+    import rhino3dm
+
+    rhino: Any = rhino3dm
+    model = _model(rhino, unit, max((patch.spline.size for patch in patches), default=1.0))
+    layers = []
+    for name in ("surfaces", "outlines"):
+        layer = rhino.Layer()
+        layer.Name = name
+        attributes = rhino.ObjectAttributes()
+        attributes.LayerIndex = model.Layers.Add(layer)
+        layers.append(attributes)
+    for patch in patches:
+        model.Objects.AddSurface(_surface(rhino, patch.spline), layers[0])
+        for line in patch.outlines():
+            points = [rhino.Point3d(*p) for p in [*line.tolist(), line[0].tolist()]]
+            model.Objects.AddPolyline(rhino.Polyline(points), layers[1])
+    return base64.b64decode(model.Encode())
+
+
+def _surface(rhino: Any, spline: BSplineSurface) -> Any:
     n, m = spline.net.shape[:2]
     p, q = spline.degrees
     surface = rhino.NurbsSurface.Create(3, False, p + 1, q + 1, n, m)
@@ -43,9 +75,7 @@ def write(spline: BSplineSurface, unit: str) -> bytes:
         surface.KnotsV[k] = knot
     if not surface.IsValid:
         raise MeshError(f"is no valid surface to openNURBS: {surface.IsValidWithLog[1]}")
-    model = _model(rhino, unit, spline.size)
-    model.Objects.AddSurface(surface)
-    return base64.b64decode(model.Encode())
+    return surface
 
 
 def write_faces(mesh: Mesh, unit: str) -> bytes:

@@ -58,6 +58,7 @@ INFO: dict[str, Info] = {
     "rulings_crossed": Info("", True, "pairs of successive rulings that cross", "sum"),
     "bend_radius_min": Info("size", False, "smallest radius at a ruling, mesh's unit", "min"),
     "crease_angle_max": Info("deg", True, "largest angle at a crease between strips", "max"),
+    "crease_turn_max": Info("deg", True, "largest turn of a crease at one of its vertices", "max"),
     "angle_distortion_mean": Info("", True, "mean over faces of s1/s2 - 1, principal stretches"),
     "angle_distortion_p99": Info("", True, "99th percentile of s1/s2 - 1"),
     "scale_min": Info("", False, "smallest ratio of lengths, flat over surface", "min"),

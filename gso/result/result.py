@@ -205,9 +205,10 @@ class Result:
 
         ``.npz`` stores the whole result, to be read by :meth:`load`. ``.svg`` is the flat
         pattern at scale 1:1, where `unit` is the unit of the mesh's coordinates. ``.step``,
-        ``.iges`` and ``.3dm`` are the spline in that unit (see :func:`gso.save_spline`), and for
-        a ruled surface its planar faces, which share their edges. Any
-        other suffix of :func:`gso.save` is the surface (for `flatten` the pattern at z = 0).
+        ``.iges`` and ``.3dm`` are the spline in that unit (see :func:`gso.save_spline`); for a
+        ruled surface they are its smooth strips (:func:`gso.smooth_strips`), and where these
+        are not torsal its planar faces. The notes say which. Any other suffix of
+        :func:`gso.save` is the surface (for `flatten` the pattern at z = 0).
         Labels, materials and texture coordinates that the format cannot store are listed in
         the notes.
         """
@@ -229,7 +230,7 @@ class Result:
             bends = () if self.ruled is None else self.ruled.bends
             io.save_flat(self.pattern.flat, outline, path, unit=unit, bends=bends)
         elif f".{suffix}" in io.SPLINE_SUFFIXES and self.ruled is not None:
-            io.save_faces(self.mesh, path, unit=unit)
+            self._save_strips(self.ruled, path, unit)
         elif f".{suffix}" in io.SPLINE_SUFFIXES:
             if any(part.spline is not None for part in self.components):
                 raise MeshError(
@@ -245,6 +246,28 @@ class Result:
         else:
             io.write(self.mesh, path)
         self.notes += tuple(n for n in io.left_out(self.mesh, path) if n not in self.notes)
+
+    def _save_strips(self, ruled: RuledSurface, path: str | PathLike[str], unit: str) -> None:
+        """Write a ruled surface to a CAD file."""
+        from gso import io
+        from gso.ruled.smooth.surface import smooth_strips
+
+        io.check_spline(path, unit)
+        strips = smooth_strips(ruled, self.design)
+        if strips.is_torsal:
+            io.save_patches(strips.patches, path, unit=unit)
+            note = (
+                f"{path} has smooth strips, whose normals turn by {strips.turning:.2g} degrees at "
+                f"most along rulings; they are {strips.distances[1]:.3g} {unit} at most from the "
+                "planar faces that the pattern belongs to"
+            )
+        else:
+            io.save_faces(self.mesh, path, unit=unit)
+            note = (
+                f"{path} has planar faces: normals of smooth strips would turn by "
+                f"{strips.turning:.2g} degrees along rulings"
+            )
+        self.notes += (note,)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Result:

@@ -13,7 +13,7 @@ from gso.ruled.layout import Strips
 from gso.ruled.polygon import corners, on, resampled
 from gso.ruled.prices import along, prices
 from gso.ruled.program import Branch, sequences
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Points on the outline.
 _COUNT = 96
@@ -29,9 +29,13 @@ _TURNS, _CHOICES, _STEADY = (6.0, 1.5, 0.4), 13, 0.05
 #: Least distance of ends on the offset polygon, relative to their mean distance, and the largest
 #: number of points by which they move for the sake of a straight continuation.
 _APART, _FAR = 0.2, 8.0
+#: Price of chords that cross given ones, relative to the highest.
+_DEAR = 100.0
 
 
-def chords(domain: Domain, count: int, flat: float | None = None) -> tuple[Strips, Array]:
+def chords(
+    domain: Domain, count: int, flat: float | None = None, given: Array | None = None
+) -> tuple[Strips, Array]:
     """Find first rulings: chords of low price, continued beyond the outline by the margin.
 
     Parameters
@@ -42,6 +46,8 @@ def chords(domain: Domain, count: int, flat: float | None = None) -> tuple[Strip
         Number of chords of a single sequence; about the number of all chords of several.
     flat : float, optional
         Cost of a flat triangle between three sequences. Without it there is one sequence.
+    given : ndarray, (m, 2, 2), optional
+        Ends of parts of chords that are among the result.
 
     Returns
     -------
@@ -53,6 +59,8 @@ def chords(domain: Domain, count: int, flat: float | None = None) -> tuple[Strip
     outline, normals = resampled(domain.flat[domain.outline], _COUNT)
     beyond = outline + domain.margin * normals
     price, normal = prices(domain, outline)
+    for segment in () if given is None else given:
+        price[_crossed(outline, segment)] += _DEAR * price.max()
     found, triangles = sequences(outline, price, None if flat is None else normal, flat or 0.0)
     steps = sum(len(b.first) - 1 for b in found)
     index, places = [], []
@@ -64,6 +72,8 @@ def chords(domain: Domain, count: int, flat: float | None = None) -> tuple[Strip
             continue
         number = count if len(found) == 1 else max(round(count * share), 2)
         one, other = _spread(domain, outline, beyond, branch, number)
+        for segment in () if given is None else given:
+            one, other = _with_chord(beyond, segment, one, other)
         own = size + np.arange(2 * number).reshape(number, 2)
         # Number 0 is the first chord, -1 the last.
         for at in np.flatnonzero(branch.held):
@@ -96,6 +106,64 @@ def _spread(
     return _cornered(one, sharp), _cornered(other, sharp)
 
 
+def _crossed(outline: Array, segment: Array) -> Flags:
+    """Return which chords (n, n) between points of the outline cross the line of a segment.
+
+    The line goes from one side of the outline to the other.
+    """
+    ends = _hits(outline, segment[None, ::-1])[0], _hits(outline, segment[None])[0]
+    low, high = sorted(e % len(outline) for e in np.concatenate(ends).tolist())
+    k = np.arange(len(outline))
+    between, outside = (k > low + 0.5) & (k < high - 0.5), (k < low - 0.5) | (k > high + 0.5)
+    cross = between[:, None] & outside
+    return np.asarray(cross | cross.T)
+
+
+def _with_chord(beyond: Array, segment: Array, one: Array, other: Array) -> tuple[Array, Array]:
+    """Replace the nearest chord by the line of a segment; others keep out of its way."""
+    n = len(beyond)
+    ends = [float(_hits(beyond, x[None])[0][0]) for x in (segment[::-1], segment)]
+    best: tuple[float, int, Array] | None = None
+    for pair in (ends, ends[::-1]):
+        off = [(x - e + 0.5 * n) % n - 0.5 * n for x, e in zip((one, other), pair, strict=True)]
+        far = np.abs(off[0]) + np.abs(off[1])
+        k = int(far.argmin())
+        if best is None or far[k] < best[0]:
+            best = float(far[k]), k, np.array([one[k] - off[0][k], other[k] - off[1][k]])
+    if best is None or best[0] > 0.5 * n:
+        return one, other
+    _, k, (x, y) = best
+    row = np.arange(len(one))
+    one = np.where(row < k, np.minimum(one, x), np.maximum(one, x))
+    other = np.where(row < k, np.maximum(other, y), np.minimum(other, y))
+    one[k], other[k] = x, y
+    return one, other
+
+
+def _hits(polygon: Array, ways: Array) -> tuple[Array, Flags]:
+    """Find where rays (k, 2, 2) through two points, from the first, leave a closed polygon (n, 2).
+
+    Returns
+    -------
+    at : ndarray, (k,)
+        Numbers of the polygon's points, with fractions.
+    found : ndarray of bool, (k,)
+        Whether there is such a place beyond the second point.
+    """
+    start, way = ways[:, 0], ways[:, 1] - ways[:, 0]
+    off = polygon - start[:, None]
+    side = way[:, :1] * off[:, :, 1] - way[:, 1:] * off[:, :, 0]
+    along = np.einsum("kd,knd->kn", way, off) / (way**2).sum(axis=1)[:, None]
+    after, ahead = np.roll(side, -1, axis=1), np.roll(along, -1, axis=1)
+    crosses = (side > 0) != (after > 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(crosses, side / (side - after), 0.0)
+    there = np.where(crosses, along + share * (ahead - along), np.inf)
+    there[there < 1.0] = np.inf
+    k, row = there.argmin(axis=1), np.arange(len(ways))
+    return k + share[row, k], np.isfinite(there[row, k])
+
+
 def _continued(
     outline: Array, beyond: Array, one: Array, other: Array, held: tuple[bool, bool]
 ) -> tuple[Array, Array]:
@@ -110,20 +178,9 @@ def _continued(
     ends = on(outline, one), on(outline, other)
     found = []
     for at, start, stop, sign in ((one, *ends[::-1], 1.0), (other, *ends, -1.0)):
-        way = stop - start
-        off = beyond - start[:, None]
-        side = way[:, :1] * off[:, :, 1] - way[:, 1:] * off[:, :, 0]
-        along = np.einsum("kd,knd->kn", way, off) / (way**2).sum(axis=1)[:, None]
-        after, ahead = np.roll(side, -1, axis=1), np.roll(along, -1, axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = side / (side - after)
-        share = np.where((side > 0) != (after > 0), share, 0.0)
-        there = np.where((side > 0) != (after > 0), along + share * (ahead - along), np.inf)
-        there[there < 1.0] = np.inf
-        k = there.argmin(axis=1)
-        row = np.arange(len(k))
-        move = (k + share[row, k] - at + 0.5 * n) % n - 0.5 * n
-        move[~np.isfinite(there[row, k]) | (np.abs(move) > _FAR)] = 0.0
+        there, hit = _hits(beyond, np.stack([start, stop], axis=1))
+        move = (there - at + 0.5 * n) % n - 0.5 * n
+        move[~hit | (np.abs(move) > _FAR)] = 0.0
         ordered = sign * _ordered(sign * at, sign * move, held)
         found.append(ordered)
     return found[0], found[1]

@@ -86,7 +86,7 @@ def descend(
         while True:
             damped = matrix.copy()
             damped[diagonal] += damping * mean
-            step = system.solve(damped, right)[system.unknowns]
+            step = energy.even_step(system.solve(damped, right)[system.unknowns])
             longest = float(np.abs(step).max())
             fall, trial, knots = -1.0, vertices, 0
             there: Measured | None = None

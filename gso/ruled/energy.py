@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gso.mesh.closest_point import Nearest
+from gso.ruled.conditions import Conditions, Radius, on_lines
+from gso.ruled.differences import Differences
 from gso.ruled.extended import Extended
 from gso.ruled.layout import Strips
 from gso.ruled.measured import Measured, Weights
@@ -20,6 +22,7 @@ _SAMPLES, _LEAST = 8, 2
 _OUTSIDE = 0.8
 #: Distance from the normal through the nearest point at which a point is beyond the face.
 _APART = 1e-9
+_NONE = Conditions()
 
 
 class Energy:
@@ -37,8 +40,8 @@ class Energy:
         Points of the design whose distances are minimised.
     width : float, optional
         Mean width of the faces; that of the start when not given.
-    held : ndarray, (h, 3), optional
-        Points that the strips have to pass through.
+    conditions : Conditions, optional
+        What the strips have to satisfy.
     """
 
     def __init__(
@@ -48,11 +51,12 @@ class Energy:
         start: Array,
         points: Array,
         width: float | None = None,
-        held: Array | None = None,
+        conditions: Conditions = _NONE,
     ):
         self.design, self.strips, self.start = design, strips, start
         #: Number of the design's points; those that are held follow them.
         self.count = len(points)
+        held = conditions.points
         self.points = points if held is None else np.concatenate([points, held])
         self.system = System(strips)
         count = max(_LEAST, -(-_SAMPLES // strips.count))
@@ -73,7 +77,14 @@ class Energy:
         self._hinge = np.stack([one, two], axis=1)
         self._hinge_places = self.system.blocks(c[self._hinge].reshape(-1, 8))
         self._outer_places = self.system.blocks(strips.outer[:, None])
-        self._second = self._constant()
+        self._second = Differences(self.system, start, self.width, self._rulings)
+        self._line, self._through, self._across = on_lines(conditions, strips, start)
+        self._line_places = self.system.blocks(self._line[:, None])
+        self._radius = None
+        if conditions.radius is not None:
+            self._radius = Radius(self._hinge, self._rulings_ends, design.margin, conditions.radius)
+        self.mirror = conditions.mirror
+        self.partners = None if self.mirror is None else self.mirror.partners(start)
 
     # -- measures -----------------------------------------------------------------------------
 
@@ -169,7 +180,12 @@ class Energy:
         total = float(((np.abs(far) / scale) ** w.power).sum()) / self.count * scale**2
         total += w.hold * float(held @ held)
         total += w.back * float((weight * (np.abs(m.back) / scale) ** w.power).sum()) * scale**2
-        total += 0.5 * self._linear(vertices, w)[0]
+        off = np.einsum("kij,kj->ki", self._across, vertices[self._line] - self._through)
+        total += w.hold * float((off**2).sum())
+        if self._radius is not None:
+            excess, _ = self._radius.excess(vertices, m.turn, m.gap)
+            total += w.radius * float((excess**2).sum())
+        total += 0.5 * self._second.energy(vertices, w)[0]
         total += w.ends / len(m.off) * float((m.off**2).sum())
         total += w.inside / len(m.off) * float(m.deep @ m.deep)
         total += w.fold * float(m.stiff @ (m.turn**2).sum(axis=1))
@@ -194,7 +210,7 @@ class Energy:
             self._faces(gradient, vertices, m, w, scale),
             self._folds(gradient, vertices, m, w),
         ]
-        gradient += self._linear(vertices, w)[1]
+        gradient += self._second.energy(vertices, w)[1]
         factor = 2.0 * w.ends / len(m.off)
         gradient[self.strips.outer] += factor * m.off
         block = factor * m.across
@@ -202,10 +218,20 @@ class Energy:
         gradient[self.strips.outer] -= factor * m.deep[:, None] * m.out
         block = block + factor * (m.deep > 0)[:, None, None] * m.out[:, :, None] * m.out[:, None]
         parts.append((self._outer_places, block))
-        matrix = self.system.matrix(parts)
-        for key, _, band in self._second:
-            matrix += getattr(w, key) * band
-        return gradient, matrix
+        off = np.einsum("kij,kj->ki", self._across, vertices[self._line] - self._through)
+        np.add.at(gradient, self._line, 2.0 * w.hold * off)
+        parts.append((self._line_places, 2.0 * w.hold * self._across))
+        return gradient, self.system.matrix(parts) + self._second.matrix(w)
+
+    def even_step(self, step: Array) -> Array:
+        """Return a symmetric step, where there is a plane of symmetry."""
+        if self.mirror is None or self.partners is None:
+            return step
+        return self.mirror.even_step(step, self.partners)
+
+    def even_pairs(self, pairs: Ints) -> Ints:
+        """Add the mirror images of pairs (m, 2) of vertices."""
+        return pairs if self.partners is None else np.concatenate([pairs, self.partners[pairs]])
 
     def _there(self, gradient: Array, m: Measured, w: Weights, scale: float) -> tuple[Ints, Array]:
         """Distances of the design's points from the triangles' planes."""
@@ -286,43 +312,16 @@ class Energy:
         row = np.concatenate([by[one], -by[two]], axis=2)
         factor = 2.0 * w.fold * m.stiff
         local = factor[:, None] * np.einsum("hi,hik->hk", m.turn, row)
+        block = np.matmul((factor[:, None, None] * row).transpose(0, 2, 1), row)
+        if self._radius is not None:
+            slope, second = self._radius.parts(
+                *self._radius.excess(vertices, m.turn, m.gap), m.turn, m.side, row
+            )
+            local += w.radius * slope
+            block += w.radius * second
         corners = self.strips.corners[self._hinge].reshape(-1, 8)
         _add(gradient, corners, local.reshape(-1, 8, 3))
-        return self._hinge_places, np.matmul((factor[:, None, None] * row).transpose(0, 2, 1), row)
-
-    # -- second differences -------------------------------------------------------------------
-
-    def _constant(self) -> list[tuple[str, Array, Array]]:
-        """Second differences: (name of the weight, operator, band storage of the Hessian)."""
-        from scipy.sparse import csr_matrix
-
-        out = []
-        along = 1.0 / (self._rulings * self.width**2)
-        across = self.strips.count / self._rulings
-        kinds = [("moved", self.strips.along, along), ("bent", self.strips.along, along)]
-        if len(self.strips.across):
-            kinds.append(("even", self.strips.across, across))
-        for key, triples, factor in kinds:
-            rows = np.repeat(np.arange(len(triples)), 3)
-            ones = np.tile([1.0, -2.0, 1.0], len(triples))
-            matrix = csr_matrix((ones, (rows, triples.ravel())), (len(triples), self.strips.size))
-            operator = 2.0 * factor * (matrix.T @ matrix).tocsr()
-            block = 2.0 * factor * np.outer([1.0, -2.0, 1.0], [1.0, -2.0, 1.0])
-            block = np.kron(block, np.eye(3)).astype(np.float64)
-            places = self.system.blocks(triples)
-            every = np.broadcast_to(block, (len(triples), 9, 9))
-            out.append((key, operator, self.system.matrix([(places, every)])))
-        return out
-
-    def _linear(self, vertices: Array, w: Weights) -> tuple[float, Array]:
-        """Return twice the quadratic energy of the second differences, and its gradient."""
-        total, gradient = 0.0, np.zeros_like(vertices)
-        for key, operator, _ in self._second:
-            x = vertices - self.start if key == "moved" else vertices
-            slope = getattr(w, key) * (operator @ x)
-            total += float((x * slope).sum())
-            gradient += slope
-        return total, gradient
+        return self._hinge_places, block
 
 
 def _skew(a: Array) -> Array:

@@ -71,6 +71,8 @@ class Extended:
         rim = domain.points(outline + domain.margin * normals)
         self._rim = rim
         self._out = rim - domain.sample(domain.mesh.vertices, outline)[0]
+        #: Mean width of the continuation.
+        self.margin = float(lengths(self._out).mean())
         self._step = np.roll(rim, -1, axis=0) - rim
         self._length = np.maximum(lengths(self._step), 1e-300)
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gso.ruled.conditions import Conditions
 from gso.ruled.descent import Tell, descend, planarised
 from gso.ruled.energy import Energy
 from gso.ruled.extended import Extended
@@ -30,6 +31,8 @@ _PENALISED, _EXACT, _EACH = 6, 15, 8
 _POWERS = {True: (4.0, 8.0), False: (4.0,)}
 #: Weights by which points that strips pass through are met in the end.
 _HOLDS = (1e5, 1e7)
+#: Weights of the smallest radius in the end.
+_RADII = (1.0, 100.0)
 #: Ends of rulings are merged when their gap is below this multiple of the least one.
 _MERGED = 1.7
 #: Root mean square distance below which other terms lose weight; rounds of that, the largest
@@ -64,19 +67,17 @@ class Fit:
 
 
 class Job(NamedTuple):
-    """What all phases share: the target, points of the design, weights, who is told,
-    and points that the strips pass through.
-    """
+    """What all phases share: target, points of the design, weights, who is told, conditions."""
 
     target: Extended
     points: Array
     weights: Weights = Weights()
     tell: Tell | None = None
-    held: Array | None = None
+    conditions: Conditions = Conditions()
 
     def energy(self, strips: Strips, start: Array, width: float | None = None) -> Energy:
         """Make the energy of a layout."""
-        return Energy(self.target, strips, start, self.points, width, self.held)
+        return Energy(self.target, strips, start, self.points, width, self.conditions)
 
 
 def single(job: Job, strips: Strips, start: Array) -> Fit:
@@ -118,8 +119,8 @@ def evened(job: Job, fit: Fit) -> Fit:
         vertices = descend(energy, vertices, w, _POLISH, _TIGHT, job.tell)
     for power in _POWERS[fit.strips.count == 1]:
         vertices = descend(energy, vertices, replace(w, power=power), _EACH, tell=job.tell)
-    for hold in _HOLDS if job.held is not None else ():
-        closing = replace(w, power=power, hold=hold)
+    for hold, radius in zip(_HOLDS, _RADII) if job.conditions.closing else ():
+        closing = replace(w, power=power, hold=hold, radius=radius)
         vertices = descend(energy, vertices, closing, _EACH, 0.0, job.tell)
     return _uncrossed(job, energy, replace(fit, vertices=planarised(energy.system, vertices)))
 
@@ -184,4 +185,4 @@ def close(energy: Energy, vertices: Array, least: float) -> Ints:
         corners[(gap[:, end] < least) | (knot & (nearer == end))][:, [end, 2 + end]]
         for end in (0, 1)
     ]
-    return np.concatenate(pairs)
+    return energy.even_pairs(np.concatenate(pairs))

@@ -43,6 +43,22 @@ class Folds:
         """The largest angle, regardless of its sign, in radians."""
         return float(np.abs(self.angles).max(initial=0.0))
 
+    def turns(self, vertices: Array) -> Array:
+        """Return the angles in radians by which chains of the edges turn where two of them meet.
+
+        Parameters
+        ----------
+        vertices : ndarray, (n, 3)
+            The mesh's vertices.
+        """
+        ends = np.concatenate([self.edges, self.edges[:, ::-1]])
+        ends = ends[np.argsort(ends[:, 0], kind="stable")]
+        at, first, count = np.unique(ends[:, 0], return_index=True, return_counts=True)
+        inner = first[count == 2]
+        one, two = (vertices[ends[inner + k, 1]] - vertices[at[count == 2]] for k in (0, 1))
+        cosine = -np.einsum("kd,kd->k", unit(one), unit(two))
+        return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
 
 def folds(
     strips: Strips, vertices: Array, unrolled: Unrolled, mesh: Mesh, owner: Ints

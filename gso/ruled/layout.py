@@ -93,6 +93,13 @@ class Strips:
         return _different(np.concatenate(parts))
 
     @cached_property
+    def creased(self) -> Ints:
+        """Triples (s, 3) of vertices that follow each other on creases."""
+        inner = [i[:, 1:-1] for i in self.index]
+        parts = [np.stack([i[:-2], i[1:-1], i[2:]], axis=2).reshape(-1, 3) for i in inner]
+        return _different(np.concatenate(parts))
+
+    @cached_property
     def across(self) -> Ints:
         """Triples (s, 3) of vertices that follow each other on rulings."""
         parts = [

@@ -18,6 +18,8 @@ class Weights:
         strips.
     moved, bent : float
         Second differences along the strip, of the displacement and of the position.
+    crease : float
+        Second differences along creases, for each of them: without it they zigzag.
     fold : float
         Bending: squared changes of the normal at rulings, times length over mean width.
     even : float
@@ -32,6 +34,8 @@ class Weights:
         The distance that they keep, relative to the mean.
     hold : float
         Squared distances of points that the strips have to pass through.
+    radius : float
+        Squared angles by which folds are too sharp for the smallest radius.
     planar : float
         Squared distance between the diagonals of a quad; 0 where quads are planar exactly.
     power : float
@@ -41,6 +45,7 @@ class Weights:
     back: float = 1.0
     moved: float = 1e-4
     bent: float = 1e-7
+    crease: float = 5e-5
     fold: float = 1e-6
     even: float = 1e-2
     ends: float = 1e-3
@@ -48,12 +53,13 @@ class Weights:
     gap: float = 5.0
     least: float = 0.1
     hold: float = 1e3
+    radius: float = 1e-2
     planar: float = 0.0
     power: float = 2.0
 
     def scaled(self, share: float) -> Weights:
         """Return other weights for all terms that a design which is ruled does not minimise."""
-        names = ("bent", "fold", "even", "ends")
+        names = ("bent", "crease", "fold", "even", "ends")
         return replace(self, **{name: share * getattr(self, name) for name in names})
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gso.ruled.chords import chords
+from gso.ruled.conditions import Conditions
 from gso.ruled.descent import Stopped, Tell
 from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
@@ -46,6 +47,8 @@ class Wanted:
         Largest distance between design and surface, in both directions.
     max_crease : float or None
         Largest angle at a crease, in radians.
+    min_radius : float or None
+        Smallest radius of a bend.
     """
 
     strips: int | None = 1
@@ -53,12 +56,14 @@ class Wanted:
     flats: bool = False
     max_deviation: float | None = None
     max_crease: float | None = None
+    min_radius: float | None = None
 
     def met(self, found: Found) -> bool:
         """Return whether a surface is sound and meets the bounds."""
-        far, turn = self.max_deviation, self.max_crease
+        far, turn, radius = self.max_deviation, self.max_crease, self.min_radius
         return (
             found.surface.sound
+            and (radius is None or found.surface.rulings.smallest_radius >= radius)
             and (far is None or found.deviation <= far * (1.0 + _TIGHT))
             and (turn is None or found.surface.creases.largest_angle <= turn)
         )
@@ -83,6 +88,12 @@ class Found:
     start: str
 
     @property
+    def ends(self) -> Array:
+        """Ends of the rulings before trimming."""
+        source = self.surface.untrimmed
+        return self.surface.mesh.vertices if source is None else source.vertices
+
+    @property
     def order(self) -> tuple[bool, float]:
         """Sort key: sound surfaces first, then by distance."""
         return not self.surface.sound, self.mean + 0.2 * self.deviation
@@ -93,7 +104,7 @@ def solve(
     starts: dict[str, Array],
     wanted: Wanted,
     tell: Tell | None = None,
-    held: Array | None = None,
+    conditions: Conditions = Conditions(),  # noqa: B008
 ) -> tuple[Found | None, dict[int, float]]:
     """Fit a ruled surface to a design with a diagonal of one.
 
@@ -108,8 +119,8 @@ def solve(
         Strips, rulings and bounds.
     tell : callable, optional
         Told each iteration; see :data:`gso.ruled.descent.Tell`.
-    held : ndarray, (h, 3), optional
-        Points that the surface has to pass through.
+    conditions : Conditions, optional
+        What the surface has to satisfy.
 
     Returns
     -------
@@ -119,7 +130,12 @@ def solve(
         Largest distance by number of strips, for all numbers that were tried.
     """
     target = Extended(domain)
-    jobs = [Job(target, domain.lattice(count), tell=tell, held=held) for count in _POINTS]
+    jobs = []
+    for count in _POINTS:
+        points = domain.lattice(count)
+        if conditions.mirror is not None:
+            points = np.concatenate([points, conditions.mirror.image(points)])
+        jobs.append(Job(target, points, tell=tell, conditions=conditions))
     search = _Search(jobs, wanted)
     with contextlib.suppress(Stopped):
         search.run(starts)
@@ -206,8 +222,16 @@ def _first(job: Job, normals: Array, wanted: Wanted) -> Fit:
     quads = wanted.rulings - 1
     rounds = max(int(np.ceil(np.log2(quads / _COARSE))), 0)
     flat = _FLAT if wanted.flats else None
-    strips, places = chords(domain.with_normals(normals), round(quads / 2**rounds) + 1, flat)
-    fit = single(job, strips, domain.points(places))
+    strips, places = chords(
+        domain.with_normals(normals),
+        round(quads / 2**rounds) + 1,
+        flat,
+        job.conditions.chords,
+    )
+    start = domain.points(places)
+    if job.conditions.mirror is not None:
+        start = job.conditions.mirror.arranged(strips.index[0], start)
+    fit = single(job, strips, start)
     for _ in range(rounds):
         fit = refined(job, fit)
     return fit

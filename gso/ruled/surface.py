@@ -20,7 +20,7 @@ from gso.ruled.sheet import unrolled_pattern
 from gso.ruled.trim import trimmed
 from gso.ruled.unroll import Unrolled
 from gso.ruled.untrimmed import Untrimmed
-from gso.ruled.vectors import cross, lengths
+from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Flags, Ints
 
 #: Names of the arrays in files.
@@ -200,6 +200,17 @@ class RuledSurface:
             float(back.mean()),
             max(float(back.max()), rim_back),
         )
+
+    def on_ruling(self, line: Array, points: Array) -> Array:
+        """Move points (k, 3) to the ruling, or piece of outline, nearest to a line (2, 3)."""
+        a, b = self.mesh.vertices[self.mesh.edges].transpose(1, 0, 2)
+        way, size = unit(b - a), lengths(b - a)
+        off = [lengths(cross(x - a, way)) for x in line]
+        inside = np.einsum("kd,kd->k", line.mean(axis=0) - a, way)
+        beyond = np.maximum(np.maximum(-inside, inside - size), 0.0)
+        k = int((off[0] + off[1] + beyond).argmin())
+        along = np.clip((points - a[k]) @ way[k], 0.0, size[k])
+        return np.asarray(a[k] + along[:, None] * way[k])
 
     def transformed(self, move: Any, scale: float, back: Any) -> RuledSurface:
         """Return the surface in another frame.

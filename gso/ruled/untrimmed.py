@@ -59,8 +59,8 @@ class Untrimmed:
         if not (whole and rulings.ndim == flats.ndim == 2 and flats.shape[1] == 4):
             raise ValueError("the arrays of the strips do not fit each other")
         ids = np.concatenate([rulings.ravel(), flats.ravel()])
-        fits = rulings.size and sizes.min() > 1 and sizes.sum() == len(rulings)
-        fits &= rulings.shape[1] > 1 and vertices.shape == (len(vertices), 3)
+        fits = rulings.size and sizes.size and sizes.min() > 1 and sizes.sum() == len(rulings)
+        fits = fits and rulings.shape[1] > 1 and vertices.shape == (len(vertices), 3)
         if not (fits and 0 <= ids.min() <= ids.max() == len(vertices) - 1):
             raise ValueError("the arrays of the strips do not fit each other")
         strips = Strips(tuple(np.split(rulings, np.cumsum(sizes)[:-1])), flats)

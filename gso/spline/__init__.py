@@ -1,5 +1,6 @@
-"""Bicubic B-spline surfaces."""
+"""B-spline surfaces, whole and trimmed."""
 
 from gso.spline.surface import BSplineSurface, Gap, basis, basis_matrix, clamped_knots
+from gso.spline.trimmed import TrimmedSpline
 
-__all__ = ["BSplineSurface", "Gap", "basis", "basis_matrix", "clamped_knots"]
+__all__ = ["BSplineSurface", "Gap", "TrimmedSpline", "basis", "basis_matrix", "clamped_knots"]

@@ -50,6 +50,10 @@ class Options(KnownFields):
                 + choices(self.method, ("gauss-newton", "levenberg-marquardt"))
             )
 
+    def in_unit(self, unit: float) -> Options:
+        """Return the settings with lengths of the mesh's unit divided by another unit."""
+        return self
+
     @classmethod
     def preset(cls, name: str) -> Options:
         """Return the settings of a named preset."""

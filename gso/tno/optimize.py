@@ -199,7 +199,8 @@ def _solved(asked: Asked, job: Job, callback: Callback | None) -> Result:
         tolerance=given.tolerance,
         lay_out=lay_out,
     )
-    request = Request(asked.options, asked.formulation, frame.start(given.points, flat=flat))
+    options = asked.options.in_unit(unit)
+    request = Request(options, asked.formulation, frame.start(given.points, flat=flat))
     if asked.bounded:
         solution, formulation = module.search(
             run, request, asked.bounds, unit, others=not asked.formulation_given

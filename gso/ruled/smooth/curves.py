@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -177,9 +178,8 @@ class Curves:
             width = np.diff(at)[rows]
             stencil = [ids[rows], first + after[rows], ids[rows + 1], first + before[rows + 1]]
             corner = unknowns[np.stack(stencil, axis=2)]
-            value, slope = (
-                np.einsum("rc,rjcd->rjd", w, corner) for w in hermite(np.full(len(rows), 0.5), width)
-            )
+            weights = hermite(np.full(len(rows), 0.5), width)
+            value, slope = (np.einsum("rc,rjcd->rjd", w, corner) for w in weights)
             moves = ids[rows] != ids[rows + 1]
             count = int(moves.sum())
             points.append(value[moves])
@@ -217,5 +217,5 @@ class Curves:
         for k, (left, right) in enumerate(zip(self.left, self.right, strict=True)):
             broken = 1 + np.flatnonzero((left[1:-1] != right[1:-1]).any(axis=1))
             ends = np.r_[0, broken, len(left) - 1].tolist()
-            out += [(k, a, b) for a, b in zip(ends[:-1], ends[1:], strict=True) if b > a]
+            out += [(k, a, b) for a, b in pairwise(ends) if b > a]
         return out

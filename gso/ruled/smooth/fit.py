@@ -9,6 +9,7 @@ import numpy as np
 
 from gso.energy.base import Weighted, mean_weights
 from gso.energy.position import build as position
+from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.ruled.smooth.curves import Curves
 from gso.ruled.smooth.terms import Terms
@@ -20,7 +21,7 @@ from gso.typing import Array, Ints
 from gso.unknowns import Layout, Variables
 
 #: Weights of the terms; that of the turning of normals rises.
-_DISTANCE, _MOVED, _BEND, _JUMP, _BOUNDS = 10.0, 1.0, 1e-2, 1e-3, 10.0
+_DISTANCE, _MOVED, _BEND, _JUMP, _BOUNDS = 30.0, 30.0, 0.1, 0.01, 10.0
 _TURNS = (0.0, 1e-3, 1e-1, 1e1, 1e3, 1e4)
 #: Number of the weights that are used again after spans were halved, and of times that they are.
 _AGAIN, _ROUNDS = 2, 4
@@ -46,14 +47,19 @@ class Fitter:
     ----------
     source : Untrimmed
         The strips, from a surface whose diagonal is one.
+    design : Mesh, optional
+        The surface that distances are minimised from; the planar faces when not given.
     """
 
-    def __init__(self, source: Untrimmed):
+    def __init__(self, source: Untrimmed, design: Mesh | None = None):
         self.source = source
         vertices = source.vertices
-        triangles, _ = source.strips.divided(vertices)
-        self._near = Nearest.of(vertices, triangles)
-        a, b, c = vertices[triangles].transpose(1, 0, 2)
+        if design is None:
+            corner, triangles = vertices, source.strips.divided(vertices)[0]
+        else:
+            corner, triangles = design.vertices, design.triangles
+        self._near = Nearest.of(corner, triangles)
+        a, b, c = corner[triangles].transpose(1, 0, 2)
         self._normals = unit(cross(b - a, c - a))
         sides = np.diff(vertices[source.strips.sides], axis=1)[:, 0]
         self._width = float(lengths(sides).mean())
@@ -124,9 +130,7 @@ def turning(curves: Curves, ranges: Array) -> Array:
     worst = np.zeros(len(ranges))
     for s in np.linspace(0.0, 1.0, _MEASURED):
         p, q, dp, dq = curves.both(s)
-        one, two = (
-            unit(cross((1 - v[:, None]) * dp + v[:, None] * dq, q - p)) for v in ranges.T
-        )
+        one, two = (unit(cross((1 - v[:, None]) * dp + v[:, None] * dq, q - p)) for v in ranges.T)
         angle = np.arctan2(lengths(cross(one, two)), np.einsum("ed,ed->e", one, two))
         # At the end of a span beside a point where curves stay, there may be no normal.
         none = (lengths(one) < 0.5) | (lengths(two) < 0.5)

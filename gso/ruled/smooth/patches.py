@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from gso.ruled.polygon import enclosed_area
 from gso.ruled.smooth.curves import Curves
 from gso.ruled.vectors import cross, lengths, unit
-from gso.spline import BSplineSurface
+from gso.spline import BSplineSurface, TrimmedSpline
+from gso.spline.trimmed import Loop
 from gso.typing import Array, Ints
 
 #: Spans of a strip's triangles, per span of the spline, in searches for the nearest point.
@@ -43,10 +45,8 @@ class Patch:
     domain : ndarray, (3 or 4, 2)
         Corners of the domain, anticlockwise.
     sides : tuple of Side
-    rings : tuple of tuple of ndarray, (k, 2) each
-        The outlines of the part that is inside the design, each as a chain of smooth curves
-        given by points in the parameters: the outer one anticlockwise, then the holes, for each
-        part.
+    faces : tuple of tuple of Loop
+        The parts inside the outline, as in :class:`gso.spline.TrimmedSpline`.
     """
 
     spline: BSplineSurface
@@ -54,7 +54,7 @@ class Patch:
     strip: int
     domain: Array
     sides: tuple[Side, ...]
-    rings: tuple[tuple[Array, ...], ...] = ()
+    faces: tuple[tuple[Loop, ...], ...] = ()
 
     @property
     def is_flat(self) -> bool:
@@ -68,6 +68,12 @@ class Patch:
     def normals(self, uv: Array) -> Array:
         """Return unit normals (k, 3)."""
         return self.spline.normals(uv[:, 0], uv[:, 1])
+
+    def area(self, ring: Array) -> float:
+        """Return the area of a small polygon (k, 2), from the derivatives in its middle."""
+        u, v = ring.mean(axis=0)
+        by = [self.spline.evaluate(u, v, **d) for d in ({"du": 1}, {"dv": 1})]
+        return abs(enclosed_area(ring)) * float(lengths(cross(*by)))
 
     def nearest(self, points: Array, uv: Array) -> Array:
         """Return the parameters (k, 2) of the nearest points to points (k, 3), near a guess."""
@@ -96,9 +102,9 @@ class Patch:
             [np.stack([a, a + 2, a + 3], axis=1), np.stack([a, a + 3, a + 1], axis=1)]
         )
 
-    def moved(self, scale: float, shift: Array | float) -> Patch:
-        """Return the patch with every point multiplied by `scale`, then moved by `shift`."""
-        return replace(self, spline=self.spline.moved(scale, shift))
+    def trimmed(self, scale: float, shift: Array) -> TrimmedSpline:
+        """Return the parts inside the outline, moved to another frame."""
+        return TrimmedSpline(self.spline, self.faces).moved(scale, shift)
 
 
 def patches(curves: Curves) -> list[Patch]:
@@ -107,7 +113,8 @@ def patches(curves: Curves) -> list[Patch]:
     for k, first, last in curves.pieces():
         rows = slice(first, last + 1)
         ids, knots = curves.index[k][rows], curves.knots[k][rows]
-        one, two = curves.slopes[curves.right[k][rows][:-1]], curves.slopes[curves.left[k][rows][1:]]
+        right, left = curves.right[k][rows], curves.left[k][rows]
+        one, two = curves.slopes[right[:-1]], curves.slopes[left[1:]]
         ends, third = curves.points[ids], np.diff(knots)[:, None, None] / 3.0
         inner = np.stack([ends[:-1] + third * one, ends[1:] - third * two], axis=1)
         inner = inner.reshape(-1, *ends.shape[1:])

@@ -15,6 +15,8 @@ from gso.ruled.smooth.patches import Patch, bends, patches
 from gso.ruled.smooth.trim import trimmed
 from gso.ruled.surface import RuledSurface
 from gso.ruled.vectors import cross, lengths
+from gso.spline import TrimmedSpline
+from gso.spline.trimmed import Loop
 from gso.typing import Array
 
 #: Rulings at which a patch is measured, and points of each.
@@ -32,33 +34,41 @@ class SmoothSurface:
 
     Attributes
     ----------
-    patches : tuple of Patch
-        Splines of degree three along a strip and one along its rulings, and flat triangles, with
-        the outlines of the parts inside the design.
+    patches : tuple of TrimmedSpline
+        Splines of degree three along a strip (u) and one along its rulings (v), and flat
+        triangles (degree one in both), with the outlines of the parts inside the design.
     turning : float
-        Largest angle between the surface's normals at the two ends of a ruling, inside the
+        Largest angle between the normals at the two ends of a ruling, inside the
         outline, in degrees; zero for a torsal surface, which is developable.
     break_ : float
         Largest angle between the tangent planes of two patches of one strip, at the middle of
         their common ruling, in degrees. At the creases between strips side by side the angle is
         meant, and not counted.
     distances : tuple of float
-        Mean and largest distance to the surface of planar faces, in its unit.
+        Mean and largest distance from the surface of planar faces, in its unit; the larger of
+        both directions.
     """
 
-    patches: tuple[Patch, ...]
+    patches: tuple[TrimmedSpline, ...]
     turning: float
     break_: float
     distances: tuple[float, float]
 
+    @property
+    def is_torsal(self) -> bool:
+        """Whether normals turn by 0.1 degrees at most along rulings, and at common rulings."""
+        return max(self.turning, self.break_) <= np.degrees(_TORSAL)
 
-def smooth(surface: RuledSurface) -> SmoothSurface:
+
+def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSurface:
     """Replace the planar faces of a ruled surface by smooth strips with straight rulings.
 
     Parameters
     ----------
     surface : RuledSurface
         The `ruled` of a result, or what :func:`gso.loft` returns.
+    design : Mesh, optional
+        The surface that they should be close to; the planar faces when not given.
 
     Returns
     -------
@@ -90,7 +100,8 @@ def smooth(surface: RuledSurface) -> SmoothSurface:
     face, corner = np.nonzero(mesh.faces >= 0)
     points = unit_mesh.vertices[mesh.faces[face, corner]]
     unit_source = source.transformed(lambda x: (x - middle) / size)
-    fitter = Fitter(unit_source)
+    target = None if design is None else design.replaced((design.vertices - middle) / size)
+    fitter = Fitter(unit_source, target)
     found = fitter.first(points, source.owner[face])
     for attempt in range(_ATTEMPTS):
         parts = trimmed(patches(found.curves), unit_mesh)
@@ -98,13 +109,16 @@ def smooth(surface: RuledSurface) -> SmoothSurface:
         if turn <= _TORSAL or attempt == _ATTEMPTS - 1:
             break
         found = fitter.again(Smooth(found.curves, _widened(found, parts)))
-    far = Nearest(unit_mesh).distances(samples)
+    there, back = Nearest(unit_mesh).distances(samples), _back(parts, unit_mesh)
     break_ = max((bends(a, b) for a, b in _pairs(parts)), default=0.0)
     return SmoothSurface(
-        tuple(part.moved(size, middle) for part in parts),
+        tuple(part.trimmed(size, middle) for part in parts),
         float(np.degrees(turn)),
         float(np.degrees(break_)),
-        (size * float(far.mean()), size * float(far.max())),
+        (
+            size * max(float(there.mean()), float(back.mean())),
+            size * max(float(there.max()), float(back.max())),
+        ),
     )
 
 
@@ -149,15 +163,36 @@ def _measured(parts: Sequence[Patch]) -> tuple[float, Array]:
     return worst, np.concatenate(points)
 
 
+def _back(parts: Sequence[Patch], mesh: Mesh) -> Array:
+    """Return the distances of the vertices of a mesh from the parts inside the outline."""
+    import shapely
+
+    vertices, triangles, count = [], [], 0
+    for part in parts:
+        uv, faces = part.triangles()
+        inside = [[_ring(loop) for loop in loops] for loops in part.faces]
+        region = shapely.multipolygons([shapely.Polygon(r, holes) for r, *holes in inside])
+        shapely.prepare(region)
+        cells = shapely.polygons(uv[faces])
+        kept = shapely.intersects(region, cells)
+        vertices.append(part.points(uv))
+        triangles.append(count + faces[kept])
+        count += len(uv)
+    near = Nearest.of(np.concatenate(vertices), np.concatenate(triangles))
+    return near.distances(mesh.vertices)
+
+
+def _ring(loop: Loop) -> Array:
+    return np.concatenate([curve[:-1] for curve in loop])
+
+
 def _rulings(part: Patch) -> Iterator[tuple[Array, Array, Array]]:
     """Yield parameters (k,) of rulings of each outer outline, and their ends inside it."""
     import shapely
 
-    for chain in part.rings:
-        ring = np.concatenate([curve[:-1] for curve in chain])
+    for loop, *_ in part.faces:
+        ring = _ring(loop)
         outline = shapely.Polygon(ring)
-        if not shapely.is_ccw(outline.exterior):
-            continue
         low, high = ring.min(axis=0), ring.max(axis=0)
         at = low[0] + (np.arange(_RULINGS) + 0.5) / _RULINGS * (high[0] - low[0])
         ends = np.stack([np.stack([at, np.full_like(at, v)], axis=1) for v in (-1.0, 2.0)], axis=1)

@@ -1,24 +1,29 @@
-"""Energy terms of smooth strips: residuals of one span, in the form of :mod:`gso.energy`."""
+"""Energy terms of smooth strips."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from gso import geometry
 from gso.energy.base import Term, mean_weights
-from gso.geometry import ops
 from gso.ruled.smooth.curves import Curves, hermite
+from gso.ruled.smooth.residuals import (
+    bend_residual,
+    break_residual,
+    distance_residual,
+    joined_residual,
+    jump_residual,
+    length_residual,
+    speed_residual,
+    turn_residual,
+)
 from gso.ruled.vectors import cross, lengths, unit
-from gso.typing import Array, Flags
+from gso.typing import Array, Flags, Ints
 
 #: Positions in a span where its normals are compared.
 _PLACES = (0.06, 0.25, 0.5, 0.75, 0.94)
-#: Least speed across the rulings, relative to that of the strips, and least length of the
-#: rulings; the rounding of both bounds.
-_SPEED, _LENGTH, _ROUND = 0.2, 0.4, 1e-2
 #: Speed, relative to the mean width, below which normals lose their meaning, and least width
 #: that speeds are compared with.
 _SLOW, _NARROW = 3e-4, 0.02
@@ -28,134 +33,6 @@ _ACROSS, _ALONG = 4, (0.25, 0.75)
 #: own, for spans of width one.
 _SPEEDS = np.array([[0.0, 1, 0, 0], [-3, -1, 3, -1], [0, 0, 0, 1]])
 _CONTROLS = np.array([[1.0, 0, 0, 0], [1, 1 / 3, 0, 0], [0, 0, 1, -1 / 3], [0, 0, 1, 0]])
-
-Points = Sequence[tuple[Any, ...]]
-Numbers = Sequence[Any]
-
-
-def _sum(weights: Numbers, points: Points) -> tuple[Any, ...]:
-    return tuple(
-        sum(w * x for w, x in zip(weights, parts, strict=True))
-        for parts in zip(*points, strict=True)
-    )
-
-
-def _mixed(v: Any, p: tuple[Any, ...], q: tuple[Any, ...]) -> tuple[Any, ...]:
-    return tuple((1 - v) * x + v * y for x, y in zip(p, q, strict=True))
-
-
-def _below(x: Any) -> Any:
-    """Return the negative part of a number, rounded off at zero."""
-    return 0.5 * (x - ops.sqrt(x * x + _ROUND**2))
-
-
-def turn_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
-    """Return the difference of the unit normals at two places of a ruling.
-
-    It is zero for a torsal ruling, along which the tangent plane is constant.
-
-    Points: end, derivative, next end, derivative of one curve, and of the other. Constants:
-    weights of the four for the value, then for the derivative; the places from 0 to 1; the
-    square of a small length that bounds the length of the normals from below.
-    """
-    value, slope, (v0, v1, least) = constants[:4], constants[4:8], constants[8:]
-    one, two = points[:4], points[4:]
-    way = geometry.sub(_sum(value, two), _sum(value, one))
-    speeds = _sum(slope, one), _sum(slope, two)
-    normals = [geometry.cross(_mixed(v, *speeds), way) for v in (v0, v1)]
-    sizes = [ops.sqrt(geometry.dot(n, n) + least) for n in normals]
-    return tuple(a / sizes[0] - b / sizes[1] for a, b in zip(*normals, strict=True))
-
-
-def speed_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
-    """Return by how much speeds across the rulings are too low, at two places of a ruling.
-
-    Constants: weights of the four points of a curve; the places; the direction (3) across the
-    rulings; the width of the span at both places.
-    """
-    weights, places, side, widths = constants[:4], constants[4:6], constants[6:9], constants[9:]
-    speeds = _sum(weights, points[:4]), _sum(weights, points[4:])
-    return tuple(
-        _below(geometry.dot(_mixed(v, *speeds), side) / w - _SPEED)
-        for v, w in zip(places, widths, strict=True)
-    )
-
-
-def length_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
-    """Return by how much a ruling is too short.
-
-    Constants: weights of the four points of a curve; the direction (3) of the rulings; the
-    length.
-    """
-    weights, along, length = constants[:4], constants[4:7], constants[7]
-    way = geometry.sub(_sum(weights, points[4:]), _sum(weights, points[:4]))
-    return (_below(geometry.dot(way, along) / length - _LENGTH),)
-
-
-def distance_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
-    """Return the distance of a point from a plane.
-
-    Constants: weights of the four points of a curve; the place on the ruling; the plane's
-    normal (3), and its offset.
-    """
-    weights, v, normal, offset = constants[:4], constants[4], constants[5:8], constants[8]
-    at = _mixed(v, _sum(weights, points[:4]), _sum(weights, points[4:]))
-    return (geometry.dot(at, normal) - offset,)
-
-
-def bend_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
-    """Return the second derivatives of a curve at both ends of a span, times its squared width.
-
-    Constants: the width.
-    """
-    p, a, q, b = points
-    h = constants[0]
-    first = _sum((-6, -4 * h, 6, -2 * h), (p, a, q, b))
-    return (*first, *_sum((6, 2 * h, -6, 4 * h), (p, a, q, b)))
-
-
-def jump_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
-    """Return the jump of the second derivative of a curve at a ruling, times a squared width.
-
-    Points: end, derivative, the end in the middle, its derivative, next end, derivative.
-    Constants: the factors of the six.
-    """
-    return _sum(constants, points)
-
-
-def break_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
-    """Return the difference of the unit normals before and after a ruling, at a place of it.
-
-    Points: both ends; the derivatives of both curves before, and those after. Constants: the
-    place; the square of a small length.
-    """
-    p, q, *slopes = points
-    v, least = constants
-    way = geometry.sub(q, p)
-    normals = [geometry.cross(_mixed(v, *x), way) for x in (slopes[:2], slopes[2:])]
-    one, two = (ops.sqrt(geometry.dot(n, n) + least) for n in normals)
-    return tuple(a / one - b / two for a, b in zip(*normals, strict=True))
-
-
-def joined_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
-    """Return the differences of a flat triangle's unit normal from two at a ruling beside it.
-
-    Points and constants as for :func:`turn_residual`, then the triangle's third corner, and the
-    sign of its normal.
-    """
-    one, two, third = points[:4], points[4:8], points[8]
-    value, slope, (v0, v1, least, sign) = constants[:4], constants[4:8], constants[8:]
-    p, q = _sum(value, one), _sum(value, two)
-    way = geometry.sub(q, p)
-    flat = geometry.cross(geometry.sub(third, p), way)
-    size = ops.sqrt(geometry.dot(flat, flat) + least)
-    speeds = _sum(slope, one), _sum(slope, two)
-    out: list[Any] = []
-    for v in (v0, v1):
-        normal = geometry.cross(_mixed(v, *speeds), way)
-        own = ops.sqrt(geometry.dot(normal, normal) + least)
-        out += [a / own - sign * b / size for a, b in zip(normal, flat, strict=True)]
-    return tuple(out)
 
 
 class Terms:
@@ -278,17 +155,29 @@ class Terms:
     def breaks(self) -> Term | None:
         """Return the angles at rulings where derivatives are not continuous; None without any."""
         curves, spans, n = self.curves, self._spans, len(self.curves.points)
-        rows, places = [], []
+        rows, rest = [], []
+        ends: dict[tuple[int, int], tuple[list[int], float]] = {}
         for e in range(len(spans.row)):
             k, i, j = (int(x[e]) for x in (spans.sequence, spans.row, spans.column))
-            left, right = (x[k][i, j : j + 2] for x in (curves.left, curves.right))
-            if i and (left != right).any():
-                rows.append([*curves.index[k][i, j : j + 2], *(n + left), *(n + right)])
-                places.append(self.ranges[e].mean())
-        if not rows:
-            return None
-        constants = np.stack([np.array(places), np.full(len(places), self._least)], axis=1)
-        return _mean("break", break_residual, np.array(rows), constants)
+            own, place = slice(j, j + 2), float(self.ranges[e].mean())
+            index, left, right = curves.index[k], curves.left[k], curves.right[k]
+            if i and (left[i, own] != right[i, own]).any():
+                rows.append([*index[i, own], *(n + left[i, own]), *(n + right[i, own])])
+                rest.append([place, self._least, 1.0])
+            # Two sequences may end at the same ruling.
+            for at, slopes, way in ((0, right[0], -1.0), (len(index) - 1, left[-1], 1.0)):
+                if i != min(at, len(index) - 2):
+                    continue
+                pair, by = index[at, own].tolist(), (n + slopes[own]).tolist()
+                if pair[0] > pair[1]:
+                    pair, by, place = pair[::-1], by[::-1], 1.0 - place
+                key = pair[0], pair[1]
+                if key in ends:
+                    other, old = ends[key]
+                    rows.append([*pair, *by, *other])
+                    rest.append([place, self._least, -way * old])
+                ends[key] = by, way
+        return _mean("break", break_residual, np.array(rows), np.array(rest)) if rows else None
 
     def joined(self) -> Term | None:
         """Return the angles between flat triangles and the strips beside them, if there are any."""
@@ -326,7 +215,7 @@ def _outermost(curves: Curves) -> Flags:
     return (spans.row == 0) | (spans.row == last)
 
 
-def _mean(name: str, residual: Any, ids: Array, constants: Array, *, linear: bool = False) -> Term:
+def _mean(name: str, residual: Any, ids: Ints, constants: Array, *, linear: bool = False) -> Term:
     return Term(
         name,
         residual,

@@ -13,14 +13,21 @@ from gso.mesh.closest_point import Nearest
 from gso.ruled.polygon import turning
 from gso.ruled.smooth.patches import Patch
 from gso.ruled.vectors import lengths, unit
+from gso.spline.trimmed import Loop
 from gso.typing import Array, Flags, Ints
 
 #: Length of outline segments that cross sides of patches, relative to the diagonal.
 _SHORT = 1e-6
 #: Turn of the outline that is a corner, in radians.
 _CORNER = 0.3
+#: Distance of parameters within which points are the same.
+_SAME = 1e-7
 #: Digits of the parameters of outlines.
 _DIGITS = 10
+#: Area of holes, relative to the squared diagonal, that come from an outline that crosses itself.
+_HOLE = 1e-5
+#: Turn of the outline, in radians, from which it goes back.
+_BACK = 2.5
 #: Shares of the corners of a triangle below this are zero.
 _EDGE = 1e-9
 
@@ -63,14 +70,14 @@ def trimmed(patches: Sequence[Patch], mesh: Mesh) -> list[Patch]:
     for loop in mesh.boundary_loops:
         points = mesh.vertices[loop]
         sharp = _corners(points)
-        for k, uv, own in _divided(patches, *_traced(places, points, sharp)):
-            arcs[k].append((uv, own))
+        for k, uv, corner in _divided(patches, *_traced(places, points, sharp)):
+            arcs[k].append((uv, corner))
     inside = _Inside(mesh)
     out = []
     for patch, own in zip(patches, arcs, strict=True):
-        rings = _rings(patch, own, inside)
-        if rings:
-            out.append(replace(patch, rings=tuple(rings)))
+        faces = _faces(patch, own, inside)
+        if faces:
+            out.append(replace(patch, faces=tuple(faces)))
     return out
 
 
@@ -81,27 +88,28 @@ def _corners(points: Array) -> Flags:
     return np.asarray(turn < np.cos(_CORNER))
 
 
-def _traced(places: _Places, points: Array, sharp: Flags) -> tuple[Ints, Array, Flags]:
+def _traced(places: _Places, points: Array, sharp: Flags) -> tuple[Ints, Array, Flags, Flags]:
     """Locate a closed polygon on the patches.
 
-    Segments between different patches are halved until they are short.
+    Segments between different patches are halved until they are short. The last array tells the
+    points that were given from those between them.
     """
     owner, uv = places.locate(points)
-    flag = sharp.copy()
+    flag, given = sharp, np.ones(len(points), bool)
     while True:
         after = np.roll(points, -1, axis=0)
         k = np.flatnonzero((owner != np.roll(owner, -1)) & (lengths(after - points) > _SHORT))
         if not k.size:
-            return owner, uv, flag
+            return owner, uv, flag, given
         middle = 0.5 * (points[k] + after[k])
         more = places.locate(middle)
         points = np.insert(points, k + 1, middle, axis=0)
         owner, uv = np.insert(owner, k + 1, more[0]), np.insert(uv, k + 1, more[1], axis=0)
-        flag = np.insert(flag, k + 1, False)
+        flag, given = (np.insert(x, k + 1, False) for x in (flag, given))
 
 
 def _divided(
-    patches: Sequence[Patch], owner: Ints, uv: Array, sharp: Flags
+    patches: Sequence[Patch], owner: Ints, uv: Array, sharp: Flags, given: Flags
 ) -> list[tuple[int, Array, Flags]]:
     """Divide a closed polygon at the sides of patches.
 
@@ -118,7 +126,9 @@ def _divided(
         ring, own = np.roll(uv, -first, axis=0), np.roll(sharp, -first)
         own[0] = True
         return [(k, np.vstack([ring, ring[:1]]), np.r_[own, True])]
-    owner, uv, sharp = (np.roll(x, -change[0], axis=0) for x in (owner, uv, sharp))
+    first = -int(change[0])
+    owner, uv = np.roll(owner, first), np.roll(uv, first, axis=0)
+    sharp, given = np.roll(sharp, first), np.roll(given, first)
     starts = np.flatnonzero(owner != np.roll(owner, 1))
     parts = [np.arange(a, b) for a, b in zip(starts, np.r_[starts[1:], len(owner)], strict=True)]
     count = len(parts)
@@ -132,8 +142,9 @@ def _divided(
         ends[n], begins[(n + 1) % count] = crossing
     out = []
     for rows, begin, end in zip(parts, begins, ends, strict=True):
-        # The points beside a side are that close to it only because segments were halved.
-        inner = [r for r in rows if min(_apart(uv[r], begin), _apart(uv[r], end)) > 1e-4]
+        inner = rows[given[rows]]
+        near = [min(_apart(uv[r], begin), _apart(uv[r], end)) > _SAME for r in inner]
+        inner = inner[near]
         line = np.vstack([begin[None], uv[inner].reshape(-1, 2), end[None]])
         out.append((int(owner[rows[0]]), line, np.r_[True, sharp[inner], True]))
     return out
@@ -189,13 +200,14 @@ class _Inside:
 
     def __call__(self, points: Array) -> Flags:
         which, shares, _ = self._near.locate(points)
-        return ~((shares < _EDGE) & self._rim[which]).any(axis=1)
+        outside = np.asarray((shares < _EDGE) & self._rim[which]).any(axis=1)
+        return np.logical_not(outside)
 
 
-def _rings(
+def _faces(
     patch: Patch, arcs: list[tuple[Array, Flags]], inside: _Inside
-) -> list[tuple[Array, ...]]:
-    """Return the outlines of the part of a patch inside a mesh, as chains of smooth curves."""
+) -> list[tuple[Loop, ...]]:
+    """Return the outlines of the parts of a patch inside a mesh."""
     import shapely
 
     arcs = [(np.round(uv, _DIGITS), sharp) for uv, sharp in arcs]
@@ -210,19 +222,36 @@ def _rings(
         at = np.array(cell.representative_point().coords)
         if not inside(patch.points(at))[0]:
             continue
+        loops: list[Loop] = []
         for k, ring in enumerate([cell.exterior, *cell.interiors]):
             uv = np.asarray(ring.coords)[:-1]
-            if (shapely.is_ccw(ring)) != (k == 0):
-                uv = uv[::-1]
-            out.append(_chain(uv, corner))
+            if k and patch.area(uv) < _HOLE:
+                continue
+            uv = _without_spikes(uv, corner)
+            loops.append(_chain(uv if shapely.is_ccw(ring) == (k == 0) else uv[::-1], corner))
+        out.append(tuple(loops))
     return out
+
+
+def _without_spikes(ring: Array, corner: set[tuple[float, ...]]) -> Array:
+    """Leave out points of a ring (k, 2), other than corners, where it nearly turns back.
+
+    Close to the common point of a fan of rulings the outline may go back and forth.
+    """
+    while len(ring) > 4:
+        turn = np.abs(turning(ring))
+        turn[[tuple(x) in corner for x in ring.tolist()]] = 0.0
+        if turn.max() < _BACK:
+            break
+        ring = np.delete(ring, int(turn.argmax()), axis=0)
+    return ring
 
 
 def _border(domain: Array, points: list[Array]) -> Array:
     """Return the corners of a domain and points on its border, in their order around it."""
     after = np.roll(domain, -1, axis=0)
     keys, found = [], []
-    for k, (a, b) in enumerate(zip(domain, after, strict=True)):
+    for k, a in enumerate(domain):
         keys.append(float(k))
         found.append(a)
     for x in points:
@@ -239,7 +268,7 @@ def _border(domain: Array, points: list[Array]) -> Array:
     return out[new]
 
 
-def _chain(ring: Array, corner: set[tuple[float, ...]]) -> tuple[Array, ...]:
+def _chain(ring: Array, corner: set[tuple[float, ...]]) -> Loop:
     """Divide a ring (k, 2) at corners."""
     at = [k for k, x in enumerate(ring.tolist()) if tuple(x) in corner]
     if not at:

@@ -59,6 +59,7 @@ def ruled_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
     true = surface.distances(design)
     percent = 100.0 / design.diagonal
     flat, sheet = surface.pattern.flat, surface.pattern.surface(surface.mesh)
+    turns = surface.creases.turns(surface.mesh.vertices)
     return measure.strains(sheet, flat) | {
         "distance_mean": percent * max(true.there_mean, true.back_mean),
         "distance_max": percent * max(true.there_max, true.back_max),
@@ -72,6 +73,7 @@ def ruled_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
         "rulings_crossed": float(surface.crossed),
         "bend_radius_min": surface.rulings.smallest_radius,
         "crease_angle_max": float(np.degrees(surface.creases.largest_angle)),
+        "crease_turn_max": float(np.degrees(turns.max(initial=0.0))),
     }
 
 

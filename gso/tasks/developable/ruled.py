@@ -14,18 +14,24 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gso import parametrization
-from gso.constraints.parts import Pins
+from gso.constraints import Compiled
+from gso.constraints.parts import OnPlane, Pins, Relations, Straight
 from gso.errors import MeshError, OptionError
 from gso.mesh.normals import vertex_normals
+from gso.ruled.conditions import Conditions
+from gso.ruled.mirror import Mirror
 from gso.status import Progress, Status
 from gso.tasks.base import Plan, Request, Solution
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.options import Options as BaseOptions
+from gso.typing import Array
 
 #: Surfaces whose normals give first rulings.
 _STARTS = ("design", "curvature")
 #: Distance of vertices from their places, relative to the diagonal, that counts as zero.
 _SAME = 1e-9
+#: Radius that the solve keeps, relative to the smallest one.
+_SAFE = 1.6
 
 
 @dataclass(frozen=True)
@@ -45,6 +51,9 @@ class Options(BaseOptions):
         for a single strip.
     max_crease : float or None
         Largest angle at a crease between strips, in degrees.
+    min_radius : float or None
+        Smallest radius of the bends, in the unit of the mesh; a result with a smaller one is not
+        usable.
     starts : tuple of str
         Surfaces whose normals give first rulings: "design", "curvature" (the result of that
         formulation). The best result of all is kept. A warm start `x0` replaces "curvature".
@@ -60,6 +69,7 @@ class Options(BaseOptions):
     rulings: int = 33
     flats: bool = False
     max_crease: float | None = None
+    min_radius: float | None = None
     starts: tuple[str, ...] = _STARTS
 
     def __post_init__(self) -> None:
@@ -81,6 +91,9 @@ class Options(BaseOptions):
         if not self.starts or set(self.starts) - set(_STARTS):
             raise OptionError(f"starts is {self.starts!r}; it must name some of {_STARTS}")
 
+    def in_unit(self, unit: float) -> Options:
+        return self if self.min_radius is None else replace(self, min_radius=self.min_radius / unit)
+
 
 def plan(analysis: Analysis, request: Request, before: Callable[[Analysis, Request], Plan]) -> Plan:
     """Plan the solve of `before` where its result is wanted, and then that for the strips.
@@ -93,11 +106,17 @@ def plan(analysis: Analysis, request: Request, before: Callable[[Analysis, Reque
         There are constraints other than positions.
     """
     compiled = analysis.constraints
-    if compiled.flat or not all(isinstance(part, Pins) for part in compiled.parts):
-        raise OptionError(
-            "the formulation 'ruled' takes constraints on the positions of vertices only: Fixed, "
-            "FixedBoundary and Handle; leave the others out, or take 'curvature'"
-        )
+    plane = _mirror(compiled)
+    for part in compiled.parts:
+        mirrored = plane is not None and isinstance(part, OnPlane | Relations)
+        if compiled.flat or not (isinstance(part, Pins | Straight) or mirrored):
+            raise OptionError(
+                f"{compiled.names[part.owner]}: the formulation 'ruled' takes Fixed, "
+                "FixedBoundary, Handle, Ruling and one SymmetryPlane; leave it out, or take "
+                "'curvature'"
+            )
+    if plane is not None and request.options.flats:
+        raise OptionError("flats=True does not go with a SymmetryPlane; leave one of them out")
     mesh = analysis.mesh
     if not parametrization.flattens(mesh) or analysis.opened.cut is not None:
         raise MeshError(
@@ -124,10 +143,12 @@ def _converted(
 
     options: Options = request.options
     size = analysis.mesh.diagonal
-    pins, targets = analysis.constraints.pinned_positions
+    compiled = analysis.constraints
+    pins, targets = compiled.pinned_positions
     # Where constraints move vertices, the surface that meets them is the design.
     same = np.abs(targets - analysis.mesh.vertices[pins]).max(initial=0.0) <= _SAME * size
     near = analysis.mesh.vertices if same else before.points
+    near = _symmetric(compiled, near)
     mesh = analysis.mesh.replaced(near / size)
     domain = Domain(mesh, parametrization.begin(mesh).flat)
     starts = {"design": domain.normals} if "design" in options.starts else {}
@@ -145,6 +166,16 @@ def _converted(
         options.flats,
         None if bound is None else bound / size,
         None if options.max_crease is None else float(np.radians(options.max_crease)),
+        None if options.min_radius is None else options.min_radius / size,
+    )
+    beams = [part for part in compiled.parts if isinstance(part, Straight)]
+    plane = _mirror(compiled)
+    conditions = Conditions(
+        points=targets / size if len(pins) else None,
+        lines=np.array([b.ends for b in beams]) / size if beams else None,
+        chords=np.array([domain.flat[b.ids[[0, -1]]] for b in beams]) if beams else None,
+        mirror=None if plane is None else Mirror(plane.normal, plane.offset / size),
+        radius=None if wanted.min_radius is None else _SAFE * wanted.min_radius,
     )
     stopped = False
 
@@ -159,12 +190,19 @@ def _converted(
         starts or {"design": domain.normals},
         wanted,
         told,
-        targets / size if len(pins) else None,
+        conditions,
     )
     if found is None:
         return replace(before, status=Status.CANCELLED)
     surface = found.surface.transformed(lambda points: size * points, size, lambda rows: rows)
-    missed = bounded and not wanted.met(found)
+    moved = surface.moved.copy()
+    for beam in beams:
+        moved[beam.ids] = surface.on_ruling(beam.ends, moved[beam.ids])
+    if conditions.mirror is not None and conditions.mirror.partners(found.ends) is not None:
+        # Vertices on the plane may be as near to a point as to its image.
+        moved = _symmetric(compiled, moved)
+    surface = replace(surface, moved=moved)
+    missed = (bounded or wanted.min_radius is not None) and not wanted.met(found)
     status = Status.TARGET_MISSED if missed else Status.CONVERGED
     return replace(
         before,
@@ -176,6 +214,28 @@ def _converted(
         ruled=surface,
         stage=None,
     )
+
+
+def _mirror(compiled: Compiled) -> OnPlane | None:
+    """Return the plane of a single symmetry; None if there is none."""
+    owners = {p.owner for p in compiled.parts if isinstance(p, Relations) and not p.is_glue}
+    planes = [p for p in compiled.parts if isinstance(p, OnPlane) and p.owner in owners]
+    return planes[0] if len(owners) == len(planes) == 1 else None
+
+
+def _symmetric(compiled: Compiled, points: Array) -> Array:
+    """Return points moved to the nearest symmetric places, if there is a plane of symmetry."""
+    out = points.copy()
+    for part in compiled.parts if _mirror(compiled) is not None else ():
+        if isinstance(part, Relations):
+            one, other = points[part.first], points[part.second]
+            image = part.anchor + (other - part.anchor) @ part.matrix
+            out[part.first] = 0.5 * (one + image)
+            out[part.second] = part.anchor + (out[part.first] - part.anchor) @ part.matrix.T
+        elif isinstance(part, OnPlane):
+            off = (points[part.ids] - part.anchor) @ part.normal
+            out[part.ids] -= np.outer(off, part.normal)
+    return out
 
 
 def _said(tried: dict[int, float]) -> str:
