@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +16,9 @@ from gso.ruled.smooth.fit import _places
 from gso.ruled.smooth.patches import patches
 from gso.ruled.smooth.surface import smooth_strips
 from gso.ruled.untrimmed import Untrimmed
-from tests.conftest import cylinder, saddle
+from tests.conftest import cylinder
+
+ROOT = Path(__file__).resolve().parents[1]
 
 
 def fan(strips=2):
@@ -30,7 +33,8 @@ def fan(strips=2):
 
 @pytest.fixture(scope="module")
 def solved():
-    return gso.tno.optimize(saddle(17, strength=0.25), options=gso.RuledOptions(strips=2))
+    panel = gso.load(ROOT / "examples" / "panel.obj")
+    return gso.tno.optimize(panel, options=gso.RuledOptions(strips=3, starts=("design",)))
 
 
 def test_hermite_weights_reproduce_cubics():

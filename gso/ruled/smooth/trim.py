@@ -24,8 +24,9 @@ _CORNER = 0.3
 _SAME = 1e-7
 #: Digits of the parameters of outlines.
 _DIGITS = 10
-#: Area of holes, relative to the squared diagonal, that come from an outline that crosses itself.
-_HOLE = 1e-5
+#: Areas of parts and of holes, relative to the squared diagonal, that are left out: they come from
+#: an outline that crosses itself.
+_TINY = 1e-6, 1e-5
 #: Turn of the outline, in radians, from which it goes back.
 _BACK = 2.5
 #: Shares of the corners of a triangle below this are zero.
@@ -225,11 +226,14 @@ def _faces(
         loops: list[Loop] = []
         for k, ring in enumerate([cell.exterior, *cell.interiors]):
             uv = np.asarray(ring.coords)[:-1]
-            if k and patch.area(uv) < _HOLE:
+            if patch.area(uv) < _TINY[min(k, 1)]:
+                if k == 0:
+                    break
                 continue
             uv = _without_spikes(uv, corner)
             loops.append(_chain(uv if shapely.is_ccw(ring) == (k == 0) else uv[::-1], corner))
-        out.append(tuple(loops))
+        if loops:
+            out.append(tuple(loops))
     return out
 
 
