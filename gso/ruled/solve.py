@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -209,7 +209,7 @@ class _Search:
         surface = built(job, evened(job, fit))
         far = surface.distances(job.target.domain.mesh)
         return Found(
-            surface,
+            replace(surface, deviation=far),
             max(far.there_mean, far.back_mean),
             max(far.there_max, far.back_max),
             start,

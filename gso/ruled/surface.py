@@ -54,6 +54,8 @@ class RuledSurface:
         Number of pairs of successive rulings that cross.
     untrimmed : Untrimmed or None
         The strips that it was cut out of; None in files of earlier versions.
+    deviation : Distances or None
+        Its distances from the design, where they are known; see :meth:`distances`.
     """
 
     mesh: Mesh
@@ -65,6 +67,7 @@ class RuledSurface:
     moved: Array
     crossed: int
     untrimmed: Untrimmed | None = None
+    deviation: metrics.Distances | None = None
 
     @property
     def strips(self) -> int:
@@ -231,6 +234,9 @@ class RuledSurface:
             creases=replace(self.creases, radii=scale * self.creases.radii),
             pattern=replace(self.pattern, flat=scale * self.pattern.flat),
             moved=move(back(self.moved)),
+            deviation=None
+            if self.deviation is None
+            else metrics.Distances(*(scale * x for x in self.deviation)),
             untrimmed=None if self.untrimmed is None else self.untrimmed.transformed(move),
         )
 

@@ -89,7 +89,7 @@ def ruled(result: Result, asked: Asked) -> Iterator[str]:
     surface = result.ruled
     if surface is None:
         return
-    far = surface.distances(result.design)
+    far = surface.deviation or surface.distances(result.design)
     deviation = max(far.there_max, far.back_max)
     found = {"deviation": deviation, **asked.limits, "strain_max": 0.0}
     if result.pattern is not None:

@@ -56,7 +56,7 @@ def ruled_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
     It has no Gaussian curvature, so there is none here. Distances are measured all over both
     surfaces; each is the larger one of both directions.
     """
-    true = surface.distances(design)
+    true = surface.deviation or surface.distances(design)
     percent = 100.0 / design.diagonal
     flat, sheet = surface.pattern.flat, surface.pattern.surface(surface.mesh)
     turns = surface.creases.turns(surface.mesh.vertices)

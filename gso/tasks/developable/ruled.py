@@ -25,11 +25,14 @@ from gso.tasks.base import Plan, Request, Solution
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.options import Options as BaseOptions
 from gso.typing import Array
+from gso.unknowns import Layout
 
 #: Surfaces whose normals give first rulings.
 _STARTS = ("design", "curvature")
 #: Distance of vertices from their places, relative to the diagonal, that counts as zero.
 _SAME = 1e-9
+#: Angle of a fold, in degrees, that a note is made of.
+_SHARP = 45.0
 #: Radius that the solve keeps, relative to the smallest one.
 _SAFE = 1.6
 
@@ -130,7 +133,7 @@ def plan(analysis: Analysis, request: Request, before: Callable[[Analysis, Reque
     elif "curvature" in request.options.starts or not compiled.empty:
         first = before(analysis, made)
     else:
-        first = replace(before(analysis, made), stages=(), start=mesh.vertices.ravel())
+        first = Plan(Layout.of(len(mesh.vertices), "surface"), mesh.vertices.ravel(), ())
     return replace(first, convert=partial(_converted, analysis, request), details={}, notes=())
 
 
@@ -202,6 +205,13 @@ def _converted(
         # Vertices on the plane may be as near to a point as to its image.
         moved = _symmetric(compiled, moved)
     surface = replace(surface, moved=moved)
+    notes = before.notes
+    sharpest = np.degrees(surface.rulings.largest_angle)
+    if sharpest > _SHARP:
+        notes += (
+            f"the surface folds by {sharpest:.0f} degrees at one ruling; more strips, or "
+            "min_radius, bend it more gently",
+        )
     missed = (bounded or wanted.min_radius is not None) and not wanted.met(found)
     status = Status.TARGET_MISSED if missed else Status.CONVERGED
     return replace(
@@ -212,6 +222,7 @@ def _converted(
         energy={"distance": found.mean},
         details={"strips": surface.strips, "rulings_from": found.start, "tried": _said(tried)},
         ruled=surface,
+        notes=notes,
         stage=None,
     )
 
