@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     # The same names for type checkers and editors; they are imported at first use.
-    from gso import constraints, dataset, hybrid, io, metrics, net, plot, rulings, tno
+    from gso import constraints, dataset, hybrid, io, metrics, net, plot, rulings, seams, tno
     from gso import verdict as verdict
     from gso.constraints import (
         Fixed,
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         Handle,
         OnCurve,
         PlanarFaces,
+        Ruling,
         SlidingBoundary,
         SymmetryPlane,
     )
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from gso.result import Result
     from gso.ruled.loft import loft
     from gso.ruled.smooth.surface import smooth_strips
+    from gso.seams import cut
     from gso.spline import BSplineSurface
     from gso.spline.fit import fit_spline
     from gso.status import Progress, Status
@@ -80,6 +82,7 @@ __all__ = [
     "Progress",
     "Result",
     "RuledOptions",
+    "Ruling",
     "SlidingBoundary",
     "Status",
     "SymmetryPlane",
@@ -87,6 +90,7 @@ __all__ = [
     "__version__",
     "as_mesh",
     "constraints",
+    "cut",
     "dataset",
     "fit_spline",
     "hybrid",
@@ -99,6 +103,7 @@ __all__ = [
     "rulings",
     "save",
     "save_spline",
+    "seams",
     "smooth_strips",
     "tno",
     "topology",
@@ -124,6 +129,7 @@ _NAMES = {
     "DatasetError": "gso.errors",
     "ConvergenceWarning": "gso.errors",
     "Options": "gso.tasks.options",
+    "cut": "gso.seams",
     "loft": "gso.ruled.loft",
     "smooth_strips": "gso.ruled.smooth.surface",
     "Fixed": "gso.constraints",
@@ -158,6 +164,7 @@ _MODULES = (
     "hybrid",
     "plot",
     "rulings",
+    "seams",
 )
 
 

@@ -73,11 +73,12 @@ class Nearest:
         """
         _, triangle, foot = self._query(points)
         a, b, c = (self._vertices[self._triangles[triangle, k]] for k in range(3))
-        u, v, w = b - a, c - a, foot - a
-        uu, uv, vv, uw, vw = (
-            np.einsum("ij,ij->i", x, y) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w))
-        )
+        # Solvers ask for points of steps that they then reject, which may not be finite.
         with np.errstate(invalid="ignore", divide="ignore"):
+            u, v, w = b - a, c - a, foot - a
+            uu, uv, vv, uw, vw = (
+                np.einsum("ij,ij->i", x, y) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w))
+            )
             second, third = np.array([vv * uw - uv * vw, uu * vw - uv * uw]) / (uu * vv - uv * uv)
         shares = np.nan_to_num(np.clip(np.stack([1 - second - third, second, third], axis=1), 0, 1))
         # Triangles without area count as their first corner.
