@@ -177,6 +177,27 @@ def test_norms_do_what_they_say(surfaces):
     assert by_norm["mixed"][2] < by_norm["l2"][2]
 
 
+def test_minimax_lowers_the_largest_strains(surfaces):
+    for points in surfaces:
+        strain = solve(points)
+        least = solve(points, formulation="minimax")
+        assert least.metrics["flipped_cells"] == 0
+        assert least.metrics["strain_p99"] < 0.9 * strain.metrics["strain_p99"]
+        assert least.metrics["strain_max"] < 0.8 * strain.metrics["strain_max"]
+        # The lengths of the edges, which are not minimised, are distorted less, too.
+        edges = strain.design.edges
+        one, two = (_stretched(strain.design, x.flat, edges) for x in (strain, least))
+        assert two < one
+
+
+def _stretched(mesh, flat, edges):
+    """Return the largest relative change of the lengths of edges."""
+    here, there = (
+        np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1) for x in (mesh.vertices, flat)
+    )
+    return np.abs(there / here - 1.0).max()
+
+
 def test_lengths_reach_the_published_metric(surfaces):
     for points in surfaces:
         strain = solve(points).metrics
@@ -328,7 +349,14 @@ def test_orientation_limit_is_the_first_collapse():
 
 
 @pytest.mark.parametrize(
-    "loss", [stretch.TwoPowerLoss(0.02), stretch.TwoPowerLoss(0.1, knee=np.inf, eps=0.03)]
+    "loss",
+    [
+        stretch.TwoPowerLoss(0.02),
+        stretch.TwoPowerLoss(0.1, knee=np.inf, eps=0.03),
+        stretch.PowerLoss(0.05, 2.0),
+        stretch.PowerLoss(0.05, 4.0),
+        stretch.PowerLoss(0.05, 16.0),
+    ],
 )
 def test_spread_has_the_derivative_it_says(loss):
     r = np.random.default_rng(1).standard_normal((12, 5)) * 0.05

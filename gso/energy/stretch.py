@@ -116,6 +116,39 @@ class TwoPowerLoss:
         return (first * parts).reshape(r.shape), (first + growth * parts**2).reshape(r.shape)
 
 
+@dataclass(frozen=True)
+class PowerLoss:
+    """A power of a corner's strain s: ``scale^2 (2/q) (s / scale)^q``.
+
+    With a high power the sum over the corners approaches the largest strain.
+
+    Attributes
+    ----------
+    scale : float
+        Strain at which the loss is as steep as the squared one.
+    q : float
+        The power, 2 or more.
+    """
+
+    scale: float
+    q: float
+
+    def _squares(self, r: Array) -> tuple[Array, Array]:
+        parts = r.reshape(3, -1, r.shape[1])
+        return parts, 0.5 / self.scale**2 * (parts * parts).sum(axis=0)
+
+    def value(self, r: Array) -> Array:
+        """Return the loss of each corner."""
+        return self.scale**2 * 2.0 / self.q * self._squares(r)[1] ** (0.5 * self.q)
+
+    def weights(self, r: Array) -> tuple[Array, Array]:
+        """Return the derivative, and the curvature without cross terms."""
+        parts, y = self._squares(r)
+        first = y ** (0.5 * self.q - 1.0)
+        growth = (0.5 * self.q - 1.0) * y ** max(0.5 * self.q - 2.0, 0.0) / self.scale**2
+        return (first * parts).reshape(r.shape), (first + growth * parts**2).reshape(r.shape)
+
+
 def cells(mesh: Mesh) -> list[Ints]:
     """List the faces that must not be inverted in the plane, by size: (e, 4) and (e, 3).
 

@@ -4,8 +4,9 @@
 ``lengths`` minimises the published isometry defect of the cells (Wang et al. 2024), which does
 not see some shear; use it for comparison. ``isometry`` minimises the squared defect of Jiang et
 al. 2020 with their regulariser of the mapping, like the isometry formulation of the developable
-task, but with the surface fixed. All start from an image without inverted triangles, and no step
-inverts a triangle. Grids are solved coarse to fine.
+task, but with the surface fixed. ``minimax`` makes the largest strains small, by a high power of
+the strain; it starts from the image of ``strain``. All start from an image without inverted
+triangles, and no step inverts a triangle. Grids are solved coarse to fine.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from gso.tasks.flatten.stages import (
 from gso.typing import Array
 from gso.unknowns import Layout
 
-FORMULATIONS = ("strain", "lengths", "isometry")
+FORMULATIONS = ("strain", "lengths", "isometry", "minimax")
 #: The formulation that a preset belongs to.
 IMPLIES = {"jiang2020": "isometry"}
 BLOCK = "flat"

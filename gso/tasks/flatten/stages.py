@@ -41,6 +41,10 @@ _LARGE_STRAIN = 0.03
 _NEARLY = 1e-2
 #: Ratio of a start's strain to the level above which an "l2" stage precedes the other loss.
 STRAINED = 1.5
+#: Powers of the strain in ``minimax``, with the number of iterations of each but the last; ratio
+#: of the strain at which they are scaled to the typical one.
+_POWERS = ((4.0, 6), (8.0, 6), (16.0, 6), (32.0, 1))
+_PEAK = 2.0
 #: Weight of the collapse term in ``lengths``.
 _W_COLLAPSE = 3e-3
 #: Weights of the collapse term in the stages of ``strain`` before the last, for large strains.
@@ -63,13 +67,17 @@ def planned_stages(request: Request, levels: list[Mesh], level: float) -> list[S
         stages.append(lengths)
     elif request.formulation == "isometry":
         stages.append(_isometry_stage(options, mesh))
+    elif request.formulation == "minimax":
+        stages.append(_minimax_stage(options, mesh, level))
     elif options.norm == "l1":
         stages.append(strain_stage(options, mesh, level))
     # On meshes that are not grids the last stage starts farther from the minimum.
     closer = 1.0 if levels[-1].grid_index is not None else 0.2
-    stages[-1] = replace(
-        stages[-1], iterations=options.iterations, tolerance=closer * options.tolerance
-    )
+    tolerance, rising = closer * options.tolerance, 0
+    if request.formulation == "minimax":
+        # The energy is a high power of the largest strain.
+        tolerance, rising = 0.5 * _POWERS[-1][0] * tolerance, len(stages[-1].continuation)
+    stages[-1] = replace(stages[-1], iterations=options.iterations + rising, tolerance=tolerance)
     if request.formulation == "strain" and level > FAR_FROM_FLAT:
         stages = [*stages[:-1], *_unsqueezing(mesh, stages[-1])]
     return stages
@@ -153,6 +161,19 @@ def _length_terms(options: Options, level: float, eps: float, mesh: Mesh) -> lis
         return items + [Weighted(t, 1.0 / level) for t in terms]
     size = isometry.typical_length(mesh)
     return items + [Weighted(t, size, Absolute(eps)) for t in terms]
+
+
+def _minimax_stage(options: Options, mesh: Mesh, level: float) -> Stage:
+    scale = _PEAK * level
+    terms = per_component.objective(mesh, partial(_minimax_terms, options, scale))
+    losses = tuple(stretch.PowerLoss(scale, q) for q, count in _POWERS for _ in range(count))
+    return replace(_stage("minimax", mesh, terms), continuation=losses, continued="strain")
+
+
+def _minimax_terms(options: Options, scale: float, mesh: Mesh) -> list[Weighted]:
+    loss = stretch.PowerLoss(scale, _POWERS[-1][0])
+    items = _fair(mesh, options.w_fairness)
+    return items + [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
 
 
 def _isometry_stage(options: Options, mesh: Mesh) -> Stage:
