@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from gso.ruled.folds import Folds
     from gso.ruled.surface import RuledSurface
 
+#: Largest distance of smooth strips from planar faces, relative to the diagonal, up to which they
+#: are written in their place.
+_SMOOTHED = 0.04
+
 
 @dataclass(repr=False)
 class Result:
@@ -254,18 +258,20 @@ class Result:
 
         io.check_spline(path, unit)
         strips = smooth_strips(ruled, self.design)
-        if strips.is_torsal:
+        far = strips.distances[1]
+        if strips.is_torsal and far <= _SMOOTHED * self.design.diagonal:
             io.save_patches(strips.patches, path, unit=unit)
             note = (
                 f"{path} has smooth strips, whose normals turn by {strips.turning:.2g} degrees at "
-                f"most along rulings; they are {strips.distances[1]:.3g} {unit} at most from the "
+                f"most along rulings; they are {far:.3g} {unit} at most from the "
                 "planar faces that the pattern belongs to"
             )
         else:
             io.save_faces(self.mesh, path, unit=unit)
+            turn = max(strips.turning, strips.break_)
             note = (
-                f"{path} has planar faces: normals of smooth strips would turn by "
-                f"{strips.turning:.2g} degrees along rulings"
+                f"{path} has planar faces: smooth strips would be {far:.3g} {unit} from them at "
+                f"most, and their normals would turn by {turn:.2g} degrees at rulings"
             )
         self.notes += (note,)
 
