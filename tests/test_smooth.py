@@ -16,6 +16,7 @@ from gso.ruled.smooth.fit import _places
 from gso.ruled.smooth.patches import patches
 from gso.ruled.smooth.surface import smooth_strips
 from gso.ruled.untrimmed import Untrimmed
+from gso.spline import TrimmedSpline
 from tests.conftest import cylinder
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -214,6 +215,35 @@ def test_trees_have_flat_patches():
     strips = smooth_strips(result.ruled, result.design)
     assert strips.turning < 0.1
     assert any(p.spline.degrees == (1, 1) for p in strips.patches)
+
+
+@pytest.mark.parametrize("size", [0.35, 0.04])
+def test_holes_and_slots_are_cut_out(size):
+    u, v = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 41), indexing="ij")
+    whole = gso.Mesh.from_grid(np.stack([u, v, 0.2 * u * u - 0.05 * v], axis=-1))
+    middle = whole.vertices[whole.faces].mean(axis=1)
+    hole = np.abs(middle[:, :2] - [0.2, 0.1]).max(axis=1) < size
+    slot = (np.abs(middle[:, 1] + 0.5) < 0.1) & (middle[:, 0] > 0.3)
+    mesh = gso.Mesh(whole.vertices, whole.faces[~hole & ~slot])
+    result = gso.tno.optimize(mesh, options=gso.RuledOptions(starts=("design",)))
+    strips = smooth_strips(result.ruled, result.design)
+    assert strips.is_torsal
+    assert strips.distances[1] < 0.02 * mesh.diagonal
+    area = sum(_area(p.spline, loop) for p in strips.patches for loop, *_ in p.faces)
+    area -= sum(_area(p.spline, h) for p in strips.patches for _, *holes in p.faces for h in holes)
+    assert area == pytest.approx(gso.metrics.area(result.mesh), rel=0.01)
+
+
+def test_what_cannot_be_written_is_refused(tmp_path):
+    pytest.importorskip("OCP")
+    with pytest.raises(gso.MeshError, match=r"a\.step: there are no surfaces"):
+        gso.io.save_patches([], tmp_path / "a.step")
+    net = np.array([[[0.0, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0]]])
+    spline = gso.BSplineSurface(net, [0, 0, 1, 1], [0, 0, 1, 1])
+    crossing = np.array([[0.1, 0.1], [0.9, 0.9], [0.9, 0.1], [0.1, 0.9], [0.1, 0.1]])
+    patch = TrimmedSpline(spline, ((tuple(crossing[k : k + 2] for k in range(4)),),))
+    with pytest.raises(gso.MeshError, match=r"a\.step: .*crosses itself"):
+        gso.io.save_patches([patch], tmp_path / "a.step")
 
 
 def test_a_loft_becomes_one_patch():

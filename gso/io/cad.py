@@ -156,14 +156,16 @@ def save_patches(
     Raises
     ------
     MeshError
-        Unknown suffix, a path that cannot be written, or a surface that the format cannot
-        store. The message names the file.
+        Unknown suffix, a path that cannot be written, no surfaces, or one whose outline crosses
+        itself or is not closed. The message names the file.
     OptionError
         Unknown unit.
     GSOError
         The package that writes the format is not installed: ``pip install ".[cad]"`` in the
         folder of gso.
     """
+    if not any(patch.faces for patch in patches):
+        raise MeshError(f"{os.fsdecode(path)}: there are no surfaces to write")
     _write(path, unit, "trimmed", patches)
 
 

@@ -133,51 +133,56 @@ def _trimmed_shell(patches: Sequence[TrimmedSpline], unit: str) -> tuple[Any, st
     """Return a shell of trimmed splines, and the name of its unit."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
 
+    known = unit in _UNITS
     size = max(patch.spline.size for patch in patches)
-    name = _UNITS["mm"]
-    sewing = None
+    sewing = BRepBuilderAPI_Sewing(_SEWN * size * (1.0 if known else MILLIMETRES[unit]))
     for patch in patches:
-        surface, name = _converted(patch.spline, unit)
-        if sewing is None:
-            factor = 1.0 if unit in _UNITS else MILLIMETRES[unit]
-            sewing = BRepBuilderAPI_Sewing(_SEWN * size * factor)
+        surface, _ = _converted(patch.spline, unit)
         for loops in patch.faces:
             sewing.Add(_trimmed_face(surface, loops))
-    if sewing is None:
-        raise MeshError("there are no surfaces to write")
     sewing.Perform()
-    return sewing.SewedShape(), name
+    return sewing.SewedShape(), _UNITS[unit if known else "mm"]
 
 
 def _trimmed_face(surface: Any, loops: Sequence[Loop]) -> Any:
     """Return a face of a surface inside loops of its parameters.
 
-    Where smooth curves through the points of the loops cross each other, their chords are taken.
+    Where smooth curves through the points of the loops cross each other, straight segments
+    between the points are used.
     """
-    from OCP.BRepBuilderAPI import (
-        BRepBuilderAPI_MakeEdge,
-        BRepBuilderAPI_MakeFace,
-        BRepBuilderAPI_MakeWire,
-    )
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
     from OCP.BRepCheck import BRepCheck_Analyzer
-    from OCP.BRepLib import BRepLib
 
-    for degree in (3, 1):
-        wires = []
-        for loop in loops:
-            wire = BRepBuilderAPI_MakeWire()
-            for curve in loop:
-                for points in [curve] if degree > 1 else pairwise(curve):
-                    edge = BRepBuilderAPI_MakeEdge(_plane_curve(np.array(points)), surface)
-                    wire.Add(edge.Edge())
-            BRepLib.BuildCurves3d_s(wire.Wire())
-            wires.append(wire.Wire())
+    for straight in (False, True):
+        wires = [_wire(surface, loop, straight) for loop in loops]
+        if any(wire is None for wire in wires):
+            continue
         face = BRepBuilderAPI_MakeFace(surface, wires[0], True)
         for hole in wires[1:]:
             face.Add(hole)
-        if BRepCheck_Analyzer(face.Face()).IsValid():
-            break
-    return face.Face()
+        if face.IsDone() and BRepCheck_Analyzer(face.Face()).IsValid():
+            return face.Face()
+    raise MeshError("a surface has an outline that crosses itself or is not closed")
+
+
+def _wire(surface: Any, loop: Loop, straight: bool) -> Any:
+    """Return the wire of a loop, of smooth curves or of straight segments; None if it is open."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeWire
+    from OCP.BRepLib import BRepLib
+
+    wire = BRepBuilderAPI_MakeWire()
+    for curve in loop:
+        new = np.r_[True, (np.diff(curve, axis=0) != 0).any(axis=1)]
+        points = curve[new]
+        for part in pairwise(points) if straight else [points]:
+            edge = BRepBuilderAPI_MakeEdge(_plane_curve(np.array(part)), surface)
+            if not edge.IsDone():
+                return None
+            wire.Add(edge.Edge())
+            if not wire.IsDone():
+                return None
+    BRepLib.BuildCurves3d_s(wire.Wire())
+    return wire.Wire()
 
 
 def _plane_curve(points: Array) -> Any:

@@ -45,7 +45,7 @@ def write_trimmed(patches: Sequence[TrimmedSpline], unit: str) -> bytes:
     import rhino3dm
 
     rhino: Any = rhino3dm
-    model = _model(rhino, unit, max((patch.spline.size for patch in patches), default=1.0))
+    model = _model(rhino, unit, max(patch.spline.size for patch in patches))
     layers = []
     for name in ("surfaces", "outlines"):
         layer = rhino.Layer()

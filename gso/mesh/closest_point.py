@@ -80,7 +80,8 @@ class Nearest:
                 np.einsum("ij,ij->i", x, y) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w))
             )
             second, third = np.array([vv * uw - uv * vw, uu * vw - uv * uw]) / (uu * vv - uv * uv)
-        shares = np.nan_to_num(np.clip(np.stack([1 - second - third, second, third], axis=1), 0, 1))
+            first = 1 - second - third
+        shares = np.nan_to_num(np.clip(np.stack([first, second, third], axis=1), 0, 1))
         # Triangles without area count as their first corner.
         shares[shares.sum(axis=1) == 0] = [1.0, 0.0, 0.0]
         return triangle, shares / shares.sum(axis=1, keepdims=True), foot

@@ -257,7 +257,9 @@ class Result:
         from gso.ruled.smooth.surface import smooth_strips
 
         io.check_spline(path, unit)
-        strips = smooth_strips(ruled, self.design)
+        # Constraints may have moved the strips away from the design.
+        design = None if "constraints" in self.details else self.design
+        strips = smooth_strips(ruled, design)
         far = strips.distances[1]
         if strips.is_torsal and far <= _SMOOTHED * self.design.diagonal:
             io.save_patches(strips.patches, path, unit=unit)

@@ -23,7 +23,7 @@ class Conditions:
     lines : ndarray, (m, 2, 3), or None
         Ends of straight lines that are parts of rulings.
     chords : ndarray, (m, 2, 2), or None
-        The same on the design's flat image.
+        The same on the design's flat image, for the first rulings.
     mirror : Mirror or None
         The plane of symmetry.
     radius : float or None

@@ -41,8 +41,12 @@ class Spans(NamedTuple):
         of the other.
     width : ndarray, (e,)
         Width in the parameter along the strip.
-    sequence, row, column : ndarray of int, (e,)
-        Number of the sequence of rulings, of the first ruling in it, and of the strip.
+    sequence : ndarray of int, (e,)
+        Number of the sequence of rulings.
+    row : ndarray of int, (e,)
+        Number of the span's first ruling in the sequence.
+    column : ndarray of int, (e,)
+        Number of the strip.
     """
 
     ids: Ints
@@ -62,7 +66,8 @@ class Curves:
         For each sequence of rulings, the rows of their ends in `points`.
     left, right : tuple of ndarray of int, (r, k + 1) each
         Rows of `slopes`: derivatives of the curves before and after each ruling. They differ
-        where a curve stays in a point on one side. The last row of `slopes` is zero.
+        where a curve stands still on one side, as successive rulings share that end. The last
+        row of `slopes` is zero.
     knots : tuple of ndarray, (r,) each
         Parameter along the strip at each ruling.
     points, slopes : ndarray, (n, 3), (m, 3)

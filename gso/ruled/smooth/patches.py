@@ -142,7 +142,7 @@ def patches(curves: Curves) -> list[Patch]:
 
 
 def _crease(sequence: int, column: int, ends: Array) -> Side:
-    """Return the side on a curve; it is told from other parts of the curve by its first knot."""
+    """Return the side on a curve; its first knot tells it from other parts of the curve."""
     return Side(("curve", sequence, column, float(ends[0, 0])), *ends)
 
 

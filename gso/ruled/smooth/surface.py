@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from gso.spline.trimmed import Loop
 from gso.typing import Array
 
 #: Rulings at which a patch is measured, and points of each.
-_RULINGS, _ACROSS = 400, 5
+_RULINGS, _ACROSS = 400, 7
 #: Turning of the normal along a ruling, in radians, up to which no other fit is tried, and the
 #: largest number of fits.
 _TORSAL, _ATTEMPTS = np.radians(0.1), 3
@@ -42,8 +43,8 @@ class SmoothSurface:
         outline, in degrees; zero for a torsal surface, which is developable.
     break_ : float
         Largest angle between the tangent planes of two patches of one strip, at the middle of
-        their common ruling, in degrees. At the creases between strips side by side the angle is
-        meant, and not counted.
+        their common ruling, in degrees. Creases between strips side by side are intended, and
+        are not counted.
     distances : tuple of float
         Mean and largest distance from the surface of planar faces, in its unit; the larger of
         both directions.
@@ -56,7 +57,10 @@ class SmoothSurface:
 
     @property
     def is_torsal(self) -> bool:
-        """Whether normals turn by 0.1 degrees at most along rulings, and at common rulings."""
+        """Whether normals turn by 0.1 degrees at most along rulings.
+
+        Tangent planes of two patches must not differ by more at their common rulings, either.
+        """
         return max(self.turning, self.break_) <= np.degrees(_TORSAL)
 
 
@@ -68,7 +72,8 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     surface : RuledSurface
         The `ruled` of a result, or what :func:`gso.loft` returns.
     design : Mesh, optional
-        The surface that they should be close to; the planar faces when not given.
+        The surface that they should be close to; the planar faces when not given, as where
+        constraints move these away from the design.
 
     Returns
     -------
@@ -78,7 +83,7 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     ------
     MeshError
         The surface was read from a file of an earlier version, or its outline cannot be carried
-        over.
+        over to the smooth strips.
 
     Examples
     --------
@@ -103,12 +108,23 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     target = None if design is None else design.replaced((design.vertices - middle) / size)
     fitter = Fitter(unit_source, target)
     found = fitter.first(points, source.owner[face])
-    for attempt in range(_ATTEMPTS):
-        parts = trimmed(patches(found.curves), unit_mesh)
-        turn, samples = _measured(parts)
-        if turn <= _TORSAL or attempt == _ATTEMPTS - 1:
+    parts: list[Patch] = []
+    turn, samples = np.inf, np.zeros((0, 3))
+    for _ in range(_ATTEMPTS):
+        tried = trimmed(patches(found.curves), unit_mesh)
+        if not tried:
             break
-        found = fitter.again(Smooth(found.curves, _widened(found, parts)))
+        measured, inside = _measured(tried)
+        if measured < turn:
+            parts, turn, samples = tried, measured, inside
+        if turn <= _TORSAL:
+            break
+        found = fitter.again(Smooth(found.curves, _widened(found, tried)))
+    if not parts or not len(samples):
+        raise MeshError(
+            "the outline cannot be carried over to smooth strips; take the planar faces, "
+            "gso.io.save_faces"
+        )
     there, back = Nearest(unit_mesh).distances(samples), _back(parts, unit_mesh)
     break_ = max((bends(a, b) for a, b in _pairs(parts)), default=0.0)
     return SmoothSurface(
@@ -146,9 +162,15 @@ def _pairs(parts: Sequence[Patch]) -> Iterator[tuple[Patch, Patch]]:
 
 
 def _measured(parts: Sequence[Patch]) -> tuple[float, Array]:
-    """Return the largest turning of the normal along a ruling, and points inside the outline."""
+    """Return the largest turning of the normal along a ruling, and points inside the outline.
+
+    Between parts of a ruling that a hole divides, the normal counts, too.
+    """
+    import shapely
+
     worst, points = 0.0, []
     for part in parts:
+        region = _region(part)
         for at, low, high in _rulings(part):
             if not part.is_flat:
                 one, two = (part.normals(np.stack([at, v], axis=1)) for v in (low, high))
@@ -157,10 +179,13 @@ def _measured(parts: Sequence[Patch]) -> tuple[float, Array]:
                 speed = [lengths(part.spline.evaluate(at, v, du=1)) for v in (low, high)]
                 angle[np.minimum(*speed) < _STILL * np.maximum(*speed)] = 0.0
                 worst = max(worst, float(angle.max(initial=0.0)))
-            for share in np.linspace(0.0, 1.0, _ACROSS):
-                v = low + share * (high - low)
-                points.append(part.points(np.stack([at, v], axis=1)))
-    return worst, np.concatenate(points)
+            shares = np.linspace(0.0, 1.0, _ACROSS)[:, None]
+            v = (low + shares * (high - low)).ravel()
+            uv = np.stack([np.tile(at, _ACROSS), v], axis=1)
+            uv = uv[shapely.contains_xy(region, *uv.T)]
+            if len(uv):
+                points.append(part.points(uv))
+    return worst, np.concatenate([np.zeros((0, 3)), *points])
 
 
 def _back(parts: Sequence[Patch], mesh: Mesh) -> Array:
@@ -170,9 +195,7 @@ def _back(parts: Sequence[Patch], mesh: Mesh) -> Array:
     vertices, triangles, count = [], [], 0
     for part in parts:
         uv, faces = part.triangles()
-        inside = [[_ring(loop) for loop in loops] for loops in part.faces]
-        region = shapely.multipolygons([shapely.Polygon(r, holes) for r, *holes in inside])
-        shapely.prepare(region)
+        region = _region(part)
         cells = shapely.polygons(uv[faces])
         kept = shapely.intersects(region, cells)
         vertices.append(part.points(uv))
@@ -180,6 +203,16 @@ def _back(parts: Sequence[Patch], mesh: Mesh) -> Array:
         count += len(uv)
     near = Nearest.of(np.concatenate(vertices), np.concatenate(triangles))
     return near.distances(mesh.vertices)
+
+
+def _region(part: Patch) -> Any:
+    """Return the parameters inside the outlines as Shapely polygons."""
+    import shapely
+
+    rings = [[_ring(loop) for loop in loops] for loops in part.faces]
+    region = shapely.multipolygons([shapely.Polygon(ring, holes) for ring, *holes in rings])
+    shapely.prepare(region)
+    return region
 
 
 def _ring(loop: Loop) -> Array:

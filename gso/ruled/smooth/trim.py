@@ -92,8 +92,8 @@ def _corners(points: Array) -> Flags:
 def _traced(places: _Places, points: Array, sharp: Flags) -> tuple[Ints, Array, Flags, Flags]:
     """Locate a closed polygon on the patches.
 
-    Segments between different patches are halved until they are short. The last array tells the
-    points that were given from those between them.
+    Segments between different patches are halved until they are short. The last array marks the
+    points that were given.
     """
     owner, uv = places.locate(points)
     flag, given = sharp, np.ones(len(points), bool)
@@ -214,6 +214,8 @@ def _faces(
     arcs = [(np.round(uv, _DIGITS), sharp) for uv, sharp in arcs]
     border = _border(patch.domain, [x for uv, _ in arcs for x in (uv[0], uv[-1])])
     corner = {tuple(x) for x in border.tolist()}
+    # Holes of the design that are wholly inside the patch.
+    whole = {tuple(uv[0].tolist()) for uv, _ in arcs if (uv[0] == uv[-1]).all()}
     for uv, sharp in arcs:
         corner |= {tuple(x) for x in uv[sharp].tolist()}
     lines = [shapely.LineString(pair) for pair in zip(border, np.roll(border, -1, axis=0))]
@@ -226,7 +228,8 @@ def _faces(
         loops: list[Loop] = []
         for k, ring in enumerate([cell.exterior, *cell.interiors]):
             uv = np.asarray(ring.coords)[:-1]
-            if patch.area(uv) < _TINY[min(k, 1)]:
+            own = any(tuple(x) in whole for x in uv.tolist())
+            if not own and patch.area(uv) < _TINY[min(k, 1)]:
                 if k == 0:
                     break
                 continue
