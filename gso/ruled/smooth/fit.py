@@ -83,13 +83,17 @@ class Fitter:
     def _divided(self, found: Smooth) -> Smooth:
         """Halve spans where normals turn along rulings, and fit again, until they do not."""
         curves, ranges = found
+        bad = turning(curves, ranges) > _TORSAL
         for _ in range(_ROUNDS):
-            bad = turning(curves, ranges) > _TORSAL
             if not bad.any():
                 break
             start, parent = curves.split(bad)
-            ranges = ranges[parent]
-            curves = self._solved(start, ranges, _TURNS[-_AGAIN:])
+            halves = ranges[parent]
+            tried = self._solved(start, halves, _TURNS[-_AGAIN:])
+            still = turning(tried, halves) > _TORSAL
+            if still.sum() > bad.sum():
+                break
+            curves, ranges, bad = tried, halves, still
         return Smooth(curves, ranges)
 
     def _nearest(self, points: Array) -> tuple[Array, Array]:
