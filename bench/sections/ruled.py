@@ -84,7 +84,7 @@ def cad(seed: str = "", count: int = 24) -> dict[str, Any]:
             percent = 100.0 / result.design.diagonal
             far = [percent * x for x in strips.distances]
             faces = sum(len(p.faces) for p in strips.patches)
-            found.append([strips.turning, strips.break_, strips.is_torsal, *far, faces, seconds])
+            found.append([strips.turning, strips.kink, strips.is_torsal, *far, faces, seconds])
         every = np.array(found, float)
         out[number] = every.tolist()
         turn, lean, torsal, mean, largest, faces, seconds = every.T

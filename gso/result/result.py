@@ -270,7 +270,7 @@ class Result:
             )
         else:
             io.save_faces(self.mesh, path, unit=unit)
-            turn = max(strips.turning, strips.break_)
+            turn = max(strips.turning, strips.kink)
             note = (
                 f"{path} has planar faces: smooth strips would be {far:.3g} {unit} from them at "
                 f"most, and their normals would turn by {turn:.2g} degrees at rulings"

@@ -9,7 +9,7 @@ import numpy as np
 
 from gso.ruled.polygon import enclosed_area
 from gso.ruled.smooth.curves import Curves
-from gso.ruled.vectors import cross, lengths, unit
+from gso.ruled.vectors import cross, lengths
 from gso.spline import BSplineSurface, TrimmedSpline
 from gso.spline.trimmed import Loop
 from gso.typing import Array, Ints
@@ -163,6 +163,10 @@ def bends(one: Patch, two: Patch) -> float:
             if a.name != b.name or a.name[0] != "ruling":
                 continue
             n, m = (p.normals(np.array([0.5 * (s.start + s.end)])) for p, s in ((one, a), (two, b)))
-            angle = np.arctan2(lengths(cross(n, m)), np.abs(np.einsum("kd,kd->k", unit(n), m)))
+            cosine = np.einsum("kd,kd->k", n, m)
+            if one.sequence < 0 or one.sequence != two.sequence:
+                # Their parameters may have opposite orientations.
+                cosine = np.abs(cosine)
+            angle = np.arctan2(lengths(cross(n, m)), cosine)
             worst = max(worst, float(angle[0]))
     return worst

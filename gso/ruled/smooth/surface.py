@@ -41,7 +41,7 @@ class SmoothSurface:
     turning : float
         Largest angle between the normals at the two ends of a ruling, inside the
         outline, in degrees; zero for a torsal surface, which is developable.
-    break_ : float
+    kink : float
         Largest angle between the tangent planes of two patches of one strip, at the middle of
         their common ruling, in degrees. Creases between strips side by side are intended, and
         are not counted.
@@ -52,7 +52,7 @@ class SmoothSurface:
 
     patches: tuple[TrimmedSpline, ...]
     turning: float
-    break_: float
+    kink: float
     distances: tuple[float, float]
 
     @property
@@ -61,7 +61,7 @@ class SmoothSurface:
 
         Tangent planes of two patches must not differ by more at their common rulings, either.
         """
-        return max(self.turning, self.break_) <= np.degrees(_TORSAL)
+        return max(self.turning, self.kink) <= np.degrees(_TORSAL)
 
 
 def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSurface:
@@ -126,11 +126,11 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
             "gso.io.save_faces"
         )
     there, back = Nearest(unit_mesh).distances(samples), _back(parts, unit_mesh)
-    break_ = max((bends(a, b) for a, b in _pairs(parts)), default=0.0)
+    kink = max((bends(a, b) for a, b in _pairs(parts)), default=0.0)
     return SmoothSurface(
         tuple(part.trimmed(size, middle) for part in parts),
         float(np.degrees(turn)),
-        float(np.degrees(break_)),
+        float(np.degrees(kink)),
         (
             size * max(float(there.mean()), float(back.mean())),
             size * max(float(there.max()), float(back.max())),
