@@ -168,14 +168,14 @@ class Terms:
             for at, slopes, way in ((0, right[0], -1.0), (len(index) - 1, left[-1], 1.0)):
                 if i != min(at, len(index) - 2):
                     continue
-                pair, by = index[at, own].tolist(), (n + slopes[own]).tolist()
+                pair, by, there = index[at, own].tolist(), (n + slopes[own]).tolist(), place
                 if pair[0] > pair[1]:
-                    pair, by, place = pair[::-1], by[::-1], 1.0 - place
+                    pair, by, there = pair[::-1], by[::-1], 1.0 - place
                 key = pair[0], pair[1]
                 if key in ends:
                     other, old = ends[key]
                     rows.append([*pair, *by, *other])
-                    rest.append([place, self._least, -way * old])
+                    rest.append([there, self._least, -way * old])
                 ends[key] = by, way
         return _mean("break", break_residual, np.array(rows), np.array(rest)) if rows else None
 
