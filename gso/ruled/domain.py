@@ -17,6 +17,8 @@ from gso.typing import Array, Ints
 _MARGIN = 0.018
 #: Turning angles that differ by less are the same.
 _ALIKE = 1e-3
+#: Largest number of points of a lattice around the outline, relative to those wanted inside.
+_SPARSE = 16.0
 #: Distances below this share of the margin are rounding errors.
 _TINY = 1e-9
 
@@ -85,13 +87,16 @@ class Domain:
         turned = self.flat @ frame
         low, high = turned.min(axis=0), turned.max(axis=0)
         area = abs(enclosed_area(self.flat[self.outline]))
-        step = float(np.sqrt(area / count))
+        box = high - low
+        # Of a sliver, the lattice is coarser.
+        least = max(np.sqrt(box.prod() / (_SPARSE * count)), box.max() / count)
+        step = max(float(np.sqrt(area / count)), float(least))
         axes = [np.arange(a + 0.5 * step, b, step) for a, b in zip(low, high, strict=True)]
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2) @ frame.T
         points, feet = self.sample(self.mesh.vertices, places)
         inside = np.linalg.norm(feet - places, axis=1) < _TINY * self.margin
         around = float(lengths(np.roll(loop, -1, axis=0) - loop).sum())
-        on, _ = resampled(loop, max(int(around / step), 8))
+        on, _ = resampled(loop, min(max(int(around / step), 8), 4 * count))
         return np.concatenate([points[inside], self.sample(self.mesh.vertices, on)[0]])
 
     def points(self, places: Array) -> Array:
