@@ -31,12 +31,8 @@ class Mirror:
         paired = (partner[partner] == np.arange(len(points))).all()
         return partner if away.max(initial=0.0) <= _TOLERANCE and paired else None
 
-    def even(self, points: Array, partners: Ints) -> Array:
-        """Return the means of points and the images of their partners."""
-        return np.asarray(0.5 * (points + self.image(points[partners])))
-
     def even_step(self, step: Array, partners: Ints) -> Array:
-        """Return the same for displacements."""
+        """Return the means of displacements (k, 3) and the images of those of their partners."""
         other = step[partners]
         return np.asarray(0.5 * (step + other - 2.0 * np.outer(other @ self.normal, self.normal)))
 

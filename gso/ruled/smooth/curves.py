@@ -86,22 +86,15 @@ class Curves:
     @classmethod
     def of(cls, strips: Strips, vertices: Array) -> Curves:
         """Interpolate the ends of the rulings of strips; derivatives do not overshoot."""
-        index = []
+        index, left, right, slopes, count = [], [], [], [], 0
         for every in strips.index:
             new = np.r_[True, (np.diff(every, axis=0) != 0).any(axis=1)]
-            index.append(every[new])
-        return cls._made(tuple(index), [np.arange(float(len(i))) for i in index], vertices, strips)
-
-    @classmethod
-    def _made(
-        cls, index: tuple[Ints, ...], knots: list[Array], points: Array, strips: Strips
-    ) -> Curves:
-        left, right, slopes, count = [], [], [], 0
-        for ids in index:
+            ids = every[new]
+            index.append(ids)
             moves = np.diff(ids, axis=0) != 0
             none = np.zeros((1, ids.shape[1]), bool)
             before, after = np.vstack([none, moves]), np.vstack([moves, none])
-            chord = np.diff(points[ids], axis=0)
+            chord = np.diff(vertices[ids], axis=0)
             blank = np.zeros((1, *chord.shape[1:]))
             one, two = np.concatenate([blank, chord]), np.concatenate([chord, blank])
             # The weighted harmonic mean of both chords' lengths: curves stay monotone.
@@ -109,17 +102,18 @@ class Curves:
             both = (before & after)[:, :, None]
             with np.errstate(invalid="ignore"):
                 mean = np.nan_to_num((b * one + a * two) / (a + b))
-            every = np.stack([np.where(both, mean, one), np.where(both, mean, two)], axis=2)
+            steps = np.stack([np.where(both, mean, one), np.where(both, mean, two)], axis=2)
             # Number the derivatives: one before and one after each ruling, or one for both.
             own = np.stack([before, after & ~before], axis=2)
             number = count + np.cumsum(own).reshape(own.shape) - 1
-            slopes.append(every[own])
+            slopes.append(steps[own])
             left.append(np.where(before, number[:, :, 0], -1))
             right.append(np.where(after, np.where(before, number[:, :, 0], number[:, :, 1]), -1))
             count += int(own.sum())
         rows = [tuple(np.where(x < 0, count, x) for x in side) for side in (left, right)]
-        every = np.concatenate([*slopes, np.zeros((1, 3))])
-        return cls(index, rows[0], rows[1], tuple(knots), points, every, strips.flats)
+        knots = tuple(np.arange(float(len(i))) for i in index)
+        last = np.concatenate([*slopes, np.zeros((1, 3))])
+        return cls(tuple(index), rows[0], rows[1], knots, vertices, last, strips.flats)
 
     @cached_property
     def spans(self) -> Spans:

@@ -74,13 +74,9 @@ class Fitter:
         """
         curves = Curves.of(self.source.strips, self.source.vertices)
         ranges = _inside(self.source, corners, owner)[: len(curves.spans.row)]
-        return self._divided(Smooth(self._solved(curves, ranges, _TURNS), ranges))
+        return self.divided(Smooth(self._solved(curves, ranges, _TURNS), ranges))
 
-    def again(self, found: Smooth) -> Smooth:
-        """Fit again, after the ranges have changed."""
-        return self._divided(found)
-
-    def _divided(self, found: Smooth) -> Smooth:
+    def divided(self, found: Smooth) -> Smooth:
         """Halve spans where normals turn along rulings, and fit again, until they do not."""
         curves, ranges = found
         bad = turning(curves, ranges) > _TORSAL

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -119,14 +120,14 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
             parts, turn, samples = tried, measured, inside
         if turn <= _TORSAL:
             break
-        found = fitter.again(Smooth(found.curves, _widened(found, tried)))
+        found = fitter.divided(Smooth(found.curves, _widened(found, tried)))
     if not parts or not len(samples):
         raise MeshError(
             "the outline cannot be carried over to smooth strips; take the planar faces, "
             "gso.io.save_faces"
         )
     there, back = Nearest(unit_mesh).distances(samples), _back(parts, unit_mesh)
-    kink = max((bends(a, b) for a, b in _pairs(parts)), default=0.0)
+    kink = max((bends(a, b) for a, b in combinations(parts, 2)), default=0.0)
     return SmoothSurface(
         tuple(part.trimmed(size, middle) for part in parts),
         float(np.degrees(turn)),
@@ -152,13 +153,6 @@ def _widened(found: Smooth, parts: Sequence[Patch]) -> Array:
             np.minimum.at(ranges[:, 0], which, low)
             np.maximum.at(ranges[:, 1], which, high)
     return ranges
-
-
-def _pairs(parts: Sequence[Patch]) -> Iterator[tuple[Patch, Patch]]:
-    """Yield the pairs of patches."""
-    for k, one in enumerate(parts):
-        for other in parts[k + 1 :]:
-            yield one, other
 
 
 def _measured(parts: Sequence[Patch]) -> tuple[float, Array]:

@@ -178,11 +178,16 @@ def _crossing(one: Patch, a: Array, two: Patch, b: Array) -> tuple[Array, Array]
     return best[1], best[2]
 
 
-def _on_border(domain: Array, x: Array) -> Array:
-    """Return the nearest point of the border of a domain."""
+def _on_sides(domain: Array, x: Array) -> tuple[Array, Array]:
+    """Return the nearest points (s, 2) of the sides of a domain, and the shares (s,) of each."""
     way = np.roll(domain, -1, axis=0) - domain
     share = np.clip(((x - domain) * way).sum(axis=1) / (way**2).sum(axis=1), 0.0, 1.0)
-    points = domain + share[:, None] * way
+    return domain + share[:, None] * way, share
+
+
+def _on_border(domain: Array, x: Array) -> Array:
+    """Return the nearest point of the border of a domain."""
+    points, _ = _on_sides(domain, x)
     return np.asarray(points[lengths(points - x).argmin()])
 
 
@@ -256,15 +261,10 @@ def _without_spikes(ring: Array, corner: set[tuple[float, ...]]) -> Array:
 
 def _border(domain: Array, points: list[Array]) -> Array:
     """Return the corners of a domain and points on its border, in their order around it."""
-    after = np.roll(domain, -1, axis=0)
-    keys, found = [], []
-    for k, a in enumerate(domain):
-        keys.append(float(k))
-        found.append(a)
+    keys, found = [float(k) for k in range(len(domain))], list(domain)
     for x in points:
-        way = after - domain
-        share = np.clip(((x - domain) * way).sum(axis=1) / (way**2).sum(axis=1), 0.0, 1.0)
-        far = np.abs(domain + share[:, None] * way - x).max(axis=1)
+        places, share = _on_sides(domain, x)
+        far = np.abs(places - x).max(axis=1)
         k = int(far.argmin())
         if far[k] < 1e-9:
             keys.append(k + float(share[k]))
