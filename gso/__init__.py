@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         PlanarFaces,
         Ruling,
         SlidingBoundary,
+        SmoothCurves,
         SymmetryPlane,
     )
     from gso.errors import (
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from gso.ruled.loft import loft
     from gso.ruled.smooth.surface import smooth_strips
     from gso.seams import cut
+    from gso.segmentation import pieces
     from gso.spline import BSplineSurface
     from gso.spline.fit import fit_spline
     from gso.status import Progress, Status
@@ -84,6 +86,7 @@ __all__ = [
     "RuledOptions",
     "Ruling",
     "SlidingBoundary",
+    "SmoothCurves",
     "Status",
     "SymmetryPlane",
     "WeightsError",
@@ -99,6 +102,7 @@ __all__ = [
     "loft",
     "metrics",
     "net",
+    "pieces",
     "plot",
     "rulings",
     "save",
@@ -130,6 +134,7 @@ _NAMES = {
     "ConvergenceWarning": "gso.errors",
     "Options": "gso.tasks.options",
     "cut": "gso.seams",
+    "pieces": "gso.segmentation",
     "loft": "gso.ruled.loft",
     "smooth_strips": "gso.ruled.smooth.surface",
     "Fixed": "gso.constraints",
@@ -141,6 +146,7 @@ _NAMES = {
     "PlanarFaces": "gso.constraints",
     "Ruling": "gso.constraints",
     "SlidingBoundary": "gso.constraints",
+    "SmoothCurves": "gso.constraints",
     "SymmetryPlane": "gso.constraints",
 }
 _OPTIONS = {

@@ -19,6 +19,7 @@ from gso.constraints.positions import Fixed, FixedBoundary, Handle
 from gso.constraints.read import add, read_constraints
 from gso.constraints.ruling import Ruling
 from gso.constraints.shape import FixedLengths, PlanarFaces
+from gso.constraints.smooth import SmoothCurves
 from gso.constraints.symmetry import SymmetryPlane
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "Relations",
     "Ruling",
     "SlidingBoundary",
+    "SmoothCurves",
     "Straight",
     "SymmetryPlane",
     "add",

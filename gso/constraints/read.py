@@ -13,6 +13,7 @@ from gso.constraints.glue import Glue
 from gso.constraints.positions import Fixed, FixedBoundary, Handle
 from gso.constraints.ruling import Ruling
 from gso.constraints.shape import FixedLengths, PlanarFaces
+from gso.constraints.smooth import SmoothCurves
 from gso.constraints.symmetry import SymmetryPlane
 from gso.errors import OptionError
 from gso.spelling import check_keywords, choices, nearest
@@ -29,6 +30,7 @@ KINDS: dict[str, type[Constraint]] = {
         PlanarFaces,
         Ruling,
         SlidingBoundary,
+        SmoothCurves,
         SymmetryPlane,
     )
 }

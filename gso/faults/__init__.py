@@ -5,6 +5,6 @@ Each function returns faces or edges in the numbering of the mesh; an empty arra
 
 from gso.faults.crossings import crossings
 from gso.faults.folds import SHORT, collapsed, folded
-from gso.faults.overlaps import overlaps
+from gso.faults.overlaps import overlapping, overlaps
 
-__all__ = ["SHORT", "collapsed", "crossings", "folded", "overlaps"]
+__all__ = ["SHORT", "collapsed", "crossings", "folded", "overlapping", "overlaps"]

@@ -44,12 +44,19 @@ def overlaps(mesh: Mesh, flat: Array) -> Ints:
     array([], dtype=int64)
     """
     points = flat - flat[mesh.used].mean(axis=0)
+    triangles, count = split(mesh.faces, _other_diagonal(points, mesh.faces))
+    wound = _wound(points, mesh.faces, triangles, count)
+    return np.unique(np.r_[overlapping(mesh, flat).ravel(), wound])
+
+
+def overlapping(mesh: Mesh, flat: Array) -> Ints:
+    """Find the pairs of faces (p, 2) without a common vertex that overlap, as :func:`overlaps`."""
+    points = flat - flat[mesh.used].mean(axis=0)
     pairs, width = candidates(points, mesh.faces)
     triangles, count = split(mesh.faces, _other_diagonal(points, mesh.faces))
     which, first, second = by_triangles(pairs, triangles, count)
     met = _meet(points[first], points[second], DEPTH * width[which])
-    wound = _wound(points, mesh.faces, triangles, count)
-    return np.unique(np.r_[pairs[which[met]].ravel(), wound])
+    return np.unique(pairs[which[met]], axis=0)
 
 
 def _other_diagonal(points: Array, faces: Ints) -> NDArray[np.bool_]:

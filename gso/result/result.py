@@ -22,6 +22,7 @@ from gso.typing import Array
 if TYPE_CHECKING:
     from gso.ruled.folds import Folds
     from gso.ruled.surface import RuledSurface
+    from gso.seams.pieces import Pieces
 
 #: Largest distance of smooth strips from planar faces, relative to the diagonal, up to which they
 #: are written in their place.
@@ -95,6 +96,9 @@ class Result:
         For the formulation "ruled": the surface with its rulings, creases and exact pattern. Then
         `mesh` is a mesh of its own, `pattern` its unrolling, and :meth:`on_design` has the
         design's vertices moved onto it.
+    pieces : Pieces or None
+        For a design in pieces: the pieces of the result, and the whole surface with its seams
+        closed, ``pieces.design``. `design` and `mesh` are cut open along the seams.
     """
 
     task: str
@@ -118,6 +122,7 @@ class Result:
     components: list[Result] = field(default_factory=list)
     names: NDArray[np.int64] | None = None
     ruled: RuledSurface | None = None
+    pieces: Pieces | None = None
 
     def __post_init__(self) -> None:
         if self.pattern is None and self.flat is not None:

@@ -54,6 +54,10 @@ class Options(KnownFields):
         """Return the settings with lengths of the mesh's unit divided by another unit."""
         return self
 
+    def for_pieces(self) -> Options:
+        """Return the settings for a surface that is cut into pieces."""
+        return self
+
     @classmethod
     def preset(cls, name: str) -> Options:
         """Return the settings of a named preset."""

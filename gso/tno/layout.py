@@ -14,9 +14,13 @@ from gso.tno.run import Run
 
 
 def lay_out(
-    surface: Mesh, given: Pattern | None = None, *, options: str = "fast"
+    surface: Mesh,
+    given: Pattern | None = None,
+    *,
+    options: str = "fast",
+    formulation: str = "strain",
 ) -> Pattern | None:
-    """Flatten a surface with little strain, by the flatten task's formulation ``strain``.
+    """Flatten a surface with little strain, by the flatten task.
 
     A surface that closes around itself is cut open.
 
@@ -28,6 +32,8 @@ def lay_out(
         An existing pattern of the surface; the one with the smaller maximal strain is returned.
     options : str
         Preset of the flatten task.
+    formulation : str
+        Formulation of the flatten task.
 
     Returns
     -------
@@ -53,7 +59,7 @@ def lay_out(
     frame = Canonical(surface)
     analysis = Analysis(frame.mesh, Compiled(flat=True))
     try:
-        outcome = Run(flatten, analysis)(Request(flatten.Options.preset(options), "strain"))
+        outcome = Run(flatten, analysis)(Request(flatten.Options.preset(options), formulation))
     except MeshError:
         return given
     flat = outcome.points * frame.frame.scale

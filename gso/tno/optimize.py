@@ -14,20 +14,19 @@ import numpy as np
 
 from gso import linalg, tasks
 from gso.components import several
-from gso.constraints import TIGHT, Compiled, Constraint, compile_constraints
+from gso.constraints import Constraint, compile_constraints
 from gso.errors import ConvergenceWarning, MeshError, OptionError
 from gso.mesh import Mesh
-from gso.pattern import Pattern
 from gso.result import Result
+from gso.seams import Pieces
 from gso.spelling import known_keywords
-from gso.spline.fit import describe_spline
-from gso.status import Status
-from gso.tasks.base import Options, Request, Solution
-from gso.tno import components
+from gso.tasks.base import Options, Request
+from gso.tno import components, joint
 from gso.tno.job import Job
 from gso.tno.judged import judged, requirements, warning
 from gso.tno.layout import lay_out
 from gso.tno.normalise import Canonical
+from gso.tno.packed import packed, record_violations
 from gso.tno.run import Run
 from gso.tno.solver import Callback
 from gso.tno.start import Start
@@ -56,8 +55,10 @@ def optimize(
 
     Parameters
     ----------
-    mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, or path
-        The design, in any unit of length.
+    mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, path, or Pieces
+        The design, in any unit of length. A design that :func:`gso.cut` or :func:`gso.pieces` has
+        cut into pieces is solved as a whole: each piece becomes developable, the seams stay
+        closed, and may become creases. The result's `pieces` has its pieces.
     task : {"developable", "flatten", "denoise", "bend", "conformal"}
         What to do.
     formulation : str, optional
@@ -120,10 +121,6 @@ def optimize(
     Jiang et al. 2020, Quad-mesh based isometric mappings and developable surfaces.
     """
     clock = time.perf_counter()
-    from gso.io import as_mesh
-
-    design = as_mesh(mesh)
-    design.check_joined()
     bounds = {
         "max_deviation": max_deviation,
         "max_strain": max_strain,
@@ -131,22 +128,20 @@ def optimize(
     }
     module, chosen, settings = check(task, formulation, options, **bounds)
     given = x0 if isinstance(x0, Start) else Start(x0)
-    flat = getattr(module, "BLOCK", "surface") == "flat"
-    whole = Job(design, compile_constraints(constraints, design, flat=flat), given)
+    if isinstance(mesh, Pieces) and not isinstance(options, Options):
+        settings = settings.for_pieces()
     asked = Asked(task, chosen, settings, bounds, formulation is not None, verdict)
     if given.iterations is not None and asked.bounded:
         module.check_iterations(bounds)
-    one = partial(_solved, asked)
-    pieces = components.parts(design, whole.constraints)
-    if pieces and chosen == "ruled":
-        raise MeshError(
-            f"the formulation 'ruled' takes one surface, and this mesh has {len(pieces)} "
-            "components: solve each on its own"
-        )
-    if pieces:
-        result = components.solve(one, whole, pieces, callback)
+    one = partial(_one_mesh, asked, callback)
+    if isinstance(mesh, Pieces):
+        result = joint.solved(mesh, task, constraints, given, one)
     else:
-        result = one(whole, callback)
+        from gso.io import as_mesh
+
+        design = as_mesh(mesh)
+        design.check_joined()
+        result = one(design, constraints, given)
     result.seconds["total"] = time.perf_counter() - clock
     if said := warning(result):
         warnings.warn(said, ConvergenceWarning, stacklevel=3)
@@ -180,6 +175,28 @@ class Asked:
     def bounded(self) -> bool:
         """Whether there is any bound."""
         return any(value is not None for value in self.bounds.values())
+
+
+def _one_mesh(
+    asked: Asked,
+    callback: Callback | None,
+    design: Mesh,
+    constraints: Sequence[Constraint],
+    start: Start,
+) -> Result:
+    """Solve a mesh: each of its components that no constraint joins to others on its own."""
+    flat = getattr(tasks.get(asked.task), "BLOCK", "surface") == "flat"
+    whole = Job(design, compile_constraints(constraints, design, flat=flat), start)
+    one = partial(_solved, asked)
+    parts = components.parts(design, whole.constraints)
+    if parts and asked.formulation == "ruled":
+        raise MeshError(
+            f"the formulation 'ruled' takes one surface, and this mesh has {len(parts)} "
+            "components: solve each on its own"
+        )
+    if parts:
+        return components.solve(one, whole, parts, callback)
+    return one(whole, callback)
 
 
 def _solved(asked: Asked, job: Job, callback: Callback | None) -> Result:
@@ -264,82 +281,3 @@ def check(
     if any(value is not None for value in bounds.values()):
         module.check_bounds(formulation, bounds)
     return module, formulation, settings
-
-
-def record_violations(compiled: Compiled, frame: Canonical, solution: Solution) -> None:
-    """Record the violation of each constraint, in the user's unit; note missed hard ones."""
-    if not compiled.names:
-        return
-    unit = frame.frame.scale
-    misses = compiled.violations(solution.blocks[compiled.block])
-    lengths = {name: unit * miss.length for name, miss in misses.items()}
-    solution.details = {**solution.details, "constraints": lengths}
-    broken = [k for k, miss in misses.items() if miss.hard and not miss.length <= TIGHT]
-    for name in broken:
-        where = ", ".join(map(str, frame.names[misses[name].vertices]))
-        solution.notes += (f"{name} is missed by {lengths[name]:.3g} (vertices {where})",)
-    if broken and solution.status is not Status.CANCELLED:
-        solution.status = Status.CONSTRAINTS_MISSED
-
-
-def packed(
-    task: str,
-    formulation: str,
-    design: Mesh,
-    frame: Canonical,
-    solution: Solution,
-    run: Run,
-) -> Result:
-    """Convert a solution to a result in the user's frame and numbering."""
-    # The numbering of a cut mesh begins with the user's.
-    own = {"flat"} if solution.cut is not None else set()
-    blocks = {k: x if k in own else frame.back(k, x) for k, x in solution.blocks.items()}
-    flat = blocks["flat"] * frame.frame.scale if "flat" in blocks else None
-    pattern = None
-    if solution.cut is not None and flat is not None:
-        pattern = Pattern(flat, solution.cut.mesh.faces, solution.cut.vertex, solution.cut.seams)
-        flat = None
-    if solution.status is Status.ALREADY_GOOD:
-        mesh = design
-    elif "surface" in blocks:
-        mesh = design.replaced(frame.frame.to_user(blocks["surface"]))
-    elif pattern is not None:
-        mesh = pattern.mesh
-    else:
-        mesh = design.replaced(np.c_[flat, np.zeros(len(design.vertices))])
-    seconds = run.timings.as_dict()
-    ruled = None
-    if solution.ruled is not None:
-        seconds["strips"] = run.converting
-        ruled = solution.ruled.transformed(
-            frame.frame.to_user, frame.frame.scale, lambda rows: frame.back("surface", rows)
-        )
-        mesh, pattern = ruled.mesh, ruled.pattern
-        flat = None if pattern.is_cut else pattern.flat
-    spline, details = None, dict(solution.details)
-    lengths = getattr(tasks.get(task), "LENGTHS", ())
-    details |= {name: details[name] * frame.frame.scale for name in lengths if name in details}
-    if solution.spline is not None:
-        before = solution.fitted
-        fitted = None if before is None else frame.frame.to_user(frame.back("surface", before))
-        spline, said = describe_spline(frame.frame.to_user(solution.spline), mesh, design, fitted)
-        details = {**details, "spline": said}
-    return Result(
-        task=task,
-        formulation=formulation,
-        design=design,
-        mesh=mesh,
-        flat=flat,
-        pattern=pattern,
-        cell_scale=blocks["scale"][:, 0] if "scale" in blocks else None,
-        status=solution.status,
-        iterations=run.iterations,
-        energy=solution.energy,
-        history=run.history,
-        seconds=seconds,
-        backend=solution.backend,
-        notes=design.notes + solution.notes,
-        details=details,
-        spline=spline,
-        ruled=ruled,
-    )

@@ -22,7 +22,8 @@ from gso.tasks.base import Plan, Request, Solution, Stage
 from gso.tno.handles import moved, pinned
 from gso.tno.judged import better, difference, judged, requirements, warning
 from gso.tno.normalise import Canonical
-from gso.tno.optimize import check, packed, record_violations
+from gso.tno.optimize import check
+from gso.tno.packed import packed, record_violations
 from gso.tno.run import Run, objective
 from gso.tno.solver import METHODS, Minimum, minimise
 from gso.tno.solver.augmented_lagrangian import tighten

@@ -48,7 +48,7 @@ def objective(analysis: Analysis, request: Request, mesh: Mesh) -> list[Weighted
 
     Several components are weighted each for its own size and curvature.
     """
-    if not parted(analysis.mesh):
+    if not request.options.by_component or not parted(analysis.mesh):
         shape = analysis.shape
         return _terms(request, shape.mesh, shape.curvature, shape.bending, shape.smooth, mesh)
 

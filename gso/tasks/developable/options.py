@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from gso.errors import OptionError
@@ -10,6 +10,8 @@ from gso.tasks.options import Options as BaseOptions
 
 #: Largest strain of a developable surface when only a maximum deviation was asked for.
 DEVELOPABLE = 5e-3
+#: Factors on the weights for a surface that is cut into pieces.
+_PIECES_FAIRNESS, _PIECES_CURVATURE = 2.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,9 @@ class Options(BaseOptions):
         Iterations on each grid between the coarsest and the design's own, where the unknowns
         are normal offsets. With "free" and without `x0` the vertices are free there too and
         take `iterations`, halved from grid to grid on fine grids.
+    by_component : bool
+        Weigh each of several components that constraints join for its own size and curvature;
+        otherwise for those of the whole mesh, as for the pieces of one design.
     developable_below : float
         A design whose mean |K| is below this is developable already and is returned unchanged,
         unless there are constraints, `x0` or variables "surface".
@@ -88,7 +93,20 @@ class Options(BaseOptions):
     coarse_iterations: int = 12
     coarse_size: int = 32
     between_iterations: int = 6
+    by_component: bool = True
     developable_below: float = 1e-3
+
+    def for_pieces(self) -> Options:
+        """Return settings with more fairness: seams take up what single surfaces need creases for.
+
+        More weight on the curvature then keeps the strain as small.
+        """
+        return replace(
+            self,
+            by_component=False,
+            w_fairness=_PIECES_FAIRNESS * self.w_fairness,
+            w_curvature=_PIECES_CURVATURE * self.w_curvature,
+        )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -1,0 +1,206 @@
+"""Cuts of a design by an estimate of the strain, then measured on the flat patterns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gso.seams.cutting import cut
+from gso.seams.kinds import Edges
+from gso.seams.pieces import Pieces
+from gso.segmentation.loops import opening
+from gso.segmentation.merging import Merging, patches
+from gso.segmentation.options import NECK, Wishes
+from gso.segmentation.sheets import Sheet, flattened
+from gso.segmentation.splitting import apart, halves
+from gso.segmentation.stitching import key, stitched
+from gso.segmentation.straightening import straightened
+from gso.segmentation.tree import Ground, cut_tree
+from gso.typing import Ints
+
+#: Numbers of patches to merge, and how much compact pieces are preferred.
+_COUNTS = (100, 200)
+_COMPACT = (1.0, 2.5, 6.0)
+#: Shares of the neck that are tried, largest first.
+_NECKS = (1.0, 0.8, 0.65, 0.5, 0.0)
+#: Relative excess of an estimate over its bound that counts as none.
+_EXCESS = 0.05
+#: Most rounds of cuts through pieces that overlap or are too large.
+_ROUNDS = 25
+
+Said = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """Pieces with their flat patterns, in the order of the pieces; None where there is none."""
+
+    pieces: Pieces
+    sheets: tuple[Sheet | None, ...]
+
+    @cached_property
+    def strain(self) -> float:
+        """The largest 99th percentile of the strain; infinite without a pattern."""
+        return max(np.inf if s is None else s.strain for s in self.sheets)
+
+    @property
+    def sound(self) -> bool:
+        """Whether every piece has a pattern without overlap and inverted faces."""
+        return all(s is not None and s.sound for s in self.sheets)
+
+    def neck(self, limit: float) -> float:
+        """Return the narrowest place of all pieces, or a limit where that is less."""
+        return min(limit, *(s.neck(limit) for s in self.sheets if s is not None))
+
+
+def neck_of(ground: Ground, wishes: Wishes) -> float:
+    """Return the width of necks to aim at."""
+    if wishes.min_neck is not None:
+        return wishes.min_neck
+    return NECK * float(np.sqrt(ground.potential.area.sum()))
+
+
+def cuts(ground: Ground, wishes: Wishes, strain: float) -> Pieces:
+    """Cut a design for a bound on the estimated strain."""
+    if wishes.darts:
+        firm = wishes.min_neck is not None
+        return with_darts(ground, strain, neck_of(ground, wishes), firm=firm)
+    some = without_darts(ground, strain)
+    return min(some, key=lambda p: wishes.value(len(p), p.seam_length))
+
+
+def with_darts(ground: Ground, strain: float, neck: float, *, firm: bool) -> Pieces:
+    """Cut by :func:`cut_tree`, with necks as wide as the bound on the estimated strain allows."""
+    edges = ground.kept
+    for share in (1.0,) if firm else _NECKS:
+        edges = cut_tree(ground, strain, share * neck)
+        if share == 0.0 or _largest(ground, edges) <= (1.0 + _EXCESS) * strain:
+            break
+    return _disks(ground, edges)
+
+
+def without_darts(ground: Ground, strain: float) -> list[Pieces]:
+    """Cut by merging of patches, in several ways, without darts."""
+    out = []
+    for count in _COUNTS:
+        label = _small(ground, strain, count)
+        for compact in _COMPACT:
+            merging = Merging(ground, label, strain, compact)
+            merging.run()
+            label = straightened(ground, merging)
+            out.append(_disks(ground, merging.edges(label)))
+    return out
+
+
+def _small(ground: Ground, strain: float, count: int) -> Ints:
+    """Divide the design into patches with less strain than the bound."""
+    most = len(ground.mesh.faces) // 4
+    while True:
+        label = patches(ground.mesh, min(count, most))
+        edges = Merging(ground, label, strain, 1.0).edges()
+        if count >= most or _largest(ground, edges) <= 0.6 * strain:
+            return label
+        count *= 2
+
+
+def _largest(ground: Ground, edges: Ints) -> float:
+    reached = ground.begun
+    reached[edges] = True
+    for own in np.unique(ground.mesh.components[ground.mesh.used]):
+        ids = np.flatnonzero(ground.mesh.components == own)
+        if not reached[ids].any():
+            return np.inf
+    return 0.5 * float(np.abs(ground.potential.solve(reached)).max())
+
+
+def _disks(ground: Ground, edges: Ints) -> Pieces:
+    """Cut a design along edges, and along more of them where a piece is no disk."""
+    pieces = cut(ground.mesh, Edges(edges))
+    more = [piece.vertices[opening(piece.mesh)] for piece in pieces if not piece.is_disk]
+    if not more:
+        return pieces
+    return cut(ground.mesh, Edges(np.concatenate([edges, *more])))
+
+
+def measured(
+    ground: Ground, pieces: Pieces, most: tuple[float, float] | None = None, say: Said | None = None
+) -> Candidate:
+    """Lay pieces flat, and cut those that overlap themselves or are larger than a sheet.
+
+    Parameters
+    ----------
+    ground : Ground
+    pieces : Pieces
+        All of them disks.
+    most : (float, float), optional
+        Length and width of a sheet.
+    say : callable, optional
+        Called with what is being done.
+    """
+    known: dict[bytes, Sheet | None] = {}
+    for _ in range(_ROUNDS):
+        sheets: list[Sheet | None] = []
+        for number, piece in enumerate(pieces):
+            name = piece.faces.tobytes() + piece.mesh.faces.tobytes()
+            if name not in known:
+                if say is not None:
+                    say(f"pattern {number + 1} of {len(pieces)}")
+                known[name] = flattened(piece.mesh)
+            sheets.append(known[name])
+        more = []
+        for piece, sheet in zip(pieces, sheets, strict=True):
+            if sheet is None:
+                continue
+            edges = np.empty((0, 2), np.int64)
+            if len(sheet.overlaps):
+                edges = apart(sheet)
+            elif most is not None and not fits(sheet, most):
+                edges = halves(sheet)
+            if len(edges):
+                more.append(ground.mirrored(piece.vertices[edges]))
+        if not more:
+            break
+        pieces = _disks(ground, np.concatenate([pieces.edges, *more]))
+    return Candidate(pieces, tuple(sheets))
+
+
+def fits(sheet: Sheet, most: tuple[float, float]) -> bool:
+    """Whether a pattern fits on a sheet."""
+    return sheet.size[0] <= max(most) and sheet.size[1] <= min(most)
+
+
+def joined(
+    ground: Ground,
+    found: Candidate,
+    strain: float,
+    neck: float,
+    most: tuple[float, float] | None = None,
+    say: Said | None = None,
+) -> Candidate:
+    """Join pieces along parts of their seams (:func:`gso.segmentation.stitching.stitched`)."""
+    sheets = [s for s in found.sheets if s is not None]
+    if len(sheets) < len(found.sheets) or len(sheets) < 2 or ground.mirror is not None:
+        return found
+    edges, known = stitched(
+        ground,
+        found.pieces,
+        sheets,
+        strain,
+        neck,
+        lambda sheet: most is None or fits(sheet, most),
+        (lambda said: None) if say is None else say,
+    )
+    pieces = cut(ground.mesh, Edges(edges))
+    return Candidate(pieces, tuple(_renumbered(p.mesh.faces, p, known) for p in pieces))
+
+
+def _renumbered(faces: Ints, piece: object, known: dict[bytes, Sheet]) -> Sheet:
+    """Give a pattern the numbering of its piece; their faces are in the same order."""
+    mesh, own = piece.mesh, known[key(piece.faces)]  # type: ignore[attr-defined]
+    real = faces >= 0
+    flat = np.empty((len(mesh.vertices), 2))
+    flat[faces[real]] = own.flat[own.mesh.faces[real]]
+    return Sheet(mesh, flat)

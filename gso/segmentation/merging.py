@@ -1,0 +1,184 @@
+"""Merging of pieces across their common seams, while the estimated strain stays low."""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from gso.mesh import Mesh
+from gso.segmentation.tree import Ground
+from gso.typing import Ints
+
+
+def patches(mesh: Mesh, count: int) -> Ints:
+    """Divide a mesh into about `count` compact patches; return the patch of each face (m,).
+
+    The Voronoi cells of farthest points, by distances between the centres of faces.
+    """
+    he = mesh.half_edges
+    k = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
+    centre = mesh.vertices[corners].mean(axis=1)
+    f, g = he.face[k], he.face[he.twin[k]]
+    length = np.linalg.norm(centre[f] - centre[g], axis=1)
+    graph = coo_matrix(
+        (np.maximum(length, 1e-300), (f, g)), shape=(len(centre), len(centre))
+    ).tocsr()
+    middle = centre.mean(axis=0)
+    seed = int(np.linalg.norm(centre - middle, axis=1).argmax())
+    best, owner = np.full(len(centre), np.inf), np.zeros(len(centre), np.int64)
+    for number in range(min(count, len(centre))):
+        away = dijkstra(graph, directed=False, indices=seed, limit=float(best.max()))
+        closer = away < best
+        best[closer], owner[closer] = away[closer], number
+        seed = int(np.where(np.isinf(best), np.inf, best).argmax())
+        if best[seed] == 0.0:
+            break
+    return owner
+
+
+class Merging:
+    """Pieces by label of each face, merged one pair after the other.
+
+    Parameters
+    ----------
+    ground : Ground
+    label : ndarray of int, (m,)
+        Piece of each face; every piece a disk.
+    strain : float
+        Bound on the estimated strain of a piece.
+    compact : float
+        How much more a merge counts that removes much of a boundary.
+    """
+
+    def __init__(self, ground: Ground, label: Ints, strain: float, compact: float):
+        mesh = ground.mesh
+        self.ground, self.strain, self.compact = ground, strain, compact
+        self.label = label.astype(np.int64).copy()
+        he = mesh.half_edges
+        k = np.flatnonzero(he.twin > np.arange(he.twin.size))
+        self._ends = np.stack([he.origin[k], he.dest[k]], axis=1)
+        self._sides = np.stack([he.face[k], he.face[he.twin[k]]], axis=1)
+        self._length = np.linalg.norm(
+            mesh.vertices[self._ends[:, 0]] - mesh.vertices[self._ends[:, 1]], axis=1
+        )
+        n = len(mesh.vertices)
+        kept = np.sort(ground.kept, axis=1) @ np.array([n, 1])
+        self._kept = np.isin(np.sort(self._ends, axis=1) @ np.array([n, 1]), kept)
+        rim = np.flatnonzero(he.twin < 0)
+        self._rim = np.bincount(
+            he.face[rim],
+            np.linalg.norm(mesh.vertices[he.origin[rim]] - mesh.vertices[he.dest[rim]], axis=1),
+            len(mesh.faces),
+        )
+        self._corners = mesh.faces
+        self._fixed = ground.begun
+
+    def run(self) -> Ints:
+        """Merge until no merge is allowed; return the piece of each face (m,)."""
+        members = {int(k): np.flatnonzero(self.label == k) for k in np.unique(self.label)}
+        stamp = dict.fromkeys(members, 0)
+        beside: dict[int, dict[int, float]] = {k: {} for k in members}
+        forbidden: set[tuple[int, int]] = set()
+        sides = self.label[self._sides]
+        for k in np.flatnonzero(sides[:, 0] != sides[:, 1]).tolist():
+            a, b = sides[k].tolist()
+            beside[a][b] = beside[a].get(b, 0.0) + self._length[k]
+            beside[b][a] = beside[b].get(a, 0.0) + self._length[k]
+            if self._kept[k]:
+                forbidden.add((min(a, b), max(a, b)))
+        round_ = {k: sum(beside[k].values()) + float(self._rim[members[k]].sum()) for k in members}
+        heap: list[tuple[float, int, int, int, int]] = []
+
+        def offer(a: int, b: int) -> None:
+            a, b = min(a, b), max(a, b)
+            if (a, b) in forbidden:
+                return
+            found = self.estimate(np.concatenate([members[a], members[b]]))
+            if found is None or found > self.strain:
+                return
+            share = beside[a][b] / min(round_[a], round_[b])
+            heapq.heappush(
+                heap, (found / self.strain - self.compact * share, a, b, stamp[a], stamp[b])
+            )
+
+        for a, others in beside.items():
+            for b in others:
+                if a < b:
+                    offer(a, b)
+        while heap:
+            _, a, b, seen_a, seen_b = heapq.heappop(heap)
+            if a not in members or b not in members or (stamp[a], stamp[b]) != (seen_a, seen_b):
+                continue
+            members[a] = np.concatenate([members[a], members.pop(b)])
+            round_[a] += round_.pop(b) - 2.0 * beside[a].pop(b)
+            stamp[a] += 1
+            for c, length in beside.pop(b).items():
+                if c == a:
+                    continue
+                beside[c].pop(b)
+                beside[a][c] = beside[a].get(c, 0.0) + length
+                beside[c][a] = beside[a][c]
+                if (min(b, c), max(b, c)) in forbidden:
+                    forbidden.add((min(a, c), max(a, c)))
+            for c in beside[a]:
+                offer(a, c)
+        for number, faces in enumerate(members.values()):
+            self.label[faces] = number
+        return self.label
+
+    def between(self, label: Ints) -> tuple[Ints, Ints]:
+        """Return the edges (e, 2) between pieces, and the pieces (e, 2) on both sides."""
+        sides = label[self._sides]
+        cut = sides[:, 0] != sides[:, 1]
+        return self._ends[cut], sides[cut]
+
+    def edges(self, label: Ints | None = None) -> Ints:
+        """Return the edges (e, 2) between pieces, with those that are cut in any case."""
+        sides = (self.label if label is None else label)[self._sides]
+        cut = self._ends[(sides[:, 0] != sides[:, 1]) | self._kept]
+        return np.unique(np.sort(cut, axis=1), axis=0)
+
+    def estimate(self, faces: Ints) -> float | None:
+        """Estimate the strain of some faces together; None where they are no disk."""
+        corners = self._corners[faces]
+        ids, local = np.unique(corners, return_inverse=True)
+        own = corners.reshape(-1)
+        local = local.reshape(corners.shape)
+        if corners.shape[1] == 4 and (own < 0).any():
+            local = np.where(corners < 0, -1, local - 1)
+            ids = ids[1:]
+        rim, disk = _rim(local, len(ids))
+        if not disk:
+            return None
+        potential = self.ground.potential
+        inner = ids[~rim & ~self._fixed[ids]]
+        if not inner.size:
+            return 0.0
+        fixed = np.ones(len(self._fixed), bool)
+        fixed[inner] = False
+        scale = potential.solve(fixed, inner)
+        return potential.strain(scale, ids)
+
+
+def _rim(faces: Ints, count: int) -> tuple[NDArray[np.bool_], bool]:
+    """Mark the vertices on the boundary of faces (m, 3 or 4), and tell whether they are a disk."""
+    size = (faces >= 0).sum(axis=1)
+    place = np.arange(faces.shape[1])
+    after = np.where(place + 1 < size[:, None], np.roll(faces, -1, axis=1), faces[:, :1])
+    real = faces >= 0
+    a, b = faces[real], after[real]
+    key = np.minimum(a, b) * count + np.maximum(a, b)
+    edges, often = np.unique(key, return_counts=True)
+    rim_edges = edges[often == 1]
+    rim = np.zeros(count, bool)
+    rim[rim_edges // count] = True
+    rim[rim_edges % count] = True
+    # A boundary vertex with more than two boundary edges is a pinch.
+    touched = np.bincount(np.r_[rim_edges // count, rim_edges % count], minlength=count)
+    plain = bool((touched <= 2).all())
+    return rim, plain and count - len(edges) + len(faces) == 1 and rim_edges.size > 0

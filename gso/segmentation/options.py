@@ -1,0 +1,106 @@
+"""What was asked of a search for seams, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gso.errors import OptionError
+from gso.mesh import Mesh
+from gso.mesh.topology import edge_keys
+from gso.typing import Array
+
+#: Factors on the cost of edges in regions to avoid, and on edges to follow.
+_AVOID, _FOLLOW = 20.0, 0.2
+#: Smallest neck, relative to the root of the area, unless given.
+NECK = 0.1
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """Budgets and preferences of :func:`gso.pieces`."""
+
+    max_strain: float
+    max_deviation: float | None
+    max_pieces: int | None
+    seam: float | None
+    darts: bool
+    min_neck: float | None
+    max_size: tuple[float, float] | None
+    say: Callable[[str], None]
+
+    def __post_init__(self) -> None:
+        for name in ("max_strain", "max_deviation", "seam", "min_neck"):
+            value = getattr(self, name)
+            if value is not None and not _positive(value):
+                raise OptionError(f"{name} is {value!r}; it must be a positive number")
+        count = self.max_pieces
+        if count is not None and not (isinstance(count, int | np.integer) and count >= 1):
+            raise OptionError(f"max_pieces is {count!r}; it must be a whole number from 1 up")
+        size = self.max_size
+        if size is not None and not (len(size) == 2 and all(map(_positive, size))):
+            raise OptionError(f"max_size is {size!r}; it must be length and width of a sheet")
+
+    def value(self, pieces: int, seam: float) -> tuple[int, float, float]:
+        """Rank pieces, lower is better: budgets first, then seam and number of pieces."""
+        many = max(0, pieces - self.max_pieces) if self.max_pieces is not None else 0
+        long = max(0.0, seam - self.seam) if self.seam is not None else 0.0
+        # One piece fewer is worth a seam of half the root of the area.
+        return many, long, seam + 0.5 * pieces
+
+    def missed(self, pieces: int, seam: float) -> list[str]:
+        """Say which budgets are exceeded."""
+        out = []
+        if self.max_pieces is not None and pieces > self.max_pieces:
+            out.append(f"there are {pieces} pieces, more than {self.max_pieces}")
+        if self.seam is not None and seam > self.seam:
+            out.append(f"the seams are {seam:.3g} times the root of the area long, not {self.seam}")
+        return out
+
+
+def prices(mesh: Mesh, along: ArrayLike | None, avoid: ArrayLike | None) -> Array | None:
+    """Return the factor on the cost of each edge of ``mesh.edges``; None if all are one."""
+    if along is None and avoid is None:
+        return None
+    ends, n = mesh.edges, len(mesh.vertices)
+    factor = np.ones(len(ends))
+    if avoid is not None:
+        faces = _faces(avoid, len(mesh.faces))
+        corners = mesh.faces[faces]
+        inside = np.zeros(n, bool)
+        inside[corners[corners >= 0]] = True
+        factor[inside[ends].all(axis=1)] *= _AVOID
+    if along is not None:
+        wanted = np.asarray(along)
+        if wanted.ndim != 2 or wanted.shape[1] != 2 or wanted.dtype.kind not in "iu":
+            raise OptionError(
+                f"along has shape {wanted.shape}; it must be pairs of vertices (k, 2)"
+            )
+        keys, own = (edge_keys(pairs[:, 0], pairs[:, 1], n) for pairs in (wanted, ends))
+        missing = np.flatnonzero(~np.isin(keys, own))
+        if missing.size:
+            a, b = wanted[missing[0]]
+            raise OptionError(f"along has the pair {a}-{b}, which is no edge of a face")
+        factor[np.isin(own, keys)] *= _FOLLOW
+    return factor
+
+
+def _faces(given: ArrayLike, count: int) -> Any:
+    faces = np.atleast_1d(np.asarray(given))
+    if faces.dtype == bool and faces.shape == (count,):
+        return np.flatnonzero(faces)
+    if faces.ndim != 1 or faces.dtype.kind not in "iu":
+        raise OptionError("avoid must be a list of faces, or a mask of all faces")
+    bad = faces[(faces < 0) | (faces >= count)]
+    if bad.size:
+        raise OptionError(f"avoid names face {bad[0]}; the mesh has {count}")
+    return faces
+
+
+def _positive(value: Any) -> bool:
+    real = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    return bool(real and 0 < value < np.inf)

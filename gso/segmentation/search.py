@@ -1,0 +1,211 @@
+"""The search for seams."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gso.errors import ConvergenceWarning
+from gso.seams.cutting import cut
+from gso.seams.kinds import Seam
+from gso.seams.pieces import Pieces
+from gso.segmentation.candidates import Candidate, cuts, joined, measured, neck_of
+from gso.segmentation.found import Segmentation
+from gso.segmentation.mirror import mirror_of
+from gso.segmentation.options import Wishes, prices
+from gso.segmentation.packed import packed
+from gso.segmentation.paths import Paths
+from gso.segmentation.potential import Potential
+from gso.segmentation.reshaping import reshaped
+from gso.segmentation.tree import Ground
+from gso.spelling import known_keywords
+
+#: Ratio of the estimated to the measured strain of a first attempt.
+_RATIO = 1.3
+#: Share of the allowed strain from which on an attempt is not loosened any more.
+_CLOSE = 0.93
+_ATTEMPTS = 6
+#: Ratio of the absolute curvature of a design to that of its smoothed copy from which on it
+#: counts as noisy.
+_NOISY = 4.0
+
+
+@known_keywords()
+def pieces(
+    mesh: Any,
+    *,
+    max_strain: float = 0.01,
+    max_deviation: float | None = None,
+    max_pieces: int | None = None,
+    seam: float | None = None,
+    darts: bool = True,
+    symmetric: bool = False,
+    min_neck: float | None = None,
+    max_size: tuple[float, float] | None = None,
+    keep: Seam | Iterable[Seam] | ArrayLike | Pieces | None = None,
+    along: ArrayLike | None = None,
+    avoid: ArrayLike | None = None,
+    denoise: bool = False,
+    callback: Callable[[str], None] | None = None,
+) -> Segmentation:
+    """Find seams along which a design can be cut into pieces that can be laid flat.
+
+    Without `max_deviation` the shape stays as it is, and the seams are as short as the strain
+    allows. With it the shape changes within that distance: the pieces become developable.
+
+    Parameters
+    ----------
+    mesh : Mesh, array_like or path
+        The design: closed or with boundary loops, with handles, of one or more components. Quads
+        are cut along edge rows.
+    max_strain : float
+        Bound on the 99th percentile of the strain ``|s - 1|`` of every pattern.
+    max_deviation : float, optional
+        Largest distance between the result and the design, in both directions, in the mesh's unit.
+    max_pieces : int, optional
+        Budget of pieces.
+    seam : float, optional
+        Budget of the length of all seams, relative to the root of the design's area.
+    darts : bool
+        Whether seams may end inside a piece; False for sheet metal.
+    symmetric : bool
+        Make the seams symmetric; the mesh has to be, vertex by vertex. Then pieces that overlap
+        themselves are cut, and not joined again elsewhere.
+    min_neck : float, optional
+        Smallest width of a piece, in the mesh's unit. When not given, a tenth of the root of the
+        area is aimed at, and less is taken where the strain cannot be held otherwise.
+    max_size : (float, float), optional
+        Length and width of a sheet that every pattern must fit on, in the mesh's unit.
+    keep : Seam, iterable of Seam, array_like (e, 2), or Pieces, optional
+        Seams that stay: what :func:`gso.cut` takes, or an earlier result.
+    along : array_like of int, (k, 2), optional
+        Edges that seams should follow.
+    avoid : array_like, optional
+        Faces that seams should keep away from: indices, or a mask of all faces.
+    denoise : bool
+        Denoise the design first, such as a scan.
+    callback : callable, optional
+        Called with what is being done, in words.
+
+    Returns
+    -------
+    Segmentation
+        The pieces, their patterns, and the reasons if they are not what was asked for.
+
+    Raises
+    ------
+    MeshError
+        The mesh cannot be cut into pieces: it is not orientable, or not manifold.
+    OptionError
+        A parameter is wrong.
+
+    Examples
+    --------
+    >>> import numpy as np, gso
+    >>> u, v = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
+    >>> dome = np.stack([u, v, 0.5 - 0.25 * (u * u + v * v)], axis=-1)
+    >>> found = gso.pieces(dome, max_strain=0.01)
+    >>> len(found), found.usable, found.metrics["strain_p99"] <= 0.01
+    (1, True, True)
+
+    Notes
+    -----
+    The cut is chosen by an estimate of the strain (:mod:`gso.segmentation.potential`), then the
+    pieces are laid flat with the least largest strain and measured, and the estimate's bound is
+    adapted.
+    """
+    clock = time.perf_counter()
+    wishes = Wishes(
+        max_strain,
+        max_deviation,
+        max_pieces,
+        seam,
+        darts,
+        min_neck,
+        max_size,
+        callback or (lambda said: None),
+    )
+    notes: list[str] = []
+    ground = _ground(mesh, keep, along, avoid, symmetric, denoise)
+    said = _noise(ground)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        if max_deviation is None:
+            out = packed(_as_is(ground, wishes), None, ground, wishes)
+        else:
+            out = packed(*reshaped(ground, wishes), ground, wishes)
+    reasons = list(out.reasons)
+    if said:
+        (reasons if reasons else notes).append(said)
+    return replace(
+        out,
+        reasons=tuple(reasons),
+        notes=(*out.notes, *notes),
+        seconds=time.perf_counter() - clock,
+    )
+
+
+def _ground(mesh: Any, keep: Any, along: Any, avoid: Any, symmetric: bool, denoise: bool) -> Ground:
+    from gso.io import as_mesh
+
+    design = as_mesh(mesh)
+    design.check_joined()
+    if denoise:
+        from gso.tno import optimize
+
+        design = design.replaced(optimize(design, task="denoise", verdict=False).mesh.vertices)
+    kept = np.empty((0, 2), np.int64)
+    if isinstance(keep, Pieces):
+        design, kept = keep.design, keep.edges
+    elif keep is not None:
+        begun = cut(design, keep)
+        design, kept = begun.design, begun.edges
+    factor = prices(design, along, avoid)
+    mirror = mirror_of(design) if symmetric else None
+    ground = Ground(design, Potential(design), Paths(design, factor), kept, mirror)
+    return replace(ground, kept=ground.mirrored(kept))
+
+
+def _noise(ground: Ground) -> str:
+    """Say so if a design is noisy: smoothing over some edges removes most of its curvature."""
+    inner = ~ground.mesh.half_edges.boundary_vertex & (ground.potential.area > 0)
+    raw = float(np.abs(ground.potential.curvature[inner]).sum())
+    left = float(np.abs(ground.potential.smoothed()[inner]).sum())
+    if raw <= _NOISY * max(left, 1.0):
+        return ""
+    return (
+        f"the design is noisy: its absolute curvature falls from {raw:.3g} to {left:.3g} "
+        "when it is averaged over a few edges; denoise it with denoise=True, or let its shape "
+        "change with max_deviation"
+    )
+
+
+def _as_is(ground: Ground, wishes: Wishes) -> Candidate:
+    """Find seams of a shape that does not change."""
+    most, ratio = wishes.max_strain, _RATIO
+    found: list[Candidate] = []
+    for attempt in range(_ATTEMPTS):
+        wishes.say(f"seams, attempt {attempt + 1}")
+        last = measured(ground, cuts(ground, wishes, ratio * most), wishes.max_size, wishes.say)
+        found.append(last)
+        good = any(one.strain <= most and one.sound for one in found)
+        whole = len(last.pieces.edges) == len(ground.kept)
+        if good and (_CLOSE * most < last.strain <= most or attempt >= 3):
+            break
+        if whole and last.strain <= most:
+            break
+        ratio *= float(np.clip(0.985 * most / max(last.strain, 1e-300), 0.5, 1.6))
+    best = min(found, key=lambda one: (one.strain > most or not one.sound, *_rank(one, wishes)))
+    if best.strain > most or not wishes.darts:
+        return best
+    return joined(ground, best, most, neck_of(ground, wishes), wishes.max_size, wishes.say)
+
+
+def _rank(found: Candidate, wishes: Wishes) -> tuple[int, float, float]:
+    return wishes.value(len(found.pieces), found.pieces.seam_length)

@@ -1,0 +1,96 @@
+"""The solve of a design cut into pieces: each piece developable, the seams closed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gso.constraints import Constraint, Glue, SmoothCurves
+from gso.errors import OptionError
+from gso.mesh import Mesh
+from gso.mesh.cutting import Cut
+from gso.result import Result
+from gso.seams.chains import chains
+from gso.seams.pieces import Pieces
+from gso.tno.start import Start
+from gso.typing import Ints
+
+#: Weight of the smoothness of seams.
+_SMOOTH = 8e-6
+
+
+def constraints_of(pieces: Pieces) -> list[Constraint]:
+    """Return what keeps the seams of pieces closed, and smooth."""
+    opened = pieces.opened
+    pairs = np.unique(np.sort(opened.seams.transpose(0, 2, 1).reshape(-1, 2), axis=1), axis=0)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    if not len(pairs):
+        return []
+    lines = [line for _, line in chains(pieces.edges, pieces.sides) if len(line) > 2]
+    out: list[Constraint] = [Glue(pairs)]
+    return [*out, SmoothCurves(lines, _SMOOTH)] if lines else out
+
+
+def solved(
+    pieces: Pieces,
+    task: str,
+    constraints: Sequence[Constraint],
+    start: Start,
+    solve: Callable[[Mesh, Sequence[Constraint], Start], Result],
+) -> Result:
+    """Solve a design cut into pieces.
+
+    Parameters
+    ----------
+    pieces : Pieces
+    task : str
+        The task: "developable", or "flatten" for the patterns of the pieces as they are.
+    constraints : sequence of Constraint
+        In the numbering of the design.
+    start : Start
+        In the numbering of the design.
+    solve : callable
+        Solves a mesh with constraints from a start.
+
+    Returns
+    -------
+    Result
+        Its design and mesh are cut open; `pieces` has the result's.
+    """
+    if task not in ("developable", "flatten"):
+        raise OptionError(
+            f"task {task!r} does not take pieces; give it the whole design, pieces.design"
+        )
+    design = pieces.opened.mesh
+    joined = constraints_of(pieces) if task == "developable" else []
+    if start.points is not None:
+        points = np.asarray(getattr(start.points, "vertices", start.points), float)
+        if len(points) == len(pieces.design.vertices):
+            start = replace(start, points=points[pieces.opened.vertex])
+    result = solve(design, [*joined, *constraints], start)
+    # Advice to join what was cut open is no use here.
+    own = tuple(note for note in result.notes if note not in design.notes)
+    result.notes = pieces.design.notes + own
+    if task == "developable":
+        result.pieces = moved(pieces, result.mesh)
+    return result
+
+
+def moved(pieces: Pieces, surface: Mesh) -> Pieces:
+    """Return the pieces with the vertices of a surface that is cut open, (p, 3)."""
+    vertex = pieces.opened.vertex
+    points = pieces.design.vertices.copy()
+    points[vertex] = surface.vertices
+    return replace(
+        pieces,
+        design=pieces.design.replaced(points),
+        opened=Cut(surface, vertex, pieces.opened.seams),
+    )
+
+
+def gap(surface: Mesh, seams: Ints) -> float:
+    """Return the largest distance between the two copies of a vertex on a seam."""
+    one, two = (surface.vertices[seams[:, k]] for k in (0, 1))
+    return float(np.linalg.norm(one - two, axis=2).max(initial=0.0))
