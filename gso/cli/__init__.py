@@ -9,6 +9,7 @@ import click
 from gso.cli.dataset import dataset
 from gso.cli.inspect import info, metrics, plot
 from gso.cli.optimize import optimize
+from gso.cli.pieces import pieces
 from gso.cli.train import train
 from gso.errors import GSOError
 
@@ -57,5 +58,5 @@ def main() -> None:
     """Make quad and grid surfaces developable, flatten them, denoise them."""
 
 
-for _command in (optimize, metrics, info, plot, dataset, train):
+for _command in (optimize, pieces, metrics, info, plot, dataset, train):
     main.add_command(_command)

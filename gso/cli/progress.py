@@ -62,6 +62,18 @@ def iterations() -> Iterator[Callable[[Progress], None] | None]:
 
 
 @contextmanager
+def words() -> Iterator[Callable[[str], None] | None]:
+    """Provide a callback that shows what is being done, or None without a terminal."""
+    if not watched():
+        yield None
+        return
+    from tqdm import tqdm
+
+    with tqdm(bar_format="{desc} [{elapsed}]", leave=False) as bar:
+        yield bar.set_description_str
+
+
+@contextmanager
 def files(count: int) -> Iterator[Any]:
     """Provide a bar over files, with `update(n)` and `write(line, file=...)`."""
     from tqdm import tqdm

@@ -25,19 +25,35 @@ from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.plot.draw import GRAZING, SUFFIXES, Panel, draw, facing, write
 from gso.plot.heat import curvatures, distance, numbers, scales, strain, stretch
+from gso.plot.pieces import pieces
 from gso.plot.rulings import gauss, ruled
 from gso.plot.strips import strips
 from gso.plot.view import View
 from gso.result import Result
+from gso.segmentation import Segmentation
 from gso.spelling import choices, known_keywords
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "SUFFIXES", "plot_result", "plot_rulings", "plot_surface", "require"]
+__all__ = [
+    "COLOURS",
+    "SUFFIXES",
+    "available",
+    "plot_pieces",
+    "plot_result",
+    "plot_rulings",
+    "plot_surface",
+    "require",
+]
 
 COLOURS = ("curvature", "distance", "strain", "none")
 """Names that :func:`plot_surface` takes for its values."""
+
+
+def available() -> bool:
+    """Tell whether Matplotlib is installed."""
+    return find_spec("matplotlib") is not None
 
 
 def require() -> None:
@@ -48,7 +64,7 @@ def require() -> None:
     GSOError
         With instructions to install it.
     """
-    if find_spec("matplotlib") is None:
+    if not available():
         raise GSOError('plots need Matplotlib: pip install ".[plot]" in the folder of gso')
 
 
@@ -203,6 +219,31 @@ def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figu
 def _curved(design: Mesh, mesh: Mesh) -> float:
     """Compute the mean absolute Gaussian curvature of a surface, scaled by its design's size."""
     return metrics.mean_abs_K(mesh, scale=metrics.unit(design))
+
+
+def plot_pieces(found: Segmentation, path: str | PathLike[str] | None = None) -> Figure:
+    """Draw a design in pieces from both sides, with its seams, beside the patterns.
+
+    Parameters
+    ----------
+    found : Segmentation
+        Returned by :func:`gso.pieces`.
+    path : str or PathLike, optional
+        A .png, .pdf or .svg file to write.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    GSOError
+        Matplotlib is not installed.
+    MeshError
+        The file cannot be written.
+    """
+    require()
+    return write(draw(pieces(found)), path)
 
 
 @known_keywords()

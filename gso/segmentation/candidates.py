@@ -23,7 +23,7 @@ from gso.typing import Ints
 
 #: Numbers of patches to merge, and how much compact pieces are preferred.
 _COUNTS = (100, 200)
-_COMPACT = (1.0, 2.5, 6.0)
+_COMPACT = (1.7, 3.0, 6.0)
 #: Shares of the neck that are tried, largest first.
 _NECKS = (1.0, 0.8, 0.65, 0.5, 0.0)
 #: Relative excess of an estimate over its bound that counts as none.
@@ -69,7 +69,7 @@ def cuts(ground: Ground, wishes: Wishes, strain: float) -> Pieces:
         firm = wishes.min_neck is not None
         return with_darts(ground, strain, neck_of(ground, wishes), firm=firm)
     some = without_darts(ground, strain)
-    return min(some, key=lambda p: wishes.value(len(p), p.seam_length))
+    return pieces_of(min(some, key=lambda one: merged_value(one, wishes)))
 
 
 def with_darts(ground: Ground, strain: float, neck: float, *, firm: bool) -> Pieces:
@@ -82,17 +82,27 @@ def with_darts(ground: Ground, strain: float, neck: float, *, firm: bool) -> Pie
     return _disks(ground, edges)
 
 
-def without_darts(ground: Ground, strain: float) -> list[Pieces]:
-    """Cut by merging of patches, in several ways, without darts."""
+def without_darts(ground: Ground, strain: float) -> list[Merging]:
+    """Merge patches in several ways, without darts; see :func:`pieces_of`."""
     out = []
     for count in _COUNTS:
         label = _small(ground, strain, count)
         for compact in _COMPACT:
-            merging = Merging(ground, label, strain, compact)
-            merging.run()
-            label = straightened(ground, merging)
-            out.append(_disks(ground, merging.edges(label)))
+            out.append(Merging(ground, label, strain, compact))
+            out[-1].run()
     return out
+
+
+def merged_value(merging: Merging, wishes: Wishes) -> tuple[int, float, float]:
+    """Rank merged pieces by :meth:`Wishes.value`, before their seams are straightened."""
+    length = merging.length / float(np.sqrt(merging.ground.potential.area.sum()))
+    return wishes.value(int(merging.label.max()) + 1, length)
+
+
+def pieces_of(merging: Merging) -> Pieces:
+    """Cut between merged pieces, along straightened seams."""
+    label = straightened(merging.ground, merging)
+    return _disks(merging.ground, merging.edges(label))
 
 
 def _small(ground: Ground, strain: float, count: int) -> Ints:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -110,6 +111,17 @@ class Segmentation(Pieces):
                 }
             rows.append(row)
         return rows
+
+    def save(self, folder: str | PathLike[str], *, unit: str = "mm") -> list[str]:
+        """Write a folder of files, and return their names.
+
+        ``pieces.obj`` has the whole surface with a group for each piece, ``patterns.svg`` and
+        ``pattern_NAME.svg`` the patterns at 1:1, where `unit` is the unit of the coordinates, and
+        ``pieces.json`` the metrics and the table.
+        """
+        from gso.segmentation.files import save
+
+        return save(self, folder, unit)
 
     def __repr__(self) -> str:
         said = f"{len(self)} pieces, seam {self.seam_length:.3g}"

@@ -131,6 +131,12 @@ class Merging:
             self.label[faces] = number
         return self.label
 
+    @property
+    def length(self) -> float:
+        """Length of the seams between pieces."""
+        sides = self.label[self._sides]
+        return float(self._length[sides[:, 0] != sides[:, 1]].sum())
+
     def between(self, label: Ints) -> tuple[Ints, Ints]:
         """Return the edges (e, 2) between pieces, and the pieces (e, 2) on both sides."""
         sides = label[self._sides]

@@ -15,7 +15,16 @@ from gso.errors import ConvergenceWarning
 from gso.seams.cutting import cut
 from gso.seams.kinds import Seam
 from gso.seams.pieces import Pieces
-from gso.segmentation.candidates import Candidate, cuts, joined, measured, neck_of
+from gso.segmentation.candidates import (
+    Candidate,
+    cuts,
+    joined,
+    measured,
+    merged_value,
+    neck_of,
+    pieces_of,
+    without_darts,
+)
 from gso.segmentation.found import Segmentation
 from gso.segmentation.mirror import mirror_of
 from gso.segmentation.options import Wishes, prices
@@ -28,6 +37,8 @@ from gso.spelling import known_keywords
 
 #: Ratio of the estimated to the measured strain of a first attempt.
 _RATIO = 1.3
+#: The same for pieces without darts, in groups that are tried one after the other.
+_RATIOS = ((1.45, 1.35, 1.25), (1.0,), (0.7,))
 #: Share of the allowed strain from which on an attempt is not loosened any more.
 _CLOSE = 0.93
 _ATTEMPTS = 6
@@ -188,6 +199,24 @@ def _noise(ground: Ground) -> str:
 
 def _as_is(ground: Ground, wishes: Wishes) -> Candidate:
     """Find seams of a shape that does not change."""
+    return _darted(ground, wishes) if wishes.darts else _dartless(ground, wishes)
+
+
+def _dartless(ground: Ground, wishes: Wishes) -> Candidate:
+    """Measure pieces without darts, the best by the estimate first, until some hold the strain."""
+    found: list[Candidate] = []
+    for ratios in _RATIOS:
+        wishes.say(f"seams without darts, attempt {len(found) + 1}")
+        pool = [m for r in ratios for m in without_darts(ground, r * wishes.max_strain)]
+        for some in sorted(pool, key=lambda one: merged_value(one, wishes)):
+            found.append(measured(ground, pieces_of(some), wishes.max_size, wishes.say))
+            if found[-1].strain <= wishes.max_strain and found[-1].sound:
+                return found[-1]
+    return min(found, key=lambda one: (not one.sound, one.strain))
+
+
+def _darted(ground: Ground, wishes: Wishes) -> Candidate:
+    """Cut with darts, and adapt the bound on the estimated strain to the measured one."""
     most, ratio = wishes.max_strain, _RATIO
     found: list[Candidate] = []
     for attempt in range(_ATTEMPTS):
@@ -202,7 +231,7 @@ def _as_is(ground: Ground, wishes: Wishes) -> Candidate:
             break
         ratio *= float(np.clip(0.985 * most / max(last.strain, 1e-300), 0.5, 1.6))
     best = min(found, key=lambda one: (one.strain > most or not one.sound, *_rank(one, wishes)))
-    if best.strain > most or not wishes.darts:
+    if best.strain > most:
         return best
     return joined(ground, best, most, neck_of(ground, wishes), wishes.max_size, wishes.say)
 

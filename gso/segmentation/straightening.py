@@ -13,8 +13,8 @@ from gso.segmentation.merging import Merging
 from gso.segmentation.tree import Ground
 from gso.typing import Ints
 
-#: Number of passes over all seams.
-_PASSES = 2
+#: Number of passes over all seams, and number of edges that are straightened together.
+_PASSES, _WINDOW = 3, 12
 
 
 def straightened(ground: Ground, merging: Merging) -> Ints:
@@ -27,42 +27,88 @@ def straightened(ground: Ground, merging: Merging) -> Ints:
     ndarray of int, (m,)
         The piece of each face.
     """
-    mesh, paths = ground.mesh, ground.paths
+    mesh = ground.mesh
     label = merging.label.copy()
-    even = np.ones(len(paths.ends))
     kept = np.zeros(len(mesh.vertices), bool)
     kept[ground.kept] = True
-    for _ in range(_PASSES):
-        changed = False
+    for number in range(_PASSES):
         ends, sides = merging.between(label)
         for (a, b), line in chains(ends, sides):
-            if a == b or line[0] == line[-1] or kept[line[1:-1]].any():
+            if a == b or kept[line[1:-1]].any():
                 continue
-            faces = np.flatnonzero((label == a) | (label == b))
-            closed = np.ones(len(mesh.vertices), bool)
-            closed[_inside(ground, label, a, b)] = False
-            closed[line[[0, -1]]] = False
-            goal = np.zeros(len(closed), bool)
-            goal[line[-1]] = True
-            path = paths.cheapest(int(line[0]), goal, even, closed)
-            if path[-1] != line[-1] or len(path) < 2 or np.array_equal(path, line):
-                continue
-            if _length(ground, path) > (1.0 + 1e-9) * _length(ground, line):
-                continue
-            new = _divided(ground, faces, path)
-            if new is None:
-                continue
-            one, two = faces[new], faces[~new]
-            if (label[one] == a).sum() + (label[two] == b).sum() < 0.5 * len(faces):
-                one, two = two, one
-            strains = [merging.estimate(some) for some in (one, two)]
-            if any(s is None or s > merging.strain for s in strains):
-                continue
-            label[one], label[two] = a, b
-            changed = True
-        if not changed:
-            break
+            for first, last in _windows(line, number):
+                # The seam may have moved since the chains were listed.
+                if not _still(merging, label, a, b, line):
+                    break
+                part = _shorter(ground, label, (a, b), line, first, last)
+                if part is None:
+                    continue
+                new = np.r_[line[:first], part, line[last + 1 :]]
+                if _relabelled(ground, merging, label, (a, b), new):
+                    line = new
+                    if first == 0 and last == len(line) - 1:
+                        break
     return label
+
+
+def _windows(line: Ints, number: int) -> list[tuple[int, int]]:
+    """List parts of a chain to straighten: all of it, then windows, shifted from pass to pass."""
+    count = len(line)
+    out = [(0, count - 1)] if line[0] != line[-1] else []
+    begin = number * _WINDOW // _PASSES
+    windows = [(k, k + _WINDOW) for k in range(begin, count - 1, _WINDOW // 2)]
+    # From the end, so that places before a window keep their numbers.
+    return out + [(k, min(stop, count - 1)) for k, stop in windows[::-1] if count - k > 3]
+
+
+def _still(merging: Merging, label: Ints, a: int, b: int, line: Ints) -> bool:
+    """Tell whether a chain still divides the same two pieces."""
+    ends, sides = merging.between(label)
+    pair = np.sort(sides, axis=1)
+    own = ends[(pair[:, 0] == min(a, b)) & (pair[:, 1] == max(a, b))]
+    n = int(max(own.max(initial=0), line.max())) + 1
+    keys = edge_keys(line[:-1], line[1:], n)
+    return bool(np.isin(keys, edge_keys(own[:, 0], own[:, 1], n)).all())
+
+
+def _shorter(
+    ground: Ground, label: Ints, pair: tuple[int, int], line: Ints, first: int, last: int
+) -> Ints | None:
+    """Find a shorter path between two vertices of a chain, inside the two pieces."""
+    last = min(last, len(line) - 1)
+    if last - first < 2:
+        return None
+    closed = np.ones(len(ground.mesh.vertices), bool)
+    closed[_inside(ground, label, *pair)] = False
+    closed[line] = True
+    closed[line[first : last + 1]] = False
+    goal = np.zeros(len(closed), bool)
+    goal[line[last]] = True
+    even = np.ones(len(ground.paths.ends))
+    path = ground.paths.cheapest(int(line[first]), goal, even, closed)
+    before = line[first : last + 1]
+    if path[-1] != line[last] or len(path) < 2 or np.array_equal(path, before):
+        return None
+    return path if _length(ground, path) <= (1.0 + 1e-9) * _length(ground, before) else None
+
+
+def _relabelled(
+    ground: Ground, merging: Merging, label: Ints, pair: tuple[int, int], line: Ints
+) -> bool:
+    """Divide two pieces along a new chain, if the estimated strain allows it."""
+    a, b = pair
+    faces = np.flatnonzero((label == a) | (label == b))
+    new = _divided(ground, faces, line)
+    if new is None:
+        return False
+    one, two = faces[new], faces[~new]
+    if (label[one] == a).sum() + (label[two] == b).sum() < 0.5 * len(faces):
+        one, two = two, one
+    strains = [merging.estimate(some) for some in (one, two)]
+    if any(s is None or s > merging.strain for s in strains):
+        return False
+    label[one], label[two] = a, b
+    return True
 
 
 def _length(ground: Ground, line: Ints) -> float:
