@@ -10,6 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+import gso
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
@@ -26,7 +31,7 @@ def load(name):
 
 
 class Connectivity:
-    """Edges, valences and boundary loops of oriented quads."""
+    """Edges, valences and boundary loops of oriented faces."""
 
     def __init__(self, faces):
         self.faces = faces
@@ -51,12 +56,13 @@ class Connectivity:
         return count
 
     def components(self):
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
+        return self.pieces().max() + 1
 
+    def pieces(self):
+        """Number of the component of each vertex."""
         i, j = np.array(sorted(self.edges)).T
         size = self.faces.max() + 1
-        return connected_components(coo_array((np.ones(len(i)), (i, j)), (size, size)))[0]
+        return connected_components(coo_array((np.ones(len(i)), (i, j)), (size, size)), False)[1]
 
     def inner_valences(self):
         valence = Counter(v for e in self.edges for v in e)
@@ -91,7 +97,9 @@ def read_obj(path):
     return vertices, faces
 
 
-@pytest.mark.parametrize("name", ["_write", "teapot", "terrain", "great_court", "irregular"])
+@pytest.mark.parametrize(
+    "name", ["_write", "_sheets", "teapot", "terrain", "great_court", "irregular", "whole"]
+)
 def test_docstrings_hold(name):
     flags = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
     assert doctest.testmod(load(name), optionflags=flags).failed == 0
@@ -295,6 +303,139 @@ def test_a_cone_fits_the_irregular_mesh_within_one_percent(name):
     assert miss < 0.01 * np.linalg.norm(np.ptp(vertices, axis=0))
 
 
+# Components, boundary loops, faces, smallest angle, size in millimetres.
+WHOLE = {
+    "sphere": (1, 0, 5120, 50, (1000, 1000, 1000)),
+    "helmet": (1, 1, 2904, 24, (300, 247, 181)),
+    "hull": (1, 1, 2632, 20, (6000, 1920, 1174)),
+    "canopy": (1, 1, 6032, 20, (19916, 11335, 3218)),
+    "quad_dome": (1, 1, 1680, 65, (14000, 11000, 3000)),
+    "teapot": (4, 6, 7708, 12, (321.4, 200, 157.5)),
+}
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_whole_design(name):
+    components, loops, count, angle, size = WHOLE[name]
+    vertices, faces = load("whole").DESIGNS[name]()
+    mesh = Connectivity(faces)
+    assert len(faces) == count
+    assert np.array_equal(np.unique(faces), np.arange(len(vertices)))
+    assert (mesh.is_manifold(), mesh.components(), mesh.loops()) == (True, components, loops)
+    # All components are spheres with holes.
+    assert len(vertices) - len(mesh.edges) + len(faces) == 2 * components - loops
+    assert len(np.unique(np.sort(faces, axis=1), axis=0)) == count
+    angles = corner_angles(vertices, faces)
+    assert angles.min() > angle
+    assert angles.max() < (180 - 2 * angle if faces.shape[1] == 3 else 130)
+    np.testing.assert_allclose(np.ptp(vertices, axis=0), size, rtol=1e-3)
+    checked = gso.Mesh(vertices, faces)
+    np.testing.assert_array_equal(checked.faces, faces)
+    if components == 1:
+        assert checked.notes == ()
+
+
+@pytest.mark.parametrize(
+    "name, resolution, count",
+    [
+        ("sphere", 2, 320),
+        ("helmet", 10, 600),
+        ("hull", 6, 480),
+        ("canopy", 8, 576),
+        ("quad_dome", 10, 220),
+        ("teapot", 8, 2152),
+    ],
+)
+def test_whole_design_at_another_resolution(name, resolution, count):
+    whole = load("whole")
+    vertices, faces = whole.DESIGNS[name](resolution)
+    mesh = Connectivity(faces)
+    assert len(faces) == count
+    assert (mesh.is_manifold(), mesh.components(), mesh.loops()) == (True, *WHOLE[name][:2])
+    np.testing.assert_allclose(np.ptp(vertices, axis=0), WHOLE[name][4], rtol=0.03)
+
+
+@pytest.mark.parametrize("name", ["sphere", "helmet", "teapot"])
+def test_hollow_design_faces_out(name):
+    vertices, faces = load("whole").DESIGNS[name]()
+    piece = Connectivity(faces).pieces()[faces[:, 0]]
+    for p in np.unique(piece):
+        corners = vertices[faces[piece == p]]
+        corners = corners - corners.mean(axis=(0, 1))
+        assert np.linalg.det(corners).sum() > 0
+
+
+@pytest.mark.parametrize("name, side", [("hull", -1), ("canopy", 1), ("quad_dome", 1)])
+def test_open_design_faces_one_way(name, side):
+    vertices, faces = load("whole").DESIGNS[name]()
+    corners = vertices[faces]
+    up = np.cross(corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1])[:, 2]
+    assert np.all(side * up > 0)
+
+
+def test_sphere_has_its_radius_and_twelve_corners():
+    vertices, faces = load("whole").sphere()
+    np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 500)
+    assert Connectivity(faces).inner_valences() == {5: 12, 6: 2550}
+
+
+def test_quad_dome_has_four_irregular_vertices_and_its_formula():
+    vertices, faces = load("whole").quad_dome()
+    assert Connectivity(faces).inner_valences() == {3: 4, 4: 1621}
+    x, y, z = vertices.T / 1000
+    np.testing.assert_allclose(z, 3 * (1 - (x / 7) ** 2 - (y / 5.5) ** 2), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["helmet", "hull"])
+def test_helmet_and_hull_are_mirror_symmetric(name):
+    vertices, faces = load("whole").DESIGNS[name]()
+    distance, other = cKDTree(vertices).query(vertices * [1, -1, 1])
+    assert distance.max() < 1e-6
+    mirrored = {frozenset(f) for f in other[faces].tolist()}
+    assert mirrored == {frozenset(f) for f in faces.tolist()}
+
+
+def test_hull_is_pointed_in_front_and_round_behind():
+    vertices, _ = load("whole").hull()
+    t = 0.5 - vertices[:, 0] / 6000
+    sheer = 450 * (1 - t) ** 2 + 120 * t**2
+    keel = 900 * (1 - (1 - t) ** 6) * np.sqrt(np.maximum(1 - t**4, 0))
+    middle = np.abs(vertices[:, 1]) < 1e-6
+    np.testing.assert_allclose(vertices[middle, 2], (sheer - keel)[middle], atol=1e-6)
+    top = np.abs(vertices[:, 2] - sheer) < 1e-6
+    breadth = 1100 * (1 - (1 - t) ** 3) * np.sqrt(np.maximum(1 - t**4, 0))
+    np.testing.assert_allclose(np.abs(vertices[top, 1]), breadth[top], atol=1e-3)
+
+
+def test_canopy_is_curved_both_ways():
+    vertices, faces = load("whole").canopy()
+    curvature = np.full(len(vertices), 2 * np.pi)
+    np.subtract.at(curvature, faces, np.radians(corner_angles(vertices, faces)))
+    inner = np.setdiff1d(np.arange(len(vertices)), list(Connectivity(faces).boundary))
+    assert 0.2 < np.mean(curvature[inner] > 0) < 0.8
+
+
+def test_whole_teapot_lies_on_its_patches():
+    teapot = load("teapot")
+    vertices = load("whole").teapot()[0] / 50
+    t = np.linspace(0, 1, 65)
+    grid = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(-1, 2)
+    miss = np.full(len(vertices), np.inf)
+    for k in range(32):
+        distance, nearest = cKDTree(teapot.point(k, *grid.T)).query(vertices)
+        near = np.flatnonzero(distance < 0.05)
+        at = grid[nearest[near]]
+        for _ in range(10):
+            here = teapot.point(k, *at.T)
+            ahead = [teapot.point(k, *(at + d).T) - here for d in 1e-6 * np.eye(2)]
+            inverse = np.linalg.pinv(np.stack(ahead, axis=-1) / 1e-6, rcond=1e-6)
+            move = np.einsum("nij,nj->ni", inverse, vertices[near] - here)
+            at = np.clip(at + move, 0, 1)
+        left = np.linalg.norm(teapot.point(k, *at.T) - vertices[near], axis=1)
+        miss[near] = np.minimum(miss[near], left)
+    assert miss.max() < 1e-6
+
+
 @pytest.mark.parametrize(
     "name, options, files",
     [
@@ -302,6 +443,8 @@ def test_a_cone_fits_the_irregular_mesh_within_one_percent(name):
         ("terrain", ["--step", "40"], 2),
         ("great_court", [], 5),
         ("irregular", [], 3),
+        ("whole", [], 6),
+        ("whole", ["sphere", "helmet"], 2),
     ],
 )
 def test_scripts_write_their_files(name, options, files, tmp_path, monkeypatch):
