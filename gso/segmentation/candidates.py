@@ -23,7 +23,7 @@ from gso.typing import Ints
 
 #: Numbers of patches to merge, and how much compact pieces are preferred.
 _COUNTS = (100, 200)
-_COMPACT = (1.7, 3.0, 6.0)
+_COMPACT = (2.0, 5.0)
 #: Shares of the neck that are tried, largest first.
 _NECKS = (1.0, 0.8, 0.65, 0.5, 0.0)
 #: Relative excess of an estimate over its bound that counts as none.
@@ -136,7 +136,11 @@ def _disks(ground: Ground, edges: Ints) -> Pieces:
 
 
 def measured(
-    ground: Ground, pieces: Pieces, most: tuple[float, float] | None = None, say: Said | None = None
+    ground: Ground,
+    pieces: Pieces,
+    most: tuple[float, float] | None = None,
+    say: Said | None = None,
+    limit: float = np.inf,
 ) -> Candidate:
     """Lay pieces flat, and cut those that overlap themselves or are larger than a sheet.
 
@@ -149,6 +153,8 @@ def measured(
         Length and width of a sheet.
     say : callable, optional
         Called with what is being done.
+    limit : float
+        Strain from which on a piece is enough to give up: the others then have no pattern.
     """
     known: dict[bytes, Sheet | None] = {}
     for _ in range(_ROUNDS):
@@ -160,6 +166,8 @@ def measured(
                     say(f"pattern {number + 1} of {len(pieces)}")
                 known[name] = flattened(piece.mesh)
             sheets.append(known[name])
+            if sheets[-1] is None or sheets[-1].strain > limit:
+                return Candidate(pieces, (*sheets, *[None] * (len(pieces) - len(sheets))))
         more = []
         for piece, sheet in zip(pieces, sheets, strict=True):
             if sheet is None:
@@ -168,7 +176,7 @@ def measured(
             if len(sheet.overlaps):
                 edges = apart(sheet)
             elif most is not None and not fits(sheet, most):
-                edges = halves(sheet)
+                edges = halves(sheet, max(most))
             if len(edges):
                 more.append(ground.mirrored(piece.vertices[edges]))
         if not more:

@@ -56,6 +56,7 @@ class Paths:
         reached: NDArray[np.bool_],
         weight: Array,
         closed: NDArray[np.bool_] | None = None,
+        limit: float = np.inf,
     ) -> Ints:
         """Return the vertices of the cheapest path from a vertex to marked ones.
 
@@ -69,6 +70,8 @@ class Paths:
             Factor on the cost of each edge.
         closed : ndarray of bool, (n,), optional
             Vertices that the path must avoid.
+        limit : float
+            Largest cost of the path, turns left out.
 
         Returns
         -------
@@ -85,7 +88,9 @@ class Paths:
         graph = coo_matrix(
             (np.maximum(cost[keep], 1e-300), (a, b)), shape=(self.count, self.count)
         ).tocsr()
-        away, before = dijkstra(graph, directed=False, indices=target, return_predecessors=True)
+        away, before = dijkstra(
+            graph, directed=False, indices=target, return_predecessors=True, limit=limit
+        )
         return _traced(away, before, target, reached)
 
 

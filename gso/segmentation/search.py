@@ -38,13 +38,13 @@ from gso.spelling import known_keywords
 #: Ratio of the estimated to the measured strain of a first attempt.
 _RATIO = 1.3
 #: The same for pieces without darts, in groups that are tried one after the other.
-_RATIOS = ((1.45, 1.35, 1.25), (1.0,), (0.7,))
+_RATIOS = ((1.4, 1.28), (1.0,), (0.7,))
 #: Share of the allowed strain from which on an attempt is not loosened any more.
 _CLOSE = 0.93
 _ATTEMPTS = 6
 #: Ratio of the absolute curvature of a design to that of its smoothed copy from which on it
 #: counts as noisy.
-_NOISY = 4.0
+_NOISY = 3.0
 
 
 @known_keywords()
@@ -209,7 +209,10 @@ def _dartless(ground: Ground, wishes: Wishes) -> Candidate:
         wishes.say(f"seams without darts, attempt {len(found) + 1}")
         pool = [m for r in ratios for m in without_darts(ground, r * wishes.max_strain)]
         for some in sorted(pool, key=lambda one: merged_value(one, wishes)):
-            found.append(measured(ground, pieces_of(some), wishes.max_size, wishes.say))
+            limit = (
+                wishes.max_strain if some is not pool[-1] or ratios is not _RATIOS[-1] else np.inf
+            )
+            found.append(measured(ground, pieces_of(some), wishes.max_size, wishes.say, limit))
             if found[-1].strain <= wishes.max_strain and found[-1].sound:
                 return found[-1]
     return min(found, key=lambda one: (not one.sound, one.strain))

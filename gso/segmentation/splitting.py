@@ -39,23 +39,40 @@ def apart(sheet: Sheet) -> Ints:
     return between(mesh, from_one <= reach, from_two <= reach)
 
 
-def halves(sheet: Sheet) -> Ints:
-    """Choose the edges (e, 2) of a shortest cut across the long side of a pattern."""
+def halves(sheet: Sheet, longest: float) -> Ints:
+    """Choose the edges (e, 2) of a shortest cut across the long side of a pattern.
+
+    The parts are as few as a largest length allows, and about equal.
+    """
     mesh = sheet.mesh
     angle, (length, _) = rectangle(sheet.flat)
+    parts = max(int(np.ceil(length / longest)), 2)
+    place = (parts // 2) / parts
+    room = float(np.clip(0.5 * (longest / length - 1.0 / parts), 0.01, 0.1))
     along = sheet.flat @ np.array([np.cos(angle), np.sin(angle)])
     corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
     middle = (along[corners].mean(axis=1) - along.min()) / length
-    return between(mesh, middle < 0.4, middle > 0.6)
+    return between(
+        mesh,
+        middle < place - room,
+        middle > place + room,
+        1.0 + 0.1 * np.abs(middle - place) / room,
+    )
 
 
-def between(mesh: Mesh, one: NDArray[np.bool_], two: NDArray[np.bool_]) -> Ints:
+def between(
+    mesh: Mesh, one: NDArray[np.bool_], two: NDArray[np.bool_], price: Array | None = None
+) -> Ints:
     """Return the shortest edges (e, 2) whose removal separates two sets of faces.
+
+    The length of an edge is multiplied by the mean price (m,) of its faces.
 
     Source: minimum cut (Ford and Fulkerson 1956) of the dual graph.
     """
     length, k = _spans(mesh)[1:]
     he, count = mesh.half_edges, len(mesh.faces)
+    if price is not None:
+        length = length * 0.5 * (price[he.face[k]] + price[he.face[he.twin[k]]])
     capacity = np.maximum(np.round(_STEPS * length / max(float(length.max()), 1e-300)), 1.0)
     f, g = he.face[k], he.face[he.twin[k]]
     much = np.int64(capacity.sum() + 1)

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from gso import metrics
+from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.cutting import cut
 from gso.seams.chains import chains
@@ -19,6 +21,9 @@ from gso.typing import Array, Ints
 
 #: Ratio of estimated strain and bound up to which a joined piece is laid flat to measure it.
 _WORTH = 1.5
+#: Smallest length of the seam along which a small piece is joined, relative to the root of its
+#: area.
+_SMALL = 0.6
 
 
 def stitched(
@@ -60,6 +65,8 @@ def stitched(
     kept = set((np.sort(ground.kept, axis=1) @ np.array([n, 1])).tolist())
     members = {k: piece.faces for k, piece in enumerate(pieces)}
     known = dict(enumerate(sheets))
+    # Small pieces may be joined along seams shorter than a neck: they are not wider.
+    size = {k: _SMALL * float(np.sqrt(metrics.area(sheet.mesh))) for k, sheet in known.items()}
     root = list(range(len(members)))
     cut_keys = set((np.sort(pieces.edges, axis=1) @ np.array([n, 1])).tolist())
     spans = chains(pieces.edges, pieces.sides)
@@ -67,14 +74,14 @@ def stitched(
     for k in np.argsort([-float(s[-1]) for s in lengths], kind="stable").tolist():
         (a, b), line = spans[k]
         a, b = _root(root, a), _root(root, b)
-        if a == b or lengths[k][-1] < neck:
+        if a == b or lengths[k][-1] < min(neck, min(size[a], size[b])):
             continue
         keys = np.sort(np.stack([line[:-1], line[1:]], 1), axis=1) @ np.array([n, 1])
         if kept.intersection(keys.tolist()):
             continue
         progress(f"joining pieces: {len(members)} left")
         faces = np.sort(np.concatenate([members[a], members[b]]))
-        for first, last in _parts(lengths[k], neck):
+        for first, last in _parts(lengths[k], min(neck, float(lengths[k][-1]))):
             trial = cut_keys.difference(keys[first:last].tolist())
             if _estimate(ground, trial, faces) > _WORTH * strain:
                 continue
@@ -85,6 +92,7 @@ def stitched(
             root[b] = a
             members[a], known[a] = faces, sheet
             del members[b], known[b]
+            size[a] = _SMALL * float(np.sqrt(metrics.area(sheet.mesh)))
             break
     left = np.array(sorted(cut_keys), np.int64)
     edges = np.stack([left // n, left % n], axis=1)
@@ -143,7 +151,11 @@ def _flat(mesh: Mesh, keys: set[int], faces: Ints) -> Sheet | None:
     ids = np.unique(corners[corners >= 0])
     local = np.full(n, -1)
     local[ids] = np.arange(len(ids))
-    part = Mesh(mesh.vertices[ids], np.where(corners < 0, -1, local[corners]))
+    try:
+        part = Mesh(mesh.vertices[ids], np.where(corners < 0, -1, local[corners]))
+    except MeshError:
+        # The pieces also touch at a single vertex.
+        return None
     he = part.half_edges
     k = np.flatnonzero(he.twin > np.arange(he.twin.size))
     ends = np.stack([he.origin[k], he.dest[k]], axis=1)

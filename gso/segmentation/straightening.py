@@ -85,8 +85,9 @@ def _shorter(
     goal = np.zeros(len(closed), bool)
     goal[line[last]] = True
     even = np.ones(len(ground.paths.ends))
-    path = ground.paths.cheapest(int(line[first]), goal, even, closed)
     before = line[first : last + 1]
+    limit = (1.0 + 1e-9) * _length(ground, before) if ground.mesh.has_triangles else np.inf
+    path = ground.paths.cheapest(int(line[first]), goal, even, closed, limit)
     if path[-1] != line[last] or len(path) < 2 or np.array_equal(path, before):
         return None
     return path if _length(ground, path) <= (1.0 + 1e-9) * _length(ground, before) else None

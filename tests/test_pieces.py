@@ -1,0 +1,393 @@
+"""The search for seams, and designs in pieces that become developable."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import gso
+from gso import faults, metrics
+from gso.cli import main
+from gso.mesh import Mesh
+from gso.seams import Path
+from gso.segmentation.loops import opening
+from gso.segmentation.paths import Paths
+from gso.segmentation.potential import Potential
+from gso.segmentation.splitting import between
+from gso.segmentation.tree import Ground, cut_tree
+from tests.conftest import rotation, saddle, shuffled, sphere_cap
+from tests.test_seams import ball, cube
+
+
+def dome(n: int = 21, height: float = 0.35) -> Mesh:
+    """A dome of quads over the square."""
+    u, v = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")
+    return gso.as_mesh(np.stack([u, v, height * (1 - u * u) * (1 - v * v)], axis=-1))
+
+
+def triangulated(mesh: Mesh) -> Mesh:
+    return Mesh(mesh.vertices, mesh.triangles)
+
+
+def torus(around: int = 36, across: int = 16) -> Mesh:
+    """A torus of quads, radii 1 and 0.4."""
+    a, b = np.meshgrid(
+        2 * np.pi * np.arange(around) / around,
+        2 * np.pi * np.arange(across) / across,
+        indexing="ij",
+    )
+    ring = 1 + 0.4 * np.cos(b)
+    points = np.stack([ring * np.cos(a), ring * np.sin(a), 0.4 * np.sin(b)], axis=-1)
+    k = np.arange(around * across).reshape(around, across)
+    on, up = np.roll(k, -1, axis=0), np.roll(k, -1, axis=1)
+    both = np.roll(on, -1, axis=1)
+    return Mesh(points.reshape(-1, 3), np.stack([k, on, both, up], axis=-1).reshape(-1, 4))
+
+
+def plate_with_handles() -> Mesh:
+    """The surface of a thick square plate with three square holes: genus 3."""
+    solid = np.ones((7, 3, 1), bool)
+    solid[[1, 3, 5], 1, 0] = False
+    full = np.pad(solid, 1)
+    corners, faces = {}, []
+    for axis in range(3):
+        for sign in (1, -1):
+            for i, j, k in np.argwhere(full & ~np.roll(full, -sign, axis=axis)):
+                one, two = np.eye(3, dtype=int)[[(axis + 1) % 3, (axis + 2) % 3]]
+                base = np.array([i, j, k]) + (sign > 0) * np.eye(3, dtype=int)[axis]
+                loop = [base, base + one, base + one + two, base + two][::sign]
+                faces.append([corners.setdefault(tuple(p), len(corners)) for p in loop])
+    return Mesh(np.array(list(corners), float), np.array(faces))
+
+
+def sound(found) -> None:
+    """Every piece is a disk, nothing overlaps, and the strain is what the metrics say."""
+    assert all(piece.is_disk for piece in found)
+    for piece, sheet in zip(found, found.sheets, strict=True):
+        np.testing.assert_array_equal(piece.mesh.faces, sheet.mesh.faces)
+        assert not faults.overlaps(sheet.mesh, sheet.flat).size
+        assert not metrics.flipped_faces(sheet.mesh, sheet.flat).size
+        # A second measure of the strain: lengths of edges.
+        a, b = piece.mesh.edges.T
+        before = np.linalg.norm(piece.mesh.vertices[a] - piece.mesh.vertices[b], axis=1)
+        after = np.linalg.norm(sheet.flat[a] - sheet.flat[b], axis=1)
+        assert np.percentile(np.abs(after / before - 1), 99) <= 1.1 * sheet.strain + 1e-9
+    worst = max(sheet.strain for sheet in found.sheets)
+    assert found.metrics["strain_p99"] == pytest.approx(worst)
+
+
+def test_the_potential_of_a_cap_is_known():
+    """On a spherical cap the conformal factor is that of the stereographic projection."""
+    angle, radius = 0.5, 2.0
+    t, a = np.meshgrid(np.linspace(0, angle, 30)[1:], 2 * np.pi * np.arange(60) / 60)
+    ring = np.stack([np.sin(t) * np.cos(a), np.sin(t) * np.sin(a), np.cos(t)], axis=-1)
+    points = radius * np.concatenate([[[0, 0, 1.0]], ring.reshape(-1, 3)])
+    from scipy.spatial import Delaunay
+
+    mesh = Mesh(points, Delaunay(points[:, :2]).simplices)
+    field = Potential(mesh)
+    scale = field.solve(mesh.half_edges.boundary_vertex)
+    exact = -2.0 * np.log(1.0 / np.cos(angle / 2))
+    assert scale[0] == pytest.approx(exact, rel=0.01)
+    assert field.area.sum() == pytest.approx(2 * np.pi * radius**2 * (1 - np.cos(angle)), rel=0.01)
+
+
+def test_a_flat_sheet_needs_no_cut():
+    found = gso.pieces(np.dstack([*np.mgrid[:6.0, :9.0], np.zeros((6, 9))]))
+    assert (len(found), found.seam_length, found.usable) == (1, 0.0, True)
+    assert found.sheets[0].size == pytest.approx((8.0, 5.0))
+
+
+def test_a_sphere_becomes_one_piece_with_darts():
+    mesh = ball(24)
+    found = gso.pieces(mesh, max_strain=0.03)
+    sound(found)
+    assert len(found) == 1
+    assert found.usable
+    assert found.metrics["strain_p99"] <= 0.03
+    # Strips of the same strain and no waste would be sqrt(pi / 0.03) / 2 long.
+    assert found.seam_length < 1.6 * 0.5 * np.sqrt(np.pi / 0.03)
+    # The area of the pattern is the surface's, up to the strain.
+    flat = found.patterns[0].mesh
+    assert metrics.area(flat) == pytest.approx(metrics.area(mesh), rel=0.06)
+
+
+def test_less_strain_takes_longer_seams():
+    lengths = [gso.pieces(dome(), max_strain=s).seam_length for s in (0.04, 0.01)]
+    assert lengths[0] < lengths[1]
+
+
+def test_without_darts_no_seam_ends_inside():
+    found = gso.pieces(ball(24), max_strain=0.03, darts=False)
+    sound(found)
+    assert found.usable
+    assert len(found) > 1
+    assert (found.sides[:, 0] != found.sides[:, 1]).all()
+
+
+@pytest.mark.parametrize(
+    "mesh", [torus(), plate_with_handles(), cube()], ids=["torus", "plate", "cube"]
+)
+def test_closed_surfaces_with_handles_become_disks(mesh):
+    found = gso.pieces(mesh, max_strain=0.1)
+    assert all(piece.is_disk for piece in found)
+    assert all(sheet is not None and sheet.sound for sheet in found.sheets)
+    assert found.usable
+
+
+def test_opening_cuts_to_disks():
+    for mesh in (torus(), plate_with_handles(), cube(), ball()):
+        cut = gso.cut(mesh, opening(mesh)) if len(opening(mesh)) else None
+        if cut is not None:
+            (piece,) = cut
+            assert piece.is_disk
+    # The shortest cut of a torus: once around the tube, once around the hole.
+    short = gso.cut(torus(), opening(torus())).lengths.sum()
+    assert short == pytest.approx(2 * np.pi * (0.4 + 0.6), rel=0.1)
+
+
+def test_holes_are_opened():
+    mesh = triangulated(dome(25))
+    middle = mesh.vertices[mesh.faces].mean(axis=1)[:, :2]
+    spots = np.array([[0.5, 0.5], [-0.5, 0.5], [0.5, -0.5], [-0.5, -0.5], [0.0, 0.0]])
+    away = np.linalg.norm(middle[:, None] - spots, axis=2).min(axis=1)
+    mesh = Mesh(mesh.vertices, mesh.faces[away > 0.15])
+    assert len(mesh.boundary_loops) == 6
+    found = gso.pieces(mesh, max_strain=0.02)
+    sound(found)
+    assert found.usable
+
+
+def test_saddles_are_divided_so_that_nothing_overlaps():
+    found = gso.pieces(gso.as_mesh(saddle(25, strength=0.5)), max_strain=0.02)
+    sound(found)
+    assert found.usable
+    assert len(found) > 1
+
+
+def test_seams_do_not_depend_on_pose_unit_and_order():
+    mesh = triangulated(dome(15))
+    first = gso.pieces(mesh, max_strain=0.02)
+    again = gso.pieces(mesh, max_strain=0.02)
+    np.testing.assert_array_equal(first.edges, again.edges)
+    moved = shuffled(mesh.replaced(1000.0 * mesh.vertices @ rotation(4).T))
+    other = gso.pieces(moved, max_strain=0.02)
+    assert len(other) == len(first)
+    assert other.seam_length == pytest.approx(first.seam_length, rel=0.2)
+
+
+def test_quads_are_cut_along_rows():
+    mesh = dome(21)
+    found = gso.pieces(mesh, max_strain=0.02)
+    assert all((piece.mesh.faces >= 0).all() for piece in found)
+    # Few turns: most vertices on seams have both seam edges in one line.
+    edges = found.edges
+    way = mesh.vertices[edges[:, 1]] - mesh.vertices[edges[:, 0]]
+    along = np.abs(way[:, :2]).max(axis=1) / np.linalg.norm(way[:, :2], axis=1)
+    np.testing.assert_allclose(along, 1.0, atol=1e-9)
+    ids, times = np.unique(edges, return_counts=True)
+    direction = np.abs(way[:, 0]) > np.abs(way[:, 1])
+    first = np.zeros(len(mesh.vertices))
+    np.add.at(first, edges.ravel(), np.repeat(direction, 2))
+    straight = np.isin(first[ids[times == 2]], (0, 2)).mean()
+    assert straight > 0.6
+
+
+def test_symmetric_seams():
+    mesh = triangulated(dome(17))
+    mesh = Mesh(mesh.vertices, np.concatenate([mesh.faces]))
+    quads = dome(17)
+    found = gso.pieces(quads, max_strain=0.02, symmetric=True)
+    points = quads.vertices
+    for axis in (0, 1):
+        flip = points.copy()
+        flip[:, axis] *= -1
+        partner = np.array([int(np.linalg.norm(points - p, axis=1).argmin()) for p in flip])
+        mirrored = {tuple(sorted(e)) for e in partner[found.edges].tolist()}
+        if mirrored == {tuple(sorted(e)) for e in found.edges.tolist()}:
+            break
+    else:
+        raise AssertionError("the seams are not symmetric")
+    with pytest.raises(gso.OptionError, match="symmetric"):
+        gso.pieces(Mesh(*_skew()), symmetric=True)
+
+
+def _skew():
+    points = sphere_cap(7).reshape(-1, 3)
+    points[3] += 0.05
+    return points, Mesh.from_grid(sphere_cap(7)).faces
+
+
+def test_seams_that_are_kept_and_followed_and_avoided():
+    mesh = dome(21)
+    across = np.arange(21) * 21 + 5
+    found = gso.pieces(mesh, max_strain=0.05, keep=Path(across[[0, -1]]))
+    kept = {tuple(sorted(e)) for e in np.stack([across[:-1], across[1:]], axis=1).tolist()}
+    assert kept <= {tuple(sorted(e)) for e in found.edges.tolist()}
+    again = gso.pieces(mesh, max_strain=0.05, keep=found)
+    assert len(again.edges) >= len(found.edges)
+    region = np.abs(mesh.vertices[mesh.faces].mean(axis=1)[:, 0]) < 0.3
+    plain, spared = (gso.pieces(mesh, max_strain=0.02, avoid=faces) for faces in (None, region))
+
+    def inside(found):
+        middle = np.abs(mesh.vertices[found.edges].mean(axis=1)[:, 0]) < 0.25
+        return found.lengths[middle].sum()
+
+    assert inside(spared) <= inside(plain)
+
+
+def test_pieces_fit_on_the_sheet():
+    flat = np.dstack([*np.mgrid[:5.0, :17.0], np.zeros((5, 17))])
+    found = gso.pieces(flat, max_size=(9.0, 4.5))
+    assert found.usable
+    assert len(found) == 2
+    assert all(sheet.size[0] <= 9.0 for sheet in found.sheets)
+    assert found.alike() == [[0, 1]]
+
+
+def test_budgets_that_are_missed_are_named():
+    found = gso.pieces(ball(16), max_strain=0.05, seam=0.5)
+    assert not found.usable
+    assert "seams" in found.reasons[0]
+    narrow = gso.pieces(ball(16), max_strain=0.01, min_neck=1.5)
+    assert any("strain" in reason for reason in narrow.reasons)
+
+
+def test_a_changed_shape_is_developable_and_closed():
+    mesh = ball(32)
+    found = gso.pieces(mesh, max_strain=1e-3, max_deviation=0.12)
+    sound(found)
+    assert found.usable, found.reasons
+    assert found.metrics["strain_p99"] <= 1e-3
+    # Distances by another route: vertices and midpoints of faces, both ways.
+    from gso.mesh.closest_point import Nearest
+
+    middles = found.design.vertices[found.design.faces].mean(axis=1)
+    assert Nearest(mesh).distances(middles).max() <= 0.13
+    assert found.metrics["dihedral_mean"] <= 1.1 * found.metrics["dihedral_mean_before"]
+    result = found.result
+    one, two = (result.mesh.vertices[result.pieces.opened.seams[:, k]] for k in (0, 1))
+    np.testing.assert_allclose(one, two, atol=1e-9)
+
+
+def test_optimize_takes_pieces():
+    pieces = gso.cut(dome(17), Path([8 * 17, 8 * 17 + 16]))
+    result = gso.tno.optimize(pieces, constraints=[gso.Fixed([0, 16])])
+    whole = result.pieces.design
+    assert whole.faces.tolist() == pieces.design.faces.tolist()
+    np.testing.assert_allclose(whole.vertices[[0, 16]], pieces.design.vertices[[0, 16]], atol=1e-9)
+    np.testing.assert_allclose(
+        result.pieces.sewn([p.mesh.vertices for p in result.pieces]).vertices,
+        whole.vertices,
+        atol=1e-9,
+    )
+    uncut = gso.tno.optimize(dome(17))
+    assert result.metrics["strain_p99"] < uncut.metrics["strain_p99"]
+    flat = gso.tno.optimize(pieces, task="flatten")
+    assert flat.usable
+    with pytest.raises(gso.OptionError, match=r"pieces\.design"):
+        gso.tno.optimize(pieces, task="denoise")
+
+
+def test_noise_is_named():
+    rng = np.random.default_rng(1)
+    mesh = ball(24)
+    noisy = mesh.replaced(  # a scan
+        mesh.vertices * (1 + 0.02 * rng.standard_normal((len(mesh.vertices), 1)))
+    )
+    found = gso.pieces(noisy, max_strain=0.01, max_pieces=40)
+    said = [*found.reasons, *found.notes]
+    assert any("denoise" in one for one in said)
+
+
+def test_what_is_no_surface_is_refused():
+    turn = np.linspace(0, 2 * np.pi, 13)[:-1]
+    ring = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    side = 0.3 * np.stack(
+        [np.cos(turn / 2) * ring[:, 0], np.cos(turn / 2) * ring[:, 1], np.sin(turn / 2)], axis=1
+    )
+    k = np.arange(12)
+    strip = np.stack([k, (k + 1) % 12, (k + 1) % 12 + 12, k + 12], axis=1)
+    strip[-1] = [11, 12, 0, 23]
+    with pytest.raises(gso.MeshError, match="orient"):
+        gso.pieces((np.concatenate([ring - side, ring + side]), strip))
+    fins = [[0, 1, 2], [1, 0, 3], [0, 1, 4]]
+    with pytest.raises(gso.MeshError, match="0"):
+        gso.pieces((np.random.default_rng(0).random((5, 3)), fins))
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"max_strain": 0}, "max_strain"),
+        ({"max_deviation": -1}, "max_deviation"),
+        ({"max_pieces": 0}, "max_pieces"),
+        ({"max_size": (1.0,)}, "max_size"),
+        ({"min_neck": "wide"}, "min_neck"),
+        ({"along": [[0, 99]]}, "0-99"),
+        ({"avoid": [999]}, "face 999"),
+        ({"max_strian": 1}, "max_strain"),
+    ],
+)
+def test_bad_wishes_are_named(given, said):
+    with pytest.raises(gso.OptionError, match=said):
+        gso.pieces(dome(7), **given)
+
+
+def test_minimum_cuts_are_shortest():
+    mesh = Mesh.from_grid(np.dstack([*np.mgrid[:4.0, :9.0], np.zeros((4, 9))]))
+    middle = mesh.vertices[mesh.faces].mean(axis=1)[:, 1]
+    edges = between(mesh, middle < 2, middle > 6)
+    assert len(edges) == 3
+
+
+def test_a_tree_of_cuts_bounds_the_potential():
+    mesh = ball(20)
+    ground = Ground(mesh, Potential(mesh), Paths(mesh))
+    edges = cut_tree(ground, 0.03)
+    reached = np.zeros(len(mesh.vertices), bool)
+    reached[edges] = True
+    assert np.abs(ground.potential.solve(reached)).max() <= 0.06
+
+
+def test_command(tmp_path):
+    source = tmp_path / "dome.obj"
+    gso.save(dome(15), source)
+    out = tmp_path / "cut"
+    done = CliRunner().invoke(main, ["pieces", str(source), "-o", str(out), "--max-strain", "3%"])
+    assert done.exit_code == 0, done.output
+    said = json.loads((out / "pieces.json").read_text())
+    assert said["usable"]
+    assert said["metrics"]["strain_p99"] <= 0.03
+    again = gso.load(out / "pieces.obj")
+    assert set(again.attributes.labels["g"].names) == {row["name"] for row in said["pieces"]}
+    for row in said["pieces"]:
+        assert (out / f"pattern_{row['name']}.svg").exists()
+    tight = CliRunner().invoke(main, ["pieces", str(source), "-o", str(out), "--seam", "0.001"])
+    assert tight.exit_code == 1
+    assert "not usable" in tight.output
+    bad = CliRunner().invoke(main, ["pieces", str(source), "-o", str(out), "--max-strain", "x"])
+    assert bad.exit_code != 0
+    kept = CliRunner().invoke(
+        main, ["pieces", str(out / "pieces.obj"), "-o", str(tmp_path / "b"), "--keep-groups"]
+    )
+    assert kept.exit_code == 0, kept.output
+
+
+def test_curves_stay_smooth():
+    mesh = dome(17)
+    line = np.arange(17) * 17 + 8
+    jagged = line + np.where(np.arange(17) % 2 == 1, 1, 0)
+    smooth = gso.SmoothCurves([jagged], weight=1e-2)
+    turned = [
+        np.abs(
+            np.diff(gso.tno.optimize(mesh, constraints=c).mesh.vertices[jagged], 2, axis=0)
+        ).max()
+        for c in ([gso.SmoothCurves([jagged], weight=1e-9)], [smooth])
+    ]
+    assert turned[1] < 0.7 * turned[0]
+    with pytest.raises(gso.OptionError, match="two or more"):
+        gso.tno.optimize(mesh, constraints=[gso.SmoothCurves([[3]])])
