@@ -12,11 +12,11 @@ import gso
 from gso import faults, metrics
 from gso.cli import main
 from gso.mesh import Mesh
+from gso.mesh.paths import Paths
+from gso.mesh.separation import between
 from gso.seams import Path
 from gso.segmentation.loops import opening
-from gso.segmentation.paths import Paths
 from gso.segmentation.potential import Potential
-from gso.segmentation.splitting import between
 from gso.segmentation.tree import Ground, cut_tree
 from tests.conftest import rotation, saddle, shuffled, sphere_cap
 from tests.test_seams import ball, cube

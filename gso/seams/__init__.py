@@ -7,5 +7,17 @@
 from gso.seams.cutting import cut
 from gso.seams.kinds import Creases, Edges, Labels, Path, Seam, Slice
 from gso.seams.pieces import Piece, Pieces
+from gso.seams.polyline import Polyline
 
-__all__ = ["Creases", "Edges", "Labels", "Path", "Piece", "Pieces", "Seam", "Slice", "cut"]
+__all__ = [
+    "Creases",
+    "Edges",
+    "Labels",
+    "Path",
+    "Piece",
+    "Pieces",
+    "Polyline",
+    "Seam",
+    "Slice",
+    "cut",
+]

@@ -13,6 +13,7 @@ from gso.mesh import Mesh
 from gso.mesh.cutting import cut as cut_open
 from gso.seams.kinds import Edges, Seam
 from gso.seams.pieces import Pieces
+from gso.seams.slicing import followed
 
 
 def cut(mesh: Mesh | ArrayLike, seams: Seam | Iterable[Seam] | ArrayLike) -> Pieces:
@@ -24,8 +25,8 @@ def cut(mesh: Mesh | ArrayLike, seams: Seam | Iterable[Seam] | ArrayLike) -> Pie
         The surface.
     seams : Seam, iterable of Seam, or array_like of int, (e, 2)
         What to cut along: :class:`~gso.seams.Edges`, :class:`~gso.seams.Path`,
-        :class:`~gso.seams.Slice`, :class:`~gso.seams.Labels`, :class:`~gso.seams.Creases`, or
-        pairs of vertices.
+        :class:`~gso.seams.Polyline`, :class:`~gso.seams.Slice`, :class:`~gso.seams.Labels`,
+        :class:`~gso.seams.Creases`, or pairs of vertices.
 
     Returns
     -------
@@ -52,10 +53,12 @@ def cut(mesh: Mesh | ArrayLike, seams: Seam | Iterable[Seam] | ArrayLike) -> Pie
     """
     whole = as_mesh(mesh)
     wanted = _listed(seams)
-    for seam in wanted:
-        whole = seam.refined(whole)
-    edges = [seam.edges(whole) for seam in wanted]
-    every = np.concatenate([np.zeros((0, 2), np.int64), *edges])
+    every = np.zeros((0, 2), np.int64)
+    # Edges and paths refer to the vertices and edges of the input.
+    for seam in sorted(wanted, key=lambda seam: seam.INSERTS):
+        count = len(whole.vertices)
+        whole, inserted, edges = seam.placed(whole)
+        every = np.concatenate([followed(every, inserted, count), edges])
     return Pieces(whole, cut_open(whole, every))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,20 +12,45 @@ from gso import metrics
 from gso.errors import MeshError, OptionError
 from gso.mesh import Mesh
 from gso.mesh.attributes import LABELS
+from gso.mesh.separation import between
 from gso.seams.slicing import sliced
 from gso.spelling import choices
 from gso.typing import Array, Ints
+
+#: Price of edges in the plane of a slice, relative to those at a distance of one edge length.
+_NEAR = 0.3
+
+
+class Placed(NamedTuple):
+    """A seam on a mesh.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The mesh, with vertices inserted where the seam needs them.
+    inserted : ndarray of int, (k, 2)
+        The ends of the edge on which each new vertex lies, in the order of insertion.
+    edges : ndarray of int, (e, 2)
+        The edges to cut.
+    """
+
+    mesh: Mesh
+    inserted: Ints
+    edges: Ints
 
 
 class Seam:
     """Something to cut a mesh along; subclasses give its edges."""
 
-    def refined(self, mesh: Mesh) -> Mesh:
-        """Return the mesh with vertices inserted where the seam needs them; most need none."""
-        return mesh
+    #: Whether the seam may insert vertices.
+    INSERTS = False
+
+    def placed(self, mesh: Mesh) -> Placed:
+        """Place the seam on a mesh."""
+        return Placed(mesh, np.empty((0, 2), np.int64), self.edges(mesh))
 
     def edges(self, mesh: Mesh) -> Ints:
-        """Return the edges (e, 2) of the refined mesh to cut."""
+        """Return the edges (e, 2) to cut."""
         raise NotImplementedError
 
 
@@ -89,7 +115,7 @@ class Slice(Seam):
     """The intersection with a plane.
 
     In triangle meshes, vertices are inserted where the plane crosses edges. In other meshes the
-    seam follows the edges between the faces on one side and those on the other.
+    seam follows the edge rows near the plane: the shortest cut, where edges far from it cost more.
 
     Parameters
     ----------
@@ -100,12 +126,25 @@ class Slice(Seam):
     point: ArrayLike
     normal: ArrayLike
 
-    def refined(self, mesh: Mesh) -> Mesh:
-        return sliced(mesh, self._heights(mesh)) if mesh.is_triangles else mesh
+    INSERTS = True
+
+    def placed(self, mesh: Mesh) -> Placed:
+        inserted = np.empty((0, 2), np.int64)
+        if mesh.is_triangles:
+            mesh, inserted = sliced(mesh, self._heights(mesh))
+        return Placed(mesh, inserted, self.edges(mesh))
 
     def edges(self, mesh: Mesh) -> Ints:
         height = self._heights(mesh)
         faces = mesh.faces
+        if not mesh.is_triangles:
+            a, b = mesh.edges.T
+            step = float(np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1).mean())
+            own = np.where(faces >= 0, height[faces], height[faces[:, :1]])
+            below = np.asarray((own < -step).all(axis=1))
+            above = np.asarray((own > step).all(axis=1))
+            if below.any() and above.any():
+                return between(mesh, below, above, _NEAR + np.abs(height) / step)
         corner = np.where(faces >= 0, height[faces], 0.0)
         side = corner.sum(axis=1) > 0
         return _between(mesh, side.astype(np.int64))

@@ -1,4 +1,4 @@
-"""Insertion of vertices where a plane crosses a triangle mesh."""
+"""Insertion of vertices on the edges of a triangle mesh."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ from gso.mesh.topology import edge_keys
 from gso.typing import Array, Ints
 
 
-def sliced(mesh: Mesh, height: Array) -> Mesh:
+def sliced(mesh: Mesh, height: Array) -> tuple[Mesh, Ints]:
     """Divide the triangles that a plane crosses, so that it runs along edges.
-
-    Labels of faces are kept; texture coordinates are not.
 
     Parameters
     ----------
@@ -22,48 +20,108 @@ def sliced(mesh: Mesh, height: Array) -> Mesh:
         A triangle mesh.
     height : ndarray, (n,)
         Signed distances of its vertices from the plane; zero on it.
+
+    Returns
+    -------
+    mesh, edges
+        As for :func:`divided`.
     """
+    ends = mesh.edges
+    a, b = height[ends].T
+    crossed = a * b < 0
+    return divided(mesh, ends[crossed], (a / np.where(crossed, a - b, 1.0))[crossed])
+
+
+def divided(mesh: Mesh, edges: Ints, shares: Array) -> tuple[Mesh, Ints]:
+    """Insert a vertex on each of some edges of a triangle mesh.
+
+    Two new vertices of a triangle are joined by an edge. Labels of faces are kept; texture
+    coordinates are not.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    edges : ndarray of int, (k, 2)
+        Edges, each once.
+    shares : ndarray, (k,)
+        Place of the new vertex between both ends, 0 to 1.
+
+    Returns
+    -------
+    mesh : Mesh
+        The new vertices come after the others, in the order of `edges`.
+    edges : ndarray of int, (k, 2)
+        The edges.
+
+    Examples
+    --------
+    >>> triangle = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> finer, _ = divided(triangle, np.array([[0, 1], [0, 2]]), np.array([0.5, 0.5]))
+    >>> finer.faces.tolist()
+    [[4, 0, 3], [2, 4, 3], [2, 3, 1]]
+    """
+    if not len(edges):
+        return mesh, np.empty((0, 2), np.int64)
     v, f = mesh.vertices, mesh.faces[:, :3]
     n = len(v)
-    after = np.roll(f, -1, axis=1)
-    crossed = height[f] * height[after] < 0
-    if not crossed.any():
-        return mesh
-    key = edge_keys(f[crossed], after[crossed], n)
-    known, first = np.unique(key, return_index=True)
-    a, b = f[crossed][first], after[crossed][first]
-    # The same point from both sides, to the last bit.
-    a, b = np.minimum(a, b), np.maximum(a, b)
-    share = (height[a] / (height[a] - height[b]))[:, None]
-    points = np.concatenate([v, v[a] + share * (v[b] - v[a])])
-    middle = np.full(f.shape, -1)
-    middle[crossed] = n + np.searchsorted(known, key)
+    key = edge_keys(edges[:, 0], edges[:, 1], n)
+    order = np.argsort(key)
+    sides = edge_keys(f, np.roll(f, -1, axis=1), n)
+    place = np.minimum(np.searchsorted(key[order], sides), len(key) - 1)
+    crossed = key[order][place] == sides
+    points = v[edges[:, 0]] + shares[:, None] * (v[edges[:, 1]] - v[edges[:, 0]])
+    middle = np.where(crossed, n + order[place], -1)
     count = crossed.sum(axis=1)
     new, parent = [f[count == 0]], [np.flatnonzero(count == 0)]
-    # One side is crossed: the plane goes through the opposite corner.
     rows = np.flatnonzero(count == 1)
     if rows.size:
         i, j, k, m = _turned(f, middle, rows, crossed[rows].argmax(axis=1))
         new += [np.stack([i, m, k], axis=1), np.stack([m, j, k], axis=1)]
         parent += [rows, rows]
-    # Two sides are crossed: a triangle at their common corner, and a quad, cut in two.
     rows = np.flatnonzero(count == 2)
     if rows.size:
-        i, j, k, m = _turned(f, middle, rows, ((~crossed[rows]).argmax(axis=1) + 1) % 3)
-        # Sides i j and j k are crossed.
-        other = _turned(f, middle, rows, ((~crossed[rows]).argmax(axis=1) + 2) % 3)[3]
+        # Sides i j and j k are divided: a triangle at j, and a quad, cut in two.
+        first = ((~crossed[rows]).argmax(axis=1) + 1) % 3
+        i, j, k, m = _turned(f, middle, rows, first)
+        other = _turned(f, middle, rows, (first + 1) % 3)[3]
         new += [
             np.stack([m, j, other], axis=1),
             np.stack([i, m, other], axis=1),
             np.stack([i, other, k], axis=1),
         ]
         parent += [rows] * 3
+    rows = np.flatnonzero(count == 3)
+    if rows.size:
+        i, j, k, m = _turned(f, middle, rows, np.zeros(len(rows), np.int64))
+        p, q = middle[rows, 1], middle[rows, 2]
+        new += [np.stack(corner, axis=1) for corner in ((i, m, q), (m, j, p), (q, p, k), (m, p, q))]
+        parent += [rows] * 4
     faces, owner = np.concatenate(new), np.concatenate(parent)
-    order = np.argsort(owner, kind="stable")
+    rank = np.argsort(owner, kind="stable")
     said = mesh.attributes
     if said is not None:
-        said = replace(said, texture=None, texture_corners=None).taken(owner[order])
-    return Mesh(points, faces[order], attributes=said)
+        said = replace(said, texture=None, texture_corners=None).taken(owner[rank])
+    return Mesh(np.concatenate([v, points]), faces[rank], attributes=said), edges
+
+
+def followed(seam: Ints, inserted: Ints, count: int) -> Ints:
+    """Replace the edges (e, 2) of a seam that were divided by their parts.
+
+    Parameters
+    ----------
+    seam : ndarray of int, (e, 2)
+    inserted : ndarray of int, (k, 2)
+        The ends of the edge on which each new vertex lies, in the order of insertion.
+    count : int
+        Number of vertices before.
+    """
+    kept = {(min(a, b), max(a, b)) for a, b in seam.tolist()}
+    for new, (a, b) in enumerate(inserted.tolist(), start=count):
+        edge = (min(a, b), max(a, b))
+        if edge in kept:
+            kept.remove(edge)
+            kept.update({(edge[0], new), (edge[1], new)})
+    return np.array(sorted(kept), np.int64).reshape(-1, 2)
 
 
 def _turned(f: Ints, middle: Ints, rows: Ints, first: Ints) -> tuple[Ints, Ints, Ints, Ints]:

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gso import metrics
+from gso.mesh.paths import Paths
 from gso.result import Result
 from gso.seams.pieces import Pieces
 from gso.segmentation.candidates import Candidate, cuts, joined, measured, neck_of
 from gso.segmentation.options import Wishes
-from gso.segmentation.paths import Paths
 from gso.segmentation.potential import Potential
 from gso.segmentation.tree import Ground
 from gso.tasks.developable import Options

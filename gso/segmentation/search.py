@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import ConvergenceWarning
+from gso.mesh.paths import Paths
 from gso.seams.cutting import cut
 from gso.seams.kinds import Seam
 from gso.seams.pieces import Pieces
@@ -29,7 +30,6 @@ from gso.segmentation.found import Segmentation
 from gso.segmentation.mirror import mirror_of
 from gso.segmentation.options import Wishes, prices
 from gso.segmentation.packed import packed
-from gso.segmentation.paths import Paths
 from gso.segmentation.potential import Potential
 from gso.segmentation.reshaping import reshaped
 from gso.segmentation.tree import Ground
@@ -38,7 +38,7 @@ from gso.spelling import known_keywords
 #: Ratio of the estimated to the measured strain of a first attempt.
 _RATIO = 1.3
 #: The same for pieces without darts, in groups that are tried one after the other.
-_RATIOS = ((1.4, 1.28), (1.0,), (0.7,))
+_RATIOS = ((1.3, 1.2), (1.1,), (0.8,))
 #: Share of the allowed strain from which on an attempt is not loosened any more.
 _CLOSE = 0.93
 _ATTEMPTS = 6

@@ -9,7 +9,7 @@ import numpy as np
 
 from gso import faults, metrics
 from gso.mesh import Mesh
-from gso.segmentation.paths import Paths
+from gso.mesh.paths import Paths
 from gso.tno.layout import lay_out
 from gso.typing import Array, Ints
 

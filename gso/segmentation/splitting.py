@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
+from scipy.sparse.csgraph import dijkstra
 
 from gso.mesh import Mesh
+from gso.mesh.separation import between, spans
 from gso.segmentation.sheets import Sheet, rectangle
 from gso.typing import Array, Ints
 
 #: Radius of the two parts that an overlap is cut between, relative to their distance.
 _BALL = 0.3
-#: Lengths are rounded to this share of the longest edge, for whole numbers in the flow.
-_STEPS = 1000
 
 
 def apart(sheet: Sheet) -> Ints:
@@ -24,7 +22,7 @@ def apart(sheet: Sheet) -> Ints:
     """
     mesh = sheet.mesh
     pairs = sheet.overlaps
-    graph = _dual(mesh, _spans(mesh)[0])
+    graph = _dual(mesh, spans(mesh)[0])
     firsts = np.unique(pairs[:, 0])
     some = firsts[:: max(len(firsts) // 20, 1)]
     away = dijkstra(graph, directed=False, indices=some)
@@ -52,59 +50,12 @@ def halves(sheet: Sheet, longest: float) -> Ints:
     along = sheet.flat @ np.array([np.cos(angle), np.sin(angle)])
     corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
     middle = (along[corners].mean(axis=1) - along.min()) / length
-    return between(
-        mesh,
-        middle < place - room,
-        middle > place + room,
-        1.0 + 0.1 * np.abs(middle - place) / room,
-    )
-
-
-def between(
-    mesh: Mesh, one: NDArray[np.bool_], two: NDArray[np.bool_], price: Array | None = None
-) -> Ints:
-    """Return the shortest edges (e, 2) whose removal separates two sets of faces.
-
-    The length of an edge is multiplied by the mean price (m,) of its faces.
-
-    Source: minimum cut (Ford and Fulkerson 1956) of the dual graph.
-    """
-    length, k = _spans(mesh)[1:]
-    he, count = mesh.half_edges, len(mesh.faces)
-    if price is not None:
-        length = length * 0.5 * (price[he.face[k]] + price[he.face[he.twin[k]]])
-    capacity = np.maximum(np.round(_STEPS * length / max(float(length.max()), 1e-300)), 1.0)
-    f, g = he.face[k], he.face[he.twin[k]]
-    much = np.int64(capacity.sum() + 1)
-    source, sink = count, count + 1
-    ends = np.flatnonzero(one), np.flatnonzero(two & ~one)
-    rows = np.r_[f, g, np.full(len(ends[0]), source), ends[1]]
-    columns = np.r_[g, f, ends[0], np.full(len(ends[1]), sink)]
-    full = np.full(len(ends[0]) + len(ends[1]), much)
-    values = np.r_[capacity, capacity, full].astype(np.int32 if much < 2**31 else np.int64)
-    graph = coo_matrix((values, (rows, columns)), shape=(count + 2, count + 2)).tocsr()
-    left = graph - maximum_flow(graph, source, sink).flow
-    left.data[left.data < 0] = 0
-    left.eliminate_zeros()
-    side = np.zeros(count + 2, bool)
-    side[breadth_first_order(left, source, return_predecessors=False)] = True
-    cut = side[f] != side[g]
-    return np.stack([he.origin[k[cut]], he.dest[k[cut]]], axis=1)
-
-
-def _spans(mesh: Mesh) -> tuple[Array, Array, Ints]:
-    """Return distances between neighbouring faces, lengths of their edges, and half-edges."""
-    he = mesh.half_edges
-    k = np.flatnonzero(he.twin > np.arange(he.twin.size))
-    corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
-    centre = mesh.vertices[corners].mean(axis=1)
-    distance = np.linalg.norm(centre[he.face[k]] - centre[he.face[he.twin[k]]], axis=1)
-    length = np.linalg.norm(mesh.vertices[he.origin[k]] - mesh.vertices[he.dest[k]], axis=1)
-    return distance, length, k
+    price = 1.0 + 0.1 * np.abs((along - along.min()) / length - place) / room
+    return between(mesh, middle < place - room, middle > place + room, price)
 
 
 def _dual(mesh: Mesh, distance: Array) -> coo_matrix:
-    he, k = mesh.half_edges, _spans(mesh)[2]
+    he, k = mesh.half_edges, spans(mesh)[2]
     f, g = he.face[k], he.face[he.twin[k]]
     shape = (len(mesh.faces), len(mesh.faces))
     return coo_matrix((np.maximum(distance, 1e-300), (f, g)), shape=shape).tocsr()

@@ -17,12 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.mesh import Mesh
-from gso.segmentation.paths import Paths
+from gso.mesh.paths import Paths
 from gso.segmentation.potential import Potential
 from gso.typing import Array, Ints
 
 #: Share of the largest potential that is added to it, so that no edge costs too much.
 _FLOOR = 0.05
+#: Distance of the two ends of a cut across a saddle, relative to the length of its first part.
+_APART = 2.0
 
 
 def _no_edges() -> Ints:
@@ -116,6 +118,11 @@ def _across(ground: Ground, reached: NDArray[np.bool_], line: Ints) -> Ints:
     closed[ground.mirrored(_edges(line))] = True
     goals[closed] = False
     closed[line[0]] = False
+    # Not back to where the first part ends, which would cut out a tongue.
+    step = np.diff(ground.mesh.vertices[line], axis=0)
+    reach = _APART * float(np.linalg.norm(step, axis=1).sum())
+    far = goals & ~np.isfinite(ground.paths.distance(line[-1:], reach))
+    goals = far if far.any() else goals
     weight = _weight(ground.paths, size)
     return ground.mirrored(_edges(ground.paths.cheapest(int(line[0]), goals, weight, closed)))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,6 +20,8 @@ from gso.typing import Ints
 
 #: Weight of the smoothness of seams.
 _SMOOTH = 8e-6
+#: Cosine of the turn of a seam on a quad mesh from which on it is a corner.
+_CORNER = 0.7
 
 
 def constraints_of(pieces: Pieces) -> list[Constraint]:
@@ -28,9 +31,22 @@ def constraints_of(pieces: Pieces) -> list[Constraint]:
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     if not len(pairs):
         return []
-    lines = [line for _, line in chains(pieces.edges, pieces.sides) if len(line) > 2]
+    lines = [line for _, line in chains(pieces.edges, pieces.sides)]
+    if not pieces.design.has_triangles:
+        # A corner of a quad would lose its angle if the seam became smooth there.
+        lines = [part for line in lines for part in _straight(pieces.design, line)]
+    lines = [line for line in lines if len(line) > 2]
     out: list[Constraint] = [Glue(pairs)]
     return [*out, SmoothCurves(lines, _SMOOTH)] if lines else out
+
+
+def _straight(mesh: Mesh, line: Ints) -> list[Ints]:
+    """Divide a chain of vertices at its corners."""
+    way = np.diff(mesh.vertices[line], axis=0)
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+    corner = np.flatnonzero(np.einsum("ij,ij->i", way[1:], way[:-1]) < _CORNER) + 1
+    ends = [0, *corner.tolist(), len(line) - 1]
+    return [line[a : b + 1] for a, b in pairwise(ends)]
 
 
 def solved(

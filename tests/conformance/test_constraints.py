@@ -38,6 +38,7 @@ def examples(mesh: gso.Mesh, turn: np.ndarray, shift: np.ndarray) -> dict[str, g
         "OnCurve": gso.OnCurve(rim, mesh.vertices[rim] + 0.05 * size * up, closed=True),
         "PlanarFaces": gso.PlanarFaces(np.arange(0, len(mesh.faces), 5)),
         "Ruling": gso.Ruling(np.arange(36, 45)),
+        "SmoothCurves": gso.SmoothCurves([np.arange(36, 45)]),
         "SlidingBoundary": gso.SlidingBoundary(),
         "SymmetryPlane": gso.SymmetryPlane(shift, turn @ np.array([1.0, 0.0, 0.0])),
     }

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.csgraph import dijkstra
 
 from gso.mesh import Mesh
 from gso.typing import Array, Ints
@@ -34,20 +34,27 @@ class Paths:
         self._plain = self._graph(self.length)
         self._turns = None if mesh.has_triangles else _Turns(mesh, self.ends, self.length)
 
-    def _graph(self, weight: Array) -> csr_matrix:
-        a, b = self.ends.T
+    def _graph(self, weight: Array) -> Any:
+        from scipy.sparse import coo_matrix
+
+        keep = np.isfinite(weight)
+        weight, (a, b) = weight[keep], self.ends[keep].T
         shape = (self.count, self.count)
         # Zero would mean that there is no edge.
         return coo_matrix((np.maximum(weight, 1e-300), (a, b)), shape=shape).tocsr()
 
     def distance(self, sources: Ints, limit: float = np.inf) -> Array:
         """Return the distance along edges (n,) from the nearest of some vertices."""
+        from scipy.sparse.csgraph import dijkstra
+
         return np.asarray(
             dijkstra(self._plain, directed=False, indices=sources, min_only=True, limit=limit)
         )
 
     def between(self, sources: Ints, limit: float) -> Array:
         """Return the distances (k, n) from every source up to a limit; infinite beyond."""
+        from scipy.sparse.csgraph import dijkstra
+
         return np.asarray(dijkstra(self._plain, directed=False, indices=sources, limit=limit))
 
     def cheapest(
@@ -78,16 +85,14 @@ class Paths:
         ndarray of int
             From the target on; the target alone where there is no path.
         """
+        from scipy.sparse.csgraph import dijkstra
+
         cost = self.cost * weight
         if closed is not None:
             cost = np.where(closed[self.ends].any(axis=1), np.inf, cost)
         if self._turns is not None:
             return self._turns.cheapest(target, reached, cost)
-        keep = np.isfinite(cost)
-        a, b = self.ends[keep].T
-        graph = coo_matrix(
-            (np.maximum(cost[keep], 1e-300), (a, b)), shape=(self.count, self.count)
-        ).tocsr()
+        graph = self._graph(cost)
         away, before = dijkstra(
             graph, directed=False, indices=target, return_predecessors=True, limit=limit
         )
@@ -129,6 +134,9 @@ class _Turns:
 
     def cheapest(self, target: int, reached: NDArray[np.bool_], cost: Array) -> Ints:
         """See :meth:`Paths.cheapest`; the costs (e,) include the factors."""
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import dijkstra
+
         count, each = len(self.head), cost[self.edge]
         weight = each[self.after] + self.turn
         begin = np.flatnonzero((self.tail == target) & np.isfinite(each))
