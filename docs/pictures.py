@@ -6,6 +6,7 @@ colours, a third of the size.
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,8 @@ import numpy as np
 from PIL import Image
 
 import gso
-from gso.plot import plot_result, plot_rulings
+from gso.mesh import Mesh
+from gso.plot import plot_pieces, plot_result, plot_rulings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,6 +38,12 @@ def main() -> None:
         ("strips", gso.RuledOptions(strips=4)),
     ):
         draw(name, plot_result(gso.tno.optimize(panel, options=options)))
+    sys.path.insert(0, str(ROOT / "examples"))
+    import whole
+
+    draw(
+        "pieces", plot_pieces(gso.pieces(Mesh(*whole.sphere()), max_strain=1e-3, max_deviation=30))
+    )
     noise = np.random.default_rng(0).standard_normal(panel.vertices.shape)
     noisy = panel.replaced(panel.vertices + 0.005 * panel.frame.scale * noise)
     draw("denoise", plot_result(gso.tno.optimize(noisy, task="denoise")))

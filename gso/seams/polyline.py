@@ -13,7 +13,7 @@ from gso.mesh.closest_point import Nearest
 from gso.mesh.paths import Paths
 from gso.seams.kinds import Placed, Seam
 from gso.seams.slicing import divided, followed
-from gso.seams.walking import walk
+from gso.seams.walking import Walker
 from gso.typing import Array, Ints
 
 #: Largest distance of a point from the surface, relative to the diagonal.
@@ -108,7 +108,7 @@ def _nearest_vertices(mesh: Mesh, points: Array) -> Ints:
 def _straight(mesh: Mesh, start: int, goal: int) -> tuple[Mesh, Ints, Ints | None]:
     """Insert a straight line between two vertices; a path along edges where that fails."""
     count = len(mesh.vertices)
-    found = walk(mesh, start, goal)
+    found = Walker(mesh).walk(start, goal)
     none = np.empty((0, 2), np.int64)
     if found is None or len(set(found.edges)) < len(found.edges):
         return mesh, none, _path(mesh, start, goal, np.ones(len(mesh.edges)))

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 from gso.errors import ConvergenceWarning
 from gso.mesh.paths import Paths
 from gso.seams.cutting import cut
-from gso.seams.kinds import Seam
+from gso.seams.kinds import Edges, Seam
 from gso.seams.pieces import Pieces
+from gso.seams.straightening import straight_seams
 from gso.segmentation.candidates import (
     Candidate,
     cuts,
@@ -32,6 +33,7 @@ from gso.segmentation.options import Wishes, prices
 from gso.segmentation.packed import packed
 from gso.segmentation.potential import Potential
 from gso.segmentation.reshaping import reshaped
+from gso.segmentation.sheets import flattened
 from gso.segmentation.tree import Ground
 from gso.spelling import known_keywords
 
@@ -42,6 +44,8 @@ _RATIOS = ((1.3, 1.2), (1.1,), (0.8,))
 #: Share of the allowed strain from which on an attempt is not loosened any more.
 _CLOSE = 0.93
 _ATTEMPTS = 6
+#: Share of the allowed strain that is aimed at before seams are straightened.
+_ROOM = 0.97
 #: Ratio of the absolute curvature of a design to that of its smoothed copy from which on it
 #: counts as noisy.
 _NOISY = 3.0
@@ -148,7 +152,8 @@ def pieces(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         if max_deviation is None:
-            out = packed(_as_is(ground, wishes), None, ground, wishes)
+            found = _straight(ground, _as_is(ground, wishes), wishes)
+            out = packed(found, None, ground, wishes)
         else:
             out = packed(*reshaped(ground, wishes), ground, wishes)
     reasons = list(out.reasons)
@@ -220,7 +225,9 @@ def _dartless(ground: Ground, wishes: Wishes) -> Candidate:
 
 def _darted(ground: Ground, wishes: Wishes) -> Candidate:
     """Cut with darts, and adapt the bound on the estimated strain to the measured one."""
-    most, ratio = wishes.max_strain, _RATIO
+    # Straight seams change the strain a little.
+    most = (_ROOM if ground.mesh.is_triangles else 1.0) * wishes.max_strain
+    ratio = _RATIO
     found: list[Candidate] = []
     for attempt in range(_ATTEMPTS):
         wishes.say(f"seams, attempt {attempt + 1}")
@@ -237,6 +244,21 @@ def _darted(ground: Ground, wishes: Wishes) -> Candidate:
     if best.strain > most:
         return best
     return joined(ground, best, most, neck_of(ground, wishes), wishes.max_size, wishes.say)
+
+
+def _straight(ground: Ground, found: Candidate, wishes: Wishes) -> Candidate:
+    """Straighten the seams of a triangle mesh, where the pieces stay what they are."""
+    if not ground.mesh.is_triangles or not len(found.pieces.edges) or ground.mirror is not None:
+        return found
+    wishes.say("straight seams")
+    mesh, edges = straight_seams(found.pieces, ground.kept)
+    own = cut(mesh, Edges(edges))
+    if len(own) != len(found.pieces) or not all(piece.is_disk for piece in own):
+        return found
+    sheets = tuple(flattened(piece.mesh) for piece in own)
+    straight = Candidate(own, sheets)
+    good = straight.sound and straight.strain <= max(found.strain, wishes.max_strain)
+    return straight if good else found
 
 
 def _rank(found: Candidate, wishes: Wishes) -> tuple[int, float, float]:

@@ -1,0 +1,102 @@
+"""Seams of a triangle mesh, straightened by vertices that are inserted where they cross edges."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from gso.mesh import Mesh
+from gso.mesh.topology import edge_keys
+from gso.seams.chains import chains
+from gso.seams.pieces import Pieces
+from gso.seams.slicing import divided
+from gso.seams.walking import Walker
+from gso.typing import Array, Ints
+
+#: Largest distance of a seam from the straight one, in mean edge lengths.
+_NEAR = 0.8
+
+
+def straight_seams(pieces: Pieces, kept: Ints) -> tuple[Mesh, Ints]:
+    """Replace zigzags of seams along edges by straight lines through triangles.
+
+    The shape does not change: new vertices lie on edges of the design.
+
+    Parameters
+    ----------
+    pieces : Pieces
+        Of a triangle mesh.
+    kept : ndarray of int, (k, 2)
+        Edges of seams that stay.
+
+    Returns
+    -------
+    mesh : Mesh
+        The design with the new vertices after its own.
+    edges : ndarray of int, (e, 2)
+        Its seams.
+    """
+    mesh, n = pieces.design, len(pieces.design.vertices)
+    step = float(pieces.lengths.mean()) if len(pieces.edges) else 0.0
+    walker = Walker(mesh)
+    seam = set(edge_keys(pieces.edges[:, 0], pieces.edges[:, 1], n).tolist())
+    kept = kept.reshape(-1, 2)
+    fixed = set(edge_keys(kept[:, 0], kept[:, 1], n).tolist())
+    on_seam = set(np.unique(pieces.edges).tolist())
+    taken: set[int] = set()
+    crossed: list[tuple[int, int]] = []
+    shares: list[float] = []
+    lines: list[list[int]] = []
+    for _, chain in chains(pieces.edges, pieces.sides):
+        keys = edge_keys(chain[:-1], chain[1:], n).tolist()
+        if fixed.intersection(keys):
+            lines.append(chain.tolist())
+            continue
+        stops = _stops(mesh.vertices[chain], _NEAR * step)
+        for a, b in pairwise(stops):
+            part = chain[a : b + 1].tolist()
+            found = walker.walk(part[0], part[-1]) if b - a > 1 else None
+            if found is None:
+                lines.append(part)
+                continue
+            ends = np.array(found.edges, np.int64).reshape(-1, 2)
+            own = edge_keys(ends[:, 0], ends[:, 1], n).tolist()
+            through = set(found.vertices[1:-1])
+            free = not (taken & found.faces) and not (seam - set(keys)).intersection(own)
+            # Vertices of other seams, or of other parts of this one, are in the way.
+            free = free and not (through & (on_seam - set(part)))
+            if not free:
+                lines.append(part)
+                continue
+            taken |= found.faces
+            first = len(crossed)
+            crossed += found.edges
+            shares += found.shares
+            lines.append([s if s >= 0 else n + first - 1 - s for s in found.stops])
+    finer, _ = divided(mesh, np.array(crossed, np.int64).reshape(-1, 2), np.array(shares))
+    edges = [np.stack([line[:-1], line[1:]], axis=1) for line in map(np.array, lines)]
+    return finer, np.concatenate([np.empty((0, 2), np.int64), *edges])
+
+
+def _stops(points: Array, near: float) -> list[int]:
+    """Choose the points (k, 3) of a line that a straight line between them stays near to.
+
+    Source: Douglas and Peucker 1973.
+    """
+    keep, todo = {0, len(points) - 1}, [(0, len(points) - 1)]
+    while todo:
+        a, b = todo.pop()
+        if b - a < 2:
+            continue
+        way = points[b] - points[a]
+        away = points[a + 1 : b] - points[a]
+        along = np.clip(away @ way / max(float(way @ way), 1e-300), 0.0, 1.0)
+        far = np.linalg.norm(away - along[:, None] * way, axis=1)
+        k = int(far.argmax()) + a + 1
+        # Long parts bend with the surface.
+        if far.max() > near or b - a > 12:
+            k = k if far.max() > near else (a + b) // 2
+            keep.add(k)
+            todo += [(a, k), (k, b)]
+    return sorted(keep)
