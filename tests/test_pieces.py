@@ -273,7 +273,7 @@ def test_a_changed_shape_is_developable_and_closed():
     np.testing.assert_allclose(one, two, atol=1e-9)
 
 
-def test_optimize_takes_pieces():
+def test_optimize_takes_pieces(tmp_path):
     pieces = gso.cut(dome(17), Path([8 * 17, 8 * 17 + 16]))
     result = gso.tno.optimize(pieces, constraints=[gso.Fixed([0, 16])])
     whole = result.pieces.design
@@ -286,6 +286,10 @@ def test_optimize_takes_pieces():
     )
     uncut = gso.tno.optimize(dome(17))
     assert result.metrics["strain_p99"] < uncut.metrics["strain_p99"]
+    result.save(tmp_path / "result.npz")
+    again = gso.Result.load(tmp_path / "result.npz").pieces
+    np.testing.assert_array_equal(again.edges, result.pieces.edges)
+    np.testing.assert_array_equal(again.design.vertices, whole.vertices)
     flat = gso.tno.optimize(pieces, task="flatten")
     assert flat.usable
     with pytest.raises(gso.OptionError, match=r"pieces\.design"):

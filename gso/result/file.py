@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.attributes import Attributes
+from gso.mesh.cutting import Cut
 from gso.pattern import Pattern
 from gso.result.result import Result
+from gso.seams.pieces import Pieces
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
 from gso.typing import Array
@@ -67,6 +69,8 @@ def arrays(result: Result) -> dict[str, Any]:
         out["cell_scale"] = result.cell_scale
     if result.spline is not None:
         out |= result.spline.arrays()
+    if result.pieces is not None:
+        out |= _pieces_arrays(result.pieces)
     if result.components:
         label = np.full(len(result.design.vertices), -1)
         for number, part in enumerate(result.components):
@@ -75,6 +79,31 @@ def arrays(result: Result) -> dict[str, Any]:
     if result.design.attributes is not None:
         out |= result.design.attributes.arrays()
     return out
+
+
+def _pieces_arrays(pieces: Pieces) -> dict[str, Any]:
+    return {
+        "pieces_design": pieces.design.vertices,
+        "pieces_faces": pieces.design.faces,
+        "pieces_vertex": pieces.opened.vertex,
+        "pieces_seams": pieces.opened.seams,
+        "pieces_names": np.frombuffer(json.dumps(pieces.names).encode(), np.uint8),
+    }
+
+
+def _read_pieces(data: Mapping[str, Any], surface: Mesh) -> Pieces | None:
+    if "pieces_design" not in data:
+        return None
+    vertex, seams = data["pieces_vertex"].astype(np.int64), data["pieces_seams"].astype(np.int64)
+    count = len(surface.vertices)
+    good = vertex.shape == (count,) and seams.shape[1:] == (2, 2)
+    if not good or not ((seams >= 0) & (seams < count)).all():
+        raise MeshError("the seams do not fit the surface")
+    design = Mesh(data["pieces_design"], data["pieces_faces"])
+    if not ((vertex >= 0) & (vertex < len(design.vertices))).all():
+        raise MeshError("the seams do not fit the design")
+    names = tuple(map(str, json.loads(data["pieces_names"].tobytes())))
+    return Pieces(design, Cut(surface, vertex, seams), names)
 
 
 def read(path: str | PathLike[str]) -> Result:
@@ -108,6 +137,7 @@ def read(path: str | PathLike[str]) -> Result:
             result.mesh, result.pattern = result.ruled.mesh, result.ruled.pattern
             result.flat = None if result.pattern.is_cut else result.pattern.flat
         result.spline = BSplineSurface.from_arrays(data)
+        result.pieces = _read_pieces(data, result.mesh)
         label = _checked(data, "component", (len(design.vertices),))
         if label is not None:
             _divide(result, record.get("components", []), label.astype(np.int64))

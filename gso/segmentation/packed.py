@@ -11,6 +11,7 @@ from gso.segmentation.candidates import Candidate, fits
 from gso.segmentation.found import Segmentation
 from gso.segmentation.options import NECK, Wishes
 from gso.segmentation.tree import Ground
+from gso.verdict.shape import against_surface
 
 
 def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wishes) -> Segmentation:
@@ -44,6 +45,7 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
     elif numbers["neck"] < NECK * size:
         notes.append(f"the narrowest place of a piece is {numbers['neck']:.3g} wide")
     if result is not None:
+        reasons += against_surface(result.design, result.mesh)
         away = metrics.surface_distance(ground.mesh, own.design)
         numbers["deviation_mean"] = away.there_mean
         numbers["deviation_max"] = max(away.there_max, away.back_max)
