@@ -44,8 +44,9 @@ _RATIOS = ((1.3, 1.2), (1.1,), (0.8,))
 #: Share of the allowed strain from which on an attempt is not loosened any more.
 _CLOSE = 0.93
 _ATTEMPTS = 6
-#: Share of the allowed strain that is aimed at before seams are straightened.
-_ROOM = 0.97
+#: Share of the allowed strain that is aimed at before seams are straightened, with and without
+#: darts.
+_ROOM, _MORE_ROOM = 0.97, 0.92
 #: Ratio of the absolute curvature of a design to that of its smoothed copy from which on it
 #: counts as noisy.
 _NOISY = 3.0
@@ -209,25 +210,28 @@ def _as_is(ground: Ground, wishes: Wishes) -> Candidate:
 
 def _dartless(ground: Ground, wishes: Wishes) -> Candidate:
     """Measure pieces without darts, the best by the estimate first, until some hold the strain."""
+    most = _aim(ground, wishes)
     found: list[Candidate] = []
     for ratios in _RATIOS:
         wishes.say(f"seams without darts, attempt {len(found) + 1}")
         pool = [m for r in ratios for m in without_darts(ground, r * wishes.max_strain)]
+        limit = np.inf if ratios is _RATIOS[-1] else most
         for some in sorted(pool, key=lambda one: merged_value(one, wishes)):
-            limit = (
-                wishes.max_strain if some is not pool[-1] or ratios is not _RATIOS[-1] else np.inf
-            )
             found.append(measured(ground, pieces_of(some), wishes.max_size, wishes.say, limit))
-            if found[-1].strain <= wishes.max_strain and found[-1].sound:
+            if found[-1].strain <= most and found[-1].sound:
                 return found[-1]
     return min(found, key=lambda one: (not one.sound, one.strain))
 
 
+def _aim(ground: Ground, wishes: Wishes) -> float:
+    """Return the strain to aim at; that of triangle meshes changes when seams are straightened."""
+    share = (_ROOM if wishes.darts else _MORE_ROOM) if ground.mesh.is_triangles else 1.0
+    return share * wishes.max_strain
+
+
 def _darted(ground: Ground, wishes: Wishes) -> Candidate:
     """Cut with darts, and adapt the bound on the estimated strain to the measured one."""
-    # Straight seams change the strain a little.
-    most = (_ROOM if ground.mesh.is_triangles else 1.0) * wishes.max_strain
-    ratio = _RATIO
+    most, ratio = _aim(ground, wishes), _RATIO
     found: list[Candidate] = []
     for attempt in range(_ATTEMPTS):
         wishes.say(f"seams, attempt {attempt + 1}")

@@ -15,6 +15,8 @@ from gso.typing import Ints
 
 #: Number of passes over all seams, and number of edges that are straightened together.
 _PASSES, _WINDOW = 3, 12
+#: Ratio of the estimated strain to its bound up to which a seam is straightened.
+_EXCESS = 1.03
 
 
 def straightened(ground: Ground, merging: Merging) -> Ints:
@@ -106,7 +108,7 @@ def _relabelled(
     if (label[one] == a).sum() + (label[two] == b).sum() < 0.5 * len(faces):
         one, two = two, one
     strains = [merging.estimate(some) for some in (one, two)]
-    if any(s is None or s > merging.strain for s in strains):
+    if any(s is None or s > _EXCESS * merging.strain for s in strains):
         return False
     label[one], label[two] = a, b
     return True
