@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from gso import metrics
-from gso.mesh import Mesh
 from gso.result import Result
 from gso.segmentation.candidates import Candidate, fits
 from gso.segmentation.found import Segmentation
+from gso.segmentation.measures import FACETS, mean_angle
 from gso.segmentation.options import NECK, Wishes
 from gso.segmentation.tree import Ground
 from gso.verdict.shape import against_surface
@@ -49,8 +49,14 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
         away = metrics.surface_distance(ground.mesh, own.design)
         numbers["deviation_mean"] = away.there_mean
         numbers["deviation_max"] = max(away.there_max, away.back_max)
-        numbers["dihedral_mean_before"] = _bend(result.design)
-        numbers["dihedral_mean"] = _bend(result.mesh)
+        numbers["dihedral_mean_before"] = mean_angle(result.design)
+        numbers["dihedral_mean"] = mean_angle(result.mesh)
+        if numbers["dihedral_mean"] > FACETS * numbers["dihedral_mean_before"]:
+            notes.append(
+                "the mean angle between neighbouring faces rose from "
+                f"{numbers['dihedral_mean_before']:.3g} to {numbers['dihedral_mean']:.3g} degrees: "
+                "the pieces have facets or wrinkles"
+            )
         allowed = wishes.max_deviation
         if allowed is not None and numbers["deviation_max"] > allowed:
             reasons.append(
@@ -60,9 +66,3 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
     return Segmentation(
         own.design, own.opened, own.names, sheets, numbers, tuple(reasons), tuple(notes), result
     )
-
-
-def _bend(mesh: Mesh) -> float:
-    """Return the mean angle between neighbouring faces, in degrees."""
-    angles = metrics.dihedral_angles(mesh)
-    return float(angles.mean()) if angles.size else 0.0

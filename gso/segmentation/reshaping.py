@@ -12,6 +12,7 @@ from gso.mesh.paths import Paths
 from gso.result import Result
 from gso.seams.pieces import Pieces
 from gso.segmentation.candidates import Candidate, cuts, joined, measured, neck_of
+from gso.segmentation.measures import FACETS, facet_ratio
 from gso.segmentation.options import Wishes
 from gso.segmentation.potential import Potential
 from gso.segmentation.tree import Ground
@@ -26,11 +27,13 @@ _FIRST, _STEP, _CLOSE = 0.04, 1.5, 1.1
 _LEAST = 2e-3
 #: Factor on the weight of curvature where the distance is kept and the strain is not.
 _STRONGER = 4.0
+#: Factors on the weights of fairness and curvature where pieces have facets.
+_FAIRER = (3.0, 2.0)
 
 
 @dataclass(frozen=True)
 class _Attempt:
-    """A solve of one cut; `excess` is the larger of distance and strain over what is allowed."""
+    """A solve of one cut; `excess` is the largest ratio of what was measured to its bound."""
 
     level: float
     result: Result
@@ -95,21 +98,37 @@ def _levels(tried: list[_Attempt]) -> Iterator[float]:
 def _attempt(
     ground: Ground, cut_open: Pieces, level: float, allowed: float, strain: float
 ) -> _Attempt:
+    """Solve one cut, again with other weights where the strain or facets are too large."""
+    own = Options().for_pieces()
     best: _Attempt | None = None
-    options = Options().for_pieces()
-    for factor in (1.0, _STRONGER):
-        chosen = replace(options, w_curvature=factor * options.w_curvature)
-        result = optimize(cut_open, options=chosen, verdict=False)
+    todo = [own]
+    while todo:
+        options = todo.pop(0)
+        result = optimize(cut_open, options=options, verdict=False)
         shape = cut_open if result.pieces is None else result.pieces
         away = metrics.surface_distance(ground.mesh, shape.design)
         far = max(away.there_max, away.back_max) / allowed
-        excess = far
+        strained = facets = 0.0
         if far <= 1.0:
-            measured_strain = strains_of(result.mesh).get("strain_p99", np.inf)
-            excess = max(far, measured_strain / strain)
-        attempt = _Attempt(level, result, shape, excess)
-        if best is None or excess < best.excess:
+            strained = strains_of(result.mesh).get("strain_p99", np.inf) / strain
+            facets = facet_ratio(result) / FACETS
+        attempt = _Attempt(level, result, shape, max(far, strained, facets))
+        if best is None:
+            if strained > 1.0:
+                todo.append(replace(own, w_curvature=_STRONGER * own.w_curvature))
+            if facets > 1.0:
+                todo.append(_fairer(own))
+        if best is None or attempt.excess < best.excess:
             best = attempt
-        if far > 1.0 or excess <= 1.0:
+        if best.excess <= 1.0:
             break
     return attempt if best is None else best
+
+
+def _fairer(options: Options) -> Options:
+    fairness, curvature = _FAIRER
+    return replace(
+        options,
+        w_fairness=fairness * options.w_fairness,
+        w_curvature=curvature * options.w_curvature,
+    )
