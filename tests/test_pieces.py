@@ -248,6 +248,13 @@ def test_pieces_fit_on_the_sheet():
     assert found.alike() == [[0, 1]]
 
 
+def test_faces_larger_than_the_sheet_are_named():
+    for mesh in (Mesh(np.eye(3), [[0, 1, 2]]), ball(8)):
+        found = gso.pieces(mesh, max_strain=0.1, max_size=(0.01, 0.01))
+        assert not found.usable
+        assert any("larger than the sheet" in reason for reason in found.reasons)
+
+
 def test_budgets_that_are_missed_are_named():
     found = gso.pieces(ball(16), max_strain=0.05, seam=0.5)
     assert not found.usable
@@ -292,6 +299,8 @@ def test_optimize_takes_pieces(tmp_path):
     np.testing.assert_array_equal(again.design.vertices, whole.vertices)
     flat = gso.tno.optimize(pieces, task="flatten")
     assert flat.usable
+    with pytest.raises(gso.MeshError, match="each piece"):
+        gso.tno.optimize(pieces, formulation="ruled")
     with pytest.raises(gso.OptionError, match=r"pieces\.design"):
         gso.tno.optimize(pieces, task="denoise")
 
@@ -330,6 +339,7 @@ def test_what_is_no_surface_is_refused():
         ({"max_deviation": -1}, "max_deviation"),
         ({"max_pieces": 0}, "max_pieces"),
         ({"max_size": (1.0,)}, "max_size"),
+        ({"max_size": 3.0}, "max_size"),
         ({"min_neck": "wide"}, "min_neck"),
         ({"along": [[0, 99]]}, "0-99"),
         ({"avoid": [999]}, "face 999"),

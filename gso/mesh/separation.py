@@ -26,6 +26,8 @@ def between(
 
     length, k = spans(mesh)[1:]
     he, count = mesh.half_edges, len(mesh.faces)
+    if not (one.any() and two.any() and len(k)):
+        return np.empty((0, 2), np.int64)
     if price is not None:
         length = length * 0.5 * (price[he.origin[k]] + price[he.dest[k]])
     capacity = np.maximum(np.round(_STEPS * length / max(float(length.max()), 1e-300)), 1.0)

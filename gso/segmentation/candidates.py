@@ -176,7 +176,7 @@ def measured(
             if len(sheet.overlaps):
                 edges = apart(sheet)
             elif most is not None and not fits(sheet, most):
-                edges = halves(sheet, max(most))
+                edges = halves(sheet, most)
             if len(edges):
                 more.append(ground.mirrored(piece.vertices[edges]))
         if not more:

@@ -42,7 +42,8 @@ class Wishes:
         if count is not None and not (isinstance(count, int | np.integer) and count >= 1):
             raise OptionError(f"max_pieces is {count!r}; it must be a whole number from 1 up")
         size = self.max_size
-        if size is not None and not (len(size) == 2 and all(map(_positive, size))):
+        pair = isinstance(size, tuple | list) and len(size) == 2
+        if size is not None and not (pair and all(map(_positive, size))):
             raise OptionError(f"max_size is {size!r}; it must be length and width of a sheet")
 
     def value(self, pieces: int, seam: float) -> tuple[int, float, float]:

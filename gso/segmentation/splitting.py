@@ -37,20 +37,25 @@ def apart(sheet: Sheet) -> Ints:
     return between(mesh, from_one <= reach, from_two <= reach)
 
 
-def halves(sheet: Sheet, longest: float) -> Ints:
-    """Choose the edges (e, 2) of a shortest cut across the long side of a pattern.
+def halves(sheet: Sheet, most: tuple[float, float]) -> Ints:
+    """Choose the edges (e, 2) of a shortest cut across a pattern that is larger than a sheet.
 
-    The parts are as few as a largest length allows, and about equal.
+    The parts are as few as the sheet allows, and about equal.
     """
     mesh = sheet.mesh
-    angle, (length, _) = rectangle(sheet.flat)
+    angle, size = rectangle(sheet.flat)
+    limits = max(most), min(most)
+    axis = int(size[1] / limits[1] > size[0] / limits[0])
+    length, longest = size[axis], limits[axis]
+    turn = angle + axis * 0.5 * np.pi
+    along = sheet.flat @ np.array([np.cos(turn), np.sin(turn)])
+    along = (along - along.min()) / length
+    corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
+    middle = along[corners].mean(axis=1)
     parts = max(int(np.ceil(length / longest)), 2)
     place = (parts // 2) / parts
     room = float(np.clip(0.5 * (longest / length - 1.0 / parts), 0.01, 0.1))
-    along = sheet.flat @ np.array([np.cos(angle), np.sin(angle)])
-    corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
-    middle = (along[corners].mean(axis=1) - along.min()) / length
-    price = 1.0 + 0.1 * np.abs((along - along.min()) / length - place) / room
+    price = 1.0 + 0.1 * np.abs(along - place) / room
     return between(mesh, middle < place - room, middle > place + room, price)
 
 

@@ -128,6 +128,11 @@ def optimize(
     }
     module, chosen, settings = check(task, formulation, options, **bounds)
     given = x0 if isinstance(x0, Start) else Start(x0)
+    if isinstance(mesh, Pieces) and chosen == "ruled":
+        raise MeshError(
+            "the formulation 'ruled' takes one surface: solve each piece on its own, "
+            "gso.tno.optimize(piece.mesh, formulation='ruled')"
+        )
     if isinstance(mesh, Pieces) and not isinstance(options, Options):
         settings = settings.for_pieces()
     asked = Asked(task, chosen, settings, bounds, formulation is not None, verdict)
