@@ -18,6 +18,7 @@ from harness import ROOT, progress, reference, table
 
 import gso
 from gso import metrics
+from gso.components import split
 from gso.mesh import Mesh
 
 #: Allowed strain and distance (per cent of the diagonal) of designs that may change.
@@ -138,6 +139,8 @@ _COLUMNS = [
     "mean %",
     "max %",
     "fold ratio",
+    "largest",
+    "planarity",
     "overlaps",
     "usable",
     "s",
@@ -167,6 +170,8 @@ def _row(name: str, how: str, mesh: Mesh, found: Any) -> list[Any]:
         percent * known.get("deviation_mean", 0.0),
         percent * known.get("deviation_max", 0.0),
         known.get("dihedral_mean", np.nan) / before,
+        known.get("dihedral_max", np.nan),
+        known.get("nonplanarity_max", np.nan),
         overlaps,
         "yes" if found.usable else "no",
         found.seconds,
@@ -210,8 +215,15 @@ def _xatlas(mesh: Mesh) -> tuple[int, float, float] | None:
     vertex, faces, flat = atlas[0]
     opened = Mesh(mesh.vertices[vertex], faces.astype(np.int64))
     flat = flat.astype(float) * [atlas.width, atlas.height]
-    size = metrics.area(opened) / metrics.area(Mesh(np.pad(flat, ((0, 0), (0, 1))), opened.faces))
-    strain = metrics.strains(opened, flat * np.sqrt(size))["strain_p99"]
+    strain = 0.0
+    for part in split(opened):
+        # Each chart at its own best scale, and not mirrored.
+        own = flat[part.vertices]
+        if len(metrics.flipped_faces(part.mesh, own)) > 0.5 * len(part.faces):
+            own = own * [-1.0, 1.0]
+        image = metrics.area(part.mesh, own)
+        own = own * np.sqrt(part.area / image)
+        strain = max(strain, metrics.strains(part.mesh, own)["strain_p99"])
     loops = opened.boundary_loops
     length = sum(
         float(np.linalg.norm(np.diff(opened.vertices[np.r_[x, x[:1]]], axis=0), axis=1).sum())

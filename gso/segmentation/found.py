@@ -29,7 +29,8 @@ class Segmentation(Pieces):
         ``pieces``, ``seam`` (relative to the root of the area), ``strain_p99`` and ``strain_max``
         (of the worst piece), ``neck`` (the narrowest place, in the mesh's unit), and after a
         change of shape ``deviation_mean`` and ``deviation_max`` (in the mesh's unit) and
-        ``dihedral_mean`` with ``dihedral_mean_before`` (degrees, inside pieces).
+        ``dihedral_mean`` with ``dihedral_mean_before`` and ``dihedral_max`` (degrees, inside
+        pieces), and ``nonplanarity_max`` on quads (distance of the diagonals over the mean edge).
     reasons : tuple of str
         Why it is not usable as what was asked for; empty if it is.
     notes : tuple of str

@@ -51,6 +51,9 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
         numbers["deviation_max"] = max(away.there_max, away.back_max)
         numbers["dihedral_mean_before"] = mean_angle(result.design)
         numbers["dihedral_mean"] = mean_angle(result.mesh)
+        numbers["dihedral_max"] = float(metrics.dihedral_angles(result.mesh).max(initial=0.0))
+        if not own.design.is_triangles:
+            numbers["nonplanarity_max"] = float(np.nanmax(metrics.nonplanarity(own.design)))
         if numbers["dihedral_mean"] > FACETS * numbers["dihedral_mean_before"]:
             notes.append(
                 "the mean angle between neighbouring faces rose from "
