@@ -91,11 +91,11 @@ def _pieces_arrays(pieces: Pieces) -> dict[str, Any]:
     }
 
 
-def _read_pieces(data: Mapping[str, Any], surface: Mesh) -> Pieces | None:
+def _read_pieces(data: Mapping[str, Any], opened: Mesh) -> Pieces | None:
     if "pieces_design" not in data:
         return None
     vertex, seams = data["pieces_vertex"].astype(np.int64), data["pieces_seams"].astype(np.int64)
-    count = len(surface.vertices)
+    count = len(opened.vertices)
     good = vertex.shape == (count,) and seams.shape[1:] == (2, 2)
     if not good or not ((seams >= 0) & (seams < count)).all():
         raise MeshError("the seams do not fit the surface")
@@ -103,6 +103,7 @@ def _read_pieces(data: Mapping[str, Any], surface: Mesh) -> Pieces | None:
     if not ((vertex >= 0) & (vertex < len(design.vertices))).all():
         raise MeshError("the seams do not fit the design")
     names = tuple(map(str, json.loads(data["pieces_names"].tobytes())))
+    surface = opened.replaced(design.vertices[vertex])
     return Pieces(design, Cut(surface, vertex, seams), names)
 
 
@@ -137,7 +138,7 @@ def read(path: str | PathLike[str]) -> Result:
             result.mesh, result.pattern = result.ruled.mesh, result.ruled.pattern
             result.flat = None if result.pattern.is_cut else result.pattern.flat
         result.spline = BSplineSurface.from_arrays(data)
-        result.pieces = _read_pieces(data, result.mesh)
+        result.pieces = _read_pieces(data, design)
         label = _checked(data, "component", (len(design.vertices),))
         if label is not None:
             _divide(result, record.get("components", []), label.astype(np.int64))

@@ -262,6 +262,10 @@ class Result:
         from gso.ruled.smooth.surface import smooth_strips
 
         io.check_spline(path, unit)
+        if ruled.untrimmed is None:
+            io.save_faces(self.mesh, path, unit=unit)
+            self.notes += (f"{path} has planar faces",)
+            return
         # Constraints may have moved the strips away from the design.
         design = None if "constraints" in self.details else self.design
         strips = smooth_strips(ruled, design)

@@ -71,18 +71,18 @@ class Pieces:
     names: tuple[str, ...] = ()
 
     @cached_property
-    def _parts(self) -> list[Component]:
-        """The connected parts, the largest first."""
+    def parts(self) -> list[Component]:
+        """The connected parts of the mesh that is cut open, the largest first."""
         return sorted(split(self.opened.mesh), key=lambda part: -part.area)
 
     def __len__(self) -> int:
-        return len(self._parts)
+        return len(self.parts)
 
     def __iter__(self):
         return (self[k] for k in range(len(self)))
 
     def __getitem__(self, number: int) -> Piece:
-        part = self._parts[number]
+        part = self.parts[number]
         said = self.design.attributes
         mesh = part.mesh
         if said is not None:
@@ -104,7 +104,7 @@ class Pieces:
     def of_face(self) -> Ints:
         """Number of the piece of each face (m,)."""
         out = np.empty(len(self.design.faces), np.int64)
-        for k, part in enumerate(self._parts):
+        for k, part in enumerate(self.parts):
             out[part.faces] = k
         return out
 
@@ -117,7 +117,7 @@ class Pieces:
     def sides(self) -> Ints:
         """The pieces (s, 2) on both sides of each cut edge; the same piece twice for darts."""
         number = np.empty(len(self.opened.vertex), np.int64)
-        for k, part in enumerate(self._parts):
+        for k, part in enumerate(self.parts):
             number[part.vertices] = k
         return number[self.opened.seams[:, :, 0]]
 
@@ -130,7 +130,7 @@ class Pieces:
     @property
     def seam_length(self) -> float:
         """Length of all seams together, relative to the root of the area."""
-        area = sum(part.area for part in self._parts)
+        area = sum(part.area for part in self.parts)
         return float(self.lengths.sum() / np.sqrt(area))
 
     def seams(self) -> dict[tuple[int, int], float]:
@@ -160,14 +160,14 @@ class Pieces:
         """
         if pieces is None:
             return self.design
-        wanted = [(len(part.vertices), 3) for part in self._parts]
+        wanted = [(len(part.vertices), 3) for part in self.parts]
         points = [np.asarray(x, float) for x in pieces]
         if [x.shape for x in points] != wanted:
             raise MeshError(
                 f"the positions have shapes {[x.shape for x in points]}; the pieces need {wanted}"
             )
         every = np.empty((len(self.opened.vertex), 3))
-        for part, x in zip(self._parts, points, strict=True):
+        for part, x in zip(self.parts, points, strict=True):
             every[part.vertices] = x
         count = len(self.design.vertices)
         used = self.opened.mesh.used

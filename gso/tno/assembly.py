@@ -36,7 +36,9 @@ _WORST_LAST = (
 )
 
 
-def renumbered(progress: Progress, place: int, count: int) -> Progress:
+def renumbered(
+    progress: Progress, place: int, count: int, what: str = "component"
+) -> Progress:
     """Number the stages in the progress of component `place` over all `count` components.
 
     All components are taken to have the same number of stages.
@@ -45,7 +47,7 @@ def renumbered(progress: Progress, place: int, count: int) -> Progress:
         progress,
         stage=place * progress.stages + progress.stage,
         stages=count * progress.stages,
-        name=f"component {place}, {progress.name}",
+        name=f"{what} {place}, {progress.name}",
     )
 
 

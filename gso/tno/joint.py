@@ -99,11 +99,8 @@ def moved(pieces: Pieces, surface: Mesh) -> Pieces:
     vertex = pieces.opened.vertex
     points = pieces.design.vertices.copy()
     points[vertex] = surface.vertices
-    return replace(
-        pieces,
-        design=pieces.design.replaced(points),
-        opened=Cut(surface, vertex, pieces.opened.seams),
-    )
+    opened = Cut(surface, vertex, pieces.opened.seams)
+    return Pieces(pieces.design.replaced(points), opened, pieces.names)
 
 
 def gap(surface: Mesh, seams: Ints) -> float:

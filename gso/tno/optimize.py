@@ -21,7 +21,7 @@ from gso.result import Result
 from gso.seams import Pieces
 from gso.spelling import known_keywords
 from gso.tasks.base import Options, Request
-from gso.tno import components, joint
+from gso.tno import components, joint, joint_bounds, ruled_pieces
 from gso.tno.job import Job
 from gso.tno.judged import judged, requirements, warning
 from gso.tno.layout import lay_out
@@ -30,6 +30,7 @@ from gso.tno.packed import packed, record_violations
 from gso.tno.run import Run
 from gso.tno.solver import Callback
 from gso.tno.start import Start
+from gso.verdict import Asked as Requirements
 
 
 @known_keywords()
@@ -58,7 +59,9 @@ def optimize(
     mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, path, or Pieces
         The design, in any unit of length. A design that :func:`gso.cut` or :func:`gso.pieces` has
         cut into pieces is solved as a whole: each piece becomes developable, the seams stay
-        closed, and may become creases. The result's `pieces` has its pieces.
+        closed, and may become creases. The result's `pieces` has its pieces. By "ruled" each
+        piece then becomes strips that follow that result: their seams are closed up to the
+        distance in ``details["seam_gap"]``.
     task : {"developable", "flatten", "denoise", "bend", "conformal"}
         What to do.
     formulation : str, optional
@@ -128,25 +131,22 @@ def optimize(
     }
     module, chosen, settings = check(task, formulation, options, **bounds)
     given = x0 if isinstance(x0, Start) else Start(x0)
-    if isinstance(mesh, Pieces) and chosen == "ruled":
-        raise MeshError(
-            "the formulation 'ruled' takes one surface: solve each piece on its own, "
-            "gso.tno.optimize(piece.mesh, formulation='ruled')"
-        )
     if isinstance(mesh, Pieces) and not isinstance(options, Options):
         settings = settings.for_pieces()
     asked = Asked(task, chosen, settings, bounds, formulation is not None, verdict)
     if given.iterations is not None and asked.bounded:
         module.check_iterations(bounds)
-    one = partial(_one_mesh, asked, callback)
-    if isinstance(mesh, Pieces):
-        result = joint.solved(mesh, task, constraints, given, one)
+    if isinstance(mesh, Pieces) and chosen == "ruled":
+        ask = ruled_pieces.Ask(settings, max_deviation, verdict)
+        result = ruled_pieces.solved(mesh, ask, constraints, given, callback, optimize)
+    elif isinstance(mesh, Pieces):
+        result = _in_pieces(mesh, asked, constraints, given, callback)
     else:
         from gso.io import as_mesh
 
         design = as_mesh(mesh)
         design.check_joined()
-        result = one(design, constraints, given)
+        result = _one_mesh(asked, callback, design, constraints, given)
     result.seconds["total"] = time.perf_counter() - clock
     if said := warning(result):
         warnings.warn(said, ConvergenceWarning, stacklevel=3)
@@ -180,6 +180,34 @@ class Asked:
     def bounded(self) -> bool:
         """Whether there is any bound."""
         return any(value is not None for value in self.bounds.values())
+
+
+def _in_pieces(
+    pieces: Pieces,
+    asked: Asked,
+    constraints: Sequence[Constraint],
+    start: Start,
+    callback: Callback | None,
+) -> Result:
+    """Solve a design in pieces, within a distance of it where one is given."""
+
+    def solve(what: Asked) -> Result:
+        one = partial(_one_mesh, what, callback)
+        return joint.solved(pieces, what.task, constraints, start, one)
+
+    allowed = asked.bounds["max_deviation"]
+    if allowed is None:
+        return solve(asked)
+    bounds = {**asked.bounds, "max_deviation": None}
+    free = replace(asked, bounds=bounds, verdict=False)
+    result = solve(free) if free.bounded else None
+    # A bound on strain or curvature is met with the least displacement, which may be too much.
+    if result is None or joint_bounds.deviation(pieces, result) > allowed:
+        free = replace(free, bounds=dict.fromkeys(bounds))
+        result = joint_bounds.within(
+            pieces, allowed, asked.options, lambda options: solve(replace(free, options=options))
+        )
+    return judged(result, Requirements(**asked.bounds)) if asked.verdict else result
 
 
 def _one_mesh(
