@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,17 @@ def percent(value: float) -> str:
     """
     shown = 100.0 * value
     return f"{length(shown if shown >= 1e-4 else 0.0)} %"
+
+
+def beyond(value: float, bound: float, shown: Callable[[float], str] = length) -> str:
+    """Say that a value is larger than its bound, with as many digits as show it.
+
+    >>> beyond(2.0, 1.0), beyond(1.0001, 1.0), beyond(0.03, 0.01, percent)
+    ('2.00, more than 1.00', '1.0001, more than 1', '3.00 %, more than 1.00 %')
+    """
+    if shown(value) == shown(bound):
+        return f"{value:.6g}, more than {bound:.6g}"
+    return f"{shown(value)}, more than {shown(bound)}"
 
 
 def headline(result: Any, unit: str = "") -> str:

@@ -11,6 +11,7 @@ from click.testing import CliRunner
 import gso
 from gso import faults, metrics
 from gso.cli import main
+from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.mesh.paths import Paths
 from gso.mesh.separation import between
@@ -299,8 +300,6 @@ def test_optimize_takes_pieces(tmp_path):
     np.testing.assert_array_equal(again.design.vertices, whole.vertices)
     flat = gso.tno.optimize(pieces, task="flatten")
     assert flat.usable
-    with pytest.raises(gso.MeshError, match="each piece"):
-        gso.tno.optimize(pieces, formulation="ruled")
     with pytest.raises(gso.OptionError, match=r"pieces\.design"):
         gso.tno.optimize(pieces, task="denoise")
 
@@ -405,3 +404,158 @@ def test_curves_stay_smooth():
     assert turned[1] < 0.7 * turned[0]
     with pytest.raises(gso.OptionError, match="two or more"):
         gso.tno.optimize(mesh, constraints=[gso.SmoothCurves([[3]])])
+
+
+def tetrahedron():
+    return Mesh(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
+    )
+
+
+def sheets_are_sound(found):
+    return all(piece.is_disk for piece in found) and all(s is not None for s in found.sheets)
+
+
+@pytest.mark.parametrize("darts", [True, False])
+def test_a_closed_mesh_that_needs_no_cut_is_opened(darts):
+    for mesh in (tetrahedron(), ball(8)):
+        assert sheets_are_sound(gso.pieces(mesh, max_strain=1e9, darts=darts))
+        assert sheets_are_sound(gso.pieces(mesh, max_strain=0.3, darts=darts, min_neck=100.0))
+
+
+def test_a_sphere_is_opened_along_two_edges():
+    from gso.segmentation.loops import opening
+
+    mesh = ball(8)
+    cut = gso.cut(mesh, opening(mesh))
+    assert len(cut.edges) == 2
+    assert cut[0].is_disk
+
+
+@pytest.mark.parametrize("seed", [545, 886, *range(20)])
+def test_straight_seams_of_any_labels_can_be_cut(seed):
+    from scipy.spatial import Delaunay
+
+    from gso.seams import Edges
+    from gso.seams.straightening import straight_seams
+    from gso.segmentation.merging import patches
+
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(30, 300))
+    p = rng.random((n, 2))
+    p[:4] = [[0, 0], [1, 0], [0, 1], [1, 1]]
+    height = 0.3 * np.sin(3 * p[:, 0]) * np.sin(3 * p[:, 1])
+    mesh = Mesh(np.c_[p, height], Delaunay(p).simplices)
+    label, he = patches(mesh, int(rng.integers(2, 12))), mesh.half_edges
+    k = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    k = k[label[he.face[k]] != label[he.face[he.twin[k]]]]
+    pieces = gso.cut(mesh, Edges(np.stack([he.origin[k], he.dest[k]], axis=1)))
+    finer, edges = straight_seams(pieces, np.empty((0, 2), int))
+    assert len(gso.cut(finer, Edges(edges)).edges) == len(edges)
+
+
+def test_kept_pieces_have_to_be_of_the_same_mesh():
+    mesh = ball(16)
+    found = gso.pieces(mesh, max_strain=0.05)
+    again = gso.pieces(mesh, max_strain=0.02, keep=found)
+    assert np.allclose(again.design.vertices[: len(found.design.vertices)], found.design.vertices)
+    smooth = gso.pieces(mesh, max_strain=0.05, keep=found, denoise=True)
+    assert not np.array_equal(smooth.design.vertices[:50], mesh.vertices[:50])
+    with pytest.raises(OptionError, match="another mesh"):
+        gso.pieces(ball(8), keep=found)
+
+
+def test_a_mesh_without_inner_vertices_takes_a_max_deviation():
+    found = gso.pieces(tetrahedron(), max_deviation=0.1)
+    assert found.usable and found.result is None
+    quad = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1.0, 0]], [[0, 1, 2, 3]])
+    assert gso.pieces(quad, max_deviation=0.1).usable
+
+
+@pytest.mark.parametrize("darts", [True, False])
+def test_seams_follow_and_avoid_edges_also_without_darts(darts):
+    mesh = ball(24)
+    middle = mesh.vertices[mesh.triangles].mean(axis=1)
+    avoid = np.flatnonzero(middle[:, 2] > 0.7)
+
+    def inside(found):
+        z = found.design.vertices[found.edges].mean(axis=1)[:, 2]
+        return float(found.lengths[z > 0.72].sum())
+
+    free = gso.pieces(mesh, max_strain=0.08, darts=darts)
+    away = gso.pieces(mesh, max_strain=0.08, darts=darts, avoid=avoid)
+    assert inside(away) < 0.8 * inside(free)
+    assert len(gso.pieces(mesh, max_strain=0.05, along=[], avoid=[])) == len(
+        gso.pieces(mesh, max_strain=0.05)
+    )
+    with pytest.raises(OptionError, match="vertices are 0 to"):
+        gso.pieces(mesh, along=[[0, 10**6]])
+
+
+def test_a_coarse_smooth_torus_is_not_noisy():
+    a, b = np.meshgrid(np.arange(16) * np.pi / 8, np.arange(10) * np.pi / 5, indexing="ij")
+    r = 1 + 0.4 * np.cos(b)
+    points = np.stack([r * np.cos(a), r * np.sin(a), 0.4 * np.sin(b)], axis=-1).reshape(-1, 3)
+    i = np.arange(160).reshape(16, 10)
+    j = np.roll(i, -1, axis=0)
+    faces = np.stack([i, j, np.roll(j, -1, 1), np.roll(i, -1, 1)], axis=-1).reshape(-1, 4)
+    found = gso.pieces(Mesh(points, faces), max_strain=0.1)
+    assert not any("noisy" in said for said in (*found.notes, *found.reasons))
+
+
+def test_pieces_shorter_than_min_size_are_joined_or_named():
+    mesh = ball(16)
+    found = gso.pieces(mesh, max_strain=0.03, darts=False)
+    short = min(sheet.size[0] for sheet in found.sheets)
+    assert any("shorter" in r for r in gso.pieces(mesh, max_strain=0.03, min_size=20.0).reasons)
+    longer = gso.pieces(mesh, max_strain=0.03, darts=False, min_size=1.001 * short)
+    assert longer.usable == all(s.size[0] >= 1.001 * short for s in longer.sheets)
+    with pytest.raises(OptionError, match="min_size"):
+        gso.pieces(mesh, min_size=2.0, max_size=(1.0, 1.0))
+
+
+def test_patterns_of_an_earlier_search_are_deleted(tmp_path):
+    mesh = ball(16)
+    many, one = gso.pieces(mesh, max_strain=0.03, darts=False), gso.pieces(mesh, max_strain=0.03)
+    (tmp_path / "pattern_mine.svg").write_text("mine")
+    many.save(tmp_path)
+    assert len(list(tmp_path.glob("pattern_*.svg"))) == len(many) + 1
+    one.save(tmp_path)
+    assert len(list(tmp_path.glob("pattern_*.svg"))) == len(one) + 1
+
+
+def test_bounds_on_the_joint_solve_hold():
+    cut = gso.pieces(ball(16), max_strain=0.03, darts=False)
+    free = gso.tno.optimize(cut)
+    far = free.details["verdict"]["deviation"]
+    near = gso.tno.optimize(cut, max_deviation=0.5 * far)
+    assert near.details["verdict"]["deviation"] <= 0.5 * far
+    assert near.metrics["strain_p99"] > free.metrics["strain_p99"]
+    stiff = gso.tno.optimize(cut, max_strain=0.01)
+    assert stiff.details["verdict"]["strain_max"] <= 0.01
+    with pytest.raises(OptionError, match="curvature"):
+        gso.tno.optimize(cut, formulation="isometry", max_deviation=0.1)
+
+
+def test_pieces_become_exactly_ruled(tmp_path):
+    cut = gso.pieces(ball(24), max_strain=0.03, darts=False)
+    options = gso.RuledOptions(strips=2, starts=("design",))
+    result = gso.tno.optimize(cut, formulation="ruled", options=options)
+    assert result.ruled.strips == 2 * len(cut)
+    assert result.details["strips"] == [2] * len(cut)
+    assert result.metrics["strain_max"] < 1e-6
+    # The seams of the joint result are closed, those of the strips up to a distance.
+    assert 0 < result.details["seam_gap"] < 0.1
+    assert len(result.pieces) == len(cut)
+    assert np.abs(result.on_design().vertices - result.pieces.opened.mesh.vertices).max() < 0.1
+    path = tmp_path / "ruled.npz"
+    result.save(path)
+    again = gso.Result.load(path)
+    assert again.usable == result.usable
+    assert len(again.pieces) == len(cut)
+    assert np.allclose(again.pieces.design.vertices, result.pieces.design.vertices)
+    result.save(tmp_path / "ruled.svg")
+    result.save(tmp_path / "ruled.step")
+    near = gso.tno.optimize(cut, formulation="ruled", max_deviation=0.08)
+    assert near.usable == (near.details["seam_gap"] <= 0.08 and not near.reasons)
+    assert near.ruled.deviation.there_max <= 0.08 or not near.usable

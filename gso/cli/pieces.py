@@ -62,6 +62,7 @@ class _Share(click.ParamType):
 @click.option("--no-darts", is_flag=True, help="No seams that end inside a piece.")
 @click.option("--symmetric", is_flag=True, help="Symmetric seams.")
 @click.option("--min-neck", metavar="L", type=float, help="Smallest width of a piece.")
+@click.option("--min-size", metavar="L", type=float, help="Smallest length of a piece.")
 @click.option("--sheet", metavar="L W", type=float, nargs=2, help="Length and width of a sheet.")
 @click.option("--keep-groups", is_flag=True, help="Cut between the groups (g) of IN in any case.")
 @click.option("--denoise", is_flag=True, help="Denoise the design first, such as a scan.")
@@ -102,6 +103,7 @@ def pieces(name: str, folder: str, **given: Any) -> None:
             darts=not given["no_darts"],
             symmetric=given["symmetric"],
             min_neck=given["min_neck"],
+            min_size=given["min_size"],
             max_size=given["sheet"] or None,
             keep=Labels("g") if given["keep_groups"] else None,
             denoise=given["denoise"],
@@ -109,7 +111,10 @@ def pieces(name: str, folder: str, **given: Any) -> None:
         )
     save(found, folder, given["unit"])
     if plot.available():
-        plot.plot_pieces(found, os.path.join(folder, "pieces.png"))
+        try:
+            plot.plot_pieces(found, os.path.join(folder, "pieces.png"))
+        except ImportError as error:
+            click.echo(f"note: no picture, as Matplotlib cannot be imported: {error}", err=True)
     if not given["quiet"]:
         click.echo("\n".join(text(found, given["unit"])))
     click.get_current_context().exit(0 if found.usable else 1)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.mesh import Mesh
+from gso.mesh.topology import edge_keys
 from gso.typing import Array, Ints
 
 #: Lengths are rounded to this share of the longest edge, for whole numbers in the flow.
@@ -13,11 +14,16 @@ _STEPS = 1000
 
 
 def between(
-    mesh: Mesh, one: NDArray[np.bool_], two: NDArray[np.bool_], price: Array | None = None
+    mesh: Mesh,
+    one: NDArray[np.bool_],
+    two: NDArray[np.bool_],
+    price: Array | None = None,
+    factor: Array | None = None,
 ) -> Ints:
     """Return the shortest edges (e, 2) whose removal separates two sets of faces.
 
-    The length of an edge is multiplied by the mean price (n,) of its ends.
+    The length of an edge is multiplied by the mean price (n,) of its ends, and by the factor (e,)
+    of each edge of ``mesh.edges``.
 
     Source: minimum cut (Ford and Fulkerson 1956) of the dual graph.
     """
@@ -30,6 +36,12 @@ def between(
         return np.empty((0, 2), np.int64)
     if price is not None:
         length = length * 0.5 * (price[he.origin[k]] + price[he.dest[k]])
+    if factor is not None:
+        n = len(mesh.vertices)
+        keys = edge_keys(mesh.edges[:, 0], mesh.edges[:, 1], n)
+        order = np.argsort(keys)
+        own = edge_keys(he.origin[k], he.dest[k], n)
+        length = length * factor[order[np.searchsorted(keys[order], own)]]
     capacity = np.maximum(np.round(_STEPS * length / max(float(length.max()), 1e-300)), 1.0)
     f, g = he.face[k], he.face[he.twin[k]]
     much = np.int64(capacity.sum() + 1)

@@ -26,7 +26,7 @@ def together(surfaces: Sequence[RuledSurface], rows: Sequence[Ints], count: int)
         Number of vertices of the whole design.
     """
     meshes = [surface.mesh for surface in surfaces]
-    start = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])[:-1]
+    start = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])[:-1].tolist()
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
     mesh = Mesh(vertices, _stacked([m.faces for m in meshes], start))
     strips = np.cumsum([0, *(surface.strips for surface in surfaces)])[:-1]
@@ -65,7 +65,7 @@ def _folds(several: Sequence[Folds], start: Sequence[int]) -> Folds:
 
 
 def _pattern(several: Sequence[Pattern], start: Sequence[int]) -> Pattern:
-    first = np.cumsum([0, *(len(p.flat) for p in several)])[:-1]
+    first = np.cumsum([0, *(len(p.flat) for p in several)])[:-1].tolist()
     flats: list[Array] = beside([pattern.flat for pattern in several])
     return Pattern(
         np.concatenate(flats),

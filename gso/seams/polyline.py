@@ -52,6 +52,11 @@ class Polyline(Seam):
         points = self._checked(mesh)
         ids = _nearest_vertices(mesh, points)
         stops = np.r_[ids, ids[:1]] if self.closed else ids
+        if (ids == ids[0]).all():
+            raise OptionError(
+                f"all points of the polyline are nearest to vertex {ids[0]}: it is shorter than an "
+                "edge of the mesh, so there is nothing to cut"
+            )
         inserted, edges = [], []
         for k, (start, goal) in enumerate(
             zip(stops[:-1].tolist(), stops[1:].tolist(), strict=True)

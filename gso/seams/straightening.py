@@ -45,6 +45,7 @@ def straight_seams(pieces: Pieces, kept: Ints) -> tuple[Mesh, Ints]:
     fixed = set(edge_keys(kept[:, 0], kept[:, 1], n).tolist())
     on_seam = set(np.unique(pieces.edges).tolist())
     taken: set[int] = set()
+    divided_keys: set[int] = set()
     crossed: list[tuple[int, int]] = []
     shares: list[float] = []
     lines: list[list[int]] = []
@@ -62,14 +63,24 @@ def straight_seams(pieces: Pieces, kept: Ints) -> tuple[Mesh, Ints]:
                 continue
             ends = np.array(found.edges, np.int64).reshape(-1, 2)
             own = edge_keys(ends[:, 0], ends[:, 1], n).tolist()
+            along = [
+                int(edge_keys(np.array(one), np.array(two), n))
+                for one, two in pairwise(found.stops)
+                if one >= 0 and two >= 0
+            ]
             through = set(found.vertices[1:-1])
-            free = not (taken & found.faces) and not (seam - set(keys)).intersection(own)
-            # Vertices of other seams, or of other parts of this one, are in the way.
+            free = not (taken & found.faces) and not (seam - set(keys[a:b])).intersection(own)
+            # Vertices of other seams, or of other parts of this one, are in the way; so are edges
+            # that another line divides.
             free = free and not (through & (on_seam - set(part)))
+            free = free and not divided_keys.intersection(along)
             if not free:
                 lines.append(part)
                 continue
             taken |= found.faces
+            divided_keys.update(own)
+            seam.update(along)
+            on_seam |= through
             first = len(crossed)
             crossed += found.edges
             shares += found.shares

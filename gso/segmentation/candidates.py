@@ -10,7 +10,7 @@ import numpy as np
 
 from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
-from gso.seams.pieces import Pieces
+from gso.seams.pieces import Piece, Pieces
 from gso.segmentation.loops import opening
 from gso.segmentation.merging import Merging, patches
 from gso.segmentation.options import NECK, Wishes
@@ -19,7 +19,7 @@ from gso.segmentation.splitting import apart, halves
 from gso.segmentation.stitching import key, stitched
 from gso.segmentation.straightening import straightened
 from gso.segmentation.tree import Ground, cut_tree
-from gso.typing import Ints
+from gso.typing import Array, Ints
 
 #: Numbers of patches to merge, and how much compact pieces are preferred.
 _COUNTS = (100, 200)
@@ -53,7 +53,7 @@ class Candidate:
 
     def neck(self, limit: float) -> float:
         """Return the narrowest place of all pieces, or a limit where that is less."""
-        return min(limit, *(s.neck(limit) for s in self.sheets if s is not None))
+        return min([limit, *(s.neck(limit) for s in self.sheets if s is not None)])
 
 
 def neck_of(ground: Ground, wishes: Wishes) -> float:
@@ -95,7 +95,7 @@ def without_darts(ground: Ground, strain: float) -> list[Merging]:
 
 def merged_value(merging: Merging, wishes: Wishes) -> tuple[int, float, float]:
     """Rank merged pieces by :meth:`Wishes.value`, before their seams are straightened."""
-    length = merging.length / float(np.sqrt(merging.ground.potential.area.sum()))
+    length = merging.cost / float(np.sqrt(merging.ground.potential.area.sum()))
     return wishes.value(int(merging.label.max()) + 1, length)
 
 
@@ -107,7 +107,7 @@ def pieces_of(merging: Merging) -> Pieces:
 
 def _small(ground: Ground, strain: float, count: int) -> Ints:
     """Divide the design into patches with less strain than the bound."""
-    most = len(ground.mesh.faces) // 4
+    most = max(len(ground.mesh.faces) // 4, 2)
     while True:
         label = patches(ground.mesh, min(count, most))
         edges = Merging(ground, label, strain, 1.0).edges()
@@ -129,10 +129,19 @@ def _largest(ground: Ground, edges: Ints) -> float:
 def _disks(ground: Ground, edges: Ints) -> Pieces:
     """Cut a design along edges, and along more of them where a piece is no disk."""
     pieces = cut(ground.mesh, Edges(edges))
-    more = [piece.vertices[opening(piece.mesh)] for piece in pieces if not piece.is_disk]
+    more = [
+        piece.vertices[opening(piece.mesh, _factor(ground, piece))]
+        for piece in pieces
+        if not piece.is_disk
+    ]
     if not more:
         return pieces
     return cut(ground.mesh, Edges(np.concatenate([edges, *more])))
+
+
+def _factor(ground: Ground, piece: Piece) -> Array | None:
+    """Return the factor on the cost of each edge of a piece."""
+    return ground.factor_of(piece.vertices[piece.mesh.edges])
 
 
 def measured(
@@ -174,9 +183,9 @@ def measured(
                 continue
             edges = np.empty((0, 2), np.int64)
             if len(sheet.overlaps):
-                edges = apart(sheet)
-            elif most is not None and not fits(sheet, most):
-                edges = halves(sheet, most)
+                edges = apart(sheet, _factor(ground, piece))
+            elif most is not None and len(piece.faces) > 1 and not fits(sheet, most):
+                edges = halves(sheet, most, _factor(ground, piece))
             if len(edges):
                 more.append(ground.mirrored(piece.vertices[edges]))
         if not more:
@@ -195,10 +204,12 @@ def joined(
     found: Candidate,
     strain: float,
     neck: float,
-    most: tuple[float, float] | None = None,
-    say: Said | None = None,
+    wishes: Wishes,
+    *,
+    whole: bool = False,
 ) -> Candidate:
     """Join pieces along parts of their seams (:func:`gso.segmentation.stitching.stitched`)."""
+    most = wishes.max_size
     sheets = [s for s in found.sheets if s is not None]
     if len(sheets) < len(found.sheets) or len(sheets) < 2 or ground.mirror is not None:
         return found
@@ -209,15 +220,17 @@ def joined(
         strain,
         neck,
         lambda sheet: most is None or fits(sheet, most),
-        (lambda said: None) if say is None else say,
+        least=wishes.min_size or 0.0,
+        whole=whole,
+        progress=wishes.say,
     )
     pieces = cut(ground.mesh, Edges(edges))
     return Candidate(pieces, tuple(_renumbered(p.mesh.faces, p, known) for p in pieces))
 
 
-def _renumbered(faces: Ints, piece: object, known: dict[bytes, Sheet]) -> Sheet:
+def _renumbered(faces: Ints, piece: Piece, known: dict[bytes, Sheet]) -> Sheet:
     """Give a pattern the numbering of its piece; their faces are in the same order."""
-    mesh, own = piece.mesh, known[key(piece.faces)]  # type: ignore[attr-defined]
+    mesh, own = piece.mesh, known[key(piece.faces)]
     real = faces >= 0
     flat = np.empty((len(mesh.vertices), 2))
     flat[faces[real]] = own.flat[own.mesh.faces[real]]

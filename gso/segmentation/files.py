@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,9 @@ from gso import io
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.attributes import Attributes, Labels
+
+#: Names of files that an earlier call may have left.
+_PATTERN = re.compile(r"pattern(s|_[\w.-]+)\.svg")
 
 if TYPE_CHECKING:
     from gso.segmentation.found import Segmentation
@@ -29,6 +33,7 @@ def save(found: Segmentation, folder: str | PathLike[str], unit: str = "mm") -> 
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise MeshError(f"{place}: {error.strerror}") from None
+    earlier = _written(place)
     names = ["pieces.obj"]
     io.write(grouped(found), place / names[0])
     if any(sheet is not None for sheet in found.sheets):
@@ -37,12 +42,29 @@ def save(found: Segmentation, folder: str | PathLike[str], unit: str = "mm") -> 
         io.save_flat(flat, mesh, place / names[-1], unit=unit)
     for number, sheet in enumerate(found.sheets):
         if sheet is not None:
-            names.append(f"pattern_{found.name(number)}.svg")
+            names.append(f"pattern_{_spelled(found.name(number))}.svg")
             io.save_flat(sheet.flat, sheet.mesh, place / names[-1], unit=unit)
     names.append("pieces.json")
+    known = record(found, unit) | {"files": names}
     with io.replacing(place / names[-1]) as file:
-        file.write(json.dumps(record(found, unit), indent=2).encode() + b"\n")
+        file.write(json.dumps(known, indent=2).encode() + b"\n")
+    for name in earlier - set(names):
+        (place / name).unlink(missing_ok=True)
     return names
+
+
+def _written(folder: Path) -> set[str]:
+    """Return the patterns that an earlier call wrote to a folder, by its record."""
+    try:
+        files = json.loads((folder / "pieces.json").read_text(encoding="utf-8"))["files"]
+        return {name for name in files if _PATTERN.fullmatch(name)}
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
+
+
+def _spelled(name: str) -> str:
+    """Return a piece's name as a part of a file's name."""
+    return re.sub(r"[^\w.-]+", "_", name)
 
 
 def grouped(found: Segmentation) -> Mesh:

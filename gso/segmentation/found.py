@@ -61,8 +61,8 @@ class Segmentation(Pieces):
     def alike(self, tolerance: float | None = None) -> list[list[int]]:
         """Group pieces with congruent patterns, mirror images apart.
 
-        Patterns are alike if they have the same faces and edge lengths, from some starting vertex
-        on: pieces of a design with repeated parts.
+        Patterns are alike if their outlines have the same edge lengths and angles, from some
+        starting vertex on: pieces of a design with repeated parts.
 
         Parameters
         ----------
@@ -116,6 +116,7 @@ class Segmentation(Pieces):
     def save(self, folder: str | PathLike[str], *, unit: str = "mm") -> list[str]:
         """Write a folder of files, and return their names.
 
+        Patterns that an earlier call wrote to the folder, by its ``pieces.json``, are deleted.
         ``pieces.obj`` has the whole surface with a group for each piece, ``patterns.svg`` and
         ``pattern_NAME.svg`` the patterns at 1:1, where `unit` is the unit of the coordinates, and
         ``pieces.json`` the metrics and the table.

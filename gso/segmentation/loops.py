@@ -19,6 +19,8 @@ from gso.typing import Array, Ints
 def opening(mesh: Mesh, factor: Array | None = None) -> Ints:
     """Choose the edges (e, 2) to cut so that every component of a mesh becomes a disk.
 
+    A sphere is cut along two edges.
+
     Parameters
     ----------
     mesh : Mesh
@@ -74,7 +76,7 @@ def opening(mesh: Mesh, factor: Array | None = None) -> Ints:
     tree = minimum_spanning_tree(price.tocsr()).tocoo()
     pair = np.sort(np.stack([tree.row, tree.col]), axis=0)
     used = np.isin(f * faces + g, pair[0] * faces + pair[1]) & first
-    out = [np.empty((0, 2), np.int64)]
+    out = [np.empty((0, 2), np.int64), _slits(mesh, ends[edge[~used]], length)]
     for rest in ends[edge[~used]].tolist():
         out.append(np.array([rest]))
         for vertex in rest:
@@ -83,6 +85,19 @@ def opening(mesh: Mesh, factor: Array | None = None) -> Ints:
                 line.append(int(before[line[-1]]))
             out.append(np.array([line[:-1], line[1:]], np.int64).T)
     return np.unique(np.sort(np.concatenate(out), axis=1), axis=0)
+
+
+def _slits(mesh: Mesh, cut: Ints, length: Array) -> Ints:
+    """Choose two edges (2 c, 2) at one vertex of every closed component without handles."""
+    label, ends = mesh.components, mesh.edges
+    known = np.r_[label[mesh.half_edges.boundary_vertex], label[cut[:, 0]]]
+    out = [np.empty((0, 2), np.int64)]
+    for own in np.setdiff1d(label[mesh.used], known):
+        k = np.flatnonzero(label[ends[:, 0]] == own)
+        vertex = ends[k[length[k].argmin()], 0]
+        at = k[(ends[k] == vertex).any(axis=1)]
+        out.append(ends[at[np.argsort(length[at], kind="stable")[:2]]])
+    return np.concatenate(out)
 
 
 def _sources(mesh: Mesh) -> Ints:

@@ -66,6 +66,9 @@ class Merging:
         self._length = np.linalg.norm(
             mesh.vertices[self._ends[:, 0]] - mesh.vertices[self._ends[:, 1]], axis=1
         )
+        factor = ground.factor_of(self._ends)
+        #: What an edge costs as a part of a seam.
+        self._cost = self._length if factor is None else self._length * factor
         n = len(mesh.vertices)
         kept = np.sort(ground.kept, axis=1) @ np.array([n, 1])
         self._kept = np.isin(np.sort(self._ends, axis=1) @ np.array([n, 1]), kept)
@@ -87,8 +90,8 @@ class Merging:
         sides = self.label[self._sides]
         for k in np.flatnonzero(sides[:, 0] != sides[:, 1]).tolist():
             a, b = sides[k].tolist()
-            beside[a][b] = beside[a].get(b, 0.0) + self._length[k]
-            beside[b][a] = beside[b].get(a, 0.0) + self._length[k]
+            beside[a][b] = beside[a].get(b, 0.0) + self._cost[k]
+            beside[b][a] = beside[b].get(a, 0.0) + self._cost[k]
             if self._kept[k]:
                 forbidden.add((min(a, b), max(a, b)))
         round_ = {k: sum(beside[k].values()) + float(self._rim[members[k]].sum()) for k in members}
@@ -132,10 +135,10 @@ class Merging:
         return self.label
 
     @property
-    def length(self) -> float:
-        """Length of the seams between pieces."""
+    def cost(self) -> float:
+        """Length of the seams between pieces, times the factors of their edges."""
         sides = self.label[self._sides]
-        return float(self._length[sides[:, 0] != sides[:, 1]].sum())
+        return float(self._cost[sides[:, 0] != sides[:, 1]].sum())
 
     def between(self, label: Ints) -> tuple[Ints, Ints]:
         """Return the edges (e, 2) between pieces, and the pieces (e, 2) on both sides."""

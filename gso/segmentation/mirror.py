@@ -13,10 +13,15 @@ from gso.typing import Array, Ints
 _TOLERANCE = 0.25
 
 
+_DIAGONALS = ((1, 1, 0), (1, -1, 0), (1, 0, 1), (1, 0, -1), (0, 1, 1), (0, 1, -1))
+_PAIRS = tuple((i, j, s) for i, j in ((0, 1), (0, 2), (1, 2)) for s in (1.0, -1.0))
+
+
 def mirror_of(mesh: Mesh) -> Ints:
     """Find the mirror image of each vertex (n,).
 
-    The plane goes through the centroid, along two principal axes or two coordinate axes.
+    The plane goes through the centroid; its normal is a principal axis, a coordinate axis, or a
+    diagonal of two of them.
 
     Raises
     ------
@@ -28,8 +33,11 @@ def mirror_of(mesh: Mesh) -> Ints:
     _, axes = np.linalg.eigh(points.T @ points)
     a, b = mesh.edges.T
     length = float(np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1).mean())
-    worst = np.inf
-    for normal in (*axes.T, *np.eye(3)):
+    worst, crossed = np.inf, False
+    # Diagonal planes matter where two principal axes are equal, as on a square.
+    diagonals = [np.array(d) / np.sqrt(2.0) for d in _DIAGONALS]
+    principal = [(axes.T[i] + s * axes.T[j]) / np.sqrt(2.0) for i, j, s in _PAIRS]
+    for normal in (*axes.T, *np.eye(3), *diagonals, *principal):
         partner, far = _partners(points, normal)
         worst = min(worst, far / length)
         if far > _TOLERANCE * length or (partner[partner] != np.arange(len(used))).any():
@@ -39,10 +47,16 @@ def mirror_of(mesh: Mesh) -> Ints:
         n = len(out)
         if np.isin(edge_keys(out[a], out[b], n), edge_keys(a, b, n)).all():
             return out
+        crossed = True
+    why = (
+        "one maps the vertices to themselves, but not the edges: triangulate both sides alike"
+        if crossed
+        else f"the best misses a vertex by {worst:.2g} mean edge lengths"
+    )
     raise OptionError(
-        "symmetric: no plane through the centroid maps the vertices and edges of the mesh to "
-        f"themselves (the best misses a vertex by {worst:.2g} mean edge lengths); take a mesh "
-        "that is symmetric vertex by vertex, or leave symmetric out"
+        "symmetric: no plane of symmetry was found among those through the centroid along "
+        f"principal axes, coordinate axes and their diagonals ({why}); take a mesh that is "
+        "symmetric vertex by vertex, or leave symmetric out"
     )
 
 

@@ -30,21 +30,30 @@ class Wishes:
     seam: float | None
     darts: bool
     min_neck: float | None
+    min_size: float | None
     max_size: tuple[float, float] | None
     say: Callable[[str], None]
 
     def __post_init__(self) -> None:
-        for name in ("max_strain", "max_deviation", "seam", "min_neck"):
+        for name in ("max_strain", "max_deviation", "seam", "min_neck", "min_size"):
             value = getattr(self, name)
             if value is not None and not _positive(value):
                 raise OptionError(f"{name} is {value!r}; it must be a positive number")
+        if not callable(self.say):
+            raise OptionError(f"callback is {self.say!r}; it must be a function of a text")
         count = self.max_pieces
-        if count is not None and not (isinstance(count, int | np.integer) and count >= 1):
+        whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
+        if count is not None and not (whole and count >= 1):
             raise OptionError(f"max_pieces is {count!r}; it must be a whole number from 1 up")
         size = self.max_size
-        pair = isinstance(size, tuple | list) and len(size) == 2
+        pair = isinstance(size, tuple | list | np.ndarray) and np.shape(size) == (2,)
         if size is not None and not (pair and all(map(_positive, size))):
             raise OptionError(f"max_size is {size!r}; it must be length and width of a sheet")
+        if size is not None and self.min_size is not None and self.min_size > max(size):
+            raise OptionError(
+                f"min_size is {self.min_size!r}, more than the length of a sheet (max_size); "
+                "lower it"
+            )
 
     def value(self, pieces: int, seam: float) -> tuple[int, float, float]:
         """Rank pieces, lower is better: budgets first, then seam and number of pieces."""
@@ -63,8 +72,16 @@ class Wishes:
         return out
 
 
+def too_large(mesh: Mesh, sheet: tuple[float, float]) -> bool:
+    """Tell whether an edge is longer than the diagonal of a sheet, so that no cut helps."""
+    a, b = mesh.edges.T
+    longest = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1).max(initial=0.0)
+    return bool(longest > np.hypot(*sheet))
+
+
 def prices(mesh: Mesh, along: ArrayLike | None, avoid: ArrayLike | None) -> Array | None:
     """Return the factor on the cost of each edge of ``mesh.edges``; None if all are one."""
+    along, avoid = (None if x is None or np.size(x) == 0 else x for x in (along, avoid))
     if along is None and avoid is None:
         return None
     ends, n = mesh.edges, len(mesh.vertices)
@@ -81,6 +98,10 @@ def prices(mesh: Mesh, along: ArrayLike | None, avoid: ArrayLike | None) -> Arra
             raise OptionError(
                 f"along has shape {wanted.shape}; it must be pairs of vertices (k, 2)"
             )
+        beyond = wanted[((wanted < 0) | (wanted >= n)).any(axis=1)]
+        if len(beyond):
+            a, b = beyond[0]
+            raise OptionError(f"along has the pair {a}-{b}; vertices are 0 to {n - 1}")
         keys, own = (edge_keys(pairs[:, 0], pairs[:, 1], n) for pairs in (wanted, ends))
         missing = np.flatnonzero(~np.isin(keys, own))
         if missing.size:

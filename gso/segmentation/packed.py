@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso import metrics
+from gso.mesh import Mesh
 from gso.result import Result
 from gso.segmentation.candidates import Candidate, fits
 from gso.segmentation.found import Segmentation
@@ -12,9 +13,22 @@ from gso.segmentation.measures import FACETS, mean_angle
 from gso.segmentation.options import NECK, Wishes
 from gso.segmentation.tree import Ground
 from gso.verdict.shape import against_surface
+from gso.wording import beyond, percent
+from gso.wording import length as said
 
 
 def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wishes) -> Segmentation:
+    """Measure what was found, and say what is not as it was asked for.
+
+    Parameters
+    ----------
+    found : Candidate
+    result : Result or None
+        The solve that changed the shape.
+    ground : Ground
+        The design, to measure distances from.
+    wishes : Wishes
+    """
     own, sheets = found.pieces, found.sheets
     count, length = len(own), own.seam_length
     size = float(np.sqrt(ground.potential.area.sum()))
@@ -23,27 +37,17 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
     numbers["strain_max"] = max((s.strains["strain_max"] for s in whole), default=np.inf)
     numbers["neck"] = found.neck(2.0 * NECK * size)
     reasons = wishes.missed(count, length)
-    for number, sheet in enumerate(sheets):
-        name = own.name(number)
-        if sheet is None:
-            reasons.append(f"piece {name} cannot be laid flat")
-        elif not sheet.sound:
-            reasons.append(f"the pattern of piece {name} overlaps itself or is inverted")
-        elif wishes.max_size is not None and not fits(sheet, wishes.max_size):
-            reasons.append(
-                f"the pattern of piece {name} is {sheet.size[0]:.4g} by {sheet.size[1]:.4g}, "
-                "larger than the sheet"
-            )
-    if found.strain > wishes.max_strain:
+    reasons += _unfit(found, wishes)
+    if wishes.max_strain < found.strain < np.inf:
         reasons.append(
-            f"the strain is {found.strain:.2g}, more than {wishes.max_strain:.2g}: allow narrower "
-            "necks (min_neck), more strain, or a change of shape (max_deviation)"
+            f"the strain is {beyond(found.strain, wishes.max_strain, percent)}: allow "
+            + ", or ".join(_remedies(own.design, wishes))
         )
     notes = []
     if wishes.min_neck is not None and numbers["neck"] < wishes.min_neck:
-        reasons.append(f"a neck is {numbers['neck']:.3g} wide, less than {wishes.min_neck:.3g}")
+        reasons.append(f"a neck is {said(numbers['neck'])} wide, less than {said(wishes.min_neck)}")
     elif numbers["neck"] < NECK * size:
-        notes.append(f"the narrowest place of a piece is {numbers['neck']:.3g} wide")
+        notes.append(f"the narrowest place of a piece is {said(numbers['neck'])} wide")
     if result is not None:
         reasons += against_surface(result.design, result.mesh)
         away = metrics.surface_distance(ground.mesh, own.design)
@@ -62,10 +66,52 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
             )
         allowed = wishes.max_deviation
         if allowed is not None and numbers["deviation_max"] > allowed:
-            reasons.append(
-                f"the surface is up to {numbers['deviation_max']:.3g} from the design, more than "
-                f"{allowed:.3g}"
-            )
+            far = beyond(numbers["deviation_max"], allowed)
+            reasons.append(f"the largest distance between surface and design is {far}")
     return Segmentation(
         own.design, own.opened, own.names, sheets, numbers, tuple(reasons), tuple(notes), result
     )
+
+
+def _remedies(design: Mesh, wishes: Wishes) -> list[str]:
+    """List what would lower the strain."""
+    out = ["more strain (max_strain)"]
+    if wishes.min_neck is not None:
+        out.append("narrower necks (min_neck)")
+    more = "a change" if wishes.max_deviation is None else "more change"
+    out.append(f"{more} of shape (max_deviation)")
+    if not design.is_triangles:
+        bent = float(np.nanmax(metrics.nonplanarity(design)))
+        # The strain of a bent quad grows with the square of the distance of its diagonals.
+        if bent**2 > wishes.max_strain:
+            out.append(
+                "triangles instead of quads (the diagonals of a quad are "
+                f"{percent(bent)} of the mean edge apart)"
+            )
+    return out
+
+
+def _unfit(found: Candidate, wishes: Wishes) -> list[str]:
+    """Say which pieces have no pattern that can be used."""
+    out = []
+    large: list[tuple[float, str]] = []
+    small: list[tuple[float, str]] = []
+    for number, sheet in enumerate(found.sheets):
+        name = found.pieces.name(number)
+        if sheet is None:
+            out.append(f"piece {name} cannot be laid flat")
+            continue
+        long, wide = sheet.size
+        if not sheet.sound:
+            out.append(f"the pattern of piece {name} overlaps itself or is inverted")
+        if wishes.max_size is not None and not fits(sheet, wishes.max_size):
+            large.append((-long, f"that of piece {name} is {said(long)} by {said(wide)}"))
+        if wishes.min_size is not None and long < wishes.min_size:
+            small.append((long, f"that of piece {name} is {said(long)} long"))
+    for pieces, what in ((large, "larger than the sheet"), (small, "shorter than min_size")):
+        if pieces:
+            many = (
+                f"the patterns of {len(pieces)} pieces are" if len(pieces) > 1 else "a pattern is"
+            )
+            out.append(f"{many} {what}: {min(pieces)[1]}")
+    return out

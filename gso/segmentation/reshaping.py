@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gso import metrics
-from gso.mesh.paths import Paths
+from gso.errors import MeshError
 from gso.result import Result
 from gso.seams.pieces import Pieces
 from gso.segmentation.candidates import Candidate, cuts, joined, measured, neck_of
 from gso.segmentation.measures import FACETS, facet_ratio
 from gso.segmentation.options import Wishes
-from gso.segmentation.potential import Potential
 from gso.segmentation.tree import Ground
 from gso.tasks.developable import Options
 from gso.tno import optimize
@@ -36,12 +35,12 @@ class _Attempt:
     """A solve of one cut; `excess` is the largest ratio of what was measured to its bound."""
 
     level: float
-    result: Result
+    result: Result | None
     pieces: Pieces
     excess: float
 
 
-def reshaped(ground: Ground, wishes: Wishes) -> tuple[Candidate, Result]:
+def reshaped(ground: Ground, wishes: Wishes) -> tuple[Candidate, Result | None]:
     """Search for the fewest cuts whose pieces become developable within the allowed distance."""
     allowed = np.inf if wishes.max_deviation is None else wishes.max_deviation
     tried: list[_Attempt] = []
@@ -57,19 +56,10 @@ def reshaped(ground: Ground, wishes: Wishes) -> tuple[Candidate, Result]:
         ),
     )
     shape = best.pieces
-    surface = replace(
-        ground, mesh=shape.design, potential=Potential(shape.design), paths=Paths(shape.design)
-    )
+    surface = ground.moved(shape.design)
     found = measured(surface, shape, wishes.max_size, wishes.say)
     if wishes.darts and found.strain <= wishes.max_strain:
-        found = joined(
-            surface,
-            found,
-            wishes.max_strain,
-            neck_of(ground, wishes),
-            wishes.max_size,
-            wishes.say,
-        )
+        found = joined(surface, found, wishes.max_strain, neck_of(ground, wishes), wishes)
     return found, best.result
 
 
@@ -104,7 +94,12 @@ def _attempt(
     todo = [own]
     while todo:
         options = todo.pop(0)
-        result = optimize(cut_open, options=options, verdict=False)
+        try:
+            result = optimize(cut_open, options=options, verdict=False)
+        except MeshError:
+            # No vertex is inside a piece: the shape stays as it is.
+            strained = strains_of(cut_open.opened.mesh).get("strain_p99", np.inf) / strain
+            return _Attempt(level, None, cut_open, strained)
         shape = cut_open if result.pieces is None else result.pieces
         away = metrics.surface_distance(ground.mesh, shape.design)
         far = max(away.there_max, away.back_max) / allowed

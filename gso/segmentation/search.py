@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.errors import ConvergenceWarning
-from gso.mesh.paths import Paths
+from gso.errors import ConvergenceWarning, MeshError, OptionError
+from gso.mesh import Mesh
 from gso.seams.cutting import cut
 from gso.seams.kinds import Edges, Seam
 from gso.seams.pieces import Pieces
@@ -29,13 +29,14 @@ from gso.segmentation.candidates import (
 )
 from gso.segmentation.found import Segmentation
 from gso.segmentation.mirror import mirror_of
-from gso.segmentation.options import Wishes, prices
+from gso.segmentation.noise import noise
+from gso.segmentation.options import Wishes, prices, too_large
 from gso.segmentation.packed import packed
-from gso.segmentation.potential import Potential
 from gso.segmentation.reshaping import reshaped
 from gso.segmentation.sheets import flattened
 from gso.segmentation.tree import Ground
 from gso.spelling import known_keywords
+from gso.typing import Ints
 
 #: Ratio of the estimated to the measured strain of a first attempt.
 _RATIO = 1.3
@@ -47,9 +48,8 @@ _ATTEMPTS = 6
 #: Share of the allowed strain that is aimed at before seams are straightened, with and without
 #: darts.
 _ROOM, _MORE_ROOM = 0.97, 0.92
-#: Ratio of the absolute curvature of a design to that of its smoothed copy from which on it
-#: counts as noisy.
-_NOISY = 3.0
+#: Distance, relative to the diagonal, up to which vertices count as the same.
+_SAME = 1e-9
 
 
 @known_keywords()
@@ -63,6 +63,7 @@ def pieces(
     darts: bool = True,
     symmetric: bool = False,
     min_neck: float | None = None,
+    min_size: float | None = None,
     max_size: tuple[float, float] | None = None,
     keep: Seam | Iterable[Seam] | ArrayLike | Pieces | None = None,
     along: ArrayLike | None = None,
@@ -96,10 +97,13 @@ def pieces(
     min_neck : float, optional
         Smallest width of a piece, in the mesh's unit. When not given, a tenth of the root of the
         area is aimed at, and less is taken where the strain cannot be held otherwise.
+    min_size : float, optional
+        Smallest length of a piece, in the mesh's unit. Shorter ones are joined to a neighbour where
+        the strain allows it.
     max_size : (float, float), optional
         Length and width of a sheet that every pattern must fit on, in the mesh's unit.
     keep : Seam, iterable of Seam, array_like (e, 2), or Pieces, optional
-        Seams that stay: what :func:`gso.cut` takes, or an earlier result.
+        Seams that stay: what :func:`gso.cut` takes, or an earlier result for the same mesh.
     along : array_like of int, (k, 2), optional
         Edges that seams should follow.
     avoid : array_like, optional
@@ -144,19 +148,24 @@ def pieces(
         seam,
         darts,
         min_neck,
+        min_size,
         max_size,
         callback or (lambda said: None),
     )
     notes: list[str] = []
     ground = _ground(mesh, keep, along, avoid, symmetric, denoise)
-    said = _noise(ground)
+    aim = wishes
+    if max_size is not None and too_large(ground.mesh, max_size):
+        # The pieces are not cut to size in vain; the reason names the largest.
+        aim = replace(wishes, max_size=None)
+    said = noise(ground.mesh, ground.potential)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         if max_deviation is None:
-            found = _straight(ground, _as_is(ground, wishes), wishes)
+            found = _straight(ground, _as_is(ground, aim), aim)
             out = packed(found, None, ground, wishes)
         else:
-            out = packed(*reshaped(ground, wishes), ground, wishes)
+            out = packed(*reshaped(ground, aim), ground, wishes)
     reasons = list(out.reasons)
     if said:
         (reasons if reasons else notes).append(said)
@@ -173,33 +182,34 @@ def _ground(mesh: Any, keep: Any, along: Any, avoid: Any, symmetric: bool, denoi
 
     design = as_mesh(mesh)
     design.check_joined()
+    kept = np.empty((0, 2), np.int64)
+    if isinstance(keep, Pieces):
+        design, kept = _again(design, keep), keep.edges
     if denoise:
         from gso.tno import optimize
 
         design = design.replaced(optimize(design, task="denoise", verdict=False).mesh.vertices)
-    kept = np.empty((0, 2), np.int64)
-    if isinstance(keep, Pieces):
-        design, kept = keep.design, keep.edges
-    elif keep is not None:
+    if keep is not None and not isinstance(keep, Pieces):
         begun = cut(design, keep)
         design, kept = begun.design, begun.edges
     factor = prices(design, along, avoid)
     mirror = mirror_of(design) if symmetric else None
-    ground = Ground(design, Potential(design), Paths(design, factor), kept, mirror)
+    ground = Ground.of(design, factor, kept, mirror)
     return replace(ground, kept=ground.mirrored(kept))
 
 
-def _noise(ground: Ground) -> str:
-    """Say so if a design is noisy: smoothing over some edges removes most of its curvature."""
-    inner = ~ground.mesh.half_edges.boundary_vertex & (ground.potential.area > 0)
-    raw = float(np.abs(ground.potential.curvature[inner]).sum())
-    left = float(np.abs(ground.potential.smoothed()[inner]).sum())
-    if raw <= _NOISY * max(left, 1.0):
-        return ""
-    return (
-        f"the design is noisy: its absolute curvature falls from {raw:.3g} to {left:.3g} "
-        "when it is averaged over a few edges; denoise it with denoise=True, or let its shape "
-        "change with max_deviation"
+def _again(design: Mesh, keep: Pieces) -> Mesh:
+    """Return a design with the vertices that were inserted on the seams of its earlier pieces."""
+    if np.array_equal(design.faces, keep.design.faces):
+        return design
+    own, earlier = design.vertices, keep.design.vertices[: len(design.vertices)]
+    if len(earlier) == len(own):
+        far = np.linalg.norm(own - earlier, axis=1)
+        if far.max(initial=0.0) <= _SAME * design.diagonal:
+            return keep.design
+    raise OptionError(
+        "keep: the seams are of pieces of another mesh; give their own design, "
+        "gso.pieces(found.design, keep=found), or seams as edges"
     )
 
 
@@ -219,8 +229,15 @@ def _dartless(ground: Ground, wishes: Wishes) -> Candidate:
         for some in sorted(pool, key=lambda one: merged_value(one, wishes)):
             found.append(measured(ground, pieces_of(some), wishes.max_size, wishes.say, limit))
             if found[-1].strain <= most and found[-1].sound:
-                return found[-1]
+                return _without_small(ground, found[-1], most, wishes)
     return min(found, key=lambda one: (not one.sound, one.strain))
+
+
+def _without_small(ground: Ground, found: Candidate, strain: float, wishes: Wishes) -> Candidate:
+    """Join pieces that are too short to a neighbour, along all of their common seam."""
+    if wishes.min_size is None:
+        return found
+    return joined(ground, found, strain, np.inf, wishes, whole=True)
 
 
 def _aim(ground: Ground, wishes: Wishes) -> float:
@@ -247,7 +264,7 @@ def _darted(ground: Ground, wishes: Wishes) -> Candidate:
     best = min(found, key=lambda one: (one.strain > most or not one.sound, *_rank(one, wishes)))
     if best.strain > most:
         return best
-    return joined(ground, best, most, neck_of(ground, wishes), wishes.max_size, wishes.say)
+    return joined(ground, best, most, neck_of(ground, wishes), wishes)
 
 
 def _straight(ground: Ground, found: Candidate, wishes: Wishes) -> Candidate:
@@ -255,14 +272,25 @@ def _straight(ground: Ground, found: Candidate, wishes: Wishes) -> Candidate:
     if not ground.mesh.is_triangles or not len(found.pieces.edges) or ground.mirror is not None:
         return found
     wishes.say("straight seams")
-    mesh, edges = straight_seams(found.pieces, ground.kept)
-    own = cut(mesh, Edges(edges))
+    try:
+        mesh, edges = straight_seams(found.pieces, _firm(ground))
+        own = cut(mesh, Edges(edges))
+    except MeshError:
+        # Two lines met in a way that was not foreseen: the zigzags are right, only longer.
+        return found
     if len(own) != len(found.pieces) or not all(piece.is_disk for piece in own):
         return found
     sheets = tuple(flattened(piece.mesh) for piece in own)
     straight = Candidate(own, sheets)
     good = straight.sound and straight.strain <= max(found.strain, wishes.max_strain)
     return straight if good else found
+
+
+def _firm(ground: Ground) -> Ints:
+    """Return the edges (k, 2) that are not straightened: those that are kept, or to follow."""
+    if ground.factor is None:
+        return ground.kept
+    return np.concatenate([ground.kept, ground.mesh.edges[ground.factor < 1.0]])
 
 
 def _rank(found: Candidate, wishes: Wishes) -> tuple[int, float, float]:

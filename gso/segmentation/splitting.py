@@ -15,10 +15,11 @@ from gso.typing import Array, Ints
 _BALL = 0.3
 
 
-def apart(sheet: Sheet) -> Ints:
+def apart(sheet: Sheet, factor: Array | None = None) -> Ints:
     """Choose the edges (e, 2) of a shortest cut between two faces that overlap.
 
-    Of all pairs that overlap, the one that is farthest apart on the surface.
+    Of all pairs that overlap, the one that is farthest apart on the surface. The factor (k,) is on
+    the cost of each edge of the piece.
     """
     mesh = sheet.mesh
     pairs = sheet.overlaps
@@ -34,10 +35,10 @@ def apart(sheet: Sheet) -> Ints:
     from_one = away[row[k]]
     from_two = dijkstra(graph, directed=False, indices=int(pairs[k, 1]))
     reach = _BALL * float(apart[k])
-    return between(mesh, from_one <= reach, from_two <= reach)
+    return between(mesh, from_one <= reach, from_two <= reach, factor=factor)
 
 
-def halves(sheet: Sheet, most: tuple[float, float]) -> Ints:
+def halves(sheet: Sheet, most: tuple[float, float], factor: Array | None = None) -> Ints:
     """Choose the edges (e, 2) of a shortest cut across a pattern that is larger than a sheet.
 
     The parts are as few as the sheet allows, and about equal.
@@ -56,7 +57,7 @@ def halves(sheet: Sheet, most: tuple[float, float]) -> Ints:
     place = (parts // 2) / parts
     room = float(np.clip(0.5 * (longest / length - 1.0 / parts), 0.01, 0.1))
     price = 1.0 + 0.1 * np.abs(along - place) / room
-    return between(mesh, middle < place - room, middle > place + room, price)
+    return between(mesh, middle < place - room, middle > place + room, price, factor)
 
 
 def _dual(mesh: Mesh, distance: Array) -> coo_matrix:

@@ -33,6 +33,9 @@ def stitched(
     strain: float,
     neck: float,
     accept: Callable[[Sheet], bool],
+    *,
+    least: float = 0.0,
+    whole: bool = False,
     progress: Callable[[str], None] = lambda said: None,
 ) -> tuple[Ints, dict[bytes, Sheet]]:
     """Join pieces along parts of their seams as long as the joined pieces can be laid flat.
@@ -50,6 +53,10 @@ def stitched(
         Smallest length of the part along which two pieces are joined.
     accept : callable
         Whether a joined pattern may be used, besides strain and overlaps.
+    least : float
+        Pieces shorter than this are joined along any seam.
+    whole : bool
+        Join along all of the seam between two pieces, so that no dart stays.
     progress : callable
         Called with what is being done.
 
@@ -66,9 +73,11 @@ def stitched(
     members = {k: piece.faces for k, piece in enumerate(pieces)}
     known = dict(enumerate(sheets))
     # Small pieces may be joined along seams shorter than a neck: they are not wider.
-    size = {k: _SMALL * float(np.sqrt(metrics.area(sheet.mesh))) for k, sheet in known.items()}
+    size = {k: _wide(sheet, least) for k, sheet in known.items()}
     root = list(range(len(members)))
-    cut_keys = set((np.sort(pieces.edges, axis=1) @ np.array([n, 1])).tolist())
+    every = (np.sort(pieces.edges, axis=1) @ np.array([n, 1])).tolist()
+    sides = dict(zip(every, pieces.sides.tolist(), strict=True))
+    cut_keys = set(every)
     spans = chains(pieces.edges, pieces.sides)
     lengths = [_along(mesh, line) for _, line in spans]
     for k in np.argsort([-float(s[-1]) for s in lengths], kind="stable").tolist():
@@ -77,11 +86,19 @@ def stitched(
         if a == b or lengths[k][-1] < min(neck, min(size[a], size[b])):
             continue
         keys = np.sort(np.stack([line[:-1], line[1:]], 1), axis=1) @ np.array([n, 1])
+        if whole:
+            if min(size[a], size[b]) > 0:
+                continue
+            pair = {a, b}
+            keys = np.array(
+                [e for e, two in sides.items() if {_root(root, x) for x in two} == pair]
+            )
         if kept.intersection(keys.tolist()):
             continue
         progress(f"joining pieces: {len(members)} left")
         faces = np.sort(np.concatenate([members[a], members[b]]))
-        for first, last in _parts(lengths[k], min(neck, float(lengths[k][-1]))):
+        shares = _parts(lengths[k], min(neck, float(lengths[k][-1])))
+        for first, last in [(0, len(keys))] if whole else shares:
             trial = cut_keys.difference(keys[first:last].tolist())
             if _estimate(ground, trial, faces) > _WORTH * strain:
                 continue
@@ -92,11 +109,18 @@ def stitched(
             root[b] = a
             members[a], known[a] = faces, sheet
             del members[b], known[b]
-            size[a] = _SMALL * float(np.sqrt(metrics.area(sheet.mesh)))
+            size[a] = _wide(sheet, least)
             break
     left = np.array(sorted(cut_keys), np.int64)
     edges = np.stack([left // n, left % n], axis=1)
     return edges, {key(members[k]): known[k] for k in members}
+
+
+def _wide(sheet: Sheet, least: float) -> float:
+    """Return the length of a seam along which a piece may be joined."""
+    if sheet.size[0] < least:
+        return 0.0
+    return _SMALL * float(np.sqrt(metrics.area(sheet.mesh)))
 
 
 def key(faces: Ints) -> bytes:

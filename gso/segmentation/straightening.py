@@ -88,11 +88,11 @@ def _shorter(
     goal[line[last]] = True
     even = np.ones(len(ground.paths.ends))
     before = line[first : last + 1]
-    limit = (1.0 + 1e-9) * _length(ground, before) if ground.mesh.has_triangles else np.inf
+    limit = (1.0 + 1e-9) * _cost(ground, before) if ground.mesh.has_triangles else np.inf
     path = ground.paths.cheapest(int(line[first]), goal, even, closed, limit)
     if path[-1] != line[last] or len(path) < 2 or np.array_equal(path, before):
         return None
-    return path if _length(ground, path) <= (1.0 + 1e-9) * _length(ground, before) else None
+    return path if _cost(ground, path) <= (1.0 + 1e-9) * _cost(ground, before) else None
 
 
 def _relabelled(
@@ -114,8 +114,11 @@ def _relabelled(
     return True
 
 
-def _length(ground: Ground, line: Ints) -> float:
-    return float(np.linalg.norm(np.diff(ground.mesh.vertices[line], axis=0), axis=1).sum())
+def _cost(ground: Ground, line: Ints) -> float:
+    """Return the length of a chain, times the factors of its edges."""
+    step = np.linalg.norm(np.diff(ground.mesh.vertices[line], axis=0), axis=1)
+    factor = ground.factor_of(np.stack([line[:-1], line[1:]], axis=1))
+    return float(step.sum() if factor is None else step @ factor)
 
 
 def _inside(ground: Ground, label: Ints, a: int, b: int) -> Ints:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gso.mesh import Mesh
 from gso.mesh.paths import Paths
+from gso.mesh.topology import edge_keys
 from gso.segmentation.potential import Potential
 from gso.typing import Array, Ints
 
@@ -44,6 +45,8 @@ class Ground:
         Edges that are cut in any case.
     mirror : ndarray of int, (n,), optional
         The mirror image of each vertex, for symmetric seams.
+    factor : ndarray, (e,), optional
+        Factor on the cost of seams along each edge of ``mesh.edges``; ones when not given.
     """
 
     mesh: Mesh
@@ -51,6 +54,34 @@ class Ground:
     paths: Paths
     kept: Ints = field(default_factory=_no_edges)
     mirror: Ints | None = None
+    factor: Array | None = None
+
+    @classmethod
+    def of(
+        cls,
+        mesh: Mesh,
+        factor: Array | None = None,
+        kept: Ints | None = None,
+        mirror: Ints | None = None,
+    ) -> Ground:
+        """Prepare a design for the search."""
+        own = _no_edges() if kept is None else kept
+        return cls(mesh, Potential(mesh), Paths(mesh, factor), own, mirror, factor)
+
+    def moved(self, mesh: Mesh) -> Ground:
+        """Return the same for a mesh with the same faces."""
+        return Ground.of(mesh, self.factor, self.kept, self.mirror)
+
+    def factor_of(self, ends: Ints) -> Array | None:
+        """Return the factor (k,) of some edges (k, 2) of the mesh; None if all are one."""
+        if self.factor is None:
+            return None
+        n = len(self.mesh.vertices)
+        keys = edge_keys(self.mesh.edges[:, 0], self.mesh.edges[:, 1], n)
+        order = np.argsort(keys)
+        return self.factor[
+            order[np.searchsorted(keys[order], edge_keys(ends[:, 0], ends[:, 1], n))]
+        ]
 
     @property
     def begun(self) -> NDArray[np.bool_]:

@@ -36,9 +36,7 @@ _WORST_LAST = (
 )
 
 
-def renumbered(
-    progress: Progress, place: int, count: int, what: str = "component"
-) -> Progress:
+def renumbered(progress: Progress, place: int, count: int, what: str = "component") -> Progress:
     """Number the stages in the progress of component `place` over all `count` components.
 
     All components are taken to have the same number of stages.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,8 +13,10 @@ from gso.errors import OptionError
 from gso.result import Result
 from gso.seams.pieces import Pieces
 from gso.status import Status
-from gso.tasks.developable.options import DEVELOPABLE, Options
 from gso.tno.layout import strains_of
+
+if TYPE_CHECKING:
+    from gso.tasks.developable import Options
 
 #: Factor between the weights that are tried, number of them in each direction, and number of
 #: bisections after that.
@@ -21,7 +24,7 @@ _STEP, _STEPS, _BISECTIONS = 4.0, 3, 4
 
 
 def within(
-    pieces: Pieces, allowed: float, options: Options, solve: Callable[[Options], Result]
+    pieces: Pieces, allowed: float, options: Any, solve: Callable[[Options], Result]
 ) -> Result:
     """Return the most developable result within a distance of the design.
 
@@ -42,6 +45,9 @@ def within(
     Result
         The one with the least weight if none is within the distance.
     """
+    # Imported here because it imports SciPy.
+    from gso.tasks.developable.options import DEVELOPABLE, Options
+
     if not isinstance(options, Options):
         raise OptionError(
             "max_deviation of a design in pieces goes with the formulations 'curvature' and "

@@ -207,7 +207,10 @@ def _in_pieces(
         result = joint_bounds.within(
             pieces, allowed, asked.options, lambda options: solve(replace(free, options=options))
         )
-    return judged(result, Requirements(**asked.bounds)) if asked.verdict else result
+    if asked.verdict:
+        limits: dict[str, Any] = dict(asked.bounds)
+        result = judged(result, Requirements(**limits))
+    return result
 
 
 def _one_mesh(

@@ -5,16 +5,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from gso import metrics
 from gso.constraints import Constraint
 from gso.errors import ConvergenceWarning, GSOError, MeshError
 from gso.mesh import Mesh
 from gso.result import Result
-from gso.ruled.surface import RuledSurface
 from gso.seams.pieces import Pieces
 from gso.status import Status
 from gso.tasks.base import Options
@@ -25,6 +22,9 @@ from gso.tno.solver import Callback
 from gso.tno.start import Start
 from gso.verdict import Asked, judge
 from gso.wording import length
+
+if TYPE_CHECKING:
+    from gso.ruled.surface import RuledSurface
 
 #: Share of the allowed distance that the joint solve may use; the strips get what is left.
 _JOINT = 0.5
@@ -148,7 +148,9 @@ def _merged(
     reasons: tuple[str, ...] = ()
     if ask.verdict:
         reasons = tuple(
-            f"piece {shape.name(k)}: {why}" for k, r in enumerate(strips) for why in judge(r, Asked())
+            f"piece {shape.name(k)}: {why}"
+            for k, r in enumerate(strips)
+            for why in judge(r, Asked())
         )
         for size, what in ((far, "from the design"), (apart, "apart at seams")):
             if allowed is not None and size > allowed:
