@@ -23,7 +23,7 @@ from gso.typing import Array, Ints
 
 #: Numbers of patches to merge, and how much compact pieces are preferred.
 _COUNTS = (100, 200)
-_COMPACT = (2.0, 5.0)
+_COMPACT = (1.0, 2.0, 5.0)
 #: Shares of the neck that are tried, largest first.
 _NECKS = (1.0, 0.8, 0.65, 0.5, 0.0)
 #: Relative excess of an estimate over its bound that counts as none.
@@ -54,6 +54,11 @@ class Candidate:
     def neck(self, limit: float) -> float:
         """Return the narrowest place of all pieces, or a limit where that is less."""
         return min([limit, *(s.neck(limit) for s in self.sheets if s is not None)])
+
+
+def ranked(found: Candidate, wishes: Wishes) -> tuple[int, float, float]:
+    """Rank pieces by :meth:`Wishes.value`."""
+    return wishes.value(len(found.pieces), found.pieces.seam_length)
 
 
 def neck_of(ground: Ground, wishes: Wishes) -> float:

@@ -95,18 +95,19 @@ class Merging:
             if self._kept[k]:
                 forbidden.add((min(a, b), max(a, b)))
         round_ = {k: sum(beside[k].values()) + float(self._rim[members[k]].sum()) for k in members}
-        heap: list[tuple[float, int, int, int, int]] = []
+        strain = dict.fromkeys(members, 0.0)
+        heap: list[tuple[float, int, int, int, int, float]] = []
 
-        def offer(a: int, b: int) -> None:
+        def offer(a: int, b: int, found: float | None = None) -> None:
+            """Add a merge, with the larger of both strains until its own is known."""
             a, b = min(a, b), max(a, b)
             if (a, b) in forbidden:
                 return
-            found = self.estimate(np.concatenate([members[a], members[b]]))
-            if found is None or found > self.strain:
-                return
+            known = max(strain[a], strain[b]) if found is None else found
             share = beside[a][b] / min(round_[a], round_[b])
+            value = known / self.strain - self.compact * share
             heapq.heappush(
-                heap, (found / self.strain - self.compact * share, a, b, stamp[a], stamp[b])
+                heap, (value, a, b, stamp[a], stamp[b], -1.0 if found is None else found)
             )
 
         for a, others in beside.items():
@@ -114,9 +115,15 @@ class Merging:
                 if a < b:
                     offer(a, b)
         while heap:
-            _, a, b, seen_a, seen_b = heapq.heappop(heap)
+            _, a, b, seen_a, seen_b, known = heapq.heappop(heap)
             if a not in members or b not in members or (stamp[a], stamp[b]) != (seen_a, seen_b):
                 continue
+            if known < 0.0:
+                found = self.estimate(np.concatenate([members[a], members[b]]))
+                if found is not None and found <= self.strain:
+                    offer(a, b, found)
+                continue
+            strain[a] = known
             members[a] = np.concatenate([members[a], members.pop(b)])
             round_[a] += round_.pop(b) - 2.0 * beside[a].pop(b)
             stamp[a] += 1

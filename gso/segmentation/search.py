@@ -11,43 +11,37 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.errors import ConvergenceWarning, MeshError, OptionError
+from gso.errors import ConvergenceWarning, OptionError
 from gso.mesh import Mesh
 from gso.seams.cutting import cut
-from gso.seams.kinds import Edges, Seam
+from gso.seams.kinds import Seam
 from gso.seams.pieces import Pieces
-from gso.seams.straightening import straight_seams
 from gso.segmentation.candidates import (
     Candidate,
     cuts,
     joined,
     measured,
-    merged_value,
     neck_of,
-    pieces_of,
-    without_darts,
+    ranked,
 )
+from gso.segmentation.dartless import dartless
 from gso.segmentation.found import Segmentation
 from gso.segmentation.mirror import mirror_of
 from gso.segmentation.noise import noise
 from gso.segmentation.options import Wishes, prices, too_large
 from gso.segmentation.packed import packed
 from gso.segmentation.reshaping import reshaped
-from gso.segmentation.sheets import flattened
+from gso.segmentation.straight import straight
 from gso.segmentation.tree import Ground
 from gso.spelling import known_keywords
-from gso.typing import Ints
 
 #: Ratio of the estimated to the measured strain of a first attempt.
 _RATIO = 1.3
-#: The same for pieces without darts, in groups that are tried one after the other.
-_RATIOS = ((1.3, 1.2), (1.1,), (0.8,))
 #: Share of the allowed strain from which on an attempt is not loosened any more.
 _CLOSE = 0.93
 _ATTEMPTS = 6
-#: Share of the allowed strain that is aimed at before seams are straightened, with and without
-#: darts.
-_ROOM, _MORE_ROOM = 0.97, 0.92
+#: Share of the allowed strain that is aimed at before seams are straightened.
+_ROOM = 0.97
 #: Distance, relative to the diagonal, up to which vertices count as the same.
 _SAME = 1e-9
 
@@ -162,7 +156,7 @@ def pieces(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         if max_deviation is None:
-            found = _straight(ground, _as_is(ground, aim), aim)
+            found = _as_is(ground, aim)
             out = packed(found, None, ground, wishes)
         else:
             out = packed(*reshaped(ground, aim), ground, wishes)
@@ -215,40 +209,16 @@ def _again(design: Mesh, keep: Pieces) -> Mesh:
 
 def _as_is(ground: Ground, wishes: Wishes) -> Candidate:
     """Find seams of a shape that does not change."""
-    return _darted(ground, wishes) if wishes.darts else _dartless(ground, wishes)
-
-
-def _dartless(ground: Ground, wishes: Wishes) -> Candidate:
-    """Measure pieces without darts, the best by the estimate first, until some hold the strain."""
-    most = _aim(ground, wishes)
-    found: list[Candidate] = []
-    for ratios in _RATIOS:
-        wishes.say(f"seams without darts, attempt {len(found) + 1}")
-        pool = [m for r in ratios for m in without_darts(ground, r * wishes.max_strain)]
-        limit = np.inf if ratios is _RATIOS[-1] else most
-        for some in sorted(pool, key=lambda one: merged_value(one, wishes)):
-            found.append(measured(ground, pieces_of(some), wishes.max_size, wishes.say, limit))
-            if found[-1].strain <= most and found[-1].sound:
-                return _without_small(ground, found[-1], most, wishes)
-    return min(found, key=lambda one: (not one.sound, one.strain))
-
-
-def _without_small(ground: Ground, found: Candidate, strain: float, wishes: Wishes) -> Candidate:
-    """Join pieces that are too short to a neighbour, along all of their common seam."""
-    if wishes.min_size is None:
-        return found
-    return joined(ground, found, strain, np.inf, wishes, whole=True)
-
-
-def _aim(ground: Ground, wishes: Wishes) -> float:
-    """Return the strain to aim at; that of triangle meshes changes when seams are straightened."""
-    share = (_ROOM if wishes.darts else _MORE_ROOM) if ground.mesh.is_triangles else 1.0
-    return share * wishes.max_strain
+    if wishes.darts:
+        return straight(ground, _darted(ground, wishes), wishes)
+    return dartless(ground, wishes)
 
 
 def _darted(ground: Ground, wishes: Wishes) -> Candidate:
     """Cut with darts, and adapt the bound on the estimated strain to the measured one."""
-    most, ratio = _aim(ground, wishes), _RATIO
+    # The strain of triangle meshes changes when seams are straightened.
+    most = (_ROOM if ground.mesh.is_triangles else 1.0) * wishes.max_strain
+    ratio = _RATIO
     found: list[Candidate] = []
     for attempt in range(_ATTEMPTS):
         wishes.say(f"seams, attempt {attempt + 1}")
@@ -261,37 +231,7 @@ def _darted(ground: Ground, wishes: Wishes) -> Candidate:
         if whole and last.strain <= most:
             break
         ratio *= float(np.clip(0.985 * most / max(last.strain, 1e-300), 0.5, 1.6))
-    best = min(found, key=lambda one: (one.strain > most or not one.sound, *_rank(one, wishes)))
+    best = min(found, key=lambda one: (one.strain > most or not one.sound, *ranked(one, wishes)))
     if best.strain > most:
         return best
     return joined(ground, best, most, neck_of(ground, wishes), wishes)
-
-
-def _straight(ground: Ground, found: Candidate, wishes: Wishes) -> Candidate:
-    """Straighten the seams of a triangle mesh, where the pieces stay what they are."""
-    if not ground.mesh.is_triangles or not len(found.pieces.edges) or ground.mirror is not None:
-        return found
-    wishes.say("straight seams")
-    try:
-        mesh, edges = straight_seams(found.pieces, _firm(ground))
-        own = cut(mesh, Edges(edges))
-    except MeshError:
-        # Two lines met in a way that was not foreseen: the zigzags are right, only longer.
-        return found
-    if len(own) != len(found.pieces) or not all(piece.is_disk for piece in own):
-        return found
-    sheets = tuple(flattened(piece.mesh) for piece in own)
-    straight = Candidate(own, sheets)
-    good = straight.sound and straight.strain <= max(found.strain, wishes.max_strain)
-    return straight if good else found
-
-
-def _firm(ground: Ground) -> Ints:
-    """Return the edges (k, 2) that are not straightened: those that are kept, or to follow."""
-    if ground.factor is None:
-        return ground.kept
-    return np.concatenate([ground.kept, ground.mesh.edges[ground.factor < 1.0]])
-
-
-def _rank(found: Candidate, wishes: Wishes) -> tuple[int, float, float]:
-    return wishes.value(len(found.pieces), found.pieces.seam_length)
