@@ -2,8 +2,8 @@
 
 Strain is that of the patterns, the 99th percentile of the worst piece; seams are relative to the
 root of the area; distances are those between the surfaces, both ways, per cent of the diagonal;
-necks are relative to the root of the area. Without ``shapes=FILE.npz`` (arrays NAME_vertices,
-NAME_faces) the designs of ``examples/whole.py`` are cut.
+necks are relative to the root of the piece's area. Without ``shapes=FILE.npz`` (arrays
+NAME_vertices, NAME_faces) the designs of ``examples/whole.py`` are cut.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from gso.mesh import Mesh
 #: Allowed strain and distance (per cent of the diagonal) of designs that may change.
 _JOINT = 2e-4
 _AWAY = (3.0, 2.0)
+#: Strain up to which pieces are cut before they become ruled.
+_WHOLE = 1e-3
 
 
 def as_is(shapes: str = "", strain: str = "0.01") -> dict[str, Any]:
@@ -48,6 +50,37 @@ def joint(shapes: str = "") -> dict[str, Any]:
             rows.append(_row(name, f"{share:g} %", mesh, found))
             out[f"{name}, {share:g} %"] = found.metrics
     table(f"shape may change, strain {_JOINT}", _COLUMNS, rows)
+    return out
+
+
+def ruled(shapes: str = "") -> dict[str, Any]:
+    """Cut designs without darts, and make every piece of exactly ruled strips."""
+    rows, out = [], {}
+    for name, mesh in progress(list(_shapes(shapes).items()), "ruled"):
+        allowed = 0.01 * _AWAY[0] * mesh.diagonal
+        found = _timed(mesh, max_strain=_WHOLE, max_deviation=allowed, darts=False)
+        clock = time.perf_counter()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            # The seams on the design itself, from which distances count.
+            own = gso.cut(mesh, found.edges)
+            result = gso.tno.optimize(own, formulation="ruled", max_deviation=allowed)
+        seconds = time.perf_counter() - clock
+        percent = 100.0 / mesh.diagonal
+        away = result.ruled.deviation
+        out[name] = {
+            "pieces": len(found),
+            "strips": result.ruled.strips,
+            "mean": percent * away.there_mean,
+            "max": percent * max(away.there_max, away.back_max),
+            "gap": percent * result.details["seam_gap"],
+            "strain": result.metrics["strain_max"],
+            "usable": result.usable,
+            "seconds": seconds,
+        }
+        rows.append([name, *out[name].values()])
+    columns = ["design", "pieces", "strips", "mean %", "max %", "gap at seams %", "strain"]
+    table(f"exactly ruled, within {_AWAY[0]:g} %", [*columns, "usable", "s"], rows)
     return out
 
 
@@ -166,7 +199,7 @@ def _row(name: str, how: str, mesh: Mesh, found: Any) -> list[Any]:
         len(found),
         found.seam_length,
         known["strain_p99"],
-        known["neck"] / np.sqrt(metrics.area(mesh)),
+        known["neck_share"],
         percent * known.get("deviation_mean", 0.0),
         percent * known.get("deviation_max", 0.0),
         known.get("dihedral_mean", np.nan) / before,

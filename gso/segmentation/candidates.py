@@ -51,9 +51,9 @@ class Candidate:
         """Whether every piece has a pattern without overlap and inverted faces."""
         return all(s is not None and s.sound for s in self.sheets)
 
-    def neck(self, limit: float) -> float:
-        """Return the narrowest place of all pieces, or a limit where that is less."""
-        return min([limit, *(s.neck(limit) for s in self.sheets if s is not None)])
+    def necks(self, limit: float) -> Array:
+        """Return the width of each piece's narrowest place, or a limit where that is less."""
+        return np.array([limit if s is None else s.neck(limit) for s in self.sheets])
 
 
 def ranked(found: Candidate, wishes: Wishes) -> tuple[int, float, float]:

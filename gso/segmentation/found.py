@@ -27,7 +27,8 @@ class Segmentation(Pieces):
         The flat pattern of each piece; None where there is none.
     metrics : dict
         ``pieces``, ``seam`` (relative to the root of the area), ``strain_p99`` and ``strain_max``
-        (of the worst piece), ``neck`` (the narrowest place, in the mesh's unit), and after a
+        (of the worst piece), ``neck`` (the narrowest place, in the mesh's unit), ``neck_share``
+        (the least ratio of a piece's narrowest place and the root of its area), and after a
         change of shape ``deviation_mean`` and ``deviation_max`` (in the mesh's unit) and
         ``dihedral_mean`` with ``dihedral_mean_before`` and ``dihedral_max`` (degrees, inside
         pieces), and ``nonplanarity_max`` on quads (distance of the diagonals over the mean edge).

@@ -35,7 +35,11 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
     numbers = {"pieces": float(count), "seam": length, "strain_p99": found.strain}
     whole = [s for s in sheets if s is not None]
     numbers["strain_max"] = max((s.strains["strain_max"] for s in whole), default=np.inf)
-    numbers["neck"] = found.neck(2.0 * NECK * size)
+    necks = found.necks(2.0 * NECK * size)
+    numbers["neck"] = float(necks.min())
+    roots = np.sqrt([metrics.area(piece.mesh) for piece in own])
+    thin = int((necks / roots).argmin())
+    numbers["neck_share"] = float(necks[thin] / roots[thin])
     reasons = wishes.missed(count, length)
     reasons += _unfit(found, wishes)
     if wishes.max_strain < found.strain < np.inf:
@@ -46,8 +50,11 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
     notes = []
     if wishes.min_neck is not None and numbers["neck"] < wishes.min_neck:
         reasons.append(f"a neck is {said(numbers['neck'])} wide, less than {said(wishes.min_neck)}")
-    elif numbers["neck"] < NECK * size:
-        notes.append(f"the narrowest place of a piece is {said(numbers['neck'])} wide")
+    elif numbers["neck_share"] < NECK:
+        notes.append(
+            f"piece {own.name(thin)} is {said(necks[thin])} wide at its narrowest place, "
+            f"{percent(numbers['neck_share'])} of the root of its area"
+        )
     if result is not None:
         reasons += against_surface(result.design, result.mesh)
         away = metrics.surface_distance(ground.mesh, own.design)
