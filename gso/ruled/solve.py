@@ -49,6 +49,8 @@ class Wanted:
         Largest angle at a crease, in radians.
     min_radius : float or None
         Smallest radius of a bend.
+    most : int
+        Largest number of strips that is tried.
     """
 
     strips: int | None = 1
@@ -57,6 +59,7 @@ class Wanted:
     max_deviation: float | None = None
     max_crease: float | None = None
     min_radius: float | None = None
+    most: int = MOST
 
     def met(self, found: Found) -> bool:
         """Return whether a surface is sound and meets the bounds."""
@@ -171,7 +174,7 @@ class _Search:
             found = self._found(one, fit, name)
             if 1 not in self.results or found.order < self.results[1].order:
                 self.fits[1], self.results[1], self.start = fit, found, name
-        count, most = 1, wanted.strips or MOST
+        count, most = 1, wanted.strips or wanted.most
         while count < most and not self._enough(count):
             more = min(2 * count, most)
             fit = self.fits[count]

@@ -87,8 +87,8 @@ class RuledSurface:
         )
 
     @property
-    def bends(self) -> list[Bend]:
-        """The rulings in the pattern."""
+    def bend_edges(self) -> tuple[Ints, Ints]:
+        """The rulings in the pattern: edges (k, 2) of it, and the number of the ruling of each."""
         pattern = self.pattern
         inner = pattern.mesh.half_edges
         k = np.flatnonzero((inner.twin >= 0) & (inner.origin < inner.dest))
@@ -99,12 +99,18 @@ class RuledSurface:
         )
         order = np.argsort(rulings)
         at = order[np.minimum(np.searchsorted(rulings[order], key), len(order) - 1)]
-        lines = pattern.flat[ends]
-        angles, radii = self.rulings.angles.tolist(), self.rulings.radii.tolist()
-        return [
-            Bend(lines[n], angles[at[n]], radii[at[n]])
-            for n in np.flatnonzero(np.isin(key, rulings))
-        ]
+        found = np.isin(key, rulings)
+        return ends[found], at[found]
+
+    @property
+    def bends(self) -> list[Bend]:
+        """The rulings in the pattern."""
+        if not len(self.rulings.edges):
+            return []
+        ends, at = self.bend_edges
+        lines = self.pattern.flat[ends]
+        angles, radii = self.rulings.angles[at].tolist(), self.rulings.radii[at].tolist()
+        return [Bend(*bend) for bend in zip(lines, angles, radii, strict=True)]
 
     def arrays(self) -> dict[str, Array]:
         """Return the surface as arrays by name, except `moved`; see :meth:`from_arrays`."""

@@ -59,6 +59,17 @@ class Segmentation(Pieces):
         """The flat pattern of each piece, in the mesh's unit."""
         return [None if s is None else Pattern.whole(s.mesh, s.flat) for s in self.sheets]
 
+    @property
+    def pattern(self) -> Pattern | None:
+        """The patterns of all pieces as one, each in its own place; None if one is missing."""
+        opened = self.opened
+        flat = np.zeros((len(opened.vertex), 2))
+        for part, sheet in zip(self.parts, self.sheets, strict=True):
+            if sheet is None:
+                return None
+            flat[part.vertices] = sheet.flat
+        return Pattern(flat, opened.mesh.faces, opened.vertex, opened.seams)
+
     def alike(self, tolerance: float | None = None) -> list[list[int]]:
         """Group pieces with congruent patterns, mirror images apart.
 

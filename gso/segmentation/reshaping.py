@@ -24,8 +24,12 @@ from gso.tno.layout import strains_of
 _FIRST, _STEP, _CLOSE = 0.04, 1.5, 1.1
 #: Smallest bound on the estimated strain.
 _LEAST = 2e-3
-#: Factor on the weight of curvature where the distance is kept and the strain is not.
+#: Factor on the weight of curvature where the distance is kept and the strain is not, and on that
+#: of the distance where it is the other way round.
 _STRONGER = 4.0
+#: Ratio of the distance to its bound up to which a larger weight of it is tried, ratio of the
+#: strain to its bound below which it is, and how often.
+_HOPELESS, _LITTLE, _WEAKER = 20.0, 0.5, 5
 #: Factors on the weights of fairness and curvature where pieces have facets.
 _FAIRER = (3.0, 2.0)
 
@@ -35,6 +39,7 @@ class _Attempt:
     """A solve of one cut; `excess` is the largest ratio of what was measured to its bound."""
 
     level: float
+    proximity: float
     result: Result | None
     pieces: Pieces
     excess: float
@@ -47,7 +52,9 @@ def reshaped(ground: Ground, wishes: Wishes) -> tuple[Candidate, Result | None]:
     for level in _levels(tried):
         wishes.say(f"seams and shape, attempt {len(tried) + 1}")
         cut_open = cuts(ground, wishes, level)
-        tried.append(_attempt(ground, cut_open, level, allowed, wishes.max_strain))
+        # An attempt begins with the weight of the distance that the one before ended with.
+        begin = tried[-1].proximity / _STRONGER if tried else 1.0
+        tried.append(_attempt(ground, cut_open, level, max(begin, 1.0), allowed, wishes.max_strain))
     best = min(
         tried,
         key=lambda a: (
@@ -86,12 +93,17 @@ def _levels(tried: list[_Attempt]) -> Iterator[float]:
 
 
 def _attempt(
-    ground: Ground, cut_open: Pieces, level: float, allowed: float, strain: float
+    ground: Ground,
+    cut_open: Pieces,
+    level: float,
+    proximity: float,
+    allowed: float,
+    strain: float,
 ) -> _Attempt:
-    """Solve one cut, again with other weights where the strain or facets are too large."""
-    own = Options().for_pieces()
+    """Solve one cut, again with other weights where distance, strain or facets are too large."""
+    own = replace(Options().for_pieces(), w_proximity=proximity)
     best: _Attempt | None = None
-    todo = [own]
+    todo, weaker = [own], 0
     while todo:
         options = todo.pop(0)
         try:
@@ -99,17 +111,23 @@ def _attempt(
         except MeshError:
             # No vertex is inside a piece: the shape stays as it is.
             strained = strains_of(cut_open.opened.mesh).get("strain_p99", np.inf) / strain
-            return _Attempt(level, None, cut_open, strained)
+            return _Attempt(level, proximity, None, cut_open, strained)
         shape = cut_open if result.pieces is None else result.pieces
         away = metrics.surface_distance(ground.mesh, shape.design)
         far = max(away.there_max, away.back_max) / allowed
         strained = facets = 0.0
-        if far <= 1.0:
+        if far <= _HOPELESS:
             strained = strains_of(result.mesh).get("strain_p99", np.inf) / strain
+        if far <= 1.0:
             facets = facet_ratio(result) / FACETS
-        attempt = _Attempt(level, result, shape, max(far, strained, facets))
-        if best is None:
-            if strained > 1.0:
+        excess = max(far, strained, facets)
+        attempt = _Attempt(level, options.w_proximity, result, shape, excess)
+        if 1.0 < far <= _HOPELESS and strained < _LITTLE and weaker < _WEAKER:
+            # The strain is less than allowed: a shape nearer to the design may do.
+            weaker += 1
+            todo.append(replace(options, w_proximity=_STRONGER * options.w_proximity))
+        elif best is None:
+            if strained > 1.0 >= far:
                 todo.append(replace(own, w_curvature=_STRONGER * own.w_curvature))
             if facets > 1.0:
                 todo.append(_fairer(own))

@@ -1,4 +1,4 @@
-"""Bounds on the joint solve of a design in pieces, by the weight of the curvature."""
+"""Bounds on the joint solve of a design in pieces, by the weights of its energy."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def within(
 ) -> Result:
     """Return the most developable result within a distance of the design.
 
-    The weight of the curvature is as large as the distance allows, and not larger than it takes
-    for patterns without strain.
+    The weight of the curvature relative to that of the distance is as large as the bound allows,
+    and not larger than it takes for patterns without strain.
 
     Parameters
     ----------
@@ -56,8 +56,13 @@ def within(
     tried: dict[float, Result] = {}
 
     def good(power: float) -> bool:
-        weight = options.w_curvature * _STEP**power
-        tried[power] = solve(replace(options, w_curvature=weight))
+        factor = _STEP ** abs(power)
+        if power > 0:
+            changed = replace(options, w_curvature=factor * options.w_curvature)
+        else:
+            # Less weight on the curvature alone would leave the fairness, which moves bends too.
+            changed = replace(options, w_proximity=factor * options.w_proximity)
+        tried[power] = solve(changed)
         return deviation(pieces, tried[power]) <= allowed
 
     def done(power: float) -> bool:

@@ -45,8 +45,10 @@ class Options(BaseOptions):
     ----------
     strips : int, "auto" or None
         Number of strips side by side, which share crease curves and are separate parts of the
-        pattern. "auto": as few as hold `max_deviation` and `max_crease`, at most 64. None:
-        "auto" where there is such a bound, else 1.
+        pattern. "auto": as few as hold `max_deviation` and `max_crease`, at most `max_strips`.
+        None: "auto" where there is such a bound, else 1.
+    max_strips : int
+        Largest number of strips that "auto" tries.
     rulings : int
         Number of rulings of a strip, some of them outside the outline.
     flats : bool
@@ -69,6 +71,7 @@ class Options(BaseOptions):
     }
 
     strips: int | str | None = None
+    max_strips: int = 64
     rulings: int = 33
     flats: bool = False
     max_crease: float | None = None
@@ -84,6 +87,8 @@ class Options(BaseOptions):
                 raise OptionError(f"strips is {strips!r}; it must be a number, 'auto' or None")
         elif not (isinstance(strips, int | np.integer) and 1 <= strips <= MOST):
             raise OptionError(f"strips is {strips!r}; it must be 1 to {MOST}, 'auto' or None")
+        if not 1 <= self.max_strips <= MOST:
+            raise OptionError(f"max_strips is {self.max_strips}; it must be 1 to {MOST}")
         if self.flats and strips not in (1, None):
             raise OptionError(
                 f"flats=True is for a single strip, but strips is {strips!r}; leave one of them out"
@@ -170,6 +175,7 @@ def _converted(
         None if bound is None else bound / size,
         None if options.max_crease is None else float(np.radians(options.max_crease)),
         None if options.min_radius is None else options.min_radius / size,
+        options.max_strips,
     )
     beams = [part for part in compiled.parts if isinstance(part, Straight)]
     plane = _mirror(compiled)
