@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from gso.tasks.developable.ruled import Options as RuledOptions
     from gso.tasks.flatten import Options as FlattenOptions
     from gso.tasks.options import Options
+    from gso.workshop.fabricate import fabricate
 
     __version__: str
 
@@ -95,6 +96,7 @@ __all__ = [
     "constraints",
     "cut",
     "dataset",
+    "fabricate",
     "fit_spline",
     "hybrid",
     "io",
@@ -135,6 +137,7 @@ _NAMES = {
     "Options": "gso.tasks.options",
     "cut": "gso.seams",
     "pieces": "gso.segmentation",
+    "fabricate": "gso.workshop.fabricate",
     "loft": "gso.ruled.loft",
     "smooth_strips": "gso.ruled.smooth.surface",
     "Fixed": "gso.constraints",

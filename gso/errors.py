@@ -29,5 +29,9 @@ class DatasetError(GSOError, ValueError):
     """A dataset cannot be read or written."""
 
 
+class SchedulerError(DatasetError):
+    """A scheduler does not answer or has no workers."""
+
+
 class ConvergenceWarning(UserWarning):
     """A result was returned with a status other than converged or all iterations used."""

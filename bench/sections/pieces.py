@@ -270,4 +270,4 @@ def _xatlas(mesh: Mesh) -> tuple[int, float, float] | None:
     return int(atlas.chart_count), seam, strain
 
 
-SECTIONS = (as_is, joint, uncut, minimax, times)
+SECTIONS = (as_is, joint, ruled, uncut, minimax, times)

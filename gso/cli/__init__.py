@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from gso.cli.dataset import dataset
+from gso.cli.fabricate import fabricate
 from gso.cli.inspect import info, metrics, plot
 from gso.cli.optimize import optimize
 from gso.cli.pieces import pieces
@@ -58,5 +59,5 @@ def main() -> None:
     """Make quad and grid surfaces developable, flatten them, denoise them."""
 
 
-for _command in (optimize, pieces, metrics, info, plot, dataset, train):
+for _command in (optimize, pieces, metrics, info, plot, dataset, fabricate, train):
     main.add_command(_command)

@@ -28,6 +28,10 @@ class _Share(click.ParamType):
             self.fail(f"{value!r} is no number or percentage", param, ctx)
 
 
+#: A share such as ``0.01`` or ``1%``.
+SHARE = _Share()
+
+
 @click.command(short_help="Cut a design into pieces that can be laid flat.")
 @click.argument("name", metavar="IN", type=click.Path())
 @click.option(
@@ -43,7 +47,7 @@ class _Share(click.ParamType):
 @click.option(
     "--max-strain",
     metavar="S",
-    type=_Share(),
+    type=SHARE,
     default="1%",
     show_default=True,
     help="Largest strain of the patterns (99th percentile), such as 0.01 or 1%.",

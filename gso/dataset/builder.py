@@ -18,8 +18,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from gso import parallel
-from gso.dataset import cluster, hdf, manifest, shard
+from gso import cluster, parallel
+from gso.dataset import hdf, manifest, shard
 from gso.dataset.claim import claimed
 from gso.dataset.labels import KINDS, REFERENCES
 from gso.dataset.recipe import Recipe, versions

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from gso.parallel import spread
+from gso import cluster, parallel
 from gso.result import Result
 from gso.spelling import known_keywords
 from gso.tno.optimize import optimize
@@ -36,7 +36,11 @@ def _one(keywords: dict[str, Any], mesh: Any) -> Result:
 
 @known_keywords(optimize)
 def optimize_many(
-    meshes: Iterable[Any], *, workers: int | None = None, **keywords: Any
+    meshes: Iterable[Any],
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    **keywords: Any,
 ) -> Iterator[Item]:
     """Optimise many surfaces in parallel processes, and yield results as they finish.
 
@@ -47,6 +51,8 @@ def optimize_many(
         generator of any length fits in memory.
     workers : int, optional
         Number of worker processes; the number of cores when not given, 0 to solve in this one.
+    scheduler : str, optional
+        Address of a Dask scheduler, such as ``tcp://host:8786``, whose workers solve instead.
     **keywords
         Passed to :func:`gso.tno.optimize`; a `callback` is ignored.
 
@@ -67,6 +73,11 @@ def optimize_many(
     if isinstance(keywords.get("constraints"), Iterator):
         # The first surface would exhaust the iterator.
         keywords["constraints"] = list(keywords["constraints"])
-    with closing(spread(partial(_one, keywords), meshes, workers=workers)) as results:
+    work = partial(_one, keywords)
+    if scheduler is None:
+        spread = parallel.spread(work, meshes, workers=workers)
+    else:
+        spread = cluster.spread(work, meshes, scheduler=scheduler)
+    with closing(spread) as results:
         for done in results:
             yield Item(done.index, done.value, done.error)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Generator, Iterable
 from importlib.util import find_spec
 from typing import Any
 
-from gso.errors import DatasetError, GSOError
+from gso.errors import GSOError, SchedulerError
 from gso.parallel import Done
 
 #: Seconds within which a scheduler must answer.
@@ -37,23 +37,25 @@ def spread(
 
     Raises
     ------
-    DatasetError
+    SchedulerError
         Dask is not installed, the scheduler does not answer, or it has no workers.
     """
     if find_spec("distributed") is None:
-        raise DatasetError('a scheduler needs Dask: pip install ".[cluster]" in the folder of gso')
+        raise SchedulerError(
+            'a scheduler needs Dask: pip install ".[cluster]" in the folder of gso'
+        )
     from distributed import Client, as_completed
 
     try:
         client = Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, RuntimeError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise DatasetError(f"no Dask scheduler answers at {scheduler}: {reason}") from None
+        raise SchedulerError(f"no Dask scheduler answers at {scheduler}: {reason}") from None
     with client:
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
         except TimeoutError:
-            raise DatasetError(f"the Dask scheduler at {scheduler} has no workers") from None
+            raise SchedulerError(f"the Dask scheduler at {scheduler} has no workers") from None
         numbered = enumerate(pieces)
         waiting: dict[Any, int] = {}
         running = as_completed(loop=client.loop)

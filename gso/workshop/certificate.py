@@ -1,0 +1,139 @@
+"""The certificate: what was made, measured against what was asked."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import platform
+from collections.abc import Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from gso.mesh import Mesh
+from gso.workshop.finish import Finish
+from gso.workshop.panels import Made, Panel
+from gso.workshop.part import Part
+
+#: Entries of a record that are lengths, in the mesh's unit.
+_LENGTHS = ("diagonal", "allowed", "deviation_mean", "deviation_max", "bend_radius_min", "seam_gap")
+_PACKAGES = ("gso", "numpy", "scipy", "shapely", "ezdxf", "spyrrow")
+
+
+def digest(mesh: Mesh) -> str:
+    """Return the SHA-256 of a mesh's vertices and faces."""
+    out = hashlib.sha256()
+    for array in (mesh.vertices.astype("<f8"), mesh.faces.astype("<i8")):
+        out.update(repr(array.shape).encode())
+        out.update(np.ascontiguousarray(array).tobytes())
+    return out.hexdigest()
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that matter."""
+    out = {"python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            out[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return out
+
+
+def design_record(
+    made: Made,
+    panels: Sequence[Panel],
+    parts: Sequence[Part],
+    scale: float,
+    finish: Finish,
+    copies: Sequence[str],
+) -> dict[str, Any]:
+    """Describe one design and its parts, in millimetres.
+
+    Parameters
+    ----------
+    made : Made
+    panels : sequence of Panel
+        Its panels, with patterns in millimetres for the thickness of the sheet.
+    parts : sequence of Part
+        Its parts, in the same order.
+    scale : float
+        Millimetres per unit of the design.
+    finish : Finish
+    copies : sequence of str
+        Names of the designs that are made the same, itself included.
+    """
+    own = dict(made.record)
+    for name in _LENGTHS:
+        if own.get(name) is not None:
+            own[name] = scale * own[name]
+    if "deviation_at" in own:
+        own["deviation_at"] = [scale * x for x in own["deviation_at"]]
+    if "area" in own:
+        own["area"] = scale**2 * own["area"]
+    mismatch = [seam.mismatch(tuple(panels)) for seam in made.matings]
+    worst = int(np.argmax(mismatch)) if mismatch else -1
+    own |= {
+        "name": made.name,
+        "copies": list(copies),
+        "seams": len(made.matings),
+        "seam_mismatch_max": mismatch[worst] if mismatch else 0.0,
+        "seam_mismatch_at": made.matings[worst].number if mismatch else None,
+        "parts": [
+            part_record(panel, part, finish) for panel, part in zip(panels, parts, strict=True)
+        ],
+    }
+    return plain(own)
+
+
+def part_record(panel: Panel, part: Part, finish: Finish) -> dict[str, Any]:
+    """Describe one part, in millimetres: its size as it is drawn."""
+    wide, high = part.size
+    angles = np.degrees(np.abs(panel.angles))
+    return {
+        "name": part.name,
+        "count": part.count,
+        "length": wide,
+        "width": high,
+        "area": part.area,
+        "holes": len(part.holes),
+        "bends": len(part.bends),
+        "bend_angle_max": float(angles.max(initial=0.0)),
+        "bend_radius_min": float(panel.radii.min(initial=np.inf)),
+        "notches": len(part.notches),
+        "chord": chord(part.outline),
+    }
+
+
+def chord(outline: np.ndarray[Any, Any]) -> float:
+    """Estimate how far a polygon is from the smooth curve through its points.
+
+    Corners of more than 30 degrees count as corners of the curve.
+
+    >>> turn = np.linspace(0, 2 * np.pi, 101)[:-1]
+    >>> circle = 50.0 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    >>> round(chord(circle), 3)
+    0.025
+    """
+    way = np.roll(outline, -1, axis=0) - outline
+    size = np.linalg.norm(way, axis=1)
+    angle = np.arctan2(way[:, 1], way[:, 0])
+    turn = np.abs((np.diff(angle, prepend=angle[-1]) + np.pi) % (2.0 * np.pi) - np.pi)
+    smooth = np.where(turn < np.radians(30.0), turn, 0.0)
+    at_ends = np.maximum(smooth, np.roll(smooth, -1))
+    return float((size * at_ends / 8.0).max(initial=0.0))
+
+
+def plain(value: Any) -> Any:
+    """Replace what JSON lacks: NumPy numbers, and numbers that are not finite by None."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    if isinstance(value, bool | str) or value is None:
+        return value
+    if isinstance(value, int | np.integer):
+        return int(value)
+    number = float(value)
+    return number if math.isfinite(number) else None

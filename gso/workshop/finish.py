@@ -1,0 +1,69 @@
+"""How parts are finished for cutting and joining; lengths in millimetres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gso.errors import OptionError
+from gso.spelling import choices
+from gso.workshop.thickness import Thickness
+
+SIDES = ("outside", "inside")
+
+
+@dataclass(frozen=True)
+class Finish:
+    """How parts are finished.
+
+    Attributes
+    ----------
+    kerf : float
+        Width that the cutter removes; outlines are moved outwards by half of it.
+    allowance : float
+        Width that is added about the outline, for sewing, glueing or welding.
+    notches : float or None
+        Distance of the notches along seams; None for none.
+    registration : (float, float) or None
+        Diameter of registration holes beside the notches, and their distance from the seam.
+    tabs : float or None
+        Width of tabs along one side of each seam, for paper.
+    labels : float or None
+        Height of the texts; None for none.
+    grain : bool
+        Whether the grain runs along the part's length.
+    face : {"outside", "inside"}
+        The face that is up; patterns of the inside are mirrored.
+    thickness : Thickness or None
+        The sheet's thickness, in millimetres.
+    """
+
+    kerf: float = 0.0
+    allowance: float = 0.0
+    notches: float | None = 50.0
+    registration: tuple[float, float] | None = None
+    tabs: float | None = None
+    labels: float | None = 6.0
+    grain: bool = False
+    face: str = "outside"
+    thickness: Thickness | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("kerf", "allowance", "notches", "tabs", "labels"):
+            value = getattr(self, name)
+            least = 0.0 if name in ("kerf", "allowance") else 1e-300
+            real = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+            if value is not None and not (real and least <= value < np.inf):
+                raise OptionError(f"{name} is {value!r}; it must be a positive length")
+        if self.registration is not None:
+            pair = np.asarray(self.registration, float)
+            if pair.shape != (2,) or not ((pair > 0) & np.isfinite(pair)).all():
+                raise OptionError(
+                    f"registration is {self.registration!r}; it must be the diameter of holes and "
+                    "their distance from the seam"
+                )
+        if self.face not in SIDES:
+            raise OptionError(f"no face {self.face!r}; {choices(self.face, SIDES)}")
+        if self.tabs is not None and self.allowance:
+            raise OptionError("tabs and allowance exclude each other; leave one of them out")

@@ -1,0 +1,125 @@
+"""Seams between panels: chains of corresponding points on both sides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from gso.mesh.polyline import Polylines
+from gso.pattern import Pattern
+from gso.seams.chains import chains
+from gso.seams.pieces import Pieces
+from gso.typing import Array, Ints
+from gso.workshop.panels import Mating, Panel, Side
+
+
+def of_pattern(points: Array, pattern: Pattern, label: Ints, local: Ints) -> list[Mating]:
+    """Find the seams of a pattern that is cut.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 3)
+        Vertices of the surface.
+    pattern : Pattern
+    label, local : ndarray of int, (p,)
+        The panel of each vertex of the pattern, and its number in it.
+    """
+    seams = pattern.seams
+    if not len(seams):
+        return []
+    edges = pattern.vertex[seams[:, 0]]
+    sides = label[seams[:, :, 0]]
+    ahead = _directed(pattern, seams)
+    known: dict[tuple[int, int], tuple[Ints, bool]] = {}
+    for k, (a, b) in enumerate(edges.tolist()):
+        known[a, b], known[b, a] = (seams[k], ahead[k]), (seams[k][:, ::-1], not ahead[k])
+    out = []
+    for _, line in chains(edges, sides):
+        both: list[list[int]] = [[], []]
+        for a, b in pairwise(line.tolist()):
+            copies, first = known[a, b]
+            # The first side is the one whose faces lie to the left of the chain.
+            for side, ends in zip(both, copies if first else copies[::-1], strict=True):
+                side += ends.tolist() if not side else [int(ends[1])]
+        one, two = (_side(np.array(side), label, local) for side in both)
+        out.append(Mating(0, _lengths(points[line]), one, two))
+    return out
+
+
+def across(
+    pieces: Pieces, moved: Array, owner: Sequence[int], panels: Sequence[Panel], rims: list[Ints]
+) -> list[Mating]:
+    """Find the seams between pieces whose panels follow them within a distance.
+
+    Parameters
+    ----------
+    pieces : Pieces
+        The design cut open.
+    moved : ndarray, (p, 3)
+        For each vertex of the opened design, its place on its own panels.
+    owner : sequence of int
+        The piece of each panel.
+    panels : sequence of Panel
+    rims : list of ndarray of int, (e, 2)
+        The edges of each panel's outline that are no seam within its piece.
+    """
+    opened = pieces.opened
+    label = np.full(len(opened.vertex), -1)
+    for number, part in enumerate(pieces.parts):
+        label[part.vertices] = number
+    flat = Pattern(opened.mesh.vertices[:, :2], opened.mesh.faces, opened.vertex, opened.seams)
+    out = []
+    for seam in of_pattern(pieces.design.vertices, flat, label, np.arange(len(label))):
+        feet = []
+        for side in (seam.one, seam.two):
+            own = [k for k, piece in enumerate(owner) if piece == side.panel]
+            feet.append(_nearest(moved[side.edges[:, 0]], own, panels, rims))
+        change = np.flatnonzero(np.diff(feet[0][0]) | np.diff(feet[1][0])) + 1
+        for a, b in pairwise([0, *change.tolist(), len(seam.along)]):
+            if b - a > 1:
+                one, two = (
+                    Side(int(panel[a]), edges[a:b], share[a:b]) for panel, edges, share in feet
+                )
+                out.append(Mating(0, seam.along[a:b] - seam.along[a], one, two))
+    return out
+
+
+def numbered(matings: Sequence[Mating]) -> tuple[Mating, ...]:
+    """Number seams from 1 on, the longest first."""
+    order = np.argsort([-seam.length for seam in matings], kind="stable").tolist()
+    return tuple(
+        Mating(number, matings[k].along, matings[k].one, matings[k].two)
+        for number, k in enumerate(order, start=1)
+    )
+
+
+def _directed(pattern: Pattern, seams: Ints) -> list[bool]:
+    """Tell whether the faces of the first copy of each seam edge lie to its left."""
+    he = pattern.mesh.half_edges
+    n = len(pattern.flat)
+    keys = he.origin * n + he.dest
+    first = seams[:, 0]
+    return np.isin(first[:, 0] * n + first[:, 1], keys[he.face >= 0]).tolist()
+
+
+def _side(vertices: Ints, label: Ints, local: Ints) -> Side:
+    return Side.of(int(label[vertices[0]]), local[vertices])
+
+
+def _lengths(line: Array) -> Array:
+    return np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
+
+
+def _nearest(
+    points: Array, own: Sequence[int], panels: Sequence[Panel], rims: list[Ints]
+) -> tuple[Ints, Ints, Array]:
+    """Find the nearest places on the outlines of some panels: panel, edge, share of each point."""
+    edges = np.concatenate([rims[k] for k in own])
+    which = np.repeat(list(own), [len(rims[k]) for k in own])
+    ends = np.concatenate([panels[k].surface.vertices[rims[k]] for k in own])
+    unused = np.zeros((len(ends), 2), bool), np.zeros((len(ends), 2, 3))
+    feet = Polylines(ends[:, 0], ends[:, 1], *unused).nearest(points)
+    share = np.clip(feet.along, 0.0, 1.0)
+    return which[feet.segment], edges[feet.segment], share

@@ -1,0 +1,195 @@
+"""Flat panels of a made surface, and the seams along which they meet; in the mesh's unit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from gso.errors import MeshError
+from gso.mesh import Mesh
+from gso.pattern import Bend
+from gso.typing import Array, Ints
+
+_ARRAYS = ("points", "faces", "flat", "bends", "angles", "radii")
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One flat panel: a surface in space and its pattern, with the same numbering.
+
+    Attributes
+    ----------
+    name : str
+    surface : Mesh
+        The panel in space, a disk or a disk with holes.
+    flat : ndarray, (n, 2)
+        Its pattern, outside face up.
+    bends : ndarray of int, (b, 2)
+        Edges to bend along.
+    angles, radii : ndarray, (b,)
+        Their angles in radians, positive for mountain folds, and the radii of the bends.
+    """
+
+    name: str
+    surface: Mesh
+    flat: Array
+    bends: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    angles: Array = field(default_factory=lambda: np.empty(0))
+    radii: Array = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def lines(self) -> list[Bend]:
+        """The bends as lines of the pattern."""
+        ends = self.flat[self.bends]
+        every = zip(ends, self.angles.tolist(), self.radii.tolist(), strict=True)
+        return [Bend(line, angle, radius) for line, angle, radius in every]
+
+    @cached_property
+    def loops(self) -> list[Ints]:
+        """Boundary loops, the outer one first, as indices of vertices."""
+        loops = self.surface.boundary_loops
+        size = [float(np.ptp(self.flat[loop], axis=0).prod()) for loop in loops]
+        return [loops[k] for k in np.argsort([-s for s in size], kind="stable")]
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One side of a seam: points on edges of a panel.
+
+    Attributes
+    ----------
+    panel : int
+    edges : ndarray of int, (k, 2)
+        The edge of each point.
+    shares : ndarray, (k,)
+        Its place between both ends, 0 to 1.
+    """
+
+    panel: int
+    edges: Ints
+    shares: Array
+
+    @classmethod
+    def of(cls, panel: int, vertices: Ints) -> Side:
+        """Make a side of a chain of vertices."""
+        return cls(panel, np.stack([vertices, vertices], axis=1), np.zeros(len(vertices)))
+
+    def on(self, points: Array) -> Array:
+        """Return the places (k, d) for positions (n, d) of the panel's vertices."""
+        a, b = points[self.edges].transpose(1, 0, 2)
+        return np.asarray(a + self.shares[:, None] * (b - a))
+
+
+@dataclass(frozen=True, eq=False)
+class Mating:
+    """A seam: corresponding points on the outlines of two panels, or twice of the same.
+
+    Attributes
+    ----------
+    number : int
+        The number that both sides are marked with.
+    along : ndarray, (k,)
+        Arc length of the seam in space up to each point.
+    one, two : Side
+        The same points on both sides.
+    """
+
+    number: int
+    along: Array
+    one: Side
+    two: Side
+
+    @property
+    def length(self) -> float:
+        """Length of the seam in space."""
+        return float(self.along[-1])
+
+    def mismatch(self, panels: tuple[Panel, ...]) -> float:
+        """Return how much the lengths of both sides in the patterns differ at most."""
+        both = []
+        for side in (self.one, self.two):
+            line = side.on(panels[side.panel].flat)
+            both.append(np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        return float(np.ptp(both[0] - both[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """What was made of one design.
+
+    Attributes
+    ----------
+    name : str
+    panels : tuple of Panel
+    matings : tuple of Mating
+    record : dict
+        What was measured, JSON-compatible: lengths in the mesh's unit.
+    """
+
+    name: str
+    panels: tuple[Panel, ...]
+    matings: tuple[Mating, ...]
+    record: dict[str, Any]
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why it cannot be used as what was asked for."""
+        return list(self.record.get("reasons", ()))
+
+    def named(self, name: str) -> Made:
+        """Return it with another name, which its panels begin with."""
+        panels = tuple(replace(p, name=name + p.name[len(self.name) :]) for p in self.panels)
+        return replace(self, name=name, panels=panels)
+
+    def arrays(self) -> dict[str, Any]:
+        """Return panels and seams as arrays by name."""
+        said = json.dumps([panel.name for panel in self.panels]).encode()
+        out: dict[str, Any] = {"names": np.frombuffer(said, np.uint8)}
+        for k, panel in enumerate(self.panels):
+            parts = (panel.surface.vertices, panel.surface.faces, panel.flat)
+            every = (*parts, panel.bends, panel.angles, panel.radii)
+            out |= {f"panel{k}_{name}": x for name, x in zip(_ARRAYS, every, strict=True)}
+        for k, seam in enumerate(self.matings):
+            out[f"seam{k}_along"] = seam.along
+            out[f"seam{k}_number"] = np.array(seam.number)
+            for name, side in (("one", seam.one), ("two", seam.two)):
+                out[f"seam{k}_{name}_edges"] = side.edges
+                out[f"seam{k}_{name}_shares"] = side.shares
+                out[f"seam{k}_{name}_panel"] = np.array(side.panel)
+        return out
+
+    @classmethod
+    def from_arrays(cls, name: str, data: Mapping[str, Any], record: dict[str, Any]) -> Made:
+        """Return what :meth:`arrays` describes.
+
+        Raises
+        ------
+        MeshError
+            The arrays do not fit each other.
+        """
+        try:
+            panels = []
+            for k, own in enumerate(json.loads(data["names"].tobytes())):
+                points, faces, *rest = (data[f"panel{k}_{part}"] for part in _ARRAYS)
+                panels.append(Panel(str(own), Mesh(points, faces), *rest))
+            matings: list[Mating] = []
+            while f"seam{len(matings)}_along" in data:
+                k = len(matings)
+                one, two = (
+                    Side(
+                        int(data[f"seam{k}_{side}_panel"]),
+                        data[f"seam{k}_{side}_edges"],
+                        data[f"seam{k}_{side}_shares"],
+                    )
+                    for side in ("one", "two")
+                )
+                number = int(data[f"seam{k}_number"])
+                matings.append(Mating(number, data[f"seam{k}_along"], one, two))
+        except (KeyError, ValueError, TypeError) as error:
+            raise MeshError(f"the arrays of {name} do not fit each other: {error}") from None
+        return cls(name, tuple(panels), tuple(matings), record)

@@ -1,0 +1,185 @@
+"""A flat part as the cutter sees it, in millimetres, with its outside face up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from gso.pattern import Bend
+from gso.typing import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Label:
+    """A text on a part.
+
+    Attributes
+    ----------
+    text : str
+    at : ndarray, (2,)
+        The middle of the text.
+    height : float
+        Height of capital letters, in millimetres.
+    angle : float
+        Direction of the line of text, in radians.
+    """
+
+    text: str
+    at: Array
+    height: float
+    angle: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Notch:
+    """A mark on an outline, where it meets the same mark of another part.
+
+    Attributes
+    ----------
+    at : ndarray, (2,)
+        Its place on the outline.
+    inward : ndarray, (2,)
+        Unit vector across the outline, into the part.
+    text : str
+        What stands beside it, the same on both parts.
+    """
+
+    at: Array
+    inward: Array
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A flat part.
+
+    Attributes
+    ----------
+    name : str
+    outline : ndarray, (k, 2)
+        What is cut: a closed polygon, anticlockwise, the first point not repeated.
+    holes : tuple of ndarray, (h, 2)
+        Closed polygons, clockwise.
+    bends : tuple of Bend
+        Straight lines to bend along: angles in radians, positive for mountain folds.
+    creases : tuple of ndarray, (k, 2)
+        Lines to fold along that are not bends of the sheet, such as those of tabs.
+    marks : tuple of ndarray, (k, 2)
+        Lines to engrave.
+    seams : tuple of ndarray, (k, 2)
+        Lines to sew, glue or weld along, inside an allowance; closed if the first point is
+        repeated.
+    notches : tuple of Notch
+    labels : tuple of Label
+    grain : ndarray, (2,), or None
+        Direction of the grain, a unit vector; None if any will do.
+    count : int
+        How many of it are needed.
+    """
+
+    name: str
+    outline: Array
+    holes: tuple[Array, ...] = ()
+    bends: tuple[Bend, ...] = ()
+    creases: tuple[Array, ...] = ()
+    marks: tuple[Array, ...] = ()
+    seams: tuple[Array, ...] = ()
+    notches: tuple[Notch, ...] = ()
+    labels: tuple[Label, ...] = ()
+    grain: Array | None = None
+    count: int = 1
+
+    @cached_property
+    def area(self) -> float:
+        """Area in square millimetres, without holes."""
+        return signed_area(self.outline) + sum(signed_area(hole) for hole in self.holes)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height as it lies."""
+        wide, high = np.ptp(self.outline, axis=0).tolist()
+        return wide, high
+
+    @property
+    def low(self) -> Array:
+        """The lower left corner of its bounding rectangle, (2,)."""
+        return np.asarray(self.outline.min(axis=0))
+
+    def turned(self, angle: float) -> Part:
+        """Return the part turned about the origin by an angle in radians, anticlockwise.
+
+        >>> square = Part("a", np.array([[0.0, 0], [2, 0], [2, 1], [0, 1]]))
+        >>> [round(x, 9) for x in square.turned(np.pi / 2).size]
+        [1.0, 2.0]
+        """
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, s], [-s, c]])
+        return self._mapped(lambda points: points @ turn, lambda way: way @ turn, angle)
+
+    def shifted(self, by: Array) -> Part:
+        """Return the part moved by a vector (2,)."""
+        step = np.asarray(by, float)
+        return self._mapped(lambda points: points + step, lambda way: way, 0.0)
+
+    def _mapped(
+        self, move: Callable[[Array], Array], turn: Callable[[Array], Array], angle: float
+    ) -> Part:
+        def each(lines: Sequence[Array]) -> tuple[Array, ...]:
+            return tuple(move(line) for line in lines)
+
+        return replace(
+            self,
+            outline=move(self.outline),
+            holes=each(self.holes),
+            bends=tuple(b._replace(line=move(b.line)) for b in self.bends),
+            creases=each(self.creases),
+            marks=each(self.marks),
+            seams=each(self.seams),
+            notches=tuple(replace(n, at=move(n.at), inward=turn(n.inward)) for n in self.notches),
+            labels=tuple(
+                replace(label, at=move(label.at), angle=label.angle + angle)
+                for label in self.labels
+            ),
+            grain=None if self.grain is None else turn(self.grain),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """Parts on a sheet, or side by side, to be written to a file.
+
+    Attributes
+    ----------
+    parts : tuple of Part
+        In their places.
+    sheet : (float, float) or None
+        Length and width of the sheet, whose lower left corner is the origin; None if the parts
+        are on no sheet.
+    title : str
+    """
+
+    parts: tuple[Part, ...]
+    sheet: tuple[float, float] | None = None
+    title: str = ""
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """The lower left and the upper right corner, (2,) each."""
+        points = [part.outline for part in self.parts]
+        if self.sheet is not None:
+            points.append(np.array([[0.0, 0.0], self.sheet]))
+        every = np.concatenate(points)
+        return every.min(axis=0), every.max(axis=0)
+
+
+def signed_area(polygon: Array) -> float:
+    """Return the area of a closed polygon (k, 2), positive if it is anticlockwise.
+
+    >>> signed_area(np.array([[0.0, 0], [2, 0], [2, 1], [0, 1]]))
+    2.0
+    """
+    x, y = (polygon - polygon[0]).T
+    return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))

@@ -1,0 +1,177 @@
+"""Parts of panels: outline, bends, notches, labels, holes and tabs, in millimetres."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gso.pattern import Bend
+from gso.segmentation.sheets import rectangle
+from gso.typing import Array
+from gso.workshop.finish import Finish
+from gso.workshop.offsets import offset, with_allowance
+from gso.workshop.panels import Made, Mating, Panel, Side
+from gso.workshop.part import Label, Notch, Part, signed_area
+from gso.workshop.tabs import with_tabs
+from gso.workshop.thickness import thickened
+
+#: Angle, in radians, up to which a bend is not drawn.
+_FLAT = 1e-6
+#: Corners of the polygon of a registration hole.
+_ROUND = 48
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A seam on one part, in its place.
+
+    Attributes
+    ----------
+    number : int
+    line : ndarray, (k, 2)
+        Its points on the outline, the part to the left.
+    along : ndarray, (k,)
+        Their arc length in space.
+    first : bool
+        Whether it is the side that gets tabs.
+    """
+
+    number: int
+    line: Array
+    along: Array
+    first: bool
+
+
+def parts_of(made: Made, scale: float, finish: Finish) -> list[Part]:
+    """Make the parts of a design.
+
+    Parameters
+    ----------
+    made : Made
+    scale : float
+        Millimetres per unit of length of the design.
+    finish : Finish
+    """
+    panels = scaled(made.panels, scale, finish)
+    joints: list[list[Joint]] = [[] for _ in panels]
+    for seam in made.matings:
+        for side, first in ((seam.one, True), (seam.two, False)):
+            joints[side.panel].append(_joint(panels[side.panel], seam, side, scale, first))
+    return [part_of(p, j, finish) for p, j in zip(panels, joints, strict=True)]
+
+
+def scaled(panels: Sequence[Panel], scale: float, finish: Finish) -> list[Panel]:
+    """Return panels whose patterns are in millimetres, for the thickness of the sheet."""
+    out = []
+    for panel in panels:
+        own = replace(panel, flat=scale * panel.flat, radii=scale * panel.radii)
+        out.append(own if finish.thickness is None else thickened(own, finish.thickness))
+    return out
+
+
+def part_of(panel: Panel, joints: Sequence[Joint], finish: Finish) -> Part:
+    """Make the part of one panel, whose pattern is in millimetres, long side along x."""
+    loops = [panel.flat[loop] for loop in panel.loops]
+    outline = loops[0] if signed_area(loops[0]) > 0 else loops[0][::-1]
+    holes = [hole if signed_area(hole) < 0 else hole[::-1] for hole in loops[1:]]
+    bends = tuple(b for b in panel.lines if abs(b.angle) > _FLAT)
+    part = Part(panel.name, outline, tuple(holes), bends)
+    part = replace(part, notches=_notches(joints, finish))
+    if finish.registration is not None:
+        part = _registered(part, *finish.registration)
+    if finish.tabs is not None:
+        part = with_tabs(part, [j.line for j in joints if j.first], finish.tabs)
+    part = offset(with_allowance(part, finish.allowance), 0.5 * finish.kerf)
+    part = part.turned(-rectangle(part.outline)[0])
+    if finish.face == "inside":
+        part = mirrored(part)
+    part = part.shifted(-part.low)
+    if finish.labels is not None:
+        part = replace(part, labels=(_name(part, finish.labels),))
+    return replace(part, grain=np.array([1.0, 0.0])) if finish.grain else part
+
+
+def mirrored(part: Part) -> Part:
+    """Return a part turned over: what was up is down, and mountain folds are valley folds."""
+    flip = np.array([-1.0, 1.0])
+    return replace(
+        part,
+        outline=(part.outline * flip)[::-1],
+        holes=tuple((hole * flip)[::-1] for hole in part.holes),
+        bends=tuple(Bend(b.line * flip, -b.angle, b.radius) for b in part.bends),
+        creases=tuple(line * flip for line in part.creases),
+        marks=tuple(line * flip for line in part.marks),
+        seams=tuple((line * flip)[::-1] for line in part.seams),
+        notches=tuple(replace(n, at=n.at * flip, inward=n.inward * flip) for n in part.notches),
+        labels=tuple(replace(la, at=la.at * flip, angle=-la.angle) for la in part.labels),
+        grain=None if part.grain is None else part.grain * flip,
+    )
+
+
+def _joint(panel: Panel, seam: Mating, side: Side, scale: float, first: bool) -> Joint:
+    line, along = side.on(panel.flat), scale * seam.along
+    if not first:
+        line, along = line[::-1], along[-1] - along[::-1]
+    return Joint(seam.number, line, along, first)
+
+
+def places(length: float, spacing: float) -> Array:
+    """Return the arc lengths of the notches of a seam: an odd number of them, evenly.
+
+    >>> places(100.0, 30.0).tolist()
+    [25.0, 50.0, 75.0]
+    """
+    count = max(int(length / spacing), 1)
+    count += 1 - count % 2
+    return length * np.arange(1, count + 1) / (count + 1)
+
+
+def _notches(joints: Sequence[Joint], finish: Finish) -> tuple[Notch, ...]:
+    if finish.notches is None:
+        return ()
+    out = []
+    for joint in joints:
+        if not joint.along[-1] > 0:
+            continue
+        at = places(float(joint.along[-1]), finish.notches)
+        # Both sides of a seam have their notches at the same points of the surface.
+        k = np.clip(np.searchsorted(joint.along, at, "right") - 1, 0, len(joint.along) - 2)
+        step = joint.along[k + 1] - joint.along[k]
+        share = (at - joint.along[k]) / np.maximum(step, 1e-300)
+        way = joint.line[k + 1] - joint.line[k]
+        points = joint.line[k] + share[:, None] * way
+        inward = np.stack([-way[:, 1], way[:, 0]], axis=1)
+        inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-300)
+        out += [Notch(p, n, str(joint.number)) for p, n in zip(points, inward, strict=True)]
+    return tuple(out)
+
+
+def _registered(part: Part, diameter: float, inset: float) -> Part:
+    """Add holes beside the notches, where they are inside the part and apart from each other."""
+    import shapely
+
+    inside = shapely.Polygon(part.outline, part.holes).buffer(-0.75 * diameter)
+    turn = -2.0 * np.pi * np.arange(_ROUND) / _ROUND
+    ring = 0.5 * diameter * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    taken: list[Array] = []
+    for notch in part.notches:
+        middle = notch.at + inset * notch.inward
+        near = any(np.linalg.norm(middle - other) < 2.0 * diameter for other in taken)
+        if not near and inside.contains(shapely.Point(middle)):
+            taken.append(middle)
+    return replace(part, holes=(*part.holes, *(ring + middle for middle in taken)))
+
+
+def _name(part: Part, height: float) -> Label:
+    """Place the name where there is most room, no larger than fits."""
+    import shapely
+
+    shape = shapely.make_valid(shapely.Polygon(part.outline, part.holes))
+    radius = shapely.maximum_inscribed_circle(shape)
+    middle, rim = np.asarray(radius.coords)
+    room = float(np.linalg.norm(rim - middle))
+    # A letter is about 0.7 of its height wide.
+    fits = 2.0 * room / max(0.7 * len(part.name), 1.0)
+    return Label(part.name, middle, min(height, fits))

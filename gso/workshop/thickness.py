@@ -1,0 +1,162 @@
+"""The thickness of sheets: how much longer or shorter a pattern is than the surface.
+
+A bend of angle a about an inner radius R takes the length ``a (R + k T)`` of a sheet of thickness
+T, where k, the K-factor, says where between both faces the neutral surface lies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gso.errors import OptionError
+from gso.spelling import choices
+from gso.typing import Array, Ints
+from gso.workshop.panels import Panel
+
+FACES = ("middle", "outside", "inside")
+
+
+@dataclass(frozen=True)
+class Thickness:
+    """A sheet's thickness and how it bends; lengths in the unit of the panels.
+
+    Attributes
+    ----------
+    sheet : float
+        Thickness T.
+    k : float
+        K-factor: the neutral surface's distance from the inner face of a bend, over T.
+    face : {"middle", "outside", "inside"}
+        The face of the sheet that the design's surface is.
+    radius : float or None
+        Inner radius of the tool that folds sharp bends. None: the sheet is rolled, with the radii
+        of the surface.
+    table : array_like, (k, 2), or None
+        Bend deductions of sharp bends: angles in radians, increasing, and how much shorter the
+        pattern is than both flanges outside, to the apex. Between them it is interpolated.
+
+    Examples
+    --------
+    A quarter of a cylinder, rolled, the design being the outside:
+
+    >>> sheet = Thickness(2.0, k=0.5, face="outside")
+    >>> float(sheet.change(np.pi / 2)) / (np.pi / 2)
+    -1.0
+    """
+
+    sheet: float
+    k: float = 0.5
+    face: str = "middle"
+    radius: float | None = None
+    table: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.sheet < np.inf:
+            raise OptionError(f"the thickness is {self.sheet!r}; it must be a positive length")
+        if not 0 <= self.k <= 1:
+            raise OptionError(f"the K-factor is {self.k!r}; it must be 0 to 1")
+        if self.face not in FACES:
+            raise OptionError(f"no face {self.face!r}; {choices(self.face, FACES)}")
+        if self.radius is not None and not 0 <= self.radius < np.inf:
+            raise OptionError(f"the bend radius is {self.radius!r}; it must be 0 or more")
+        if self.table is not None:
+            rows = np.asarray(self.table, float)
+            good = rows.ndim == 2 and rows.shape[1:] == (2,) and len(rows) >= 1
+            if not (good and np.isfinite(rows).all() and (np.diff(rows[:, 0]) > 0).all()):
+                raise OptionError(
+                    "the bend table must have rows of an angle and a deduction, angles increasing"
+                )
+
+    def change(self, angle: ArrayLike) -> Array:
+        """Return how much longer the pattern is across bends of some angles than the surface.
+
+        Parameters
+        ----------
+        angle : array_like
+            In radians, positive for mountain folds.
+        """
+        turn = np.asarray(angle, float)
+        size, thick = np.abs(turn), self.sheet
+        # Distance of the design's surface from the inner face of the bend.
+        outside = {"middle": 0.5, "outside": 1.0, "inside": 0.0}[self.face]
+        design = thick * np.where(turn >= 0, outside, 1.0 - outside)
+        if self.table is not None:
+            rows = np.asarray(self.table, float)
+            deduction = np.interp(size, *rows.T)
+            return np.asarray(2.0 * (thick - design) * np.tan(0.5 * size) - deduction)
+        if self.radius is None:
+            return np.asarray(size * (self.k * thick - design))
+        around = size * (self.radius + self.k * thick)
+        return np.asarray(around - 2.0 * (self.radius + design) * np.tan(0.5 * size))
+
+
+def thickened(panel: Panel, thickness: Thickness) -> Panel:
+    """Return a panel with the pattern of a sheet of some thickness.
+
+    Plates between bends are moved apart or together along the normals of the bends.
+    """
+    if not len(panel.bends):
+        return panel
+    plate, pairs, ends = _plates(panel)
+    p, q = panel.flat[ends].transpose(1, 0, 2)
+    way = q - p
+    normal = np.stack([-way[:, 1], way[:, 0]], axis=1)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    count = int(plate.max()) + 1
+    # The normal points from the first plate of each pair to the second.
+    step = thickness.change(panel.angles)[:, None] * normal
+    shift = _solved(count, pairs, step)
+    total, often = np.zeros((len(panel.flat), 2)), np.zeros(len(panel.flat))
+    faces = panel.surface.faces
+    rows, corner = np.nonzero(faces >= 0)
+    # A vertex on a bend belongs to both plates, each of which counts once.
+    both = np.unique(np.stack([faces[rows, corner], plate[rows]], axis=1), axis=0)
+    np.add.at(total, both[:, 0], shift[both[:, 1]])
+    np.add.at(often, both[:, 0], 1.0)
+    return replace(panel, flat=panel.flat + total / np.maximum(often, 1.0)[:, None])
+
+
+def _plates(panel: Panel) -> tuple[Ints, Ints, Ints]:
+    """Return the plate of each face, and for each bend its two plates and its ends.
+
+    Seen along a bend from its first end, the second plate lies to the left.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    he, n = panel.surface.half_edges, len(panel.flat)
+    k = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    keys = np.sort(np.stack([he.origin[k], he.dest[k]], axis=1), axis=1) @ np.array([n, 1])
+    wanted = np.sort(panel.bends, axis=1) @ np.array([n, 1])
+    order = np.argsort(keys)
+    bent = k[order[np.searchsorted(keys[order], wanted)]]
+    keep = k[~np.isin(k, bent)]
+    count = len(panel.surface.faces)
+    graph = coo_matrix(
+        (np.ones(len(keep)), (he.face[keep], he.face[he.twin[keep]])), shape=(count, count)
+    )
+    plate = connected_components(graph, directed=False)[1].astype(np.int64)
+    # The faces of a half-edge lie to its left.
+    pairs = np.stack([plate[he.face[he.twin[bent]]], plate[he.face[bent]]], axis=1)
+    return plate, pairs, np.stack([he.origin[bent], he.dest[bent]], axis=1)
+
+
+def _solved(count: int, pairs: Ints, step: Array) -> Array:
+    """Return the shift of each plate (count, 2) from the steps between pairs; the first stays."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.linalg import lsqr
+
+    rows = np.arange(len(pairs))
+    matrix = coo_matrix(
+        (
+            np.r_[-np.ones(len(pairs)), np.ones(len(pairs))],
+            (np.r_[rows, rows], np.r_[pairs[:, 0], pairs[:, 1]]),
+        ),
+        shape=(len(pairs), count),
+    ).tocsr()
+    out = [lsqr(matrix, step[:, d], atol=1e-14, btol=1e-14, iter_lim=20 * count)[0] for d in (0, 1)]
+    shift = np.stack(out, axis=1)
+    return shift - shift[0]

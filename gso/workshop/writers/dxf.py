@@ -1,0 +1,165 @@
+"""Flat parts as DXF drawings in millimetres: a layer per operation, a group per part."""
+
+from __future__ import annotations
+
+import io
+import re
+import uuid
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from gso.io.atomic import check_writable, replacing
+from gso.pattern import Bend
+from gso.spelling import known_keywords
+from gso.workshop.part import Drawing
+from gso.workshop.writers import strokes
+from gso.workshop.writers.checks import check, require
+from gso.workshop.writers.layers import layer_set
+from gso.workshop.writers.strokes import Line, Text
+
+SUFFIX = ".dxf"
+APPLICATION = "GSO"
+"""Name of the application under which bends have extended data: a string, ``mountain`` or
+``valley``; a real (1040), the angle in degrees; a distance (1041), the radius, if there is one."""
+
+_MILLIMETRES = 4
+# Line width in hundredths of a millimetre.
+_WIDTH = 25
+# The first of January 2000 as a Julian date, for files that do not depend on the clock.
+_DATE = "2451544.5"
+_NO_GUID = "{00000000-0000-0000-0000-000000000000}"
+
+
+@known_keywords()
+def write(
+    drawing: Drawing,
+    path: str | PathLike[str],
+    *,
+    layers: str = "operations",
+    bend_text: bool = False,
+) -> None:
+    """Write parts as a DXF drawing (R2010) at the scale 1:1, in millimetres.
+
+    Everything is in the modelspace: outlines and holes as closed polylines, bends as lines,
+    labels as texts. Each part is a group of its name. Bends have their direction, angle in
+    degrees and radius as extended data of the application ``GSO``. The border of the sheet is
+    on a layer that is not plotted. Equal drawings give equal files.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    path : str or PathLike
+        A file whose name ends in .dxf. It is replaced only when the new one is complete.
+    layers : {"operations", "astm"}
+        Names of the layers: operations, or the numbers of ASTM D6673.
+    bend_text : bool
+        Also write the direction, angle and radius beside each bend.
+
+    Raises
+    ------
+    OptionError
+        Unknown layers.
+    MeshError
+        The drawing is empty, a part is not usable, or the file cannot be written.
+    GSOError
+        ezdxf is not installed.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> from gso.workshop.part import Part
+    >>> plate = Part("plate", np.array([[0.0, 0], [80, 0], [80, 50], [0, 50]]))
+    >>> path = os.path.join(tempfile.mkdtemp(), "plate.dxf")
+    >>> write(Drawing((plate,)), path)
+    >>> import ezdxf
+    >>> [(e.dxftype(), e.dxf.layer) for e in ezdxf.readfile(path).modelspace()]
+    [('LWPOLYLINE', 'CUT')]
+    """
+    require("ezdxf", "DXF files")
+    check_writable(path, (SUFFIX,))
+    check(drawing)
+    chosen = layer_set(layers)
+    document = _document(drawing)
+    for layer in dict.fromkeys(chosen.values()):
+        made = document.layers.add(layer.name, color=layer.index, lineweight=_WIDTH)
+        made.dxf.plot = int(layer.plotted)
+    space = document.modelspace()
+    for border in strokes.sheet(drawing):
+        _line(space, border, chosen["sheet"].name)
+    for part, name in zip(drawing.parts, strokes.identifiers(drawing.parts), strict=True):
+        made = [
+            _line(space, line, chosen[line.kind].name)
+            for line in strokes.lines(part)
+            if line.kind in chosen
+        ]
+        made += [_text(space, t, chosen["text"].name) for t in strokes.texts(part, bend_text)]
+        times = f", {part.count} times" if part.count != 1 else ""
+        group = document.groups.new(name, description=strokes.printable(part.name) + times)
+        group.extend(made)
+    stream = io.StringIO()
+    document.write(stream)
+    with replacing(path) as file:
+        file.write(document.encode(_without_clock(stream.getvalue())))
+
+
+def _document(drawing: Drawing) -> Any:
+    """Make an empty document whose view shows the whole drawing."""
+    import ezdxf
+
+    document = ezdxf.new("R2010", units=_MILLIMETRES)
+    document.header["$MEASUREMENT"] = 1
+    document.header["$LWDISPLAY"] = 1
+    document.appids.new(APPLICATION)
+    low, high = drawing.bounds
+    space = document.modelspace()
+    space.reset_extents((*low.tolist(), 0.0), (*high.tolist(), 0.0))
+    space.reset_limits(tuple(low.tolist()), tuple(high.tolist()))
+    tall = 1.1 * float(max(high[1] - low[1], 0.5 * (high[0] - low[0])))
+    document.set_modelspace_vport(tall, center=tuple((0.5 * (low + high)).tolist()))
+    return document
+
+
+def _line(space: Any, line: Line, layer: str) -> Any:
+    if len(line.points) > 2:
+        return space.add_lwpolyline(
+            line.points.tolist(), format="xy", close=line.closed, dxfattribs={"layer": layer}
+        )
+    start, end = line.points.tolist()
+    made = space.add_line(start, end, dxfattribs={"layer": layer})
+    if line.bend is not None:
+        made.set_xdata(APPLICATION, _data(line.bend))
+    return made
+
+
+def _data(bend: Bend) -> list[tuple[int, str | float]]:
+    data: list[tuple[int, str | float]] = [
+        (1000, "mountain" if bend.angle > 0 else "valley"),
+        (1040, float(abs(np.degrees(bend.angle)))),
+    ]
+    return [*data, (1041, float(bend.radius))] if np.isfinite(bend.radius) else data
+
+
+def _text(space: Any, text: Text, layer: str) -> Any:
+    from ezdxf.enums import TextEntityAlignment
+
+    made = space.add_text(
+        text.text,
+        height=text.height,
+        rotation=float(np.degrees(text.angle)),
+        dxfattribs={"layer": layer},
+    )
+    return made.set_placement(text.at.tolist(), align=TextEntityAlignment.MIDDLE_CENTER)
+
+
+def _without_clock(text: str) -> str:
+    """Replace the dates and random identifiers of a file, so that equal drawings are equal files.
+
+    The new identifiers are made from the content.
+    """
+    text = re.sub(r"(\n\$TDU?(?:CREATE|UPDATE)\n *40\n)[^\n]*", rf"\g<1>{_DATE}", text)
+    text = re.sub(r"(\n\$(?:FINGERPRINT|VERSION)GUID\n *2\n)[^\n]*", rf"\g<1>{_NO_GUID}", text)
+    text = re.sub(r"(\n *1\n[\w.]+) @ \d{4}-\d\d-\d\dT[^\n]*(?=\n)", r"\g<1>", text)
+    own = str(uuid.uuid5(uuid.NAMESPACE_OID, text)).upper()
+    return text.replace(_NO_GUID, f"{{{own}}}", 2)

@@ -1,0 +1,238 @@
+"""What is drawn of a part: lines and texts of a kind each, the same in all formats."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from gso.pattern import Bend
+from gso.typing import Array
+from gso.workshop.part import Drawing, Part
+
+# A bend by less is none, in radians.
+_FLAT = 1e-9
+# Length of notches in millimetres, and its largest fraction of a part's smaller side.
+_NOTCH = 4.0
+_SHARE = 0.1
+# Height of texts beside notches, as a fraction of the notches' length.
+_BESIDE = 0.75
+# Height of texts beside bends in millimetres, and its largest fraction of the bend's length.
+_BEND_TEXT = 3.0
+_BEND_SHARE = 0.08
+# Length of the grain line as a fraction of the part's, and of its head as one of the line's.
+_GRAIN = 0.6
+_HEAD = 0.08
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A polyline.
+
+    Attributes
+    ----------
+    kind : str
+        ``outline``, ``hole``, ``mountain``, ``valley``, ``crease``, ``mark``, ``seam``,
+        ``notch``, ``grain``, ``arrow`` (the head of the grain line) or ``sheet``.
+    points : ndarray, (k, 2)
+        In millimetres. The first point of a closed line is not repeated.
+    closed : bool
+    bend : Bend, optional
+        The bend along it.
+    """
+
+    kind: str
+    points: Array
+    closed: bool = False
+    bend: Bend | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """A line of text of the kind ``text``.
+
+    Attributes
+    ----------
+    text : str
+        Printable characters only.
+    at : ndarray, (2,)
+        Its middle, in millimetres.
+    height : float
+        Height of capital letters.
+    angle : float
+        Direction in radians.
+    """
+
+    kind: ClassVar[str] = "text"
+
+    text: str
+    at: Array
+    height: float
+    angle: float = 0.0
+
+    @property
+    def start(self) -> Array:
+        """The middle of its base line, (2,)."""
+        up = np.array([-np.sin(self.angle), np.cos(self.angle)])
+        return np.asarray(self.at - 0.5 * self.height * up)
+
+
+def lines(part: Part) -> list[Line]:
+    """Return the lines of a part, the outline last.
+
+    Parameters
+    ----------
+    part : Part
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0], [60, 0], [60, 60], [0, 60]])
+    >>> bend = Bend(np.array([[30.0, 0], [30, 60]]), np.pi / 2, 1.5)
+    >>> [line.kind for line in lines(Part("a", square, bends=(bend,), grain=np.array([0.0, 1])))]
+    ['grain', 'arrow', 'mountain', 'outline']
+    """
+    drawn = [] if part.grain is None else _grain(part, part.grain)
+    drawn += [_line("mark", line) for line in part.marks]
+    drawn += [_line("crease", line) for line in part.creases]
+    depth = _depth(part)
+    for notch in part.notches:
+        drawn.append(Line("notch", np.stack([notch.at, notch.at + depth * notch.inward])))
+    drawn += [
+        Line("mountain" if bend.angle > 0 else "valley", np.asarray(bend.line), bend=bend)
+        for bend in _bends(part)
+    ]
+    drawn += [_line("seam", line) for line in part.seams]
+    drawn += [_line("hole", line, closed=True) for line in part.holes]
+    return [*drawn, _line("outline", part.outline, closed=True)]
+
+
+def texts(part: Part, bend_text: bool = False) -> list[Text]:
+    """Return the texts of a part: its labels, those of its notches and, if asked for, its bends.
+
+    Parameters
+    ----------
+    part : Part
+    bend_text : bool
+        Whether each bend has a text with its direction, angle and radius.
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0], [60, 0], [60, 60], [0, 60]])
+    >>> bend = Bend(np.array([[30.0, 0], [30, 60]]), np.pi / 2, 1.5)
+    >>> [text.text for text in texts(Part("a", square, bends=(bend,)), bend_text=True)]
+    ['down 90 deg R 1.5']
+    """
+    found = [Text(printable(x.text), x.at, x.height, x.angle) for x in part.labels]
+    depth = _depth(part)
+    height = _BESIDE * depth
+    for notch in part.notches:
+        at = notch.at + (depth + height) * notch.inward
+        found.append(Text(printable(notch.text), at, height))
+    for bend in _bends(part) if bend_text else []:
+        step = bend.line[1] - bend.line[0]
+        high = min(_BEND_TEXT, _BEND_SHARE * float(np.hypot(*step)))
+        # Readable from below or from the right.
+        step = step if (step[0], step[1]) > (1e-9 * abs(step[1]), 0) else -step
+        angle = float(np.arctan2(step[1], step[0]))
+        up = np.array([-np.sin(angle), np.cos(angle)])
+        way = "down" if bend.angle > 0 else "up"
+        words = f"{way} {abs(np.degrees(bend.angle)):.4g} deg"
+        if np.isfinite(bend.radius):
+            words += f" R {bend.radius:.4g}"
+        found.append(Text(words, np.mean(bend.line, axis=0) + high * up, high, angle))
+    return [text for text in found if text.text and text.height > 0]
+
+
+def sheet(drawing: Drawing) -> list[Line]:
+    """Return the border of the sheet; nothing if there is no sheet.
+
+    >>> square = Part("a", np.array([[0.0, 0], [60, 0], [60, 60], [0, 60]]))
+    >>> [line.points.tolist() for line in sheet(Drawing((square,), sheet=(90.0, 70.0)))]
+    [[[0.0, 0.0], [90.0, 0.0], [90.0, 70.0], [0.0, 70.0]]]
+    """
+    if drawing.sheet is None:
+        return []
+    wide, high = drawing.sheet
+    corners = np.array([[0.0, 0.0], [wide, 0.0], [wide, high], [0.0, high]])
+    return [Line("sheet", corners, closed=True)]
+
+
+def about(bend: Bend) -> str:
+    """Describe a bend.
+
+    >>> about(Bend(np.zeros((2, 2)), np.radians(12.3), 45.6))
+    'mountain 12.3 degrees, radius 45.6 mm'
+    """
+    name = "mountain" if bend.angle > 0 else "valley"
+    radius = f", radius {bend.radius:.4g} mm" if np.isfinite(bend.radius) else ""
+    return f"{name} {abs(np.degrees(bend.angle)):.4g} degrees{radius}"
+
+
+def identifiers(parts: Iterable[Part]) -> list[str]:
+    """Make names of groups from the names of parts: without special characters, all different.
+
+    >>> square = np.array([[0.0, 0], [60, 0], [60, 60], [0, 60]])
+    >>> identifiers([Part(name, square) for name in ("left/1", "Left 1", "")])
+    ['left_1', 'Left_1-2', 'part']
+    """
+    taken: set[str] = set()
+    made = []
+    for part in parts:
+        base = re.sub(r"[^\w.-]+", "_", part.name)[:100].strip("_") or "part"
+        name, number = base, 2
+        while name.casefold() in taken:
+            name, number = f"{base}-{number}", number + 1
+        taken.add(name.casefold())
+        made.append(name)
+    return made
+
+
+def printable(text: str) -> str:
+    r"""Return a text as one line of printable characters.
+
+    >>> printable("panel 3\n x 2\x00")
+    'panel 3 x 2'
+    """
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def _line(kind: str, points: Array, closed: bool = False) -> Line:
+    line = np.asarray(points, float)
+    if len(line) > 3 and np.array_equal(line[0], line[-1]):
+        return Line(kind, line[:-1], closed=True)
+    return Line(kind, line, closed)
+
+
+def _bends(part: Part) -> list[Bend]:
+    return [bend for bend in part.bends if abs(bend.angle) >= _FLAT]
+
+
+def _depth(part: Part) -> float:
+    return min(_NOTCH, _SHARE * min(part.size))
+
+
+def _grain(part: Part, grain: Array) -> list[Line]:
+    """Return the grain line, inside the part and close to its middle, and the head of its arrow."""
+    along = grain / np.hypot(*grain)
+    across = np.array([-along[1], along[0]])
+    low, high = part.outline.min(axis=0), part.outline.max(axis=0)
+    middle = 0.5 * (low + high)
+    crossed = []
+    for polygon in (part.outline, *part.holes):
+        x, y = (polygon - middle) @ along, (polygon - middle) @ across
+        x1, y1 = np.roll(x, -1), np.roll(y, -1)
+        cut = (y > 0) != (y1 > 0)
+        crossed.append(x[cut] + (x1 - x)[cut] * (y / np.where(cut, y - y1, 1.0))[cut])
+    ends = np.sort(np.concatenate(crossed))[: 2 * (sum(map(len, crossed)) // 2)].reshape(-1, 2)
+    if len(ends) == 0:
+        ends = 0.5 * min(part.size) * np.array([[-1.0, 1.0]])
+    start, end = ends[np.argmax(np.ptp(ends, axis=1))]
+    half = 0.5 * _GRAIN * (end - start)
+    centre = middle + 0.5 * (start + end) * along
+    tail, tip = centre - half * along, centre + half * along
+    back, side = 2 * _HEAD * half * along, _HEAD * half * across
+    head = np.stack([tip - back + side, tip, tip - back - side])
+    return [Line("grain", np.stack([tail, tip])), Line("arrow", head)]

@@ -1,0 +1,254 @@
+"""Panels, parts and their finish: what a workshop gets of a surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+import gso
+from gso.errors import MeshError, OptionError
+from gso.mesh import Mesh
+from gso.workshop.asking import Ask
+from gso.workshop.congruent import origins
+from gso.workshop.finish import Finish
+from gso.workshop.making import made
+from gso.workshop.offsets import offset, with_allowance
+from gso.workshop.panels import Made
+from gso.workshop.part import Part, signed_area
+from gso.workshop.parts import mirrored, parts_of, scaled
+from gso.workshop.thickness import Thickness
+from tests.test_pieces import dome
+
+
+def arch(n: int = 65, turn: float = np.pi / 2, radius: float = 1.0, long: float = 2.0) -> Mesh:
+    """A sector of a cylinder, outside face up."""
+    t = np.linspace(0, turn, n)
+    y = np.linspace(0, long, 9)
+    t, y = np.meshgrid(t, y, indexing="ij")
+    return gso.as_mesh(np.stack([radius * np.sin(t), y, radius * np.cos(t)], axis=-1))
+
+
+def cone(n: int = 65, turn: float = np.pi / 2) -> Mesh:
+    """A sector of a cone between the slant lengths 1 and 2, half angle 30 degrees."""
+    t, s = np.meshgrid(np.linspace(0, turn, n), np.linspace(1, 2, 9), indexing="ij")
+    r = s * np.sin(np.pi / 6)
+    return gso.as_mesh(np.stack([r * np.sin(t), -s * np.cos(np.pi / 6), r * np.cos(t)], axis=-1))
+
+
+SQUARE = Part("square", np.array([[0.0, 0], [100, 0], [100, 50], [0, 50]]))
+
+
+def bent(angles, width=1.0, radius=np.inf):
+    """A panel of plates of the same width, folded along parallel lines."""
+    from gso.workshop.panels import Panel
+
+    count = len(angles) + 1
+    x = width * np.arange(count + 1)
+    flat = np.stack([np.repeat(x, 2), np.tile([0.0, 1.0], count + 1)], axis=1)
+    k = 2 * np.arange(count)
+    faces = np.stack([k, k + 2, k + 3, k + 1], axis=1)
+    bends = np.stack([k[1:], k[1:] + 1], axis=1)
+    radii = np.full(len(angles), radius)
+    return Panel(
+        "p", Mesh(np.c_[flat, 0 * flat[:, 0]], faces), flat, bends, np.array(angles), radii
+    )
+
+
+def outline_length(part):
+    return np.linalg.norm(np.roll(part.outline, -1, axis=0) - part.outline, axis=1).sum()
+
+
+class TestThickness:
+    @pytest.mark.parametrize("face, radius", [("middle", 1.0), ("outside", 0.98), ("inside", 1.02)])
+    def test_a_rolled_cylinder_has_the_length_of_its_neutral_surface(self, face, radius):
+        # The design is a cylinder of radius 1; the sheet is 0.04 thick.
+        n = 400
+        angle = np.pi / 2 / n
+        panel = bent([angle] * (n - 1), width=2 * np.sin(angle / 2))
+        sheet = Thickness(0.04, k=0.5, face=face)
+        from gso.workshop.thickness import thickened
+
+        long = np.ptp(thickened(panel, sheet).flat[:, 0])
+        # Of n bends only n - 1 are inside; the others are halves at both ends.
+        want = radius * np.pi / 2 - (radius - 1.0) * angle
+        assert long == pytest.approx(want, rel=2e-6)
+
+    def test_a_valley_is_changed_the_other_way(self):
+        sheet = Thickness(0.1, k=0.4, face="outside")
+        up, down = sheet.change(0.3), sheet.change(-0.3)
+        assert up == pytest.approx(0.3 * (0.04 - 0.1))
+        assert down == pytest.approx(0.3 * 0.04)
+
+    def test_a_folded_bend_takes_the_length_of_the_standard_formula(self):
+        thick, inner, k = 2.0, 3.0, 0.42
+        sheet = Thickness(thick, k=k, face="outside", radius=inner)
+        allowance = np.pi / 2 * (inner + k * thick)
+        # Two flanges of 50 outside, up to the apex.
+        assert 100 + sheet.change(np.pi / 2) == pytest.approx(100 + allowance - 2 * (inner + thick))
+
+    def test_a_bend_table_is_interpolated(self):
+        table = [[0.0, 0.0], [np.pi / 2, 4.0]]
+        sheet = Thickness(2.0, face="outside", table=table)
+        assert sheet.change(np.pi / 4) == pytest.approx(-2.0)
+        with pytest.raises(OptionError, match="increasing"):
+            Thickness(2.0, table=[[1.0, 1.0], [0.5, 2.0]])
+
+    def test_plates_keep_their_shape(self):
+        from gso.workshop.thickness import thickened
+
+        panel = bent([0.4, -0.3, 0.2])
+        after = thickened(panel, Thickness(0.1, k=0.3)).flat
+        wide = np.diff(after[::2, 0])
+        change = Thickness(0.1, k=0.3).change([0.4, -0.3, 0.2])
+        # A vertex on a bend lies in the middle of what is inserted.
+        want = 1.0 + 0.5 * np.r_[change[0], change[:-1] + change[1:], change[-1]]
+        np.testing.assert_allclose(wide, want, atol=1e-9)
+
+    @pytest.mark.parametrize("bad", [{"sheet": 0}, {"sheet": 1, "k": 2}, {"sheet": 1, "face": "x"}])
+    def test_wrong_values_are_refused(self, bad):
+        with pytest.raises(OptionError):
+            Thickness(**bad)
+
+
+class TestOffsets:
+    def test_kerf_and_allowance_move_the_outline_outwards(self):
+        hole = np.array([[40.0, 20], [40, 30], [60, 30], [60, 20]])
+        part = replace(SQUARE, holes=(hole,))
+        wide = offset(part, 1.0)
+        assert wide.size == pytest.approx((102, 52))
+        assert signed_area(wide.holes[0]) == pytest.approx(-18 * 8)
+        sewn = with_allowance(part, 10.0)
+        assert sewn.size == pytest.approx((120, 70))
+        np.testing.assert_allclose(sewn.seams[0][:-1], part.outline)
+
+    def test_an_outline_that_falls_apart_is_named(self):
+        with pytest.raises(MeshError, match="part square"):
+            offset(SQUARE, -30.0)
+
+    def test_turning_over_mirrors_and_swaps_folds(self):
+        part = parts_of(made("arch", arch(), Ask()), 100.0, Finish())[0]
+        back = mirrored(part)
+        assert back.area == pytest.approx(part.area)
+        assert [b.angle for b in back.bends] == [-b.angle for b in part.bends]
+
+
+class TestParts:
+    def test_a_cylinder_is_a_rectangle_with_mountain_folds(self):
+        part = parts_of(made("arch", arch(), Ask()), 1000.0, Finish(notches=None))[0]
+        # The arc is a polygon of 64 chords; the strip is fitted within a tenth of a per mille.
+        assert part.size == pytest.approx((2000.0, 500 * np.pi), rel=3e-4)
+        assert part.area == pytest.approx(part.size[0] * part.size[1], rel=1e-3)
+        assert len(part.bends) > 8
+        # Rulings that run into corners may bend a little the other way.
+        assert all(bend.angle > 0 for bend in part.bends if abs(bend.angle) > np.radians(2))
+        assert sum(bend.angle for bend in part.bends) == pytest.approx(np.pi / 2, rel=0.1)
+        # Long side along x, lower left corner at the origin.
+        np.testing.assert_allclose(part.low, 0, atol=1e-9)
+
+    def test_the_inside_of_a_cylinder_has_valley_folds(self):
+        mesh = arch()
+        inside = Mesh(mesh.vertices, mesh.faces[:, ::-1])
+        part = parts_of(made("arch", inside, Ask()), 1000.0, Finish())[0]
+        assert all(bend.angle < 0 for bend in part.bends if abs(bend.angle) > np.radians(2))
+
+    def test_notches_of_strips_are_at_the_same_places_of_both_sides(self):
+        design = dome(17, height=0.6)
+        whole = made("dome", design, Ask(max_deviation=0.03 * design.diagonal))
+        assert len(whole.panels) > 1
+        parts = parts_of(whole, 100.0, Finish(notches=20.0))
+        strips = [s for s in whole.matings if s.mismatch(whole.panels) < 1e-9]
+        assert strips
+        for seam in strips:
+            both = []
+            for side in (seam.one, seam.two):
+                own = [n for n in parts[side.panel].notches if n.text == str(seam.number)]
+                both.append(np.array([n.at for n in own]))
+            one, two = both
+            step = [np.linalg.norm(np.diff(x, axis=0), axis=1) for x in (one, two[::-1])]
+            assert len(one) % 2 == 1
+            # Straight distances are equal as the pieces of outline between are congruent only
+            # where the seam is straight; arc lengths are equal anyway.
+            assert seam.mismatch(whole.panels) * 100.0 < 1e-6 * 100.0 * design.diagonal
+            assert len(step[0]) == len(step[1])
+
+    def test_notches_point_into_the_part(self):
+        design = dome(17, height=0.6)
+        whole = made("dome", design, Ask(max_deviation=0.03 * design.diagonal))
+        for part in parts_of(whole, 100.0, Finish(notches=30.0, labels=None)):
+            shape = shapely.Polygon(part.outline)
+            for notch in part.notches:
+                assert shape.exterior.distance(shapely.Point(notch.at)) < 1e-6
+                assert shape.contains(shapely.Point(notch.at + 0.05 * notch.inward))
+
+    def test_tabs_lie_outside_and_do_not_overlap(self):
+        design = dome(17, height=0.6)
+        whole = made("dome", design, Ask(max_deviation=0.03 * design.diagonal))
+        plain = parts_of(whole, 100.0, Finish(notches=None, labels=None))
+        tabbed = parts_of(whole, 100.0, Finish(notches=None, labels=None, tabs=5.0))
+        assert sum(len(part.creases) for part in tabbed) > 0
+        for before, after in zip(plain, tabbed, strict=True):
+            assert after.area >= before.area - 1e-6
+            assert shapely.Polygon(after.outline).is_valid
+
+    def test_registration_holes_are_inside(self):
+        design = dome(17, height=0.6)
+        whole = made("dome", design, Ask(max_deviation=0.03 * design.diagonal))
+        parts = parts_of(whole, 100.0, Finish(notches=30.0, registration=(1.0, 2.0)))
+        assert any(part.holes for part in parts)
+        for part in parts:
+            shape = shapely.Polygon(part.outline)
+            assert all(shape.contains(shapely.Polygon(hole)) for hole in part.holes)
+
+    def test_areas_agree_with_the_surface(self):
+        design = dome(17, height=0.4)
+        whole = made("dome", design, Ask(formulation="flatten", max_strain=0.01))
+        strain = whole.record["strain_max"]
+        for panel, part in zip(
+            whole.panels, parts_of(whole, 1.0, Finish(labels=None)), strict=True
+        ):
+            own = gso.metrics.area(panel.surface)
+            assert abs(part.area - own) <= (2 * strain + strain**2) * own
+
+
+class TestMaking:
+    def test_a_strongly_curved_design_is_cut_into_pieces(self):
+        whole = made("dome", dome(17, height=1.0), Ask())
+        assert not whole.reasons
+        assert whole.record["pieces"] > 1
+        assert whole.record["deviation_max"] <= 1.000001 * whole.record["allowed"]
+        assert whole.record["strain_p99"] <= 1e-3
+        for seam in whole.matings:
+            assert seam.mismatch(whole.panels) <= 2.0 * whole.record["allowed"]
+
+    def test_what_cannot_be_made_says_so_and_gives_the_best(self):
+        design = dome(9, height=1.0)
+        whole = made("dome", design, Ask(max_deviation=1e-6))
+        assert whole.reasons
+        assert len(whole.panels) > 0
+        assert whole.record["deviation_max"] > 1e-6
+
+    def test_it_can_be_stored_and_read_again(self, tmp_path):
+        from gso.workshop.work import key, store, stored
+
+        design, ask = dome(9), Ask()
+        whole = made("dome", design, ask)
+        path = tmp_path / "dome.npz"
+        store(whole, key(design, ask), path)
+        again = stored("dome", key(design, ask), path)
+        assert isinstance(again, Made)
+        assert len(again.matings) == len(whole.matings)
+        for one, two in zip(scaled(whole.panels, 1, Finish()), again.panels, strict=True):
+            np.testing.assert_array_equal(one.flat, two.flat)
+        assert stored("dome", key(dome(9, 0.3), ask), path) is None
+        path.write_bytes(b"damaged")
+        assert stored("dome", key(design, ask), path) is None
+
+    def test_moved_copies_are_found_and_mirrored_ones_are_not(self):
+        mesh = dome(9)
+        u = mesh.vertices * [1.0, 1.5, 1.0] + 0.1 * mesh.vertices[:, :1] * [0, 1, 0]
+        turn = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+        meshes = [Mesh(p, mesh.faces) for p in (u, u @ turn + 3.0, u * [-1, 1, 1])]
+        assert origins(meshes) == [0, 0, 2]
