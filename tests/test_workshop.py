@@ -252,3 +252,34 @@ class TestMaking:
         turn = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
         meshes = [Mesh(p, mesh.faces) for p in (u, u @ turn + 3.0, u * [-1, 1, 1])]
         assert origins(meshes) == [0, 0, 2]
+
+
+class TestMarks:
+    def test_points_go_to_the_pattern_and_back(self):
+        from gso.workshop.marks import to_pattern, to_surface
+
+        whole = made("dome", dome(17, height=0.6), Ask())
+        rng = np.random.default_rng(0)
+        for k, panel in enumerate(whole.panels):
+            triangles = panel.surface.triangles
+            some = rng.integers(len(triangles), size=20)
+            share = rng.dirichlet([2, 2, 2], size=20)
+            points = np.einsum("kc,kcd->kd", share, panel.surface.vertices[triangles[some]])
+            number, flat = to_pattern(whole.panels, points)
+            assert (number == k).all()
+            np.testing.assert_allclose(to_surface(panel, flat), points, atol=1e-9)
+
+    def test_marks_and_holes_are_drawn_on_the_part_they_are_on(self):
+        t = np.linspace(0.4, 1.0, 20)
+        line = np.stack([np.sin(t), 0 * t + 0.5, np.cos(t)], axis=1)
+        turn = np.linspace(0, 2 * np.pi, 30)
+        angle, y = 0.8 + 0.1 * np.cos(turn), 1.2 + 0.1 * np.sin(turn)
+        ring = np.stack([np.sin(angle), y, np.cos(angle)], axis=1)
+        whole = made("arch", arch(), Ask())
+        (part,) = parts_of(whole, 100.0, Finish(), [line], [ring])
+        assert len(part.marks) == 1
+        size = np.linalg.norm(np.diff(part.marks[0], axis=0), axis=1).sum()
+        assert size == pytest.approx(60.0, rel=2e-3)
+        assert signed_area(part.holes[0]) == pytest.approx(-np.pi * 100.0, rel=2e-2)
+        with pytest.raises(OptionError, match="hole is not inside part arch"):
+            parts_of(whole, 100.0, Finish(), [], [ring - [0, 1.2, 0]])

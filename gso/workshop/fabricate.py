@@ -13,7 +13,10 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from gso import cluster, io, parallel
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gso import cluster, io, metrics, parallel
 from gso.errors import GSOError, MeshError, OptionError
 from gso.io.svg import MILLIMETRES
 from gso.mesh import Mesh
@@ -29,7 +32,7 @@ from gso.workshop.nesting import nest
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.parts import parts_of, scaled
-from gso.workshop.work import key, store, stored
+from gso.workshop.work import key, store, stored, work_on
 from gso.workshop.writing import written
 
 
@@ -80,6 +83,8 @@ def fabricate(
     darts: bool = False,
     min_radius: float | None = None,
     finish: Finish = Finish(),  # noqa: B008
+    marks: Sequence[ArrayLike] = (),
+    holes: Sequence[ArrayLike] = (),
     sheet: tuple[float, float] | None = None,
     spacing: float = 2.0,
     rotations: Any = (0, 180),
@@ -120,6 +125,8 @@ def fabricate(
         Smallest radius of a bend, in the design's unit.
     finish : Finish
         Kerf, allowance, notches, holes, tabs, labels, thickness; in millimetres.
+    marks, holes : sequence of array_like, (k, 3)
+        Lines to engrave, and closed lines to cut, on the designs' surfaces and in their unit.
     sheet : (float, float), optional
         Length and width of the sheets to nest on, in millimetres.
     spacing : float
@@ -176,10 +183,12 @@ def fabricate(
     except OSError as error:
         raise MeshError(f"{place}: {error.strerror}; -o names a folder") from None
     names, meshes = designs_of(designs)
-    first = origins(meshes)
+    # Marks are on one of several copies, so that these differ.
+    first = list(range(len(meshes))) if marks or holes else origins(meshes)
     chosen = sorted(set(first))
     found, failed = _made(names, meshes, chosen, ask, place, workers, scheduler, say)
     say("parts")
+    drawn = [(given, _nearest(meshes, given)) for given in (marks, holes)]
     parts: list[Part] = []
     records = []
     for k in chosen:
@@ -188,7 +197,8 @@ def fabricate(
             records.append({"name": names[k], "copies": copies, "reasons": [failed[k]]})
             continue
         one = found[k]
-        own = [replace(p, count=len(copies)) for p in parts_of(one, scale, finish)]
+        lines = ([x for x, n in zip(given, on, strict=True) if n == k] for given, on in drawn)
+        own = [replace(p, count=len(copies)) for p in parts_of(one, scale, finish, *lines)]
         panels = scaled(one.panels, scale, finish)
         records.append(
             design_record(one, panels, own, scale, finish, copies) | {"digest": digest(meshes[k])}
@@ -239,11 +249,15 @@ def fabricate(
     return Fabrication(place, tuple(parts), tuple(sheets), certificate, tuple(files))
 
 
-def _one(ask: Ask, folder: str, named: tuple[str, Mesh]) -> str:
-    """Make one design in a worker process, and store it."""
-    name, mesh = named
-    store(make(name, mesh, ask), key(mesh, ask), Path(folder) / f"{name}.npz")
-    return name
+def _nearest(meshes: Sequence[Mesh], lines: Sequence[ArrayLike]) -> list[int]:
+    """Return the number of the design that each line is nearest to."""
+    out = []
+    for line in lines:
+        points = np.asarray(line, float)
+        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+            raise OptionError(f"a mark or hole has shape {points.shape}; it must be points (k, 3)")
+        out.append(int(np.argmin([metrics.point_to_surface(points, m).mean() for m in meshes])))
+    return out
 
 
 def _made(
@@ -281,7 +295,7 @@ def _made(
             store(one, key(meshes[k], ask), place / "work" / f"{names[k]}.npz")
             found[k] = one
         return found, failed
-    work = partial(_one, ask, str((place / "work").resolve()))
+    work = partial(work_on, ask, str((place / "work").resolve()))
     items = ((names[k], meshes[k]) for k in todo)
     if scheduler is None:
         spread = parallel.spread(work, items, workers=workers, caller=False)

@@ -11,6 +11,7 @@ import numpy as np
 
 from gso import faults, metrics, parametrization
 from gso.errors import ConvergenceWarning, GSOError, MeshError
+from gso.io.surface import welded
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.result import Result
@@ -24,6 +25,8 @@ from gso.workshop.panels import Made, Mating, Panel, Side
 
 #: Share of the allowed distance that the pieces may use where strips follow them.
 _PIECES = 0.5
+#: Distance of vertices that are merged, relative to the diagonal.
+_SAME = 1e-9
 #: Share of the design's diagonal that is allowed where nothing is given.
 SHARE = 0.01
 
@@ -45,6 +48,10 @@ def made(name: str, design: Mesh, ask: Ask, say: Say = lambda said: None) -> Mad
     say : callable
         Called with what is being done.
     """
+    joined = welded(design, _SAME * design.diagonal)
+    if len(joined.vertices) < len(design.vertices):
+        # Poles of grids, whose edges have no length, become one vertex.
+        design = joined
     allowed = SHARE * design.diagonal if ask.max_deviation is None else ask.max_deviation
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)

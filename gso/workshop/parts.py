@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gso.pattern import Bend
 from gso.segmentation.sheets import rectangle
 from gso.typing import Array
 from gso.workshop.finish import Finish
+from gso.workshop.marks import marked, with_holes
 from gso.workshop.offsets import offset, with_allowance
 from gso.workshop.panels import Made, Mating, Panel, Side
 from gso.workshop.part import Label, Notch, Part, signed_area
@@ -44,7 +46,13 @@ class Joint:
     first: bool
 
 
-def parts_of(made: Made, scale: float, finish: Finish) -> list[Part]:
+def parts_of(
+    made: Made,
+    scale: float,
+    finish: Finish,
+    marks: Sequence[ArrayLike] = (),
+    holes: Sequence[ArrayLike] = (),
+) -> list[Part]:
     """Make the parts of a design.
 
     Parameters
@@ -53,13 +61,17 @@ def parts_of(made: Made, scale: float, finish: Finish) -> list[Part]:
     scale : float
         Millimetres per unit of length of the design.
     finish : Finish
+    marks, holes : sequence of array_like, (k, 3)
+        Lines to engrave, and closed lines to cut, on the surface.
     """
     panels = scaled(made.panels, scale, finish)
     joints: list[list[Joint]] = [[] for _ in panels]
     for seam in made.matings:
         for side, first in ((seam.one, True), (seam.two, False)):
             joints[side.panel].append(_joint(panels[side.panel], seam, side, scale, first))
-    return [part_of(p, j, finish) for p, j in zip(panels, joints, strict=True)]
+    flats = [panel.flat for panel in panels]
+    drawn, cut = (marked(made.panels, lines, flats) for lines in (marks, holes))
+    return [part_of(*own, finish) for own in zip(panels, joints, drawn, cut, strict=True)]
 
 
 def scaled(panels: Sequence[Panel], scale: float, finish: Finish) -> list[Panel]:
@@ -71,13 +83,19 @@ def scaled(panels: Sequence[Panel], scale: float, finish: Finish) -> list[Panel]
     return out
 
 
-def part_of(panel: Panel, joints: Sequence[Joint], finish: Finish) -> Part:
+def part_of(
+    panel: Panel,
+    joints: Sequence[Joint],
+    marks: Sequence[Array],
+    cut: Sequence[Array],
+    finish: Finish,
+) -> Part:
     """Make the part of one panel, whose pattern is in millimetres, long side along x."""
     loops = [panel.flat[loop] for loop in panel.loops]
     outline = loops[0] if signed_area(loops[0]) > 0 else loops[0][::-1]
     holes = [hole if signed_area(hole) < 0 else hole[::-1] for hole in loops[1:]]
     bends = tuple(b for b in panel.lines if abs(b.angle) > _FLAT)
-    part = Part(panel.name, outline, tuple(holes), bends)
+    part = with_holes(Part(panel.name, outline, tuple(holes), bends, marks=tuple(marks)), cut)
     part = replace(part, notches=_notches(joints, finish))
     if finish.registration is not None:
         part = _registered(part, *finish.registration)

@@ -13,6 +13,7 @@ from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import digest, plain
+from gso.workshop.making import made
 from gso.workshop.panels import Made
 
 #: Version of the files; those of another one are made again.
@@ -25,11 +26,18 @@ def key(design: Mesh, ask: Ask) -> str:
     return hashlib.sha256(said.encode()).hexdigest()
 
 
-def store(made: Made, own: str, path: Path) -> None:
+def store(one: Made, own: str, path: Path) -> None:
     """Write what was made; it replaces the file when it is complete."""
-    record = np.frombuffer(json.dumps([own, plain(made.record)]).encode(), np.uint8)
+    record = np.frombuffer(json.dumps([own, plain(one.record)]).encode(), np.uint8)
     with io.replacing(path) as file:
-        np.savez_compressed(file, record=record, **made.arrays())
+        np.savez_compressed(file, record=record, **one.arrays())
+
+
+def work_on(ask: Ask, folder: str, named: tuple[str, Mesh]) -> str:
+    """Make one design, given with its name, and store it; for worker processes."""
+    name, mesh = named
+    store(made(name, mesh, ask), key(mesh, ask), Path(folder) / f"{name}.npz")
+    return name
 
 
 def stored(name: str, own: str, path: Path) -> Made | None:
