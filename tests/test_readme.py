@@ -20,7 +20,11 @@ from gso.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.rst"
-GUIDE, REFERENCE = (ROOT / "docs" / f"{name}.rst" for name in ("guide", "reference"))
+GUIDE, REFERENCE, WORKSHOP = (
+    ROOT / "docs" / f"{name}.rst" for name in ("guide", "reference", "workshop")
+)
+#: Pages whose commands run.
+SHOWN = (README, GUIDE, WORKSHOP)
 PAGES = [README, *sorted((ROOT / "docs").glob("*.rst"))]
 
 
@@ -55,7 +59,7 @@ def workshop(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_python_blocks_run(page, workshop):
-    for package in ("OCP", "rhino3dm"):
+    for package in ("OCP", "rhino3dm", "ezdxf"):
         pytest.importorskip(package, exc_type=ImportError)
     scope = {}
     for number, code in enumerate(blocks(page, "python")):
@@ -72,7 +76,7 @@ def test_python_blocks_run(page, workshop):
 
 
 def test_commands_run(workshop):
-    lines = [line for line in commands(README) + commands(GUIDE) if line.startswith("gso ")]
+    lines = [line for page in SHOWN for line in commands(page) if line.startswith("gso ")]
     assert len(lines) > 10
     pytest.importorskip("matplotlib")
     pytest.importorskip("OCP", exc_type=ImportError)
@@ -81,13 +85,15 @@ def test_commands_run(workshop):
         words = [path for word in words for path in (sorted(glob.glob(word)) or [word])]
         done = CliRunner().invoke(main, words, prog_name="gso")
         assert done.exit_code == 0, (line, done.output)
-        if "-o" in words and not words[words.index("-o") + 1].endswith("/"):
+        if words[0] == "fabricate":
+            assert (Path(words[words.index("-o") + 1]) / "index.html").exists()
+        elif "-o" in words and not words[words.index("-o") + 1].endswith("/"):
             assert Path(words[words.index("-o") + 1]).stat().st_size > 0
     assert Path("out/a.ply").exists()
 
 
 def test_every_option_of_a_command_in_the_readme_exists():
-    ours = [line for line in commands(README) + commands(GUIDE) if line.startswith("gso ")]
+    ours = [line for page in SHOWN for line in commands(page) if line.startswith("gso ")]
     named = set(re.findall(r"--[a-z][a-z-]+", "\n".join(ours)))
     known = {name for c in main.commands.values() for p in c.params for name in p.opts}
     assert named <= known

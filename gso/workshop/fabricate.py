@@ -134,7 +134,7 @@ def fabricate(
     rotations : sequence of float, int or "any"
         Rotations on the sheet, see :func:`gso.workshop.nesting.nest`.
     seconds : float
-        Time for nesting each sheet.
+        Time for nesting, in all.
     formats : sequence of str
         Formats of parts and sheets.
     layers : {"operations", "astm"}

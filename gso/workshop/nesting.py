@@ -1,0 +1,379 @@
+"""Nesting: parts on sheets, with distances between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gso.errors import OptionError
+from gso.typing import Array
+from gso.workshop import sparrow
+from gso.workshop.part import Drawing, Part, signed_area
+from gso.workshop.rectangles import ORDERS, packed
+
+#: Largest number of corners of the polygons that are nested.
+_CORNERS = 150
+#: Tolerance of distances in the result, and what is asked for more, in millimetres.
+_TIGHT, _MORE = 1e-6, 1e-3
+#: Number of rotations that are tried where any is allowed, for rectangles.
+_ANY = 4
+#: Least time for a sheet, and how much more than a sheet's area is tried on it.
+_LEAST, _TRIED = 0.5, 1.4
+#: Share of the density of a first attempt that the second one aims at.
+_FULL = 1.0
+#: Largest number of sheets.
+_MOST = 500
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Nested:
+    """Parts on sheets.
+
+    Attributes
+    ----------
+    sheets : tuple of Drawing
+        Each with its parts in their places, every copy for itself.
+    utilisation : tuple of float
+        Area of the parts over that of the sheet, for each sheet.
+    density : float
+        Area of the parts over that of the sheets; of the last one the rectangle about its parts
+        counts.
+    method : {"spyrrow", "rectangles"}
+    notes : tuple of str
+    """
+
+    sheets: tuple[Drawing, ...]
+    utilisation: tuple[float, ...]
+    density: float
+    method: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Item:
+    """A part to be nested: its polygon about the origin, and its allowed angles in degrees."""
+
+    part: Part
+    shape: Array
+    angles: tuple[float, ...] | None
+
+
+def nest(
+    parts: Sequence[Part],
+    sheet: tuple[float, float],
+    *,
+    spacing: float = 2.0,
+    margin: float = 0.0,
+    rotations: Any = (0, 180),
+    seconds: float = 10.0,
+    seed: int = 0,
+    method: str | None = None,
+    callback: Say | None = None,
+) -> Nested:
+    """Nest parts on sheets of one size.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        Each is placed as often as its `count` says; holes stay empty. Parts with a grain are
+        turned by 0 or 180 degrees, or so that their grain runs along the sheet.
+    sheet : (float, float)
+        Length and width, in millimetres.
+    spacing, margin : float
+        Distance between parts, and from the border of the sheet.
+    rotations : sequence of float, int, or "any"
+        Allowed angles in degrees, or how many of them, evenly.
+    seconds : float
+        Time in all, about.
+    seed : int
+    method : {"spyrrow", "rectangles"}, optional
+        The denser of both when not given.
+    callback : callable, optional
+        Called with what is being done.
+
+    Returns
+    -------
+    Nested
+
+    Raises
+    ------
+    OptionError
+        A part is larger than the sheet, or an option is wrong.
+
+    Examples
+    --------
+    >>> square = Part("a", np.array([[0.0, 0], [40, 0], [40, 40], [0, 40]]), count=4)
+    >>> nested = nest([square], (100.0, 100.0), spacing=5.0, method="rectangles")
+    >>> len(nested.sheets), len(nested.sheets[0].parts), round(nested.utilisation[0], 2)
+    (1, 4, 0.64)
+    """
+    say = callback or (lambda said: None)
+    room = _checked(parts, sheet, spacing, margin, seconds, method)
+    items = [_item(part, rotations) for part in parts]
+    best = _rectangles(items, room, spacing)
+    notes: tuple[str, ...] = ()
+    if method != "rectangles":
+        each = seconds / _count(best)
+        placed, why = None, f"{seconds:g} seconds are too few for {_count(best)} sheets"
+        if each >= _LEAST or method == "spyrrow":
+            placed, why = _sparrow(items, room, spacing, each, seed, say)
+        if placed is None:
+            notes = (f"nested by rectangles: {why}",)
+        elif method == "spyrrow" or _value(placed) < _value(best):
+            return _result(placed, sheet, margin, "spyrrow", ())
+    return _result(best, sheet, margin, "rectangles", notes)
+
+
+def _checked(
+    parts: Sequence[Part],
+    sheet: tuple[float, float],
+    spacing: float,
+    margin: float,
+    seconds: float,
+    method: str | None,
+) -> tuple[float, float]:
+    """Check the options; return the room inside the margin."""
+    import shapely
+
+    size = np.asarray(sheet, float)
+    if size.shape != (2,) or not ((size > 0) & np.isfinite(size)).all():
+        raise OptionError(f"sheet is {sheet!r}; it must be length and width in millimetres")
+    for name, value in (("spacing", spacing), ("margin", margin)):
+        if not 0 <= value < np.inf:
+            raise OptionError(f"{name} is {value!r}; it must be a length of 0 or more")
+    if not 0 < seconds < np.inf:
+        raise OptionError(f"seconds is {seconds!r}; it must be a positive number")
+    if method not in (None, "spyrrow", "rectangles"):
+        raise OptionError(f"no method {method!r}; take 'spyrrow' or 'rectangles'")
+    if not parts:
+        raise OptionError("there are no parts to nest")
+    for part in parts:
+        if not shapely.Polygon(part.outline).is_valid:
+            raise OptionError(f"part {part.name} cannot be nested: its outline crosses itself")
+    long, wide = (size - 2.0 * margin).tolist()
+    if min(long, wide) <= 0:
+        raise OptionError(f"margin is {margin!r}, which leaves nothing of the sheet; lower it")
+    return long, wide
+
+
+def _item(part: Part, rotations: Any) -> _Item:
+    """Return a part about the origin, with its polygon made simpler without getting smaller."""
+    import shapely
+
+    own = part.shifted(-part.outline.mean(axis=0))
+    angles = _angles(rotations)
+    if part.grain is not None:
+        turn = -float(np.degrees(np.arctan2(part.grain[1], part.grain[0])))
+        angles = (turn, turn + 180.0)
+    outline = own.outline
+    grow = 1e-4 * float(np.ptp(outline, axis=0).max())
+    while len(outline) > _CORNERS:
+        wider = shapely.buffer(shapely.Polygon(own.outline), grow, join_style="mitre")
+        simple = shapely.simplify(wider, 0.9 * grow)
+        if simple.geom_type == "Polygon":
+            outline = np.asarray(simple.exterior.coords)[:-1]
+        grow *= 2.0
+    return _Item(own, outline if signed_area(outline) > 0 else outline[::-1], angles)
+
+
+def _angles(rotations: Any) -> tuple[float, ...] | None:
+    if isinstance(rotations, str) and rotations == "any":
+        return None
+    if isinstance(rotations, int | np.integer) and not isinstance(rotations, bool):
+        if rotations >= 1:
+            return tuple(360.0 * k / int(rotations) for k in range(int(rotations)))
+    else:
+        try:
+            some = np.asarray(rotations, float)
+        except (TypeError, ValueError):
+            some = np.empty((0, 0))
+        if some.ndim == 1 and some.size and np.isfinite(some).all():
+            return tuple(some.tolist())
+    raise OptionError(f"rotations is {rotations!r}; it must be angles, their number, or 'any'")
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """A part in its place in the room of a sheet."""
+
+    part: Part
+    sheet: int
+
+
+def _rectangles(items: Sequence[_Item], room: tuple[float, float], spacing: float) -> list[_Place]:
+    """Pack bounding rectangles in several orders, and return the best."""
+    from gso.segmentation.sheets import rectangle
+
+    copies: list[tuple[int, list[float]]] = []
+    sizes = []
+    for number, item in enumerate(items):
+        if item.angles is None:
+            flat = -float(np.degrees(rectangle(item.part.outline)[0]))
+            angles = [flat + 360.0 * k / _ANY for k in range(_ANY)]
+        else:
+            angles = list(item.angles)
+        turned = [item.part.turned(np.radians(a)).size for a in angles]
+        fits = [
+            k for k, (x, y) in enumerate(turned) if x <= room[0] + _TIGHT and y <= room[1] + _TIGHT
+        ]
+        if not fits:
+            x, y = turned[0]
+            raise OptionError(
+                f"part {item.part.name} is {x:.4g} by {y:.4g} mm, larger than the sheet of "
+                f"{room[0]:.4g} by {room[1]:.4g} mm inside its margin: take larger sheets, more "
+                "rotations, or smaller pieces (max_size)"
+            )
+        own = [angles[k] for k in fits]
+        copies += [(number, own)] * item.part.count
+        grown = [(turned[k][0] + spacing, turned[k][1] + spacing) for k in fits]
+        sizes += [grown] * item.part.count
+    best: list[_Place] | None = None
+    for order in ORDERS:
+        found = []
+        for place in packed(sizes, (room[0] + spacing, room[1] + spacing), order):
+            number, angles = copies[place.item]
+            part = items[number].part.turned(np.radians(angles[place.choice]))
+            part = replace(part.shifted(np.array([place.x, place.y]) - part.low), count=1)
+            found.append(_Place(part, place.sheet))
+        if best is None or _value(found) < _value(best):
+            best = found
+    return best or []
+
+
+def _sparrow(
+    items: Sequence[_Item],
+    room: tuple[float, float],
+    spacing: float,
+    seconds: float,
+    seed: int,
+    say: Say,
+) -> tuple[list[_Place] | None, str]:
+    """Fill sheet after sheet: what goes beyond a sheet is nested again on the next."""
+    left = {k: item.part.count for k, item in enumerate(items)}
+    out: list[_Place] = []
+    for sheet in range(_MOST):
+        if not any(left.values()):
+            return (out, "") if _apart(out, spacing) else (None, "distances were not kept")
+        say(f"nesting sheet {sheet + 1}: {sum(left.values())} parts left")
+        best: list[tuple[int, Part]] = []
+        share = _TRIED
+        # First more than fits, to see how dense it becomes; then as much as should fit.
+        for attempt in range(2):
+            asked, chosen = _some(items, left, room, share)
+            placed, why = sparrow.solved(asked, room[1], spacing + _MORE, 0.5 * seconds, seed)
+            if placed is None:
+                return None, why
+            every, inside = _inside(items, chosen, placed, room)
+            if sum(part.area for _, part in inside) > sum(part.area for _, part in best):
+                best = inside
+            if len(inside) == len(every) == sum(left.values()):
+                break
+            long = max(float(part.low[0] + part.size[0]) for _, part in every)
+            share = _FULL * sum(part.area for _, part in every) / (long * room[1])
+            if attempt == 0 and len(inside) == len(every):
+                break
+        if not best:
+            return None, "spyrrow placed no part inside the sheet"
+        for k, part in best:
+            out.append(_Place(part, sheet))
+            left[k] -= 1
+    return None, f"more than {_MOST} sheets"
+
+
+def _inside(
+    items: Sequence[_Item],
+    chosen: Sequence[int],
+    placed: Sequence[dict[str, Any]],
+    room: tuple[float, float],
+) -> tuple[list[tuple[int, Part]], list[tuple[int, Part]]]:
+    """Place parts as they were nested; return all of them, and those inside the sheet."""
+    own = []
+    for one in placed:
+        k = chosen[one["item"]]
+        part = items[k].part.turned(np.radians(one["angle"]))
+        own.append((k, replace(part.shifted(np.array([one["x"], one["y"]])), count=1)))
+    low = min(float(part.low[0]) for _, part in own)
+    own = [(k, part.shifted(np.array([-low, 0.0]))) for k, part in own]
+    limit = np.array(room) + _TIGHT
+    inside = [
+        (k, part)
+        for k, part in own
+        if (part.low + part.size <= limit).all() and part.low[1] >= -_TIGHT
+    ]
+    return own, inside
+
+
+def _some(
+    items: Sequence[_Item], left: dict[int, int], room: tuple[float, float], share: float
+) -> tuple[list[dict[str, Any]], list[int]]:
+    """Choose the largest parts that are left, with a share of the area of a sheet."""
+    asked: list[dict[str, Any]] = []
+    chosen: list[int] = []
+    area = 0.0
+    for k in sorted((k for k, n in left.items() if n), key=lambda k: -items[k].part.area):
+        own = signed_area(items[k].shape)
+        count = min(left[k], int((share * room[0] * room[1] - area) / own))
+        count = max(count, 0 if chosen else 1)
+        if count < 1:
+            continue
+        area += count * own
+        chosen.append(k)
+        asked.append({"shape": items[k].shape.tolist(), "count": count, "angles": items[k].angles})
+    return asked, chosen
+
+
+def _apart(places: Sequence[_Place], spacing: float) -> bool:
+    """Check that the parts on each sheet are at least a distance apart."""
+    import shapely
+
+    for sheet in range(_count(places)):
+        shapes = np.array([shapely.Polygon(p.part.outline) for p in places if p.sheet == sheet])
+        tree = shapely.STRtree(shapes)
+        one, two = tree.query(shapes, predicate="dwithin", distance=max(spacing - _TIGHT, 0.0))
+        one, two = one[one < two], two[one < two]
+        meets = shapely.intersection(shapes[one], shapes[two])
+        if spacing > _TIGHT and len(one):
+            return False
+        if (shapely.area(meets) > _TIGHT).any():
+            return False
+    return True
+
+
+def _count(places: Sequence[_Place]) -> int:
+    return 1 + max((p.sheet for p in places), default=-1)
+
+
+def _used(places: Sequence[_Place]) -> float:
+    """Return the area of the rectangle about the parts on the last sheet."""
+    last = _count(places) - 1
+    corners = [p.part.low + p.part.size for p in places if p.sheet == last]
+    return float(np.max(corners, axis=0).prod()) if corners else 0.0
+
+
+def _value(places: Sequence[_Place]) -> tuple[int, float]:
+    """Rank nestings, lower is better."""
+    return _count(places), _used(places)
+
+
+def _result(
+    places: Sequence[_Place],
+    sheet: tuple[float, float],
+    margin: float,
+    method: str,
+    notes: tuple[str, ...],
+) -> Nested:
+    long, wide = (float(x) for x in sheet)
+    shift = np.array([margin, margin])
+    sheets, shares = [], []
+    for number in range(_count(places)):
+        own = tuple(p.part.shifted(shift) for p in places if p.sheet == number)
+        sheets.append(Drawing(own, (long, wide), f"sheet {number + 1}"))
+        shares.append(sum(part.area for part in own) / (long * wide))
+    area = sum(p.part.area for p in places)
+    whole = (len(sheets) - 1) * long * wide + _used(places)
+    return Nested(tuple(sheets), tuple(shares), area / whole, method, notes)

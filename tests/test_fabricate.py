@@ -1,0 +1,206 @@
+"""From designs to a folder: files, certificate, resuming, copies, the command."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import gso
+from gso.cli import main
+from gso.errors import GSOError, MeshError, OptionError
+from gso.mesh import Mesh
+from gso.workshop import making
+from gso.workshop.finish import Finish
+from gso.workshop.part import signed_area
+from tests.test_pieces import dome
+from tests.test_workshop import arch
+
+ezdxf = pytest.importorskip("ezdxf")
+
+
+def row(count=3, apart=3.0):
+    """Copies of an arch side by side, and one other panel."""
+    one = arch(33)
+    n = len(one.vertices)
+    step = np.array([apart, 0.0, 0.0])
+    points = [one.vertices + k * step for k in range(count)]
+    other = arch(33, turn=1.0).vertices + count * step
+    faces = np.concatenate([one.faces + n * k for k in range(count + 1)])
+    return Mesh(np.concatenate([*points, other]), faces)
+
+
+def drawn(path):
+    """Outlines of a DXF drawing, as an independent reader sees them."""
+    document = ezdxf.readfile(path)
+    lines = document.modelspace().query('LWPOLYLINE[layer=="CUT"]')
+    assert all(line.closed for line in lines)
+    return [np.array(line.get_points("xy")) for line in lines]
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("job")
+    return gso.fabricate(row(), folder, unit="m", workers=0, finish=Finish(kerf=0.2))
+
+
+class TestFiles:
+    def test_copies_are_made_once_and_counted(self, job):
+        assert job.usable
+        assert [part.count for part in job.parts] == [3, 1]
+        assert job.certificate["parts"] == 4
+        assert len(job.certificate["designs"][0]["copies"]) == 3
+
+    def test_drawings_have_the_dimensions_of_the_certificate(self, job):
+        for part in (p for d in job.certificate["designs"] for p in d["parts"]):
+            (outline,) = drawn(job.folder / "parts" / f"{part['name']}.dxf")
+            np.testing.assert_allclose(
+                np.ptp(outline, axis=0), [part["length"], part["width"]], rtol=1e-6
+            )
+            assert abs(signed_area(outline)) == pytest.approx(part["area"], rel=1e-6)
+            text = (job.folder / "parts" / f"{part['name']}.svg").read_text()
+            wide, high = (
+                float(x) for x in re.search(r'viewBox="\S+ \S+ (\S+) (\S+)"', text).groups()
+            )
+            assert wide >= part["length"] and high >= part["width"]
+
+    def test_the_certificate_says_what_was_asked_and_measured(self, job):
+        said = json.loads((job.folder / "certificate.json").read_text())
+        assert said["usable"] and said["unit"] == "mm"
+        assert said["versions"]["numpy"] == np.__version__
+        for design in said["designs"]:
+            assert design["deviation_max"] <= design["allowed"]
+            assert len(design["digest"]) == 64
+            assert len(design["deviation_at"]) == 3
+            for name in ("strain_p99", "strain_max", "curvature", "planarity_max", "overlaps"):
+                assert name in design
+        assert set(said["files"]) == {
+            p.relative_to(job.folder).as_posix()
+            for p in job.folder.rglob("*")
+            if p.is_file() and p.parent.name != "work"
+        }
+        page = (job.folder / "index.html").read_text()
+        assert "can be made as it was asked for" in page
+        assert "http" not in page.replace("http://www.w3.org", "")
+
+    def test_kerf_widens_the_part(self, tmp_path):
+        plain = gso.fabricate(arch(33), tmp_path, unit="m", workers=0, formats=("svg",))
+        wide = gso.fabricate(
+            arch(33), tmp_path, unit="m", workers=0, formats=("svg",), finish=Finish(kerf=0.5)
+        )
+        assert wide.parts[0].size == pytest.approx(np.add(plain.parts[0].size, 0.5), abs=1e-6)
+
+
+class TestRuns:
+    def test_a_run_that_was_ended_goes_on(self, tmp_path, monkeypatch):
+        calls = []
+        make = making.made
+
+        def count(name, *rest):
+            calls.append(name)
+            if len(calls) == 2 and not done:
+                raise KeyboardInterrupt
+            return make(name, *rest)
+
+        done = []
+        monkeypatch.setattr("gso.workshop.fabricate.make", count)
+        with pytest.raises(KeyboardInterrupt):
+            gso.fabricate(row(), tmp_path, unit="m", workers=0)
+        done.append(True)
+        job = gso.fabricate(row(), tmp_path, unit="m", workers=0)
+        assert job.usable and len(calls) == 3
+        # The same again needs no solve, another request does.
+        gso.fabricate(row(), tmp_path, unit="m", workers=0)
+        assert len(calls) == 3
+        gso.fabricate(row(), tmp_path, unit="m", workers=0, max_deviation=0.1)
+        assert len(calls) == 5
+
+    def test_files_of_an_earlier_run_are_deleted(self, tmp_path):
+        gso.fabricate(row(), tmp_path, unit="m", workers=0)
+        (tmp_path / "parts" / "mine.dxf").write_text("mine")
+        gso.fabricate(arch(33), tmp_path, unit="m", workers=0, formats=("svg",))
+        left = sorted(p.name for p in (tmp_path / "parts").iterdir())
+        assert left == ["design.svg", "mine.dxf"]
+
+    @pytest.mark.slow
+    def test_processes_give_the_same_as_one(self, tmp_path, job):
+        again = gso.fabricate(row(), tmp_path, unit="m", workers=2, finish=Finish(kerf=0.2))
+        for one, two in zip(job.parts, again.parts, strict=True):
+            np.testing.assert_allclose(one.outline, two.outline, atol=1e-9)
+
+    @pytest.mark.slow
+    def test_a_cluster_gives_the_same_as_one_process(self, tmp_path, job):
+        distributed = pytest.importorskip("distributed")
+        with distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster:
+            address = cluster.scheduler_address
+            again = gso.fabricate(
+                row(), tmp_path, unit="m", scheduler=address, finish=Finish(kerf=0.2)
+            )
+        for one, two in zip(job.parts, again.parts, strict=True):
+            np.testing.assert_allclose(one.outline, two.outline, atol=1e-9)
+
+    def test_what_cannot_be_made_is_refused_with_the_numbers(self, tmp_path):
+        job = gso.fabricate(dome(9, 1.0), tmp_path, max_deviation=1e-6, workers=0)
+        assert not job.usable
+        assert "design" in job.reasons[0]
+        assert job.parts and (tmp_path / "index.html").exists()
+        assert "cannot be made" in (tmp_path / "index.html").read_text()
+
+    @pytest.mark.parametrize(
+        "bad",
+        [
+            {"unit": "furlong"},
+            {"formulation": "x"},
+            {"formats": ("doc",)},
+            {"max_deviation": -1},
+            {"max_strips": 0},
+            {"finish": "x"},
+            {"sheet": (100.0,)},
+            {"sheet": (-1.0, 5.0)},
+            {"marks": [[1, 2]]},
+        ],
+    )
+    def test_wrong_options_are_refused(self, tmp_path, bad):
+        with pytest.raises(GSOError):
+            gso.fabricate(dome(5), tmp_path, workers=0, **bad)
+
+    def test_a_missing_file_is_named(self, tmp_path):
+        with pytest.raises(MeshError, match=r"nothing\.obj"):
+            gso.fabricate(tmp_path / "nothing.obj", tmp_path / "out")
+        (tmp_path / "file").write_text("")
+        with pytest.raises((MeshError, OptionError)):
+            gso.fabricate(dome(5), tmp_path / "file")
+
+
+class TestCommand:
+    def test_it_writes_a_folder(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        gso.save(dome(9, 0.2), "dome.obj")
+        words = "fabricate dome.obj -o out --unit m --max-deviation 0.05 --thickness 2 --workers 0"
+        more = "--holes 3 8 --format dxf --layers astm --paper A4"
+        done = CliRunner().invoke(main, [*words.split(), *more.split()])
+        assert done.exit_code == 0, done.output
+        assert "page to look at" in done.output
+        assert (tmp_path / "out" / "parts.pdf").stat().st_size > 0
+        shutil.rmtree(tmp_path / "out")
+        done = CliRunner().invoke(main, [*words.split(), "--max-deviation", "1e-7"])
+        assert done.exit_code == 1
+        assert "not usable" in done.output
+
+    def test_a_bend_table_is_read(self, tmp_path):
+        gso.save(arch(33), tmp_path / "arch.obj")
+        (tmp_path / "table.csv").write_text("30,1.1\n90,3.4\n")
+        words = ["fabricate", str(tmp_path / "arch.obj"), "-o", str(tmp_path / "out")]
+        table = ["--unit", "m", "--thickness", "2", "--workers", "0", "--bend-table"]
+        done = CliRunner().invoke(main, [*words, *table, str(tmp_path / "table.csv")])
+        assert done.exit_code == 0, done.output
+        (tmp_path / "table.csv").write_text("a,b,c\n")
+        done = CliRunner().invoke(main, [*words, *table, str(tmp_path / "table.csv")])
+        assert done.exit_code == 1
+        assert "table.csv" in done.output
