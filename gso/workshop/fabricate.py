@@ -28,7 +28,7 @@ from gso.workshop.congruent import origins
 from gso.workshop.designs import designs_of
 from gso.workshop.finish import Finish
 from gso.workshop.making import made as make
-from gso.workshop.nesting import nest
+from gso.workshop.nesting import checked_sheet, nest
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.parts import parts_of, scaled
@@ -174,7 +174,12 @@ def fabricate(
     scale = MILLIMETRES[unit]
     for name in formats:
         writers.get(name)
-    most = None if sheet is None else (sheet[0] / scale, sheet[1] / scale)
+    if not isinstance(finish, Finish):
+        raise OptionError(f"finish is {finish!r}; it must be a gso.workshop.finish.Finish")
+    most = None
+    if sheet is not None:
+        long, wide = (checked_sheet(sheet) / scale).tolist()
+        most = (long, wide)
     ask = Ask(formulation, max_deviation, max_strain, max_strips, darts, most, min_radius)
     say = callback or (lambda said: None)
     place = Path(os.fsdecode(folder))

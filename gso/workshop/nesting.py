@@ -56,10 +56,22 @@ class Nested:
 
 @dataclass(frozen=True, eq=False)
 class _Item:
-    """A part to be nested: its polygon about the origin, and its allowed angles in degrees."""
+    """A part to be nested, about the origin.
+
+    Attributes
+    ----------
+    part : Part
+    shape : ndarray, (k, 2)
+        A polygon about it.
+    border : float
+        Largest distance between both.
+    angles : tuple of float, or None
+        Allowed rotations in degrees, None for all.
+    """
 
     part: Part
     shape: Array
+    border: float
     angles: tuple[float, ...] | None
 
 
@@ -114,7 +126,7 @@ def nest(
     """
     say = callback or (lambda said: None)
     room = _checked(parts, sheet, spacing, margin, seconds, method)
-    items = [_item(part, rotations) for part in parts]
+    items = [_item(part, rotations, spacing) for part in parts]
     best = _rectangles(items, room, spacing)
     notes: tuple[str, ...] = ()
     if method != "rectangles":
@@ -129,6 +141,23 @@ def nest(
     return _result(best, sheet, margin, "rectangles", notes)
 
 
+def checked_sheet(sheet: Any) -> Array:
+    """Return length and width of a sheet as an array (2,).
+
+    Raises
+    ------
+    OptionError
+        They are not two positive lengths.
+    """
+    try:
+        size = np.asarray(sheet, float)
+    except (TypeError, ValueError):
+        size = np.empty(0)
+    if size.shape != (2,) or not ((size > 0) & np.isfinite(size)).all():
+        raise OptionError(f"sheet is {sheet!r}; it must be length and width in millimetres")
+    return size
+
+
 def _checked(
     parts: Sequence[Part],
     sheet: tuple[float, float],
@@ -140,9 +169,7 @@ def _checked(
     """Check the options; return the room inside the margin."""
     import shapely
 
-    size = np.asarray(sheet, float)
-    if size.shape != (2,) or not ((size > 0) & np.isfinite(size)).all():
-        raise OptionError(f"sheet is {sheet!r}; it must be length and width in millimetres")
+    size = checked_sheet(sheet)
     for name, value in (("spacing", spacing), ("margin", margin)):
         if not 0 <= value < np.inf:
             raise OptionError(f"{name} is {value!r}; it must be a length of 0 or more")
@@ -161,8 +188,8 @@ def _checked(
     return long, wide
 
 
-def _item(part: Part, rotations: Any) -> _Item:
-    """Return a part about the origin, with its polygon made simpler without getting smaller."""
+def _item(part: Part, rotations: Any, spacing: float) -> _Item:
+    """Return a part about the origin, with a simple polygon that has half the spacing about it."""
     import shapely
 
     own = part.shifted(-part.outline.mean(axis=0))
@@ -170,15 +197,19 @@ def _item(part: Part, rotations: Any) -> _Item:
     if part.grain is not None:
         turn = -float(np.degrees(np.arctan2(part.grain[1], part.grain[0])))
         angles = (turn, turn + 180.0)
-    outline = own.outline
-    grow = 1e-4 * float(np.ptp(outline, axis=0).max())
-    while len(outline) > _CORNERS:
-        wider = shapely.buffer(shapely.Polygon(own.outline), grow, join_style="mitre")
-        simple = shapely.simplify(wider, 0.9 * grow)
-        if simple.geom_type == "Polygon":
-            outline = np.asarray(simple.exterior.coords)[:-1]
+    grow = 1e-4 * float(np.ptp(own.outline, axis=0).max())
+    while True:
+        by = 0.5 * spacing + _MORE + grow
+        wider = shapely.buffer(
+            shapely.Polygon(own.outline), by, join_style="mitre", mitre_limit=2.0
+        )
+        simple = shapely.simplify(wider, grow)
+        outline = np.asarray(simple.exterior.coords)[:-1]
+        if len(outline) <= _CORNERS:
+            break
         grow *= 2.0
-    return _Item(own, outline if signed_area(outline) > 0 else outline[::-1], angles)
+    shape = outline if signed_area(outline) > 0 else outline[::-1]
+    return _Item(own, shape, by, angles)
 
 
 def _angles(rotations: Any) -> tuple[float, ...] | None:
@@ -256,16 +287,17 @@ def _sparrow(
     """Fill sheet after sheet: what goes beyond a sheet is nested again on the next."""
     left = {k: item.part.count for k, item in enumerate(items)}
     out: list[_Place] = []
+    border = max(item.border for item in items)
     for sheet in range(_MOST):
         if not any(left.values()):
             return (out, "") if _apart(out, spacing) else (None, "distances were not kept")
         say(f"nesting sheet {sheet + 1}: {sum(left.values())} parts left")
         best: list[tuple[int, Part]] = []
-        share = _TRIED
+        share, height = _TRIED, room[1] + 2.0 * border
         # First more than fits, to see how dense it becomes; then as much as should fit.
         for attempt in range(2):
             asked, chosen = _some(items, left, room, share)
-            placed, why = sparrow.solved(asked, room[1], spacing + _MORE, 0.5 * seconds, seed)
+            placed, why = sparrow.solved(asked, height, 0.5 * seconds, seed)
             if placed is None:
                 return None, why
             every, inside = _inside(items, chosen, placed, room)
@@ -297,14 +329,10 @@ def _inside(
         k = chosen[one["item"]]
         part = items[k].part.turned(np.radians(one["angle"]))
         own.append((k, replace(part.shifted(np.array([one["x"], one["y"]])), count=1)))
-    low = min(float(part.low[0]) for _, part in own)
-    own = [(k, part.shifted(np.array([-low, 0.0]))) for k, part in own]
+    low = np.min([part.low for _, part in own], axis=0)
+    own = [(k, part.shifted(-low)) for k, part in own]
     limit = np.array(room) + _TIGHT
-    inside = [
-        (k, part)
-        for k, part in own
-        if (part.low + part.size <= limit).all() and part.low[1] >= -_TIGHT
-    ]
+    inside = [(k, part) for k, part in own if (part.low + part.size <= limit).all()]
     return own, inside
 
 

@@ -101,8 +101,8 @@ def part_of(
         part = _registered(part, *finish.registration)
     if finish.tabs is not None:
         part = with_tabs(part, [j.line for j in joints if j.first], finish.tabs)
-    part = offset(with_allowance(part, finish.allowance), 0.5 * finish.kerf)
     part = part.turned(-rectangle(part.outline)[0])
+    part = offset(with_allowance(part, finish.allowance), 0.5 * finish.kerf)
     if finish.face == "inside":
         part = mirrored(part)
     part = part.shifted(-part.low)

@@ -16,7 +16,7 @@ _START = 30.0
 
 
 def solved(
-    items: list[dict[str, Any]], height: float, spacing: float, seconds: float, seed: int
+    items: list[dict[str, Any]], height: float, seconds: float, seed: int
 ) -> tuple[list[dict[str, Any]] | None, str]:
     """Pack polygons into a strip of a given height and least length.
 
@@ -25,8 +25,6 @@ def solved(
     items : list of dict
         "shape": its corners; "count"; "angles": allowed rotations in degrees, None for all.
     height : float
-    spacing : float
-        Least distance between polygons.
     seconds : float
     seed : int
 
@@ -43,7 +41,6 @@ def solved(
     asked = {
         "items": items,
         "height": height,
-        "spacing": spacing,
         "seconds": whole,
         "seed": seed,
     }
@@ -78,7 +75,6 @@ def main() -> None:
     instance = spyrrow.StripPackingInstance("parts", asked["height"], items)
     config = spyrrow.StripPackingConfig(
         early_termination=True,
-        min_items_separation=asked["spacing"] or None,
         total_computation_time=asked["seconds"],
         num_workers=1,
         seed=asked["seed"],
