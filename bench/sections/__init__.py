@@ -7,7 +7,18 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 #: Files with sections; each lists them as ``SECTIONS``.
-SUBJECTS = ("tno", "cost", "jiang", "hybrid", "net", "borders", "dataset", "ruled", "pieces")
+SUBJECTS = (
+    "tno",
+    "cost",
+    "jiang",
+    "hybrid",
+    "net",
+    "borders",
+    "dataset",
+    "ruled",
+    "pieces",
+    "workshop",
+)
 
 
 def sections(subjects: Iterable[str] = SUBJECTS) -> dict[str, Callable[..., dict[str, Any]]]:

@@ -119,7 +119,9 @@ def _check_part(part: Part) -> None:
 def _points(line: ArrayLike, least: int, what: str) -> None:
     points = np.asarray(line)
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < least:
-        raise MeshError(f"{what} is an array {points.shape}; give (k, 2) with {least} points or more")
+        raise MeshError(
+            f"{what} is an array {points.shape}; give (k, 2) with {least} points or more"
+        )
     if not np.isfinite(points).all():
         raise MeshError(f"{what} has coordinates that are not finite")
 

@@ -83,7 +83,7 @@ def write(
     chosen = layer_set(layers)
     document = _document(drawing)
     for layer in dict.fromkeys(chosen.values()):
-        made = document.layers.add(layer.name, color=layer.index, lineweight=_WIDTH)
+        made = document.layers.add(layer.name, color=layer.aci, lineweight=_WIDTH)
         made.dxf.plot = int(layer.plotted)
     space = document.modelspace()
     for border in strokes.sheet(drawing):

@@ -21,7 +21,7 @@ class Layer(NamedTuple):
     name : str
     colour : str
         As ``#rrggbb``, on white.
-    index : int
+    aci : int
         The colour in DXF files (AutoCAD colour index).
     plotted : bool
         False for lines that are shown but not plotted.
@@ -32,7 +32,7 @@ class Layer(NamedTuple):
 
     name: str
     colour: str
-    index: int
+    aci: int
     plotted: bool = True
     dash: tuple[float, ...] = ()
 

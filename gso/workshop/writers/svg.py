@@ -71,7 +71,7 @@ def write(
     >>> path = os.path.join(tempfile.mkdtemp(), "plate.svg")
     >>> write(Drawing((plate,)), path, stroke=0.5)
     >>> print(open(path).read().splitlines()[1][:60])
-    <svg baseProfile="full" height="60mm" version="1.1" viewBox="
+    <svg baseProfile="full" height="60mm" version="1.1" viewBox=
     """
     check_writable(path, (SUFFIX,))
     check(drawing)
@@ -82,7 +82,9 @@ def write(
     margin = 0.0 if drawing.sheet is not None else _MARGIN * width
     page = _Page(low - margin, high + margin, width)
     named = list(zip(drawing.parts, strokes.identifiers(drawing.parts), strict=True))
-    drawn = [[*strokes.lines(part), *strokes.texts(part, bend_text)] for part in drawing.parts]
+    drawn: list[list[Line | Text]] = [
+        [*strokes.lines(part), *strokes.texts(part, bend_text)] for part in drawing.parts
+    ]
     for layer in dict.fromkeys(chosen.values()):
         group = page.layer(layer, is_text=layer == chosen["text"])
         if layer == chosen["sheet"]:

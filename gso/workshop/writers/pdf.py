@@ -1,0 +1,254 @@
+"""Parts as PDF at the scale 1:1, on pages of paper that are put together."""
+
+from __future__ import annotations
+
+import io
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from gso.errors import OptionError
+from gso.io.atomic import check_writable, replacing
+from gso.spelling import choices, known_keywords
+from gso.typing import Array
+from gso.workshop.part import Drawing
+from gso.workshop.writers import strokes
+from gso.workshop.writers.checks import check, length, require
+from gso.workshop.writers.layers import Layer, layer_set
+from gso.workshop.writers.tiles import FOOT, Tile, Tiling, tiled
+
+SUFFIX = ".pdf"
+
+#: Width and height of papers in millimetres.
+PAPERS = {
+    "A0": (841.0, 1189.0),
+    "A1": (594.0, 841.0),
+    "A2": (420.0, 594.0),
+    "A3": (297.0, 420.0),
+    "A4": (210.0, 297.0),
+}
+
+# Points in a millimetre, and the line width in millimetres.
+_POINT, _LINE = 72.0 / 25.4, 0.25
+# Height of capital letters as a fraction of the font size (Helvetica).
+_CAPITAL = 0.718
+# Lengths of the scale bar, and height of the texts at the foot of a page.
+_BARS, _TEXT = (100.0, 50.0), 3.0
+# Size of the crosses at the corners of a window.
+_CROSS = 4.0
+
+
+@known_keywords()
+def write(
+    drawing: Drawing,
+    path: str | PathLike[str],
+    *,
+    paper: str = "A4",
+    overlap: float = 10.0,
+    margin: float = 10.0,
+    layers: str = "operations",
+    bend_text: bool = False,
+) -> None:
+    """Write parts as a PDF at the scale 1:1, divided into pages.
+
+    Each page has a window of the drawing with crosses at its corners, dashed lines where the
+    neighbouring pages begin, its name (A1 is the upper left page) and a scale bar. Pages without
+    parts are left out. Where there are several, the first page shows how they are put together.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    path : str or PathLike
+        A file whose name ends in .pdf. It is replaced only when the new one is complete.
+    paper : {"A0", "A1", "A2", "A3", "A4"}
+    overlap, margin : float
+        By how much pages overlap, and what stays free around each, in millimetres.
+    layers : {"operations", "astm"}
+        Colours of the lines.
+    bend_text : bool
+        Also write the direction, angle and radius beside each bend.
+
+    Raises
+    ------
+    OptionError
+        Unknown paper or layers, or lengths that leave no room on the paper.
+    MeshError
+        The drawing is empty, a part is not usable, or the file cannot be written.
+    GSOError
+        ReportLab is not installed.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> from gso.workshop.part import Part
+    >>> plate = Part("plate", np.array([[0.0, 0], [300, 0], [300, 150], [0, 150]]))
+    >>> path = os.path.join(tempfile.mkdtemp(), "plate.pdf")
+    >>> write(Drawing((plate,)), path, paper="A4")
+    >>> os.path.getsize(path) > 0
+    True
+    """
+    require("reportlab", "PDF files")
+    check_writable(path, (SUFFIX,))
+    check(drawing)
+    if not isinstance(paper, str) or paper not in PAPERS:
+        raise OptionError(f"no paper {paper!r}; {choices(paper, PAPERS)}")
+    chosen = layer_set(layers)
+    gap, free = length("overlap", overlap, zero=True), length("margin", margin, zero=True)
+    tiling = tiled(drawing, PAPERS[paper], gap, free)
+    stream = io.BytesIO()
+    book = _Book(stream, tiling, free, gap)
+    if len(tiling.tiles) > 1:
+        book.overview(drawing, chosen)
+    for tile in tiling.tiles:
+        book.tile(drawing, tile, chosen, bend_text)
+    book.close()
+    with replacing(path) as file:
+        file.write(stream.getvalue())
+
+
+class _Book:
+    """The pages, made with ReportLab; its unit is the millimetre.
+
+    Parameters
+    ----------
+    stream : file
+    tiling : Tiling
+    margin, overlap : float
+    """
+
+    def __init__(self, stream: Any, tiling: Tiling, margin: float, overlap: float):
+        from reportlab.pdfgen.canvas import Canvas
+
+        self._tiling, self._margin, self._overlap = tiling, margin, overlap
+        size = tuple(_POINT * side for side in tiling.page)
+        # The same drawing always gives the same bytes.
+        self._canvas = Canvas(stream, pagesize=size, invariant=1)
+        self._page = 0
+        self._pages = len(tiling.tiles) + (len(tiling.tiles) > 1)
+
+    def close(self) -> None:
+        self._canvas.save()
+
+    def overview(self, drawing: Drawing, layers: dict[str, Layer]) -> None:
+        """Draw all pages, scaled down, with their names."""
+        tiles = self._tiling.tiles
+        low = np.min([tile.low for tile in tiles], axis=0)
+        high = np.max([tile.high for tile in tiles], axis=0)
+        room = np.array(self._tiling.page) - 2.0 * self._margin - [0.0, FOOT]
+        scale = float((room / (high - low)).min())
+        c = self._begin()
+        c.saveState()
+        c.translate(self._margin, self._margin + FOOT)
+        c.scale(scale, scale)
+        c.translate(*(-low).tolist())
+        self._draw(drawing, layers, False, _LINE / scale)
+        c.setStrokeGray(0.5)
+        c.setFillGray(0.5)
+        c.setLineWidth(_LINE / scale)
+        for tile in tiles:
+            wide, high_ = (tile.high - tile.low).tolist()
+            c.rect(*tile.low.tolist(), wide, high_)
+            x, y = (0.5 * (tile.low + tile.high)).tolist()
+            c.setFont("Helvetica", 0.15 * min(wide, high_))
+            c.drawCentredString(x, y, tile.name)
+        c.restoreState()
+        self._foot(drawing, f"how the pages are put together, {scale:.3g} : 1", bar=False)
+
+    def tile(self, drawing: Drawing, tile: Tile, layers: dict[str, Layer], bend_text: bool) -> None:
+        """Draw one page at the scale 1:1."""
+        c = self._begin()
+        wide, high = (tile.high - tile.low).tolist()
+        c.saveState()
+        c.translate(self._margin, self._margin + FOOT)
+        frame = c.beginPath()
+        frame.rect(0, 0, wide, high)
+        c.clipPath(frame, stroke=0)
+        c.translate(*(-tile.low).tolist())
+        self._draw(drawing, layers, bend_text, _LINE)
+        c.restoreState()
+        self._marks(wide, high)
+        self._foot(drawing, tile.name)
+
+    def _begin(self) -> Any:
+        if self._page:
+            self._canvas.showPage()
+        self._page += 1
+        self._canvas.scale(_POINT, _POINT)
+        return self._canvas
+
+    def _draw(
+        self, drawing: Drawing, layers: dict[str, Layer], bend_text: bool, width: float
+    ) -> None:
+        c = self._canvas
+        c.setLineWidth(width)
+        c.setLineCap(1)
+        for line in strokes.sheet(drawing):
+            self._line(line, layers["sheet"], width)
+        for part in drawing.parts:
+            for line in strokes.lines(part):
+                if line.kind in layers:
+                    self._line(line, layers[line.kind], width)
+            c.setFillColor(layers["text"].colour)
+            for text in strokes.texts(part, bend_text):
+                c.saveState()
+                c.translate(*text.start.tolist())
+                c.rotate(float(np.degrees(text.angle)))
+                c.setFont("Helvetica", text.height / _CAPITAL)
+                c.drawCentredString(0, 0, text.text)
+                c.restoreState()
+
+    def _line(self, line: strokes.Line, layer: Layer, width: float) -> None:
+        c = self._canvas
+        c.setStrokeColor(layer.colour)
+        share = width / _LINE
+        c.setDash([share * x for x in layer.dash]) if layer.dash else c.setDash()
+        points: Array = line.points
+        path = c.beginPath()
+        path.moveTo(*points[0].tolist())
+        for x, y in points[1:].tolist():
+            path.lineTo(x, y)
+        if line.closed:
+            path.close()
+        c.drawPath(path, stroke=1, fill=0)
+
+    def _marks(self, wide: float, high: float) -> None:
+        """Draw crosses at the corners of the window, and where the neighbours' windows begin."""
+        c, x0, y0 = self._canvas, self._margin, self._margin + FOOT
+        c.setDash()
+        c.setStrokeGray(0.4)
+        c.setLineWidth(0.5 * _LINE)
+        for x in (x0, x0 + wide):
+            for y in (y0, y0 + high):
+                c.line(x - _CROSS, y, x + _CROSS, y)
+                c.line(x, y - _CROSS, x, y + _CROSS)
+        c.setDash([2, 2])
+        gap = self._overlap
+        if self._tiling.columns > 1:
+            for x in (x0 + gap, x0 + wide - gap):
+                c.line(x, y0, x, y0 + high)
+        if self._tiling.rows > 1:
+            for y in (y0 + gap, y0 + high - gap):
+                c.line(x0, y, x0 + wide, y)
+        c.setDash()
+
+    def _foot(self, drawing: Drawing, name: str, bar: bool = True) -> None:
+        """Write the page's name, number and title, and draw the scale bar."""
+        c, x, y = self._canvas, self._margin, self._margin
+        c.setDash()
+        c.setFillGray(0.0)
+        c.setStrokeGray(0.0)
+        c.setLineWidth(_LINE)
+        c.setFont("Helvetica", _TEXT / _CAPITAL)
+        title = strokes.printable(drawing.title)
+        said = f"{name}, page {self._page} of {self._pages}"
+        c.drawString(x, y, f"{title}: {said}" if title else said)
+        if not bar:
+            return
+        wide = self._tiling.page[0] - 2.0 * self._margin
+        size = next((b for b in _BARS if b <= 0.45 * wide), _BARS[-1])
+        right = self._tiling.page[0] - self._margin
+        c.line(right - size, y + 6.0, right, y + 6.0)
+        for end in (right - size, right):
+            c.line(end, y + 4.5, end, y + 7.5)
+        c.drawRightString(right, y, f"{size:g} mm; print at 100 %")

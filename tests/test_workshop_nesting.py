@@ -1,0 +1,198 @@
+"""Nesting of parts on sheets."""
+
+from __future__ import annotations
+
+import subprocess
+
+import numpy as np
+import pytest
+import shapely
+
+from gso.errors import OptionError
+from gso.workshop import sparrow
+from gso.workshop.nesting import nest
+from gso.workshop.part import Part
+from gso.workshop.rectangles import ORDERS, packed
+
+
+def gore(long=600.0, wide=120.0, n=40):
+    t = np.linspace(0, 1, n)
+    low = np.c_[long * t, -0.5 * wide * np.sin(np.pi * t)]
+    return np.r_[low, (low * [1, -1])[::-1][1:-1]]
+
+
+def triangles(count, seed=0):
+    rng = np.random.default_rng(seed)
+    corners = [
+        [[0, 0], [rng.uniform(80, 250), 30], [60, rng.uniform(80, 250)]] for _ in range(count)
+    ]
+    return [Part(f"t{k}", np.array(points, float)) for k, points in enumerate(corners)]
+
+
+def crescent(size=100.0, n=24):
+    t = np.linspace(-1, 1, n)
+    outer = np.c_[size * t, size * (1 - t * t)]
+    return np.r_[outer[::-1] * [1, 0.6] + [0, 0], outer[1:-1] * [1, 0.2]][::-1]
+
+
+def checked(nested, parts, sheet, spacing):
+    """Check that all copies are there, inside the sheets and apart; they are not mirrored."""
+    placed = [part for drawing in nested.sheets for part in drawing.parts]
+    for part in parts:
+        own = [p for p in placed if p.name == part.name]
+        assert len(own) == part.count
+        for p in own:
+            assert p.area == pytest.approx(part.area)
+    for drawing in nested.sheets:
+        assert drawing.sheet == sheet
+        shapes = [shapely.Polygon(p.outline) for p in drawing.parts]
+        for p in drawing.parts:
+            assert (p.low >= -1e-6).all()
+            assert (p.low + p.size <= np.array(sheet) + 1e-6).all()
+        for k, shape in enumerate(shapes):
+            for other in shapes[k + 1 :]:
+                assert shape.distance(other) >= spacing - 1e-6
+                assert shape.intersection(other).area <= 1e-6
+
+
+class TestRectangles:
+    @pytest.mark.parametrize("order", ORDERS)
+    def test_they_do_not_overlap(self, order):
+        rng = np.random.default_rng(1)
+        sizes = [[(x, y), (y, x)] for x, y in rng.uniform(1, 9, (60, 2)).tolist()]
+        placed = packed(sizes, (30.0, 20.0), order)
+        assert [p.item for p in placed] == list(range(60))
+        boxes = [
+            (
+                p.sheet,
+                shapely.box(
+                    p.x, p.y, p.x + sizes[p.item][p.choice][0], p.y + sizes[p.item][p.choice][1]
+                ),
+            )
+            for p in placed
+        ]
+        for k, (sheet, box) in enumerate(boxes):
+            assert box.bounds[2] <= 30 + 1e-6 and box.bounds[3] <= 20 + 1e-6
+            for other, two in boxes[k + 1 :]:
+                assert sheet != other or box.intersection(two).area < 1e-6
+
+    def test_squares_fill_a_sheet(self):
+        placed = packed([[(5.0, 5.0)]] * 12, (20.0, 15.0), "area")
+        assert {p.sheet for p in placed} == {0}
+
+
+class TestNest:
+    @pytest.mark.parametrize("rotations", [(0, 180), 4, "any"])
+    def test_parts_are_apart_and_inside(self, rotations):
+        parts = [*triangles(8), Part("c", crescent(), count=3)]
+        for method in ("rectangles", "spyrrow"):
+            nested = nest(
+                parts, (500.0, 400.0), spacing=4.0, rotations=rotations, seconds=2, method=method
+            )
+            checked(nested, parts, (500.0, 400.0), 4.0)
+
+    def test_a_margin_is_kept(self):
+        parts = [Part("s", np.array([[0.0, 0], [80, 0], [80, 80], [0, 80]]), count=4)]
+        nested = nest(parts, (200.0, 200.0), spacing=5, margin=10, method="rectangles")
+        assert len(nested.sheets) == 1
+        assert min(p.low.min() for p in nested.sheets[0].parts) >= 10 - 1e-9
+
+    def test_grain_runs_along_the_sheet(self):
+        part = Part("g", gore(300, 80), grain=np.array([0.0, 1.0]), count=2)
+        nested = nest([part], (400.0, 400.0), rotations="any", method="rectangles")
+        for drawing in nested.sheets:
+            for placed in drawing.parts:
+                assert abs(placed.grain[0]) == pytest.approx(1.0)
+
+    def test_it_is_never_below_the_best_packing_of_rectangles(self):
+        parts = [Part("g", gore(), count=10)]
+        both = [nest(parts, (1300.0, 600.0), seconds=2, method=m) for m in ("rectangles", None)]
+        assert both[1].density >= both[0].density - 1e-9
+        checked(both[1], parts, (1300.0, 600.0), 2.0)
+
+    @pytest.mark.slow
+    def test_gores_and_triangles_are_five_points_above_rectangles(self):
+        for parts, rotations in (([Part("g", gore(), count=24)], (0, 180)), (triangles(30), 4)):
+            low, high = (
+                nest(parts, (1500.0, 1000.0), rotations=rotations, seconds=10, method=method)
+                for method in ("rectangles", None)
+            )
+            assert high.density >= low.density + 0.05
+
+    def test_the_same_seed_gives_the_same(self):
+        one, two = (nest(triangles(5), (400.0, 300.0), seconds=1, seed=3) for _ in range(2))
+        if one.method == two.method:
+            assert len(one.sheets) == len(two.sheets)
+
+
+class TestFallback:
+    def test_without_spyrrow_rectangles_are_packed(self, monkeypatch):
+        monkeypatch.setattr("gso.workshop.sparrow.find_spec", lambda name: None)
+        nested = nest(triangles(4), (500.0, 400.0))
+        assert nested.method == "rectangles"
+        assert "pip install" in nested.notes[0]
+
+    def test_its_death_ends_nothing(self, monkeypatch):
+        def dead(*words, **given):
+            return subprocess.CompletedProcess(words, -6, "", "panicked")
+
+        monkeypatch.setattr("gso.workshop.sparrow.subprocess.run", dead)
+        nested = nest(triangles(4), (500.0, 400.0))
+        assert nested.method == "rectangles"
+        assert "code -6" in nested.notes[0]
+
+    def test_it_is_not_waited_for_for_ever(self, monkeypatch):
+        def slow(*words, **given):
+            raise subprocess.TimeoutExpired("spyrrow", 1)
+
+        monkeypatch.setattr("gso.workshop.sparrow.subprocess.run", slow)
+        assert sparrow.solved([], 1.0, 1.0, 0) == (None, "spyrrow took too long")
+
+    def test_a_wrong_answer_is_not_taken(self, monkeypatch):
+        def odd(*words, **given):
+            return subprocess.CompletedProcess(words, 0, "nonsense", "")
+
+        monkeypatch.setattr("gso.workshop.sparrow.subprocess.run", odd)
+        assert nest(triangles(4), (500.0, 400.0)).method == "rectangles"
+
+    def test_results_that_overlap_are_not_taken(self, monkeypatch):
+        def same(items, *rest):
+            every = [k for k, item in enumerate(items) for _ in range(item["count"])]
+            return [{"item": k, "angle": 0.0, "x": 0.0, "y": 0.0} for k in every], ""
+
+        monkeypatch.setattr("gso.workshop.sparrow.solved", same)
+        nested = nest(triangles(4), (500.0, 400.0))
+        assert nested.method == "rectangles"
+        assert "distances" in nested.notes[0]
+
+
+class TestErrors:
+    def test_a_part_larger_than_the_sheet_is_named(self):
+        with pytest.raises(OptionError, match="part g is 600 by 119.9 mm, larger than the sheet"):
+            nest([Part("g", gore())], (500.0, 500.0))
+
+    @pytest.mark.parametrize(
+        "bad",
+        [
+            {"spacing": -1.0},
+            {"margin": 300.0},
+            {"seconds": 0.0},
+            {"method": "x"},
+            {"rotations": 0},
+            {"rotations": "some"},
+            {"rotations": [np.nan]},
+        ],
+    )
+    def test_wrong_options_are_named(self, bad):
+        with pytest.raises(OptionError, match=next(iter(bad))):
+            nest(triangles(2), (500.0, 400.0), **bad)
+
+    def test_wrong_parts_and_sheets_are_named(self):
+        with pytest.raises(OptionError, match="no parts"):
+            nest([], (500.0, 400.0))
+        for sheet in ((0, 5), (5,), "x", None):
+            with pytest.raises(OptionError, match="sheet is"):
+                nest(triangles(1), sheet)
+        bow = Part("bow", np.array([[0.0, 0], [10, 10], [10, 0], [0, 10]]))
+        with pytest.raises(OptionError, match="part bow"):
+            nest([bow], (500.0, 400.0))
