@@ -126,7 +126,29 @@ def check_area(table: Ints, points: Array) -> None:
             f"the surface is {size:.3g} wide and reaches to {farthest:.3g}: all its vertices are "
             "one point, or its unit of length needs changing"
         )
-    p = points - used.mean(axis=0)
+    bad = np.flatnonzero(~have_area(table, points - used.mean(axis=0), size))
+    if bad.size:
+        raise MeshError(
+            f"face {bad[0]} = {table[bad[0]].tolist()} has no area ({bad.size} such faces); "
+            "merge its vertices or delete it"
+        )
+
+
+def have_area(table: Ints, points: Array, size: float | None = None) -> NDArray[np.bool_]:
+    """Mark the faces that have an area, relative to the size of the surface.
+
+    Parameters
+    ----------
+    table : ndarray of int, (m, 3) or (m, 4)
+    points : ndarray, (n, 2) or (n, 3)
+        Vertices, all of them used.
+    size : float, optional
+        Longest side of the bounding box.
+    """
+    p = points - points.mean(axis=0)
+    if p.shape[1] == 2:
+        p = np.pad(p, ((0, 0), (0, 1)))
+    size = float(np.ptp(p, axis=0).max()) if size is None else size
     if table.shape[1] == 3:
         last = table[:, 2]
     else:
@@ -135,12 +157,7 @@ def check_area(table: Ints, points: Array) -> None:
     a = p[table[:, 2]] - p[table[:, 0]]
     b = p[last] - p[table[:, 1]] if table.shape[1] == 4 else p[table[:, 1]] - p[table[:, 0]]
     scaled = np.linalg.norm(np.cross(a / size, b / size), axis=1)
-    bad = np.flatnonzero(~(scaled > 1e-14))
-    if bad.size:
-        raise MeshError(
-            f"face {bad[0]} = {table[bad[0]].tolist()} has no area ({bad.size} such faces); "
-            "merge its vertices or delete it"
-        )
+    return np.asarray(scaled > 1e-14)
 
 
 def weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]] | None:

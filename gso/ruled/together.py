@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from gso.mesh import Mesh
+from gso.mesh.validation import have_area
 from gso.parametrization import beside
 from gso.pattern import Pattern
 from gso.ruled.folds import Folds
@@ -28,18 +30,22 @@ def together(surfaces: Sequence[RuledSurface], rows: Sequence[Ints], count: int)
     meshes = [surface.mesh for surface in surfaces]
     start = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])[:-1].tolist()
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
-    mesh = Mesh(vertices, _stacked([m.faces for m in meshes], start))
+    table = _stacked([m.faces for m in meshes], start)
+    pattern = _pattern([surface.pattern for surface in surfaces], start)
+    # Slivers of a small surface may have no area relative to all of them.
+    kept = have_area(table, vertices) & have_area(pattern.faces, pattern.flat)
+    mesh = Mesh(vertices, table[kept])
     strips = np.cumsum([0, *(surface.strips for surface in surfaces)])[:-1]
     moved = np.zeros((count, 3))
     for surface, own in zip(surfaces, rows, strict=True):
         moved[own] = surface.moved
     return RuledSurface(
         mesh=mesh,
-        strip=np.concatenate([s.strip + k for s, k in zip(surfaces, strips, strict=True)]),
-        flat=np.concatenate([surface.flat for surface in surfaces]),
+        strip=np.concatenate([s.strip + k for s, k in zip(surfaces, strips, strict=True)])[kept],
+        flat=np.concatenate([surface.flat for surface in surfaces])[kept],
         rulings=_folds([surface.rulings for surface in surfaces], start),
         creases=_folds([surface.creases for surface in surfaces], start),
-        pattern=_pattern([surface.pattern for surface in surfaces], start),
+        pattern=replace(pattern, faces=pattern.faces[kept]),
         moved=moved,
         crossed=sum(surface.crossed for surface in surfaces),
     )

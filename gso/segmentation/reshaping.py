@@ -14,6 +14,7 @@ from gso.seams.pieces import Pieces
 from gso.segmentation.candidates import Candidate, cuts, joined, measured, neck_of
 from gso.segmentation.measures import FACETS, facet_ratio
 from gso.segmentation.options import Wishes
+from gso.segmentation.straight import straightened_pieces
 from gso.segmentation.tree import Ground
 from gso.tasks.developable import Options
 from gso.tno import optimize
@@ -40,6 +41,7 @@ class _Attempt:
 
     level: float
     proximity: float
+    cut: Pieces
     result: Result | None
     pieces: Pieces
     excess: float
@@ -62,12 +64,27 @@ def reshaped(ground: Ground, wishes: Wishes) -> tuple[Candidate, Result | None]:
             *wishes.value(len(a.pieces), a.pieces.seam_length),
         ),
     )
+    best = _with_straight_seams(ground, best, wishes, allowed)
     shape = best.pieces
     surface = ground.moved(shape.design)
     found = measured(surface, shape, wishes.max_size, wishes.say)
     if wishes.darts and found.strain <= wishes.max_strain:
         found = joined(surface, found, wishes.max_strain, neck_of(ground, wishes), wishes)
     return found, best.result
+
+
+def _with_straight_seams(
+    ground: Ground, best: _Attempt, wishes: Wishes, allowed: float
+) -> _Attempt:
+    """Solve again with straight seams instead of zigzags, if that is as good."""
+    if best.result is None:
+        return best
+    wishes.say("straight seams")
+    own = straightened_pieces(ground, best.cut)
+    if own is None:
+        return best
+    new = _attempt(ground, own, best.level, best.proximity, allowed, wishes.max_strain)
+    return new if new.excess <= max(best.excess, 1.0) else best
 
 
 def _levels(tried: list[_Attempt]) -> Iterator[float]:
@@ -111,7 +128,7 @@ def _attempt(
         except MeshError:
             # No vertex is inside a piece: the shape stays as it is.
             strained = strains_of(cut_open.opened.mesh).get("strain_p99", np.inf) / strain
-            return _Attempt(level, proximity, None, cut_open, strained)
+            return _Attempt(level, proximity, cut_open, None, cut_open, strained)
         shape = cut_open if result.pieces is None else result.pieces
         away = metrics.surface_distance(ground.mesh, shape.design)
         far = max(away.there_max, away.back_max) / allowed
@@ -121,7 +138,7 @@ def _attempt(
         if far <= 1.0:
             facets = facet_ratio(result) / FACETS
         excess = max(far, strained, facets)
-        attempt = _Attempt(level, options.w_proximity, result, shape, excess)
+        attempt = _Attempt(level, options.w_proximity, cut_open, result, shape, excess)
         if 1.0 < far <= _HOPELESS and strained < _LITTLE and weaker < _WEAKER:
             # The strain is less than allowed: a shape nearer to the design may do.
             weaker += 1

@@ -7,6 +7,7 @@ import numpy as np
 from gso.errors import MeshError
 from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
+from gso.seams.pieces import Pieces
 from gso.seams.straightening import straight_seams
 from gso.segmentation.candidates import Candidate
 from gso.segmentation.options import Wishes
@@ -17,21 +18,27 @@ from gso.typing import Ints
 
 def straight(ground: Ground, found: Candidate, wishes: Wishes) -> Candidate:
     """Straighten the seams of a triangle mesh, if patterns and strain allow it."""
-    if not ground.mesh.is_triangles or not len(found.pieces.edges) or ground.mirror is not None:
-        return found
     wishes.say("straight seams")
-    try:
-        mesh, edges = straight_seams(found.pieces, _firm(ground))
-        own = cut(mesh, Edges(edges))
-    except MeshError:
-        # Two lines met in a way that was not foreseen: the zigzags are right, only longer.
-        return found
-    if len(own) != len(found.pieces) or not all(piece.is_disk for piece in own):
+    own = straightened_pieces(ground, found.pieces)
+    if own is None:
         return found
     sheets = tuple(flattened(piece.mesh) for piece in own)
     new = Candidate(own, sheets)
     good = new.sound and new.strain <= max(found.strain, wishes.max_strain)
     return new if good else found
+
+
+def straightened_pieces(ground: Ground, pieces: Pieces) -> Pieces | None:
+    """Return pieces with straight seams; None where nothing can be straightened."""
+    if not ground.mesh.is_triangles or not len(pieces.edges) or ground.mirror is not None:
+        return None
+    try:
+        mesh, edges = straight_seams(pieces, _firm(ground))
+        own = cut(mesh, Edges(edges))
+    except MeshError:
+        # Two lines met in a way that was not foreseen: the zigzags are right, only longer.
+        return None
+    return own if len(own) == len(pieces) and all(piece.is_disk for piece in own) else None
 
 
 def _firm(ground: Ground) -> Ints:

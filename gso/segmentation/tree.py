@@ -69,8 +69,9 @@ class Ground:
         return cls(mesh, Potential(mesh), Paths(mesh, factor), own, mirror, factor)
 
     def moved(self, mesh: Mesh) -> Ground:
-        """Return the same for a mesh with the same faces."""
-        return Ground.of(mesh, self.factor, self.kept, self.mirror)
+        """Return the same for a mesh of another shape, perhaps with vertices inserted on seams."""
+        same = len(mesh.faces) == len(self.mesh.faces)
+        return Ground.of(mesh, self.factor if same else None, self.kept, self.mirror)
 
     def factor_of(self, ends: Ints) -> Array | None:
         """Return the factor (k,) of some edges (k, 2) of the mesh; None if all are one."""

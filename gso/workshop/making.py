@@ -13,6 +13,7 @@ from gso import faults, metrics, parametrization
 from gso.errors import ConvergenceWarning, GSOError, MeshError
 from gso.io.surface import welded
 from gso.mesh import Mesh
+from gso.mesh.validation import have_area
 from gso.pattern import Pattern
 from gso.result import Result
 from gso.segmentation import Segmentation
@@ -23,8 +24,11 @@ from gso.workshop.matings import across, numbered
 from gso.workshop.paneling import of_ruled, of_surface
 from gso.workshop.panels import Made, Mating, Panel, Side
 
-#: Share of the allowed distance that the pieces may use where strips follow them.
-_PIECES = 0.5
+#: Shares of the allowed distance: what the pieces may use, and within what strips follow them, so
+#: that the two sides of a seam stay together.
+_PIECES, _FOLLOW = 0.9, 0.1
+#: Largest number of strips of a piece of several; more of them are worse than none.
+_STRIPS = 4
 #: Distance of vertices that are merged, relative to the diagonal.
 _SAME = 1e-9
 #: Share of the design's diagonal that is allowed where nothing is given.
@@ -129,7 +133,6 @@ def _parted(name: str, design: Mesh, ask: Ask, allowed: float, say: Say) -> Made
     found = _searched(name, design, ask, share * allowed, say)
     if any(sheet is None for sheet in found.sheets):
         raise MeshError(f"{name}: a piece cannot be laid flat; {'; '.join(found.reasons)}")
-    left = max(allowed - found.metrics.get("deviation_max", 0.0), 0.1 * allowed)
     panels: list[Panel] = []
     matings: list[Mating] = []
     owner: list[int] = []
@@ -142,7 +145,7 @@ def _parted(name: str, design: Mesh, ask: Ask, allowed: float, say: Say) -> Made
         result = None
         if ask.formulation == "ruled":
             say(f"{own}: strips")
-            result = _strips(piece.mesh, ask, left)
+            result = _strips(piece.mesh, ask, _FOLLOW * allowed)
         if result is None or result.ruled is None or sheet is None:
             panels.append(Panel(own, piece.mesh, sheet.flat))  # type: ignore[union-attr]
             owner.append(number)
@@ -176,7 +179,8 @@ def _parted(name: str, design: Mesh, ask: Ask, allowed: float, say: Say) -> Made
 def _strips(mesh: Mesh, ask: Ask, left: float) -> Result | None:
     """Make a piece of strips; None if no strips are usable within the distance."""
     try:
-        result = optimize(mesh, formulation="ruled", options=_options(ask), max_deviation=left)
+        options = replace(_options(ask), max_strips=min(ask.max_strips, _STRIPS))
+        result = optimize(mesh, formulation="ruled", options=options, max_deviation=left)
     except MeshError:
         return None
     return result if result.usable else None
@@ -210,9 +214,11 @@ def _of_panels(design: Mesh, panels: list[Panel], ask: Ask, allowed: float) -> d
         table = panel.surface.faces
         table = np.pad(table, ((0, 0), (0, wide - table.shape[1])), constant_values=-1)
         faces.append(np.where(table < 0, -1, table + first))
-    mesh = Mesh(np.concatenate([p.surface.vertices for p in panels]), np.concatenate(faces))
-    flats = parametrization.beside([p.flat for p in panels])
-    record = _record(design, mesh, Pattern.whole(mesh, np.concatenate(flats)), ask, allowed, [])
+    points, table = np.concatenate([p.surface.vertices for p in panels]), np.concatenate(faces)
+    flat = np.concatenate(parametrization.beside([p.flat for p in panels]))
+    # Slivers of a small panel may have no area relative to the whole.
+    mesh = Mesh(points, table[have_area(table, points) & have_area(table, flat)])
+    record = _record(design, mesh, Pattern.whole(mesh, flat), ask, allowed, [])
     radii = [p.radii for p in panels if len(p.radii)]
     record["bend_radius_min"] = float(np.concatenate(radii).min()) if radii else np.inf
     return record
