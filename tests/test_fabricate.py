@@ -205,3 +205,16 @@ class TestCommand:
         done = CliRunner().invoke(main, [*words, *table, str(tmp_path / "table.csv")])
         assert done.exit_code == 1
         assert "table.csv" in done.output
+
+
+@pytest.mark.slow
+def test_a_design_larger_than_a_sheet_is_cut_to_fit(tmp_path):
+    pytest.importorskip("spyrrow")
+    design = dome(17, 0.3)
+    job = gso.fabricate(
+        design, tmp_path, unit="m", sheet=(1600.0, 1600.0), workers=0, formats=("svg",), seconds=2
+    )
+    assert job.usable
+    assert len(job.parts) > 1 and job.sheets
+    for part in job.parts:
+        assert max(part.size) <= 1600.0

@@ -18,6 +18,7 @@ from gso.pattern import Pattern
 from gso.result import Result
 from gso.segmentation import Segmentation
 from gso.segmentation import pieces as search
+from gso.segmentation.sheets import rectangle
 from gso.tno import optimize
 from gso.workshop.asking import Ask
 from gso.workshop.matings import across, numbered
@@ -62,10 +63,12 @@ def made(name: str, design: Mesh, ask: Ask, say: Say = lambda said: None) -> Mad
         if ask.formulation == "flatten":
             return _flattened(name, design, ask, say)
         whole = _whole(name, design, ask, allowed, say)
+        if whole is not None:
+            whole = _sized(whole, ask)
         if whole is not None and not whole.reasons:
             return whole
         try:
-            parted = _parted(name, design, ask, allowed, say)
+            parted = _sized(_parted(name, design, ask, allowed, say), ask)
         except GSOError:
             if whole is None:
                 raise
@@ -96,6 +99,21 @@ def _whole(name: str, design: Mesh, ask: Ask, allowed: float, say: Say) -> Made 
     except MeshError:
         return None
     return of_ruled(name, result, _ruled_record(design, result, ask, allowed))
+
+
+def _sized(made: Made, ask: Ask) -> Made:
+    """Add a reason if a pattern is larger than a sheet."""
+    if ask.max_size is None:
+        return made
+    limit = np.sort(ask.max_size)[::-1]
+    for panel in made.panels:
+        size = np.array(rectangle(panel.flat)[1])
+        if (size > limit * (1.0 + 1e-9)).any():
+            long, wide = size.tolist()
+            why = f"the pattern of {panel.name} is {long:.4g} by {wide:.4g}, larger than a sheet"
+            made.record["reasons"] = [*made.reasons, why]
+            break
+    return made
 
 
 def _options(ask: Ask) -> Any:
