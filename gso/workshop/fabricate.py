@@ -189,11 +189,11 @@ def fabricate(
         raise MeshError(f"{place}: {error.strerror}; -o names a folder") from None
     names, meshes = designs_of(designs)
     # Marks are on one of several copies, so that these differ.
-    first = list(range(len(meshes))) if marks or holes else origins(meshes)
+    first = list(range(len(meshes))) if len(marks) or len(holes) else origins(meshes)
+    drawn = [(given, _nearest(meshes, given)) for given in (marks, holes)]
     chosen = sorted(set(first))
     found, failed = _made(names, meshes, chosen, ask, place, workers, scheduler, say)
     say("parts")
-    drawn = [(given, _nearest(meshes, given)) for given in (marks, holes)]
     parts: list[Part] = []
     records = []
     for k in chosen:
@@ -211,7 +211,7 @@ def fabricate(
         parts += own
     certificate = {
         "unit": "mm",
-        "asked": plain({"unit": unit, **ask.record()}),
+        "asked": plain({"unit": unit, **ask.record(), "finish": finish.record()}),
         "versions": versions(),
         "designs": records,
         "sheets": [],
@@ -290,8 +290,8 @@ def _made(
     if workers is None and len(todo) == 1:
         workers = 0
     if workers == 0 and scheduler is None:
-        for place_in, k in enumerate(todo):
-            say(f"{names[k]} ({len(found)} of {len(found) + len(todo) - place_in})")
+        for number, k in enumerate(todo, start=1):
+            say(f"{names[k]}: design {number} of {len(todo)}")
             try:
                 one = make(names[k], meshes[k], ask, say)
             except GSOError as error:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -67,3 +68,10 @@ class Finish:
             raise OptionError(f"no face {self.face!r}; {choices(self.face, SIDES)}")
         if self.tabs is not None and self.allowance:
             raise OptionError("tabs and allowance exclude each other; leave one of them out")
+
+    def record(self) -> dict[str, Any]:
+        """Return it as JSON-compatible values."""
+        out = asdict(self)
+        if self.thickness is not None and self.thickness.table is not None:
+            out["thickness"]["table"] = np.asarray(self.thickness.table, float).tolist()
+        return out
