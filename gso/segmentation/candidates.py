@@ -12,7 +12,7 @@ from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
 from gso.seams.pieces import Piece, Pieces
 from gso.segmentation.loops import opening
-from gso.segmentation.merging import Merging, patches
+from gso.segmentation.merging import Merging
 from gso.segmentation.options import NECK, Wishes
 from gso.segmentation.sheets import Sheet, flattened
 from gso.segmentation.splitting import apart, halves
@@ -114,7 +114,7 @@ def _small(ground: Ground, strain: float, count: int) -> Ints:
     """Divide the design into patches with less strain than the bound."""
     most = max(len(ground.mesh.faces) // 4, 2)
     while True:
-        label = patches(ground.mesh, min(count, most))
+        label = ground.patches(min(count, most))
         edges = Merging(ground, label, strain, 1.0).edges()
         if count >= most or _largest(ground, edges) <= 0.6 * strain:
             return label

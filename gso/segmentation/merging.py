@@ -5,40 +5,9 @@ from __future__ import annotations
 import heapq
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import dijkstra
 
-from gso.mesh import Mesh
 from gso.segmentation.tree import Ground
 from gso.typing import Ints
-
-
-def patches(mesh: Mesh, count: int) -> Ints:
-    """Divide a mesh into about `count` compact patches; return the patch of each face (m,).
-
-    The Voronoi cells of farthest points, by distances between the centres of faces.
-    """
-    he = mesh.half_edges
-    k = np.flatnonzero(he.twin > np.arange(he.twin.size))
-    corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
-    centre = mesh.vertices[corners].mean(axis=1)
-    f, g = he.face[k], he.face[he.twin[k]]
-    length = np.linalg.norm(centre[f] - centre[g], axis=1)
-    graph = coo_matrix(
-        (np.maximum(length, 1e-300), (f, g)), shape=(len(centre), len(centre))
-    ).tocsr()
-    middle = centre.mean(axis=0)
-    seed = int(np.linalg.norm(centre - middle, axis=1).argmax())
-    best, owner = np.full(len(centre), np.inf), np.zeros(len(centre), np.int64)
-    for number in range(min(count, len(centre))):
-        away = dijkstra(graph, directed=False, indices=seed, limit=float(best.max()))
-        closer = away < best
-        best[closer], owner[closer] = away[closer], number
-        seed = int(np.where(np.isinf(best), np.inf, best).argmax())
-        if best[seed] == 0.0:
-            break
-    return owner
 
 
 class Merging:
@@ -78,8 +47,6 @@ class Merging:
             np.linalg.norm(mesh.vertices[he.origin[rim]] - mesh.vertices[he.dest[rim]], axis=1),
             len(mesh.faces),
         )
-        self._corners = mesh.faces
-        self._fixed = ground.begun
 
     def run(self) -> Ints:
         """Merge until no merge is allowed; return the piece of each face (m,)."""
@@ -161,40 +128,4 @@ class Merging:
 
     def estimate(self, faces: Ints) -> float | None:
         """Estimate the strain of some faces together; None where they are no disk."""
-        corners = self._corners[faces]
-        ids, local = np.unique(corners, return_inverse=True)
-        own = corners.reshape(-1)
-        local = local.reshape(corners.shape)
-        if corners.shape[1] == 4 and (own < 0).any():
-            local = np.where(corners < 0, -1, local - 1)
-            ids = ids[1:]
-        rim, disk = _rim(local, len(ids))
-        if not disk:
-            return None
-        potential = self.ground.potential
-        inner = ids[~rim & ~self._fixed[ids]]
-        if not inner.size:
-            return 0.0
-        fixed = np.ones(len(self._fixed), bool)
-        fixed[inner] = False
-        scale = potential.solve(fixed, inner)
-        return potential.strain(scale, ids)
-
-
-def _rim(faces: Ints, count: int) -> tuple[NDArray[np.bool_], bool]:
-    """Mark the vertices on the boundary of faces (m, 3 or 4), and tell whether they are a disk."""
-    size = (faces >= 0).sum(axis=1)
-    place = np.arange(faces.shape[1])
-    after = np.where(place + 1 < size[:, None], np.roll(faces, -1, axis=1), faces[:, :1])
-    real = faces >= 0
-    a, b = faces[real], after[real]
-    key = np.minimum(a, b) * count + np.maximum(a, b)
-    edges, often = np.unique(key, return_counts=True)
-    rim_edges = edges[often == 1]
-    rim = np.zeros(count, bool)
-    rim[rim_edges // count] = True
-    rim[rim_edges % count] = True
-    # A boundary vertex with more than two boundary edges is a pinch.
-    touched = np.bincount(np.r_[rim_edges // count, rim_edges % count], minlength=count)
-    plain = bool((touched <= 2).all())
-    return rim, plain and count - len(edges) + len(faces) == 1 and rim_edges.size > 0
+        return self.ground.estimates(faces)

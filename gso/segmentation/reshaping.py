@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gso import metrics
+from gso import faults, metrics
 from gso.errors import MeshError
 from gso.result import Result
 from gso.seams.pieces import Pieces
@@ -28,11 +28,13 @@ _LEAST = 2e-3
 #: Factor on the weight of curvature where the distance is kept and the strain is not, and on that
 #: of the distance where it is the other way round.
 _STRONGER = 4.0
-#: Ratio of the distance to its bound up to which a larger weight of it is tried, ratio of the
-#: strain to its bound below which it is, and how often.
-_HOPELESS, _LITTLE, _WEAKER = 20.0, 0.5, 5
-#: Factors on the weights of fairness and curvature where pieces have facets.
+#: Ratio of the distance to its bound up to which a larger weight of it is tried, and how often;
+#: the ratio from which the weight grows by the square of the factor.
+_HOPELESS, _NEARER, _FAR = 20.0, 6, 4.0
+#: Factors on the weights of fairness and curvature where pieces have facets or folds.
 _FAIRER = (3.0, 2.0)
+#: How often these are tried, and what a folded face adds to the excess.
+_FAIR, _FOLD = 2, 0.01
 
 
 @dataclass(frozen=True)
@@ -119,8 +121,9 @@ def _attempt(
 ) -> _Attempt:
     """Solve one cut, again with other weights where distance, strain or facets are too large."""
     own = replace(Options().for_pieces(), w_proximity=proximity)
+    sound = not len(faults.folded(ground.mesh))
     best: _Attempt | None = None
-    todo, weaker = [own], 0
+    todo, nearer, fairer = [own], 0, 0
     while todo:
         options = todo.pop(0)
         try:
@@ -132,22 +135,24 @@ def _attempt(
         shape = cut_open if result.pieces is None else result.pieces
         away = metrics.surface_distance(ground.mesh, shape.design)
         far = max(away.there_max, away.back_max) / allowed
-        strained = facets = 0.0
+        strained = uneven = 0.0
         if far <= _HOPELESS:
             strained = strains_of(result.mesh).get("strain_p99", np.inf) / strain
         if far <= 1.0:
-            facets = facet_ratio(result) / FACETS
-        excess = max(far, strained, facets)
+            folds = len(faults.folded(shape.design)) if sound else 0
+            uneven = max(facet_ratio(result) / FACETS, 1.0 + _FOLD * folds if folds else 0.0)
+        excess = max(far, strained, uneven)
         attempt = _Attempt(level, options.w_proximity, cut_open, result, shape, excess)
-        if 1.0 < far <= _HOPELESS and strained < _LITTLE and weaker < _WEAKER:
+        if 1.0 < far <= _HOPELESS and strained < 1.0 and nearer < _NEARER:
             # The strain is less than allowed: a shape nearer to the design may do.
-            weaker += 1
-            todo.append(replace(options, w_proximity=_STRONGER * options.w_proximity))
-        elif best is None:
-            if strained > 1.0 >= far:
-                todo.append(replace(own, w_curvature=_STRONGER * own.w_curvature))
-            if facets > 1.0:
-                todo.append(_fairer(own))
+            nearer += 1
+            more = _STRONGER if far < _FAR else _STRONGER**2
+            todo.append(replace(options, w_proximity=more * options.w_proximity))
+        elif uneven > 1.0 and fairer < _FAIR:
+            fairer += 1
+            todo.append(_fairer(options))
+        elif best is None and strained > 1.0 >= far:
+            todo.append(replace(own, w_curvature=_STRONGER * own.w_curvature))
         if best is None or attempt.excess < best.excess:
             best = attempt
         if best.excess <= 1.0:

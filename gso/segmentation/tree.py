@@ -12,6 +12,7 @@ curvature).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ from numpy.typing import NDArray
 from gso.mesh import Mesh
 from gso.mesh.paths import Paths
 from gso.mesh.topology import edge_keys
+from gso.segmentation.estimates import Estimates
+from gso.segmentation.patches import patches
 from gso.segmentation.potential import Potential
 from gso.typing import Array, Ints
 
@@ -83,6 +86,21 @@ class Ground:
         return self.factor[
             order[np.searchsorted(keys[order], edge_keys(ends[:, 0], ends[:, 1], n))]
         ]
+
+    @cached_property
+    def estimates(self) -> Estimates:
+        """Estimated strains of sets of faces."""
+        return Estimates(self.mesh, self.potential, self.begun)
+
+    @cached_property
+    def _patches(self) -> dict[int, Ints]:
+        return {}
+
+    def patches(self, count: int) -> Ints:
+        """Divide the mesh into about `count` patches, once: the patch of each face (m,)."""
+        if count not in self._patches:
+            self._patches[count] = patches(self.mesh, count)
+        return self._patches[count]
 
     @property
     def begun(self) -> NDArray[np.bool_]:

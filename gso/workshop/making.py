@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from gso import faults, metrics, parametrization
+from gso import decimation, faults, metrics, parametrization
 from gso.errors import ConvergenceWarning, GSOError, MeshError
 from gso.io.surface import welded
 from gso.mesh import Mesh
@@ -35,7 +35,26 @@ _SAME = 1e-9
 #: Share of the design's diagonal that is allowed where nothing is given.
 SHARE = 0.01
 
+#: Number of triangles that a larger design is decimated to, and the share of the allowed distance
+#: within which.
+_LIGHT, _NEAR = 10_000, 0.35
+
 Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class _Design:
+    """A design, the mesh that is solved in its place, and the allowed distances from both."""
+
+    mesh: Mesh
+    light: Mesh
+    allowed: float
+    left: float
+
+    @classmethod
+    def of(cls, mesh: Mesh, allowed: float) -> _Design:
+        light, away = decimation.within(mesh, _NEAR * allowed, _LIGHT)
+        return cls(mesh, light, allowed, allowed - away)
 
 
 def made(name: str, design: Mesh, ask: Ask, say: Say = lambda said: None) -> Made:
@@ -62,13 +81,14 @@ def made(name: str, design: Mesh, ask: Ask, say: Say = lambda said: None) -> Mad
         warnings.simplefilter("ignore", ConvergenceWarning)
         if ask.formulation == "flatten":
             return _flattened(name, design, ask, say)
-        whole = _whole(name, design, ask, allowed, say)
+        own = _Design.of(design, allowed)
+        whole = _whole(name, own, ask, say)
         if whole is not None:
             whole = _sized(whole, ask)
         if whole is not None and not whole.reasons:
             return whole
         try:
-            parted = _sized(_parted(name, design, ask, allowed, say), ask)
+            parted = _sized(_parted(name, own, ask, say), ask)
         except GSOError:
             if whole is None:
                 raise
@@ -78,27 +98,30 @@ def made(name: str, design: Mesh, ask: Ask, say: Say = lambda said: None) -> Mad
     return min((whole, parted), key=lambda one: one.record["deviation_max"])
 
 
-def _whole(name: str, design: Mesh, ask: Ask, allowed: float, say: Say) -> Made | None:
+def _whole(name: str, design: _Design, ask: Ask, say: Say) -> Made | None:
     """Make the design of one surface; None if it is closed, or has a handle."""
-    if not parametrization.flattens(design):
+    if not parametrization.flattens(design.light):
         return None
     say(f"{name}: as a whole")
     if ask.formulation != "ruled":
         result = optimize(
-            design,
+            design.light,
             formulation=ask.formulation,
-            max_deviation=allowed,
+            max_deviation=design.left,
             max_strain=ask.max_strain,
         )
         if result.pattern is None:
             return None
-        record = _record(design, result.mesh, result.pattern, ask, allowed, list(result.reasons))
+        reasons = list(result.reasons)
+        record = _record(design.mesh, result.mesh, result.pattern, ask, design.allowed, reasons)
         return of_surface(name, result.mesh, result.pattern, record)
     try:
-        result = optimize(design, formulation="ruled", options=_options(ask), max_deviation=allowed)
+        result = optimize(
+            design.light, formulation="ruled", options=_options(ask), max_deviation=design.left
+        )
     except MeshError:
         return None
-    return of_ruled(name, result, _ruled_record(design, result, ask, allowed))
+    return of_ruled(name, result, _ruled_record(design, result, ask))
 
 
 def _sized(made: Made, ask: Ask) -> Made:
@@ -145,10 +168,10 @@ def _searched(name: str, design: Mesh, ask: Ask, allowed: float | None, say: Say
     )
 
 
-def _parted(name: str, design: Mesh, ask: Ask, allowed: float, say: Say) -> Made:
+def _parted(name: str, design: _Design, ask: Ask, say: Say) -> Made:
     """Make the design in pieces: each of them ruled where that is asked and possible."""
     share = _PIECES if ask.formulation == "ruled" else 1.0
-    found = _searched(name, design, ask, share * allowed, say)
+    found = _searched(name, design.light, ask, share * design.left, say)
     if any(sheet is None for sheet in found.sheets):
         raise MeshError(f"{name}: a piece cannot be laid flat; {'; '.join(found.reasons)}")
     panels: list[Panel] = []
@@ -163,7 +186,7 @@ def _parted(name: str, design: Mesh, ask: Ask, allowed: float, say: Say) -> Made
         result = None
         if ask.formulation == "ruled":
             say(f"{own}: strips")
-            result = _strips(piece.mesh, ask, _FOLLOW * allowed)
+            result = _strips(piece.mesh, ask, _FOLLOW * design.left)
         if result is None or result.ruled is None or sheet is None:
             panels.append(Panel(own, piece.mesh, sheet.flat))  # type: ignore[union-attr]
             owner.append(number)
@@ -183,7 +206,7 @@ def _parted(name: str, design: Mesh, ask: Ask, allowed: float, say: Say) -> Made
         for panel in panels
     ]
     matings += across(found, moved, owner, panels, rims)
-    record = _of_panels(design, panels, ask, allowed)
+    record = _of_panels(design.mesh, panels, ask, design.allowed)
     reasons = [
         *(r for r in found.reasons if "distance between surface and design" not in r),
         *record["reasons"],
@@ -208,12 +231,14 @@ def _shifted(side: Side, by: int) -> Side:
     return replace(side, panel=side.panel + by)
 
 
-def _ruled_record(design: Mesh, result: Result, ask: Ask, allowed: float) -> dict[str, Any]:
+def _ruled_record(design: _Design, result: Result, ask: Ask) -> dict[str, Any]:
     ruled = result.ruled
     if ruled is None:
         raise MeshError("the solve was ended before there were strips")
-    away = ruled.deviation or ruled.distances(design)
-    record = _record(design, ruled.mesh, ruled.pattern, ask, allowed, list(result.reasons))
+    known = ruled.deviation if design.light is design.mesh else None
+    away = known or ruled.distances(design.mesh)
+    reasons = list(result.reasons)
+    record = _record(design.mesh, ruled.mesh, ruled.pattern, ask, design.allowed, reasons)
     return record | {
         "deviation_mean": max(away.there_mean, away.back_mean),
         "deviation_max": max(away.there_max, away.back_max),

@@ -23,6 +23,8 @@ from gso.workshop.thickness import thickened
 _FLAT = 1e-6
 #: Corners of the polygon of a registration hole.
 _ROUND = 48
+#: Largest number of notches of a seam, but for one.
+_NOTCHES = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,10 +140,12 @@ def _joint(panel: Panel, seam: Mating, side: Side, scale: float, first: bool) ->
 def places(length: float, spacing: float) -> Array:
     """Return the arc lengths of the notches of a seam: an odd number of them, evenly.
 
+    A seam has no more than 51, whatever their distance.
+
     >>> places(100.0, 30.0).tolist()
     [25.0, 50.0, 75.0]
     """
-    count = max(int(length / spacing), 1)
+    count = min(max(int(length / spacing), 1), _NOTCHES)
     count += 1 - count % 2
     return length * np.arange(1, count + 1) / (count + 1)
 

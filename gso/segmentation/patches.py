@@ -1,0 +1,37 @@
+"""Division of a mesh into compact patches."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from gso.mesh import Mesh
+from gso.typing import Ints
+
+
+def patches(mesh: Mesh, count: int) -> Ints:
+    """Divide a mesh into about `count` compact patches; return the patch of each face (m,).
+
+    The Voronoi cells of farthest points, by distances between the centres of faces.
+    """
+    he = mesh.half_edges
+    k = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
+    centre = mesh.vertices[corners].mean(axis=1)
+    f, g = he.face[k], he.face[he.twin[k]]
+    length = np.linalg.norm(centre[f] - centre[g], axis=1)
+    graph = coo_matrix(
+        (np.maximum(length, 1e-300), (f, g)), shape=(len(centre), len(centre))
+    ).tocsr()
+    middle = centre.mean(axis=0)
+    seed = int(np.linalg.norm(centre - middle, axis=1).argmax())
+    best, owner = np.full(len(centre), np.inf), np.zeros(len(centre), np.int64)
+    for number in range(min(count, len(centre))):
+        away = dijkstra(graph, directed=False, indices=seed, limit=float(best.max()))
+        closer = away < best
+        best[closer], owner[closer] = away[closer], number
+        seed = int(np.where(np.isinf(best), np.inf, best).argmax())
+        if best[seed] == 0.0:
+            break
+    return owner
