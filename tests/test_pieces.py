@@ -438,7 +438,7 @@ def test_straight_seams_of_any_labels_can_be_cut(seed):
 
     from gso.seams import Edges
     from gso.seams.straightening import straight_seams
-    from gso.segmentation.merging import patches
+    from gso.segmentation.patches import patches
 
     rng = np.random.default_rng(seed)
     n = int(rng.integers(30, 300))

@@ -11,6 +11,7 @@ import shapely
 import gso
 from gso.errors import MeshError, OptionError
 from gso.mesh import Mesh
+from gso.pattern import Bend
 from gso.workshop.asking import Ask
 from gso.workshop.congruent import origins
 from gso.workshop.finish import Finish
@@ -57,6 +58,25 @@ def bent(angles, width=1.0, radius=np.inf):
     )
 
 
+def arcs(part, seam):
+    """Arc lengths along the outline between the notches of a seam, in order."""
+    import shapely
+
+    ring = shapely.LinearRing(part.outline)
+    at = np.array(
+        [ring.project(shapely.Point(n.at)) for n in part.notches if n.text == str(seam.number)]
+    )
+    # The seam may run over the first point of the outline.
+    gap = np.diff(np.r_[np.sort(at), np.sort(at)[:1] + ring.length])
+    return np.diff(at) % ring.length if len(at) > 1 else gap[:0]
+
+
+def _centre(points):
+    """The centre of the circle through points (k, 2), by least squares."""
+    matrix = np.c_[2 * points, np.ones(len(points))]
+    return np.linalg.lstsq(matrix, (points**2).sum(axis=1), rcond=None)[0][:2]
+
+
 def outline_length(part):
     return np.linalg.norm(np.roll(part.outline, -1, axis=0) - part.outline, axis=1).sum()
 
@@ -65,7 +85,7 @@ class TestThickness:
     @pytest.mark.parametrize("face, radius", [("middle", 1.0), ("outside", 0.98), ("inside", 1.02)])
     def test_a_rolled_cylinder_has_the_length_of_its_neutral_surface(self, face, radius):
         # The design is a cylinder of radius 1; the sheet is 0.04 thick.
-        n = 400
+        n = 1000
         angle = np.pi / 2 / n
         panel = bent([angle] * (n - 1), width=2 * np.sin(angle / 2))
         sheet = Thickness(0.04, k=0.5, face=face)
@@ -74,7 +94,43 @@ class TestThickness:
         long = np.ptp(thickened(panel, sheet).flat[:, 0])
         # Of n bends only n - 1 are inside; the others are halves at both ends.
         want = radius * np.pi / 2 - (radius - 1.0) * angle
-        assert long == pytest.approx(want, rel=2e-6)
+        assert long == pytest.approx(want, rel=1e-6)
+
+    @pytest.mark.parametrize("face, offset", [("outside", -0.02), ("inside", 0.02)])
+    def test_a_rolled_cone_has_the_pattern_of_its_neutral_surface(self, face, offset):
+        # A sector of half angle 30 degrees between the slant lengths 1 and 2, in n flat plates.
+        from gso.workshop.panels import Panel
+        from gso.workshop.thickness import thickened
+
+        n, half, turn = 1000, np.pi / 6, np.pi / 2
+        theta = turn * np.arange(n + 1) / n
+        # The plates are isosceles: two slants and a chord of the circle of the cone's rim.
+        plate = 2 * np.arcsin(np.sin(half) * np.sin(turn / n / 2))
+        around = plate * np.arange(n + 1)
+        flat = np.concatenate([[[r * np.cos(a), r * np.sin(a)] for a in around] for r in (1, 2)])
+        r = np.repeat([1.0, 2.0], n + 1) * np.sin(half)
+        high = -np.repeat([1.0, 2.0], n + 1) * np.cos(half)
+        points = np.stack([r * np.cos(np.tile(theta, 2)), r * np.sin(np.tile(theta, 2)), high], 1)
+        k = np.arange(n)
+        faces = np.stack([k, n + 1 + k, n + 2 + k, k + 1], axis=1)
+        mesh = Mesh(points, faces)
+        normals = np.cross(
+            points[faces[:, 2]] - points[faces[:, 0]], points[faces[:, 3]] - points[k]
+        )
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        fold = np.arccos(np.clip((normals[1:] * normals[:-1]).sum(axis=1), -1, 1))
+        bends = np.stack([k[1:], n + 1 + k[1:]], axis=1)
+        panel = Panel("cone", mesh, flat, bends, fold, np.full(n - 1, np.inf))
+        after = thickened(panel, Thickness(0.04, k=0.5, face=face)).flat
+        # The offset surface is the same cone, moved along its axis: the pattern is the same
+        # sector, moved outwards by the offset over the tangent of the half angle.
+        middle = slice(1, n)
+        want = np.array([1.0, 2.0])[:, None] + offset / np.tan(half)
+        apex = _centre(after[: n + 1][middle])
+        radius = np.stack(
+            [np.linalg.norm(after[i : i + n + 1][middle] - apex, axis=1) for i in (0, n + 1)]
+        )
+        np.testing.assert_allclose(radius, np.broadcast_to(want, radius.shape), rtol=1e-6)
 
     def test_a_valley_is_changed_the_other_way(self):
         sheet = Thickness(0.1, k=0.4, face="outside")
@@ -111,6 +167,52 @@ class TestThickness:
     def test_wrong_values_are_refused(self, bad):
         with pytest.raises(OptionError):
             Thickness(**bad)
+
+
+class TestCongruent:
+    def test_parts_that_are_the_same_are_counted(self):
+        from gso.workshop.congruent import united
+
+        outline = np.array([[0.0, 0], [90, 0], [100, 50], [0, 50]])
+        bend = Bend(np.array([[20.0, 0], [20, 50]]), 0.3, 5.0)
+        one = Part("one", outline, bends=(bend,), count=2)
+        turned = replace(one.turned(np.pi), name="turned", count=1)
+        other = replace(one, name="valley", bends=(bend._replace(angle=-0.3),))
+        shape = replace(one, name="mirrored", outline=(outline * [-1, 1])[::-1], bends=())
+        parts, same = united([one, turned, other, shape, replace(shape, name="last")])
+        assert same == {"turned": "one", "last": "mirrored"}
+        assert [(p.name, p.count) for p in parts] == [("one", 3), ("valley", 2), ("mirrored", 4)]
+
+    def test_seams_with_other_numbers_make_other_parts(self):
+        from gso.workshop.congruent import united
+        from gso.workshop.part import Notch
+
+        notch = Notch(np.array([50.0, 0]), np.array([0.0, 1]), "1")
+        one = replace(SQUARE, notches=(notch,))
+        two = replace(SQUARE, name="two", notches=(replace(notch, text="2"),))
+        assert not united([one, two])[1]
+        # Half a turn brings the notch to the other side.
+        assert united([one, replace(one.turned(np.pi), name="two")])[1]
+
+
+class TestDecimation:
+    def test_a_decimated_surface_is_near_and_not_folded(self):
+        from gso import decimation, faults, metrics
+
+        x, y = np.meshgrid(*2 * [np.linspace(-1, 1, 65)], indexing="ij")
+        rng = np.random.default_rng(0)
+        waves = sum(
+            rng.normal() / k * np.sin(k * (x * np.cos(a) + y * np.sin(a)) + b)
+            for k, a, b in zip(range(1, 12), rng.uniform(0, 6, 11), rng.uniform(0, 6, 11))
+        )
+        design = Mesh.from_grid(np.dstack([x, y, 0.1 * waves]))
+        light, away = decimation.within(design, 0.01 * design.diagonal, 500)
+        assert len(light.faces) <= 4000 and away <= 0.01 * design.diagonal
+        assert not len(faults.folded(light))
+        found = metrics.surface_distance(design, light)
+        assert max(found.there_max, found.back_max) == pytest.approx(away)
+        same, none = decimation.within(design, 1e-9, 500)
+        assert same is design and none == 0.0
 
 
 class TestOffsets:
@@ -173,6 +275,25 @@ class TestParts:
             # where the seam is straight; arc lengths are equal anyway.
             assert seam.mismatch(whole.panels) * 100.0 < 1e-6 * 100.0 * design.diagonal
             assert len(step[0]) == len(step[1])
+
+    @pytest.mark.slow
+    def test_notches_of_pieces_are_at_equal_arc_lengths(self):
+        design = dome(9, height=1.0)
+        whole = made("dome", design, Ask(max_deviation=0.01 * design.diagonal))
+        assert any(whole.record["strips"]) and not all(seam.common for seam in whole.matings)
+        parts = parts_of(whole, 1000.0, Finish(notches=100.0, labels=None))
+        for seam in whole.matings:
+            one, two = (arcs(parts[side.panel], seam) for side in (seam.one, seam.two))
+            np.testing.assert_allclose(one, two[::-1], atol=1e-6 * 1000.0 * design.diagonal)
+
+    @pytest.mark.slow
+    def test_seams_of_strained_patterns_differ_by_no_more_than_the_strain(self):
+        design = dome(17, height=0.6)
+        whole = made("dome", design, Ask(formulation="flatten", max_strain=0.02))
+        assert len(whole.panels) > 1
+        for seam in whole.matings:
+            most = 2.0 * whole.record["strain_max"] * seam.length
+            assert seam.mismatch(whole.panels) <= most
 
     def test_notches_point_into_the_part(self):
         design = dome(17, height=0.6)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import shutil
 import subprocess
@@ -209,31 +208,47 @@ class TestPrograms:
         if program is None:
             pytest.skip("Inkscape is not installed")
         writers.write(Drawing((replace(PART, labels=(), notches=()),)), tmp_path / "a.svg")
+        actions = "select-by-element:path;object-set-property:stroke,none;query-all"
         done = subprocess.run(
-            [program, str(tmp_path / "a.svg"), "--query-all"],
+            [program, str(tmp_path / "a.svg"), f"--actions={actions}"],
             capture_output=True,
             text=True,
             timeout=120,
             check=True,
         )
         rows = [line.split(",") for line in done.stdout.splitlines() if line.startswith("CUT,")]
-        # Inkscape counts 96 pixels to the inch, and the box includes the stroke.
-        wide, high = (float(x) * 25.4 / 96 for x in rows[0][3:5])
-        size = np.ptp(OUTLINE, axis=0)
-        width = max(0.1, size.max() / 1500)
-        assert wide == pytest.approx(size[0] + width, abs=0.06)
-        assert high == pytest.approx(size[1] + width, abs=0.06)
+        # Inkscape counts 96 pixels to the inch.
+        size = np.array(rows[0][3:5], float) * 25.4 / 96
+        np.testing.assert_allclose(size, np.ptp(OUTLINE, axis=0), atol=0.01)
 
     def test_librecad_converts_the_dxf(self, tmp_path):
         program = shutil.which("librecad")
         if program is None:
             pytest.skip("LibreCAD is not installed")
-        writers.write(DRAWING, tmp_path / "a.dxf")
+        writers.write(Drawing((replace(PART, labels=(), notches=()),)), tmp_path / "a.dxf")
+        # It draws in steps of 0.02 mm, so ten times as large.
         subprocess.run(
-            [program, "dxf2pdf", "-o", str(tmp_path / "a.pdf"), str(tmp_path / "a.dxf")],
+            [
+                program,
+                "dxf2pdf",
+                "-s",
+                "10",
+                "-o",
+                str(tmp_path / "a.pdf"),
+                str(tmp_path / "a.dxf"),
+            ],
             capture_output=True,
             timeout=120,
             check=True,
             env={"QT_QPA_PLATFORM": "offscreen", "HOME": str(tmp_path), "PATH": "/usr/bin:/bin"},
         )
-        assert math.isclose(len(pypdf.PdfReader(tmp_path / "a.pdf").pages), 1)
+        (page,) = pypdf.PdfReader(tmp_path / "a.pdf").pages
+        drawn = page.get_contents().get_data().decode()
+        step = float(re.search(r"([\d.]+) 0 0 -[\d.]+ 0 \d+ cm", drawn)[1]) / 72 * 25.4 / 10
+        lines = re.findall(r"(-?[\d.]+) (-?[\d.]+) [ml]\n", drawn.split("SCN", 1)[1])
+        size = np.ptp(np.array(lines, float), axis=0) * step
+        want = np.ptp(OUTLINE, axis=0)
+        # It rounds the page to whole points, which scales everything by the same factor.
+        factor = float((size / want).mean())
+        assert factor == pytest.approx(1.0, abs=5e-4)
+        np.testing.assert_allclose(size / factor, want, atol=0.01)

@@ -43,7 +43,7 @@ def fabricate(names: str = ",".join(_SETS), seconds: str = "30") -> dict[str, An
                 designs,
                 folder,
                 unit=unit,
-                max_deviation=None if share == 1.0 else 0.01 * share * designs[0].diagonal,
+                max_deviation=f"{share}%",
                 sheet=sheet,
                 seconds=float(seconds),
                 workers=2,

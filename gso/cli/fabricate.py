@@ -42,8 +42,9 @@ from gso.errors import OptionError
 @click.option(
     "--max-deviation",
     metavar="L",
-    type=float,
-    help="Largest distance from the design, in its unit; 1 % of its diagonal if not given.",
+    default="1%",
+    show_default=True,
+    help="Largest distance from the design, in its unit, or such as 0.5% of its diagonal.",
 )
 @click.option(
     "--max-strain",

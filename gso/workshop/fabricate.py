@@ -24,7 +24,7 @@ from gso.spelling import choices, known_keywords
 from gso.workshop import writers
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import design_record, digest, plain, versions
-from gso.workshop.congruent import origins
+from gso.workshop.congruent import origins, united
 from gso.workshop.designs import designs_of
 from gso.workshop.finish import Finish
 from gso.workshop.making import made as make
@@ -77,7 +77,7 @@ def fabricate(
     *,
     unit: str = "mm",
     formulation: str = "ruled",
-    max_deviation: float | None = None,
+    max_deviation: float | str = "1%",
     max_strain: float = 1e-3,
     max_strips: int = 8,
     darts: bool = False,
@@ -113,8 +113,8 @@ def fabricate(
         "ruled": exactly developable strips, with bend lines; pieces that no strips follow are
         only nearly developable. "curvature", "isometry": all of them are nearly developable.
         "flatten": the shape stays as it is.
-    max_deviation : float, optional
-        Largest distance from the design, in its unit; 1 % of its diagonal when not given.
+    max_deviation : float or str
+        Largest distance from the design, in its unit, or such as "0.5%" of its diagonal.
     max_strain : float
         Largest strain of the patterns (99th percentile).
     max_strips : int
@@ -195,7 +195,7 @@ def fabricate(
     found, failed = _made(names, meshes, chosen, ask, place, workers, scheduler, say)
     say("parts")
     parts: list[Part] = []
-    records = []
+    records: list[dict[str, Any]] = []
     for k in chosen:
         copies = [names[j] for j, origin in enumerate(first) if origin == k]
         if k not in found:
@@ -209,6 +209,10 @@ def fabricate(
             design_record(one, panels, own, scale, finish, copies) | {"digest": digest(meshes[k])}
         )
         parts += own
+    parts, same = united(parts)
+    for record in records:
+        for entry in record.get("parts", ()):
+            entry["same_as"] = same.get(entry["name"])
     certificate = {
         "unit": "mm",
         "asked": plain({"unit": unit, **ask.record(), "finish": finish.record()}),

@@ -32,8 +32,6 @@ _PIECES, _FOLLOW = 0.9, 0.1
 _STRIPS = 4
 #: Distance of vertices that are merged, relative to the diagonal.
 _SAME = 1e-9
-#: Share of the design's diagonal that is allowed where nothing is given.
-SHARE = 0.01
 
 #: Number of triangles that a larger design is decimated to, and the share of the allowed distance
 #: within which.
@@ -76,7 +74,7 @@ def made(name: str, design: Mesh, ask: Ask, say: Say = lambda said: None) -> Mad
     if len(joined.vertices) < len(design.vertices):
         # Poles of grids, whose edges have no length, become one vertex.
         design = joined
-    allowed = SHARE * design.diagonal if ask.max_deviation is None else ask.max_deviation
+    allowed = ask.distance(design.diagonal)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         if ask.formulation == "flatten":
@@ -219,8 +217,18 @@ def _parted(name: str, design: _Design, ask: Ask, say: Say) -> Made:
 
 def _strips(mesh: Mesh, ask: Ask, left: float) -> Result | None:
     """Make a piece of strips; None if no strips are usable within the distance."""
+    # The piece is developable already: its own normals give the rulings.
+    options = replace(_options(ask), max_strips=1, starts=("design",))
+    most = min(ask.max_strips, _STRIPS)
     try:
-        options = replace(_options(ask), max_strips=min(ask.max_strips, _STRIPS))
+        result = optimize(mesh, formulation="ruled", options=options, max_deviation=left)
+        if result.usable:
+            return result
+        ruled = result.ruled
+        # Strips of pieces that are not smooth come near in proportion to their number.
+        if ruled is None or ruled.distances(mesh).there_max > most * left:
+            return None
+        options = replace(options, max_strips=most)
         result = optimize(mesh, formulation="ruled", options=options, max_deviation=left)
     except MeshError:
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -82,17 +83,14 @@ def across(
                 one, two = (
                     Side(int(panel[a]), edges[a:b], share[a:b]) for panel, edges, share in feet
                 )
-                out.append(Mating(0, seam.along[a:b] - seam.along[a], one, two))
+                out.append(Mating(0, seam.along[a:b] - seam.along[a], one, two, common=False))
     return out
 
 
 def numbered(matings: Sequence[Mating]) -> tuple[Mating, ...]:
     """Number seams from 1 on, the longest first."""
     order = np.argsort([-seam.length for seam in matings], kind="stable").tolist()
-    return tuple(
-        Mating(number, matings[k].along, matings[k].one, matings[k].two)
-        for number, k in enumerate(order, start=1)
-    )
+    return tuple(replace(matings[k], number=number) for number, k in enumerate(order, start=1))
 
 
 def _directed(pattern: Pattern, seams: Ints) -> list[bool]:

@@ -97,12 +97,15 @@ class Mating:
         Arc length of the seam in space up to each point.
     one, two : Side
         The same points on both sides.
+    common : bool
+        Whether both sides are one curve in space; else they follow it within a distance.
     """
 
     number: int
     along: Array
     one: Side
     two: Side
+    common: bool = True
 
     @property
     def length(self) -> float:
@@ -157,6 +160,7 @@ class Made:
         for k, seam in enumerate(self.matings):
             out[f"seam{k}_along"] = seam.along
             out[f"seam{k}_number"] = np.array(seam.number)
+            out[f"seam{k}_common"] = np.array(int(seam.common))
             for name, side in (("one", seam.one), ("two", seam.two)):
                 out[f"seam{k}_{name}_edges"] = side.edges
                 out[f"seam{k}_{name}_shares"] = side.shares
@@ -188,8 +192,8 @@ class Made:
                     )
                     for side in ("one", "two")
                 )
-                number = int(data[f"seam{k}_number"])
-                matings.append(Mating(number, data[f"seam{k}_along"], one, two))
+                number, common = int(data[f"seam{k}_number"]), bool(data[f"seam{k}_common"])
+                matings.append(Mating(number, data[f"seam{k}_along"], one, two, common))
         except (KeyError, ValueError, TypeError) as error:
             raise MeshError(f"the arrays of {name} do not fit each other: {error}") from None
         return cls(name, tuple(panels), tuple(matings), record)

@@ -37,7 +37,10 @@ class Joint:
     line : ndarray, (k, 2)
         Its points on the outline, the part to the left.
     along : ndarray, (k,)
-        Their arc length in space.
+        Their arc length in space. Where the sides are two curves in space, the arc length of
+        this one in the pattern, equal on both sides half-way along the seam.
+    length : float
+        Length of the seam in space.
     first : bool
         Whether it is the side that gets tabs.
     """
@@ -45,6 +48,7 @@ class Joint:
     number: int
     line: Array
     along: Array
+    length: float
     first: bool
 
 
@@ -132,9 +136,44 @@ def mirrored(part: Part) -> Part:
 
 def _joint(panel: Panel, seam: Mating, side: Side, scale: float, first: bool) -> Joint:
     line, along = side.on(panel.flat), scale * seam.along
+    length = float(along[-1])
+    if not seam.common and length > 0:
+        line, own = _outline(panel, side)
+        along = _lengths(line) - np.interp(0.5 * length, along, own) + 0.5 * length
     if not first:
-        line, along = line[::-1], along[-1] - along[::-1]
-    return Joint(seam.number, line, along, first)
+        line, along = line[::-1], length - along[::-1]
+    return Joint(seam.number, line, along, length, first)
+
+
+def _outline(panel: Panel, side: Side) -> tuple[Array, Array]:
+    """Return the outline (m, 2) from the first to the last point of a side.
+
+    Also the arc length along it up to each point of the side, (k,).
+    """
+    first = side.edges[0]
+    loop = next(loop for loop in panel.loops if np.isin(first, loop).all())
+    ring = panel.flat[loop]
+    size = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+    start, total = np.r_[0.0, np.cumsum(size)[:-1]], float(size.sum())
+    place = np.full(len(panel.flat), -1)
+    place[loop] = np.arange(len(loop))
+    a, b = place[side.edges].T
+    ahead = (a + 1) % len(loop) == b
+    share = np.where(ahead, side.shares, 1.0 - side.shares)
+    at = start[np.where(ahead, a, b)] + share * size[np.where(ahead, a, b)]
+    # Steps between points are shorter than half of the outline.
+    step = np.diff(at)
+    own = np.r_[0.0, np.cumsum(step - total * np.round(step / total))]
+    way = 1.0 if own[-1] >= 0 else -1.0
+    far = way * (start - at[0]) % total
+    between = np.flatnonzero((far > 0) & (far < abs(own[-1])))
+    between = between[np.argsort(far[between])]
+    ends = side.on(panel.flat)[[0, -1]]
+    return np.concatenate([ends[:1], ring[between], ends[1:]]), way * own
+
+
+def _lengths(line: Array) -> Array:
+    return np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
 
 
 def places(length: float, spacing: float) -> Array:
@@ -155,13 +194,13 @@ def _notches(joints: Sequence[Joint], finish: Finish) -> tuple[Notch, ...]:
         return ()
     out = []
     for joint in joints:
-        if not joint.along[-1] > 0:
+        if not joint.length > 0:
             continue
-        at = places(float(joint.along[-1]), finish.notches)
+        at = places(joint.length, finish.notches)
         # Both sides of a seam have their notches at the same points of the surface.
         k = np.clip(np.searchsorted(joint.along, at, "right") - 1, 0, len(joint.along) - 2)
         step = joint.along[k + 1] - joint.along[k]
-        share = (at - joint.along[k]) / np.maximum(step, 1e-300)
+        share = np.clip((at - joint.along[k]) / np.maximum(step, 1e-300), 0.0, 1.0)
         way = joint.line[k + 1] - joint.line[k]
         points = joint.line[k] + share[:, None] * way
         inward = np.stack([-way[:, 1], way[:, 0]], axis=1)

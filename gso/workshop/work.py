@@ -17,7 +17,7 @@ from gso.workshop.making import made
 from gso.workshop.panels import Made
 
 #: Version of the files; those of another one are made again.
-_FORMAT = 1
+_FORMAT = 2
 
 
 def key(design: Mesh, ask: Ask) -> str:
