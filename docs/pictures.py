@@ -1,12 +1,16 @@
 """Draw the pictures of the documentation: ``python docs/pictures.py`` from the repository's root.
 
 They are those of ``gso optimize --plot`` and ``gso plot --rulings``, reduced to a palette of 256
-colours, a third of the size.
+colours, a third of the size; and a part, a sheet and the page of ``gso fabricate``. The last one is
+drawn where ``wkhtmltoimage`` is installed.
 """
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,6 +51,31 @@ def main() -> None:
     noise = np.random.default_rng(0).standard_normal(panel.vertices.shape)
     noisy = panel.replaced(panel.vertices + 0.005 * panel.frame.scale * noise)
     draw("denoise", plot_result(gso.tno.optimize(noisy, task="denoise")))
+    workshop()
+
+
+def workshop() -> None:
+    """Draw what ``gso fabricate`` makes of the panel."""
+    with tempfile.TemporaryDirectory() as folder:
+        job = gso.fabricate(
+            ROOT / "examples" / "panel.obj",
+            folder,
+            unit="m",
+            max_deviation=0.01,
+            sheet=(3500.0, 1500.0),
+            formats=("svg",),
+        )
+        name = max(job.parts, key=lambda part: len(part.bends)).name
+        shutil.copy(Path(folder) / "parts" / f"{name}.svg", IMAGES / "part.svg")
+        shutil.copy(Path(folder) / "sheets" / "sheet-1.svg", IMAGES / "sheet.svg")
+        program = shutil.which("wkhtmltoimage")
+        if program is not None:
+            page = Path(folder) / "page.png"
+            words = ["--quiet", "--width", "1000", "--height", "1100"]
+            subprocess.run(
+                [program, *words, str(Path(folder) / "index.html"), str(page)], check=True
+            )
+            reduce("page", Image.open(page).convert("RGB"))
 
 
 def draw(name: str, figure: Figure) -> None:
@@ -54,7 +83,11 @@ def draw(name: str, figure: Figure) -> None:
     figure.set_dpi(100)
     figure.canvas.draw()
     pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]  # type: ignore[attr-defined]
-    image = Image.fromarray(np.ascontiguousarray(pixels))
+    reduce(name, Image.fromarray(np.ascontiguousarray(pixels)))
+
+
+def reduce(name: str, image: Image.Image) -> None:
+    """Write an image with a palette whose first colour is white."""
     palette = image.quantize(256, kmeans=3)
     IMAGES.mkdir(exist_ok=True)
     reduced = image.quantize(256, palette=palette)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -205,6 +206,29 @@ class TestCommand:
         done = CliRunner().invoke(main, [*words, *table, str(tmp_path / "table.csv")])
         assert done.exit_code == 1
         assert "table.csv" in done.output
+
+
+@pytest.mark.slow
+def test_a_hemisphere_is_made_of_its_gores(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).resolve().parents[1] / "examples"))
+    import gores
+
+    gores.write(tmp_path / "dome.obj")
+    job = gso.fabricate(tmp_path / "dome.obj", tmp_path / "out", keep_groups=True, workers=0)
+    assert job.usable and len(job.parts) == 12
+    sizes = np.array([part.size for part in job.parts])
+    np.testing.assert_allclose(sizes, sizes[:1] + 0 * sizes, rtol=2e-3)
+    # A quarter of a great circle, and a twelfth of the equator.
+    np.testing.assert_allclose(sizes[0], [250 * np.pi, 500 * np.pi / 6], rtol=0.02)
+    (design,) = job.certificate["designs"]
+    assert design["seams"] == 12
+    assert design["seam_mismatch_max"] <= 1e-6 * design["diagonal"]
+
+
+def test_groups_that_a_file_lacks_are_named(tmp_path):
+    gso.save(dome(5), tmp_path / "dome.obj")
+    with pytest.raises(MeshError, match="no groups"):
+        gso.fabricate(tmp_path / "dome.obj", tmp_path / "out", keep_groups=True, workers=0)
 
 
 @pytest.mark.slow

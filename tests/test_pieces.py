@@ -446,7 +446,7 @@ def test_straight_seams_of_any_labels_can_be_cut(seed):
     p[:4] = [[0, 0], [1, 0], [0, 1], [1, 1]]
     height = 0.3 * np.sin(3 * p[:, 0]) * np.sin(3 * p[:, 1])
     mesh = Mesh(np.c_[p, height], Delaunay(p).simplices)
-    label, he = patches(mesh, int(rng.integers(2, 12))), mesh.half_edges
+    label, he = patches(mesh, int(rng.integers(2, 12)), np.empty((0, 2), int)), mesh.half_edges
     k = np.flatnonzero(he.twin > np.arange(he.twin.size))
     k = k[label[he.face[k]] != label[he.face[he.twin[k]]]]
     pieces = gso.cut(mesh, Edges(np.stack([he.origin[k], he.dest[k]], axis=1)))

@@ -1,7 +1,7 @@
 """From designs to the cutter: time, parts, distances, mismatch of seams, density of nesting.
 
 Distances are per cent of each design's diagonal, the largest of all; mismatch is in millimetres.
-The designs are the teapot's 32 patches, a hemisphere, the terrain, and 200 facade panels.
+The designs are the teapot's 32 patches, a hemisphere of 12 gores, the terrain, 200 facade panels.
 """
 
 from __future__ import annotations
@@ -34,14 +34,15 @@ def fabricate(names: str = ",".join(_SETS), seconds: str = "30") -> dict[str, An
     rows, out = [], {}
     for name in progress(names.split(","), "fabricate"):
         unit, sheet, share = _SETS[name]
-        designs = _designs(name)
         folder = Path(tempfile.mkdtemp())
+        designs = _designs(name, folder)
         clock = time.perf_counter()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             job = gso.fabricate(
                 designs,
                 folder,
+                keep_groups=name == "hemisphere",
                 unit=unit,
                 max_deviation=f"{share}%",
                 sheet=sheet,
@@ -70,7 +71,7 @@ def fabricate(names: str = ",".join(_SETS), seconds: str = "30") -> dict[str, An
     return out
 
 
-def _designs(name: str) -> list[Mesh]:
+def _designs(name: str, folder: Path) -> list[Mesh | Path]:
     sys.path.insert(0, str(ROOT / "examples"))
     if name == "teapot":
         import teapot
@@ -84,25 +85,10 @@ def _designs(name: str) -> list[Mesh]:
         import terrain
 
         return [gso.as_mesh(terrain.terrain())]
-    return [hemisphere()]
+    import gores
 
-
-def hemisphere(radius: float = 500.0, around: int = 48, rows: int = 16) -> Mesh:
-    """Make a hemisphere of triangles, without a pole where edges have no length."""
-    a = 2.0 * np.pi * np.arange(around) / around
-    b = np.linspace(0.0, 0.5 * np.pi, rows + 1)[1:]
-    a, b = np.meshgrid(a, b, indexing="ij")
-    ring = np.stack([np.sin(b) * np.cos(a), np.sin(b) * np.sin(a), np.cos(b)], axis=-1)
-    i = np.arange(around * rows).reshape(around, rows)
-    j = np.roll(i, -1, axis=0)
-    top = around * rows
-    faces = [
-        np.stack([i[:, :-1], i[:, 1:], j[:, 1:]], axis=-1).reshape(-1, 3),
-        np.stack([i[:, :-1], j[:, 1:], j[:, :-1]], axis=-1).reshape(-1, 3),
-        np.stack([np.full(around, top), i[:, 0], j[:, 0]], axis=-1),
-    ]
-    points = np.concatenate([ring.reshape(-1, 3), [[0.0, 0.0, 1.0]]])
-    return Mesh(radius * points, np.concatenate(faces))
+    gores.write(folder / "gores.obj")
+    return [folder / "gores.obj"]
 
 
 SECTIONS = (fabricate,)

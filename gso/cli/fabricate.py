@@ -58,6 +58,7 @@ from gso.errors import OptionError
     "--max-strips", metavar="N", type=int, default=8, show_default=True, help="Strips of one piece."
 )
 @click.option("--darts", is_flag=True, help="Cuts may end inside a piece.")
+@click.option("--keep-groups", is_flag=True, help="Cut between the groups (g) of IN in any case.")
 @click.option("--min-radius", metavar="L", type=float, help="Smallest radius of a bend.")
 @click.option("--thickness", metavar="MM", type=float, help="Thickness of the sheet.")
 @click.option("--k-factor", metavar="K", type=float, default=0.5, show_default=True)
@@ -153,6 +154,7 @@ def fabricate(inputs: tuple[str, ...], folder: str, **given: Any) -> None:
             max_strain=given["max_strain"],
             max_strips=given["max_strips"],
             darts=given["darts"],
+            keep_groups=given["keep_groups"],
             min_radius=given["min_radius"],
             finish=finish,
             sheet=given["sheet"] or None,

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 
 from gso.mesh import Mesh
+from gso.mesh.topology import edge_keys
 from gso.typing import Ints
 
 
-def patches(mesh: Mesh, count: int) -> Ints:
+def patches(mesh: Mesh, count: int, kept: Ints) -> Ints:
     """Divide a mesh into about `count` compact patches; return the patch of each face (m,).
 
-    The Voronoi cells of farthest points, by distances between the centres of faces.
+    The Voronoi cells of farthest points, by distances between the centres of faces. No patch
+    reaches across an edge of `kept` (k, 2).
     """
-    he = mesh.half_edges
+    he, n = mesh.half_edges, len(mesh.vertices)
     k = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    cut = np.isin(edge_keys(he.origin[k], he.dest[k], n), edge_keys(kept[:, 0], kept[:, 1], n))
+    k = k[~cut]
     corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
     centre = mesh.vertices[corners].mean(axis=1)
     f, g = he.face[k], he.face[he.twin[k]]
@@ -27,7 +31,8 @@ def patches(mesh: Mesh, count: int) -> Ints:
     middle = centre.mean(axis=0)
     seed = int(np.linalg.norm(centre - middle, axis=1).argmax())
     best, owner = np.full(len(centre), np.inf), np.zeros(len(centre), np.int64)
-    for number in range(min(count, len(centre))):
+    least = connected_components(graph, directed=False)[0]
+    for number in range(min(max(count, least), len(centre))):
         away = dijkstra(graph, directed=False, indices=seed, limit=float(best.max()))
         closer = away < best
         best[closer], owner[closer] = away[closer], number

@@ -53,7 +53,7 @@ def reshaped(ground: Ground, wishes: Wishes) -> tuple[Candidate, Result | None]:
     """Search for the fewest cuts whose pieces become developable within the allowed distance."""
     allowed = np.inf if wishes.max_deviation is None else wishes.max_deviation
     tried: list[_Attempt] = []
-    for level in _levels(tried):
+    for level in _levels(tried, len(ground.kept)):
         wishes.say(f"seams and shape, attempt {len(tried) + 1}")
         cut_open = cuts(ground, wishes, level)
         # An attempt begins with the weight of the distance that the one before ended with.
@@ -89,15 +89,18 @@ def _with_straight_seams(
     return new if new.excess <= max(best.excess, 1.0) else best
 
 
-def _levels(tried: list[_Attempt]) -> Iterator[float]:
-    """Yield the bound on the estimated strain of the next attempt, by bisection."""
+def _levels(tried: list[_Attempt], least: int) -> Iterator[float]:
+    """Yield the bound on the estimated strain of the next attempt, by bisection.
+
+    Not above one with which no more than the `least` number of edges were cut.
+    """
     level = _FIRST
     for _ in range(12):
         yield level
         good = [a.level for a in tried if a.excess <= 1.0]
         bad = [a.level for a in tried if a.excess > 1.0]
         if not bad:
-            if not len(tried[-1].pieces.edges):
+            if len(tried[-1].cut.edges) <= least:
                 return
             level *= _STEP
         elif not good:

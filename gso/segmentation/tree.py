@@ -99,7 +99,7 @@ class Ground:
     def patches(self, count: int) -> Ints:
         """Divide the mesh into about `count` patches, once: the patch of each face (m,)."""
         if count not in self._patches:
-            self._patches[count] = patches(self.mesh, count)
+            self._patches[count] = patches(self.mesh, count, self.kept)
         return self._patches[count]
 
     @property

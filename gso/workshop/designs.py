@@ -3,31 +3,67 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from gso import io
 from gso.components import split
 from gso.mesh import Mesh
+from gso.seams.kinds import Labels
+from gso.typing import Ints
 
 
-def designs_of(given: Any) -> tuple[list[str], list[Mesh]]:
-    """Read designs, and divide them into components; return their names too."""
+def _no_edges() -> Ints:
+    return np.empty((0, 2), np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """One component of what was given.
+
+    Attributes
+    ----------
+    name : str
+    mesh : Mesh
+    kept : ndarray of int, (k, 2)
+        Edges that are cut in any case.
+    """
+
+    name: str
+    mesh: Mesh
+    kept: Ints = field(default_factory=_no_edges)
+
+
+def designs_of(given: Any, *, keep_groups: bool = False) -> list[Design]:
+    """Read designs, and divide them into components.
+
+    Raises
+    ------
+    MeshError
+        A design cannot be read, or has no groups to cut between.
+    """
     many = given if isinstance(given, list | tuple) and not _is_mesh(given) else [given]
-    names: list[str] = []
-    meshes: list[Mesh] = []
+    out: list[Design] = []
     for number, one in enumerate(many, start=1):
         path = isinstance(one, str | os.PathLike)
         suffix = number if len(many) > 1 else ""
         stem = Path(os.fsdecode(one)).stem if path else f"design{suffix}"
         mesh = io.as_mesh(one)
+        kept = Labels("g").edges(mesh) if keep_groups else _no_edges()
         components = split(mesh)
+        local = np.full(len(mesh.vertices), -1)
         for k, part in enumerate(components, start=1):
-            names.append(f"{stem}-{k}" if len(components) > 1 else stem)
-            meshes.append(part.mesh)
-    if len(set(names)) < len(names):
-        names = [f"{name}.{k}" for k, name in enumerate(names, start=1)]
-    return [_spelled(name) for name in names], meshes
+            local[:] = -1
+            local[part.vertices] = np.arange(len(part.vertices))
+            own = local[kept]
+            name = f"{stem}-{k}" if len(components) > 1 else stem
+            out.append(Design(_spelled(name), part.mesh, own[(own >= 0).all(axis=1)]))
+    if len({design.name for design in out}) < len(out):
+        out = [replace(d, name=f"{d.name}.{k}") for k, d in enumerate(out, start=1)]
+    return out
 
 
 def _is_mesh(given: Any) -> bool:

@@ -25,7 +25,7 @@ from gso.workshop import writers
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import design_record, digest, plain, versions
 from gso.workshop.congruent import origins, united
-from gso.workshop.designs import designs_of
+from gso.workshop.designs import Design, designs_of
 from gso.workshop.finish import Finish
 from gso.workshop.making import made as make
 from gso.workshop.nesting import checked_sheet, nest
@@ -81,6 +81,7 @@ def fabricate(
     max_strain: float = 1e-3,
     max_strips: int = 8,
     darts: bool = False,
+    keep_groups: bool = False,
     min_radius: float | None = None,
     finish: Finish = Finish(),  # noqa: B008
     marks: Sequence[ArrayLike] = (),
@@ -121,6 +122,8 @@ def fabricate(
         Largest number of strips side by side of one piece.
     darts : bool
         Whether cuts may end inside a piece.
+    keep_groups : bool
+        Whether to cut between the groups of faces (``g``) of an OBJ file in any case.
     min_radius : float, optional
         Smallest radius of a bend, in the design's unit.
     finish : Finish
@@ -187,19 +190,21 @@ def fabricate(
         (place / "work").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise MeshError(f"{place}: {error.strerror}; -o names a folder") from None
-    names, meshes = designs_of(designs)
+    every = designs_of(designs, keep_groups=keep_groups)
+    meshes = [design.mesh for design in every]
     # Marks are on one of several copies, so that these differ.
-    first = list(range(len(meshes))) if len(marks) or len(holes) else origins(meshes)
+    alone = len(marks) or len(holes) or any(len(design.kept) for design in every)
+    first = list(range(len(meshes))) if alone else origins(meshes)
     drawn = [(given, _nearest(meshes, given)) for given in (marks, holes)]
     chosen = sorted(set(first))
-    found, failed = _made(names, meshes, chosen, ask, place, workers, scheduler, say)
+    found, failed = _made(every, chosen, ask, place, workers, scheduler, say)
     say("parts")
     parts: list[Part] = []
     records: list[dict[str, Any]] = []
     for k in chosen:
-        copies = [names[j] for j, origin in enumerate(first) if origin == k]
+        copies = [every[j].name for j, origin in enumerate(first) if origin == k]
         if k not in found:
-            records.append({"name": names[k], "copies": copies, "reasons": [failed[k]]})
+            records.append({"name": every[k].name, "copies": copies, "reasons": [failed[k]]})
             continue
         one = found[k]
         lines = ([x for x, n in zip(given, on, strict=True) if n == k] for given, on in drawn)
@@ -270,8 +275,7 @@ def _nearest(meshes: Sequence[Mesh], lines: Sequence[ArrayLike]) -> list[int]:
 
 
 def _made(
-    names: Sequence[str],
-    meshes: Sequence[Mesh],
+    designs: Sequence[Design],
     chosen: Iterable[int],
     ask: Ask,
     place: Path,
@@ -283,29 +287,34 @@ def _made(
     found: dict[int, Made] = {}
     failed: dict[int, str] = {}
     todo = []
+
+    def read(design: Design) -> Made | None:
+        return stored(design.name, key(design, ask), place / "work" / f"{design.name}.npz")
+
     for k in chosen:
-        one = stored(names[k], key(meshes[k], ask), place / "work" / f"{names[k]}.npz")
+        one = read(designs[k])
         if one is None:
             todo.append(k)
         else:
             found[k] = one
     # The largest first, so that no large one runs alone at the end.
-    todo.sort(key=lambda k: -len(meshes[k].vertices))
+    todo.sort(key=lambda k: -len(designs[k].mesh.vertices))
     if workers is None and len(todo) == 1:
         workers = 0
     if workers == 0 and scheduler is None:
         for number, k in enumerate(todo, start=1):
-            say(f"{names[k]}: design {number} of {len(todo)}")
+            own = designs[k]
+            say(f"{own.name}: design {number} of {len(todo)}")
             try:
-                one = make(names[k], meshes[k], ask, say)
+                one = make(own, ask, say)
             except GSOError as error:
                 failed[k] = str(error)
                 continue
-            store(one, key(meshes[k], ask), place / "work" / f"{names[k]}.npz")
+            store(one, key(own, ask), place / "work" / f"{own.name}.npz")
             found[k] = one
         return found, failed
     work = partial(work_on, ask, str((place / "work").resolve()))
-    items = ((names[k], meshes[k]) for k in todo)
+    items = (designs[k] for k in todo)
     if scheduler is None:
         spread = parallel.spread(work, items, workers=workers, caller=False)
     else:
@@ -318,7 +327,7 @@ def _made(
             if done.error is not None:
                 failed[k] = done.error
                 continue
-            one = stored(names[k], key(meshes[k], ask), place / "work" / f"{names[k]}.npz")
+            one = read(designs[k])
             if one is None:
                 failed[k] = "its file in the folder work is missing; is the folder shared?"
             else:

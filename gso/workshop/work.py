@@ -10,9 +10,9 @@ import numpy as np
 
 from gso import io
 from gso.errors import MeshError
-from gso.mesh import Mesh
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import digest, plain
+from gso.workshop.designs import Design
 from gso.workshop.making import made
 from gso.workshop.panels import Made
 
@@ -20,9 +20,10 @@ from gso.workshop.panels import Made
 _FORMAT = 2
 
 
-def key(design: Mesh, ask: Ask) -> str:
+def key(design: Design, ask: Ask) -> str:
     """Return what identifies the work on a design: its digest and what was asked."""
-    said = json.dumps([_FORMAT, digest(design), plain(ask.record())], sort_keys=True)
+    own = [digest(design.mesh), design.kept.tolist()]
+    said = json.dumps([_FORMAT, *own, plain(ask.record())], sort_keys=True)
     return hashlib.sha256(said.encode()).hexdigest()
 
 
@@ -33,11 +34,10 @@ def store(one: Made, own: str, path: Path) -> None:
         np.savez_compressed(file, record=record, **one.arrays())
 
 
-def work_on(ask: Ask, folder: str, named: tuple[str, Mesh]) -> str:
-    """Make one design, given with its name, and store it; for worker processes."""
-    name, mesh = named
-    store(made(name, mesh, ask), key(mesh, ask), Path(folder) / f"{name}.npz")
-    return name
+def work_on(ask: Ask, folder: str, design: Design) -> str:
+    """Make one design and store it; for worker processes."""
+    store(made(design, ask), key(design, ask), Path(folder) / f"{design.name}.npz")
+    return design.name
 
 
 def stored(name: str, own: str, path: Path) -> Made | None:
