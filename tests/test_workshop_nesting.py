@@ -196,3 +196,18 @@ class TestErrors:
         bow = Part("bow", np.array([[0.0, 0], [10, 10], [10, 0], [0, 10]]))
         with pytest.raises(OptionError, match="part bow"):
             nest([bow], (500.0, 400.0))
+
+
+@pytest.mark.slow
+def test_parts_with_other_borders_fit_on_one_sheet():
+    pytest.importorskip("spyrrow")
+    # Long parts are simplified more, and so have wider borders than short ones.
+    rng = np.random.default_rng(0)
+    parts = []
+    for k in range(30):
+        turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+        size = rng.uniform(5, 60, 2)
+        parts.append(Part(f"p{k}", size * np.stack([np.cos(turn), np.sin(turn)], axis=1)))
+    nested = nest(parts, (1000.0, 200.0), seconds=4, method="spyrrow")
+    assert len(nested.sheets) == 1
+    assert nested.density > 0.6

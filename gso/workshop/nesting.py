@@ -287,7 +287,11 @@ def _sparrow(
     """Fill sheet after sheet: what goes beyond a sheet is nested again on the next."""
     left = {k: item.part.count for k, item in enumerate(items)}
     out: list[_Place] = []
-    border = max(item.border for item in items)
+    # With the smallest border no part is beyond the sheet; the largest part may need its own.
+    border = min(item.border for item in items)
+    for item in items:
+        if min(item.part.size) + 2.0 * item.border > room[1] + 2.0 * border:
+            border = max(item.border for item in items)
     for sheet in range(_MOST):
         if not any(left.values()):
             return (out, "") if _apart(out, spacing) else (None, "distances were not kept")
