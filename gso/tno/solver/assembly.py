@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import OrderedDict
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,12 +27,40 @@ def _repeated(columns: Ints) -> Ints:
 
 
 @dataclass
+class Places:
+    """Where the matrices of one term's elements are in the whole matrix.
+
+    Attributes
+    ----------
+    scatter : ndarray of int, (pairs * e,)
+        The place of each entry, ordered as by :func:`products`.
+    repeated : ndarray of int
+        Which of these count twice.
+    count : int
+        Number of elements.
+    """
+
+    scatter: Ints
+    repeated: Ints
+    count: int
+
+    @property
+    def doubled(self) -> bool:
+        """Whether any entry counts twice."""
+        return bool(len(self.repeated))
+
+    @cached_property
+    def by_element(self) -> Ints:
+        """The places (e, pairs), element by element."""
+        return np.ascontiguousarray(self.scatter.reshape(-1, self.count).T)
+
+
+@dataclass
 class Assembly:
-    """Positions of the element matrices' entries in the whole matrix, and which count twice."""
+    """The pattern of the matrix, and the places in it of elements, constants, and diagonal."""
 
     pattern: Pattern
-    scatter: list[Ints]
-    repeated: list[Ints]
+    places: list[Places]
     quadratic: Ints
     diagonal: Ints
 
@@ -83,7 +112,10 @@ def _analysed(n: int, columns: list[Ints], quadratic: Any) -> Assembly:
     indptr = np.searchsorted(column[keep], np.arange(n + 1))
     *scatter, fixed, diagonal = np.split(place, splits)
     pattern = Pattern(n, indptr, row[keep])
-    return Assembly(pattern, scatter, [_repeated(c) for c in columns], fixed, diagonal)
+    places = [
+        Places(own, _repeated(c), c.shape[1]) for own, c in zip(scatter, columns, strict=True)
+    ]
+    return Assembly(pattern, places, fixed, diagonal)
 
 
 #: Largest table, columns times diagonals, for which :func:`_places` does not sort.

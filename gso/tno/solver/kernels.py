@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from gso.energy.base import Residual
-from gso.errors import BackendError
 from gso.geometry.ops import TINY
+from gso.tno.solver.printing import numpy_source
 from gso.typing import Array
 
 #: Elements per block: a kernel's work arrays then fit the second-level cache.
@@ -99,7 +99,7 @@ class Kernel:
         self.rows = int(function.size1_out(0))
         self.columns = sum(shape)
         self.jacobian = jacobian
-        self.source, self._work = _print(function)
+        self.source, self._work = numpy_source(function), int(function.sz_w())
         scope: dict[str, Any] = {"np": np}
         exec(compile(self.source, "<gso kernel>", "exec"), scope)
         self._run = scope["kernel"]
@@ -128,80 +128,6 @@ def kernel(residual: Residual, shape: tuple[int, ...], constants: int, jacobian:
 def geometric_stiffness(vectors: Residual, shape: tuple[int, ...], constants: int) -> Kernel:
     """Return the kernel of the geometric stiffness, see :attr:`gso.energy.Term.vectors`."""
     return Kernel(casadi_geometric_stiffness(vectors, shape, constants), shape, jacobian=True)
-
-
-def _print(function: Any) -> tuple[str, int]:
-    """Print Python source of ``kernel(x, c, r, J, w)``; also return the number of work arrays."""
-    import casadi as ca
-
-    ufuncs = {
-        ca.OP_ADD: "add",
-        ca.OP_SUB: "subtract",
-        ca.OP_MUL: "multiply",
-        ca.OP_DIV: "divide",
-        ca.OP_NEG: "negative",
-        ca.OP_SQ: "square",
-        ca.OP_SQRT: "sqrt",
-        ca.OP_ATAN2: "arctan2",
-        ca.OP_FMIN: "minimum",
-        ca.OP_FMAX: "maximum",
-        ca.OP_INV: "reciprocal",
-        ca.OP_FABS: "absolute",
-        ca.OP_LT: "less",
-        ca.OP_LE: "less_equal",
-        ca.OP_EQ: "equal",
-        ca.OP_NE: "not_equal",
-        ca.OP_NOT: "logical_not",
-        ca.OP_AND: "logical_and",
-        ca.OP_OR: "logical_or",
-        ca.OP_SIGN: "sign",
-    }
-    lines = []
-    scalars: dict[int, str] = {}
-    outputs = ("r", "J")
-
-    def arg(k: int) -> str:
-        return scalars.get(k, f"w[{k}]")
-
-    written = set()
-    for i in range(function.n_instructions()):
-        op = function.instruction_id(i)
-        args, out = function.instruction_input(i), function.instruction_output(i)
-        if op == ca.OP_INPUT:
-            scalars[out[0]] = f"{'xc'[args[0]]}[{args[1]}]"
-        elif op == ca.OP_CONST:
-            scalars[out[0]] = repr(float(function.instruction_constant(i)))
-        elif op == ca.OP_OUTPUT:
-            lines.append(f"{outputs[out[0]]}[{out[1]}] = {arg(args[0])}")
-            written.add((out[0], out[1]))
-        elif op == ca.OP_TWICE:
-            lines.append(f"np.add({arg(args[0])}, {arg(args[0])}, out=w[{out[0]}])")
-            scalars.pop(out[0], None)
-        elif op in ufuncs:
-            operands = ", ".join(arg(a) for a in args)
-            if all(_is_number(arg(a)) for a in args):
-                lines.append(f"w[{out[0]}][...] = np.{ufuncs[op]}({operands})")
-            else:
-                lines.append(f"np.{ufuncs[op]}({operands}, out=w[{out[0]}], casting='unsafe')")
-            scalars.pop(out[0], None)
-        else:
-            raise BackendError(
-                f"a residual uses CasADi operation {op}, which kernels cannot print; "
-                "write it with + - * / and gso.geometry.ops"
-            )
-    # Entries that are structurally zero are never visited.
-    for k, name in enumerate(outputs[: function.n_out()]):
-        for row in range(function.nnz_out(k)):
-            if (k, row) not in written:
-                lines.append(f"{name}[{row}] = 0.0")
-    # CasADi reuses work slots: an input read late must not be overwritten, and is not,
-    # because inputs and constants are read in place instead of through a slot.
-    body = "\n".join(f"    {line}" for line in lines) or "    pass"
-    return f"def kernel(x, c, r, J, w):\n{body}\n", int(function.sz_w())
-
-
-def _is_number(text: str) -> bool:
-    return not text.startswith(("w[", "x[", "c["))
 
 
 def evaluate_with_casadi(

@@ -1,0 +1,167 @@
+"""CasADi's expression graph of one element, printed as Python source."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from gso.errors import BackendError
+
+
+class Style(Protocol):
+    """How the steps of a graph are written."""
+
+    def given(self, array: str, index: int) -> str:
+        """Return the operand for an entry of the coordinates "x" or of the constants "c"."""
+
+    def slot(self, index: int) -> str:
+        """Return the operand for a work slot."""
+
+    def step(self, name: str, slot: int, operands: list[str]) -> str:
+        """Return the statement that puts the result of a NumPy ufunc into a slot."""
+
+    def store(self, output: int, index: int, operand: str) -> str:
+        """Return the statement that stores an entry of an output."""
+
+
+def printed(function: Any, style: Style) -> list[str]:
+    """Return the statements of a CasADi function, one after the other."""
+    import casadi as ca
+
+    ufuncs = {
+        ca.OP_ADD: "add",
+        ca.OP_SUB: "subtract",
+        ca.OP_MUL: "multiply",
+        ca.OP_DIV: "divide",
+        ca.OP_NEG: "negative",
+        ca.OP_SQ: "square",
+        ca.OP_SQRT: "sqrt",
+        ca.OP_ATAN2: "arctan2",
+        ca.OP_FMIN: "minimum",
+        ca.OP_FMAX: "maximum",
+        ca.OP_INV: "reciprocal",
+        ca.OP_FABS: "absolute",
+        ca.OP_LT: "less",
+        ca.OP_LE: "less_equal",
+        ca.OP_EQ: "equal",
+        ca.OP_NE: "not_equal",
+        ca.OP_NOT: "logical_not",
+        ca.OP_AND: "logical_and",
+        ca.OP_OR: "logical_or",
+        ca.OP_SIGN: "sign",
+    }
+    lines: list[str] = []
+    # CasADi reuses work slots. Inputs and constants are read in place, not through a slot, so
+    # that one that is read late is not overwritten.
+    direct: dict[int, str] = {}
+
+    def operand(slot: int) -> str:
+        return direct.get(slot, style.slot(slot))
+
+    written = set()
+    for i in range(function.n_instructions()):
+        op = function.instruction_id(i)
+        args, out = function.instruction_input(i), function.instruction_output(i)
+        if op == ca.OP_INPUT:
+            direct[out[0]] = style.given("xc"[args[0]], args[1])
+        elif op == ca.OP_CONST:
+            direct[out[0]] = repr(float(function.instruction_constant(i)))
+        elif op == ca.OP_OUTPUT:
+            lines.append(style.store(out[0], out[1], operand(args[0])))
+            written.add((out[0], out[1]))
+        elif op == ca.OP_TWICE:
+            lines.append(style.step("add", out[0], 2 * [operand(args[0])]))
+            direct.pop(out[0], None)
+        elif op in ufuncs:
+            lines.append(style.step(ufuncs[op], out[0], [operand(a) for a in args]))
+            direct.pop(out[0], None)
+        else:
+            raise BackendError(
+                f"a residual uses CasADi operation {op}, which kernels cannot print; "
+                "write it with + - * / and gso.geometry.ops"
+            )
+    # Entries that are structurally zero are never visited.
+    for output in range(function.n_out()):
+        for index in range(function.nnz_out(output)):
+            if (output, index) not in written:
+                lines.append(style.store(output, index, "0.0"))
+    return lines
+
+
+class _Arrays:
+    """Statements on arrays of elements."""
+
+    def given(self, array: str, index: int) -> str:
+        return f"{array}[{index}]"
+
+    def slot(self, index: int) -> str:
+        return f"w[{index}]"
+
+    def step(self, name: str, slot: int, operands: list[str]) -> str:
+        said = ", ".join(operands)
+        if not any(text.startswith(("w[", "x[", "c[")) for text in operands):
+            return f"w[{slot}][...] = np.{name}({said})"
+        return f"np.{name}({said}, out=w[{slot}], casting='unsafe')"
+
+    def store(self, output: int, index: int, operand: str) -> str:
+        return f"{'rJ'[output]}[{index}] = {operand}"
+
+
+def numpy_source(function: Any) -> str:
+    """Return the source of ``kernel(x, c, r, J, w)``, on arrays of elements."""
+    lines = printed(function, _Arrays())
+    return "def kernel(x, c, r, J, w):\n" + "".join(f"    {line}\n" for line in lines or ["pass"])
+
+
+_SCALAR = {
+    "add": "{0} + {1}",
+    "subtract": "{0} - {1}",
+    "multiply": "{0} * {1}",
+    "divide": "{0} / {1}",
+    "negative": "-{0}",
+    "square": "{0} * {0}",
+    "reciprocal": "1.0 / {0}",
+    "less": "1.0 if {0} < {1} else 0.0",
+    "less_equal": "1.0 if {0} <= {1} else 0.0",
+    "equal": "1.0 if {0} == {1} else 0.0",
+    "not_equal": "1.0 if {0} != {1} else 0.0",
+    "logical_not": "1.0 if {0} == 0.0 else 0.0",
+    "logical_and": "1.0 if {0} != 0.0 and {1} != 0.0 else 0.0",
+    "logical_or": "1.0 if {0} != 0.0 or {1} != 0.0 else 0.0",
+}
+
+
+class _Scalars:
+    """Statements on the numbers of one element, the e-th."""
+
+    def __init__(self) -> None:
+        self.used: dict[str, str] = {}
+
+    def given(self, array: str, index: int) -> str:
+        place = f"p[gather[{index}, e]]" if array == "x" else f"c[{index}, e]"
+        return self.used.setdefault(place, f"{array}{index}")
+
+    def slot(self, index: int) -> str:
+        return f"w{index}"
+
+    def step(self, name: str, slot: int, operands: list[str]) -> str:
+        # Numbers are bracketed because of their sign.
+        said = [f"({text})" if text.startswith("-") else text for text in operands]
+        form = _SCALAR.get(name, f"np.{name}({', '.join(said)})")
+        return f"w{slot} = {form.format(*said)}"
+
+    def store(self, output: int, index: int, operand: str) -> str:
+        return f"r[{index}, e] = {operand}" if output == 0 else f"J[e - start, {index}] = {operand}"
+
+
+def loop_source(function: Any) -> str:
+    """Return the source of ``kernel(p, gather, c, start, stop, r, J)``, a loop over elements.
+
+    p : coordinates; gather : (k, e) numbers of them; c : constants (c, e); r : residuals (r, e);
+    J : Jacobians (stop - start, r * k) of the elements from `start` on.
+    """
+    style = _Scalars()
+    lines = printed(function, style)
+    loads = [f"{name} = {place}" for place, name in style.used.items()]
+    body = "".join(f"        {line}\n" for line in [*loads, *lines] or ["pass"])
+    head = "def kernel(p, gather, c, start, stop, r, J):\n    for e in range(start, stop):\n"
+    return head + body
