@@ -15,7 +15,7 @@ import gso
 from gso.cli import main
 from gso.errors import GSOError, MeshError, OptionError
 from gso.mesh import Mesh
-from gso.workshop import making
+from gso.workshop import work
 from gso.workshop.finish import Finish
 from gso.workshop.part import signed_area
 from tests.test_pieces import dome
@@ -100,7 +100,7 @@ class TestFiles:
 class TestRuns:
     def test_a_run_that_was_ended_goes_on(self, tmp_path, monkeypatch):
         calls = []
-        make = making.made
+        make = work.made
 
         def count(name, *rest):
             calls.append(name)
@@ -109,7 +109,7 @@ class TestRuns:
             return make(name, *rest)
 
         done = []
-        monkeypatch.setattr("gso.workshop.fabricate.make", count)
+        monkeypatch.setattr(work, "made", count)
         with pytest.raises(KeyboardInterrupt):
             gso.fabricate(row(), tmp_path, unit="m", workers=0)
         done.append(True)

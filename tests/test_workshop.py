@@ -403,5 +403,5 @@ class TestMarks:
         size = np.linalg.norm(np.diff(part.marks[0], axis=0), axis=1).sum()
         assert size == pytest.approx(60.0, rel=2e-3)
         assert signed_area(part.holes[0]) == pytest.approx(-np.pi * 100.0, rel=2e-2)
-        with pytest.raises(OptionError, match="hole is not inside part arch"):
+        with pytest.raises(OptionError, match="not inside part arch"):
             parts_of(whole, 100.0, Finish(), [], [ring - [0, 1.2, 0]])

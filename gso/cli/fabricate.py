@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import os
+import warnings
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from gso.cli import files
 from gso.cli.optimize import UNITS
@@ -59,52 +60,119 @@ from gso.errors import OptionError
 )
 @click.option("--darts", is_flag=True, help="Cuts may end inside a piece.")
 @click.option("--keep-groups", is_flag=True, help="Cut between the groups (g) of IN in any case.")
-@click.option("--min-radius", metavar="L", type=float, help="Smallest radius of a bend.")
+@click.option(
+    "--min-radius",
+    metavar="L",
+    type=float,
+    help="Smallest radius that the surface may be bent to, in the design's unit.",
+)
 @click.option("--thickness", metavar="MM", type=float, help="Thickness of the sheet.")
-@click.option("--k-factor", metavar="K", type=float, default=0.5, show_default=True)
+@click.option(
+    "--k-factor",
+    metavar="K",
+    type=float,
+    default=0.5,
+    show_default=True,
+    help="Where the neutral surface is: its distance from a bend's inner face over the thickness.",
+)
 @click.option(
     "--face",
     type=click.Choice(("middle", "outside", "inside")),
     default="middle",
     show_default=True,
-    help="The face of the sheet that the design is.",
+    help="The face of the sheet that the design's surface is; outside: the one from which its "
+    "faces are anticlockwise.",
 )
-@click.option("--bend-radius", metavar="MM", type=float, help="Inner radius of folded bends.")
+@click.option(
+    "--bend-radius",
+    metavar="MM",
+    type=float,
+    help="Inner radius of the tool that folds the bends; without it the sheet is rolled.",
+)
 @click.option(
     "--bend-table",
     metavar="FILE",
     type=click.Path(),
-    help="Bend deductions: rows of an angle in degrees and a length in mm (CSV).",
+    help="Bend deductions (CSV): rows of the angle of bending in degrees, 0 for flat, and a length "
+    "in mm.",
 )
 @click.option(
     "--kerf", metavar="MM", type=float, default=0.0, help="Width that the cutter removes."
 )
 @click.option("--allowance", metavar="MM", type=float, default=0.0, help="Width added about parts.")
-@click.option("--notches", metavar="MM", type=float, default=50.0, show_default=True)
+@click.option(
+    "--notches",
+    metavar="MM",
+    type=float,
+    default=50.0,
+    show_default=True,
+    help="Distance of the notches along seams: an odd number of them, at most 51, one in the "
+    "middle.",
+)
 @click.option("--no-notches", is_flag=True, help="No notches along seams.")
 @click.option(
-    "--holes", metavar="D MM", type=float, nargs=2, help="Registration holes: diameter, inset."
+    "--holes",
+    metavar="D MM",
+    type=float,
+    nargs=2,
+    help="Registration holes beside the notches, on both sides of a seam: their diameter, and "
+    "their distance from the seam.",
 )
 @click.option("--tabs", metavar="MM", type=float, help="Width of tabs along seams, for paper.")
-@click.option("--no-labels", is_flag=True, help="No texts.")
+@click.option(
+    "--labels",
+    metavar="MM",
+    type=float,
+    default=6.0,
+    show_default=True,
+    help="Height of the names on parts.",
+)
+@click.option("--no-labels", is_flag=True, help="No names on parts.")
 @click.option("--grain", is_flag=True, help="The grain runs along each part.")
-@click.option("--inside-up", is_flag=True, help="Patterns of the inside, mirrored.")
+@click.option(
+    "--inside-up",
+    is_flag=True,
+    help="Draw the inside of the surface, mirrored; otherwise the "
+    "outside, from which its faces are anticlockwise.",
+)
 @click.option(
     "--sheet", metavar="L W", type=float, nargs=2, help="Nest on sheets of this size in mm."
 )
-@click.option("--spacing", metavar="MM", type=float, default=2.0, show_default=True)
+@click.option(
+    "--spacing",
+    metavar="MM",
+    type=float,
+    default=2.0,
+    show_default=True,
+    help="Distance between parts on a sheet.",
+)
 @click.option(
     "--rotations",
     metavar="N",
     default="2",
     show_default=True,
-    help="Number of rotations on the sheet, or any.",
+    help="Number of rotations on the sheet, evenly, or any.",
 )
 @click.option(
     "--seconds", metavar="S", type=float, default=10.0, show_default=True, help="Time for nesting."
 )
-@click.option("--format", "formats", multiple=True, default=("dxf", "svg"), show_default=True)
-@click.option("--layers", type=click.Choice(("operations", "astm")), default="operations")
+@click.option(
+    "--format",
+    "formats",
+    metavar="NAME",
+    multiple=True,
+    default=("dxf", "svg"),
+    show_default=True,
+    help="Format of the drawings, dxf, svg or pdf; may be given several times.",
+)
+@click.option(
+    "--layers",
+    type=click.Choice(("operations", "astm")),
+    default="operations",
+    show_default=True,
+    help="Names of layers: CUT, BEND_UP and so on, or the numbers of ASTM D6673.",
+)
+@click.option("--bend-text", is_flag=True, help="Write angle and radius beside each bend.")
 @click.option("--paper", metavar="A4", help="Also write all parts as a PDF on pages of this size.")
 @click.option("--workers", metavar="N", type=int, help="Processes; one for each processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that makes the parts instead.")
@@ -121,8 +189,7 @@ def fabricate(inputs: tuple[str, ...], folder: str, **given: Any) -> None:
     from gso.workshop.finish import Finish
     from gso.workshop.thickness import Thickness
 
-    if os.path.isfile(folder):
-        raise OptionError(f"{folder} is a file; -o names a folder")
+    _check_together()
     thickness = None
     if given["thickness"] is not None:
         thickness = Thickness(
@@ -138,7 +205,7 @@ def fabricate(inputs: tuple[str, ...], folder: str, **given: Any) -> None:
         notches=None if given["no_notches"] else given["notches"],
         registration=given["holes"] or None,
         tabs=given["tabs"],
-        labels=None if given["no_labels"] else 6.0,
+        labels=None if given["no_labels"] else given["labels"],
         grain=given["grain"],
         face="inside" if given["inside_up"] else "outside",
         thickness=thickness,
@@ -164,6 +231,7 @@ def fabricate(inputs: tuple[str, ...], folder: str, **given: Any) -> None:
             formats=given["formats"],
             layers=given["layers"],
             paper=given["paper"],
+            bend_text=given["bend_text"],
             workers=given["workers"],
             scheduler=given["scheduler"],
             callback=say,
@@ -196,10 +264,35 @@ def text(done: Any) -> list[str]:
     lines.append(f"parts to cut: {done.certificate['parts']}")
     nesting = done.certificate.get("nesting")
     if nesting is not None:
-        lines.append(f"sheets: {len(done.sheets)}, {100 * nesting['density']:.1f} % used")
+        lines.append(
+            f"sheets: {len(done.sheets)}, parts take {100 * nesting['density']:.1f} % of the area "
+            "of the sheets up to the last cut"
+        )
         lines += [f"note: {note}" for note in nesting["notes"]]
+    lines += [f"note: {note}" for note in done.certificate["notes"]]
     lines.append(f"page to look at: {done.folder / 'index.html'}")
     return [*lines, *(f"not usable: {reason}" for reason in done.reasons)]
+
+
+#: Options that say something only together with another one.
+_NEEDED = {
+    "thickness": ("k_factor", "face", "bend_radius", "bend_table"),
+    "sheet": ("spacing", "rotations", "seconds"),
+}
+
+
+def _check_together() -> None:
+    """Raise an error if an option would be ignored."""
+    context = click.get_current_context()
+
+    def is_given(name: str) -> bool:
+        return context.get_parameter_source(name) is not ParameterSource.DEFAULT
+
+    for needed, names in _NEEDED.items():
+        for name in filter(is_given, names):
+            if not is_given(needed):
+                option = name.replace("_", "-")
+                raise OptionError(f"--{option} needs --{needed}; give both or none")
 
 
 def _rotations(given: str) -> Any:
@@ -216,9 +309,19 @@ def _table(name: str) -> Any:
     import numpy as np
 
     try:
-        rows = np.loadtxt(name, delimiter=",", ndmin=2)
-    except (OSError, ValueError) as error:
-        raise OptionError(f"{name} is no table of angles and deductions: {error}") from None
-    if rows.shape[1] != 2:
-        raise OptionError(f"{name} has {rows.shape[1]} columns; it must have an angle and a length")
+        with warnings.catch_warnings():
+            # NumPy warns of empty files.
+            warnings.simplefilter("ignore", UserWarning)
+            rows = np.loadtxt(name, delimiter=",", ndmin=2)
+    except OSError as error:
+        raise OptionError(f"{name}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise OptionError(
+            f"{name} is no table of angles and deductions: {error}; begin a heading with #"
+        ) from None
+    if rows.shape[1] != 2 or not len(rows):
+        raise OptionError(
+            f"{name} has {len(rows)} rows of {rows.shape[1]} columns; it must have rows of an "
+            "angle and a length"
+        )
     return rows * [np.pi / 180.0, 1.0]

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from gso.mesh import Mesh
-from gso.workshop.finish import Finish
-from gso.workshop.panels import Made, Panel
+from gso.workshop.panels import Panel
 from gso.workshop.part import Part
+from gso.workshop.parts import Fitted
 
 #: Entries of a record that are lengths, in the mesh's unit.
 _LENGTHS = ("diagonal", "allowed", "deviation_mean", "deviation_max", "bend_radius_min", "seam_gap")
@@ -41,29 +41,18 @@ def versions() -> dict[str, str]:
     return out
 
 
-def design_record(
-    made: Made,
-    panels: Sequence[Panel],
-    parts: Sequence[Part],
-    scale: float,
-    finish: Finish,
-    copies: Sequence[str],
-) -> dict[str, Any]:
+def design_record(fitted: Fitted, parts: Sequence[Part], copies: Sequence[str]) -> dict[str, Any]:
     """Describe one design and its parts, in millimetres.
 
     Parameters
     ----------
-    made : Made
-    panels : sequence of Panel
-        Its panels, with patterns in millimetres for the thickness of the sheet.
+    fitted : Fitted
     parts : sequence of Part
-        Its parts, in the same order.
-    scale : float
-        Millimetres per unit of the design.
-    finish : Finish
+        Its parts, one of each panel.
     copies : sequence of str
         Names of the designs that are made the same, itself included.
     """
+    made, panels, scale = fitted.made, fitted.panels, fitted.scale
     own = dict(made.record)
     for name in _LENGTHS:
         if own.get(name) is not None:
@@ -72,7 +61,7 @@ def design_record(
         own["deviation_at"] = [scale * x for x in own["deviation_at"]]
     if "area" in own:
         own["area"] = scale**2 * own["area"]
-    mismatch = [seam.mismatch(tuple(panels)) for seam in made.matings]
+    mismatch = [seam.mismatch(panels) for seam in made.matings]
     worst = int(np.argmax(mismatch)) if mismatch else -1
     own |= {
         "name": made.name,
@@ -80,14 +69,12 @@ def design_record(
         "seams": len(made.matings),
         "seam_mismatch_max": mismatch[worst] if mismatch else 0.0,
         "seam_mismatch_at": made.matings[worst].number if mismatch else None,
-        "parts": [
-            part_record(panel, part, finish) for panel, part in zip(panels, parts, strict=True)
-        ],
+        "parts": [part_record(panel, part) for panel, part in zip(panels, parts, strict=True)],
     }
     return plain(own)
 
 
-def part_record(panel: Panel, part: Part, finish: Finish) -> dict[str, Any]:
+def part_record(panel: Panel, part: Part) -> dict[str, Any]:
     """Describe one part, in millimetres: its size as it is drawn."""
     wide, high = part.size
     angles = np.degrees(np.abs(panel.angles))

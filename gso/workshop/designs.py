@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,8 @@ from gso.components import split
 from gso.mesh import Mesh
 from gso.seams.kinds import Labels
 from gso.typing import Ints
+from gso.workshop.folder import path_of
+from gso.workshop.names import different, spelled
 
 
 def _no_edges() -> Ints:
@@ -45,12 +46,12 @@ def designs_of(given: Any, *, keep_groups: bool = False) -> list[Design]:
     MeshError
         A design cannot be read, or has no groups to cut between.
     """
-    many = given if isinstance(given, list | tuple) and not _is_mesh(given) else [given]
+    many = several(given)
     out: list[Design] = []
     for number, one in enumerate(many, start=1):
-        path = isinstance(one, str | os.PathLike)
+        path = path_of(one)
         suffix = number if len(many) > 1 else ""
-        stem = Path(os.fsdecode(one)).stem if path else f"design{suffix}"
+        stem = f"design{suffix}" if path is None else path.stem
         mesh = io.as_mesh(one)
         kept = Labels("g").edges(mesh) if keep_groups else _no_edges()
         components = split(mesh)
@@ -60,17 +61,16 @@ def designs_of(given: Any, *, keep_groups: bool = False) -> list[Design]:
             local[part.vertices] = np.arange(len(part.vertices))
             own = local[kept]
             name = f"{stem}-{k}" if len(components) > 1 else stem
-            out.append(Design(_spelled(name), part.mesh, own[(own >= 0).all(axis=1)]))
-    if len({design.name for design in out}) < len(out):
-        out = [replace(d, name=f"{d.name}.{k}") for k, d in enumerate(out, start=1)]
-    return out
+            out.append(Design(spelled(name), part.mesh, own[(own >= 0).all(axis=1)]))
+    names = different(design.name for design in out)
+    return [replace(design, name=name) for design, name in zip(out, names, strict=True)]
+
+
+def several(given: Any) -> Sequence[Any]:
+    """Return what was given as a sequence of designs."""
+    return given if isinstance(given, list | tuple) and not _is_mesh(given) else [given]
 
 
 def _is_mesh(given: Any) -> bool:
     """Whether a tuple is vertices and faces rather than several designs."""
     return isinstance(given, tuple) and len(given) == 2 and not isinstance(given[0], str | Mesh)
-
-
-def _spelled(name: str) -> str:
-    """Return a name that can be part of a file's name."""
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name) or "design"

@@ -2,38 +2,34 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import closing
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from gso import cluster, io, metrics, parallel
-from gso.errors import GSOError, MeshError, OptionError
+from gso.errors import OptionError
 from gso.io.svg import MILLIMETRES
-from gso.mesh import Mesh
 from gso.spelling import choices, known_keywords
-from gso.workshop import writers
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import design_record, digest, plain, versions
+from gso.workshop.checks import refused
 from gso.workshop.congruent import origins, united
-from gso.workshop.designs import Design, designs_of
+from gso.workshop.designs import designs_of, several
 from gso.workshop.finish import Finish
-from gso.workshop.making import made as make
-from gso.workshop.nesting import checked_sheet, nest
+from gso.workshop.folder import WORK, close, opened
+from gso.workshop.marks import check_lines
+from gso.workshop.names import different
+from gso.workshop.nesting import checked_options, nest
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
-from gso.workshop.parts import parts_of, scaled
-from gso.workshop.work import key, store, stored, work_on
-from gso.workshop.writing import written
+from gso.workshop.parts import fitted, parts_from
+from gso.workshop.work import made_all
+from gso.workshop.writing import Drawings, written
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +89,7 @@ def fabricate(
     formats: Sequence[str] = ("dxf", "svg"),
     layers: str = "operations",
     paper: str | None = None,
+    bend_text: bool = False,
     workers: int | None = None,
     scheduler: str | None = None,
     callback: Callable[[str], None] | None = None,
@@ -108,6 +105,7 @@ def fabricate(
     designs : mesh, path, or sequence of them
         What :func:`gso.as_mesh` takes.
     folder : path
+        A new or empty folder, or that of an earlier run, whose drawings are replaced.
     unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
         Unit of the coordinates.
     formulation : {"ruled", "curvature", "isometry", "flatten"}
@@ -125,11 +123,12 @@ def fabricate(
     keep_groups : bool
         Whether to cut between the groups of faces (``g``) of an OBJ file in any case.
     min_radius : float, optional
-        Smallest radius of a bend, in the design's unit.
+        Smallest radius that the surface may be bent to, in the design's unit.
     finish : Finish
         Kerf, allowance, notches, holes, tabs, labels, thickness; in millimetres.
     marks, holes : sequence of array_like, (k, 3)
-        Lines to engrave, and closed lines to cut, on the designs' surfaces and in their unit.
+        Lines to engrave, and closed lines to cut (the last point is the first), on the designs'
+        surfaces and in their unit.
     sheet : (float, float), optional
         Length and width of the sheets to nest on, in millimetres.
     spacing : float
@@ -137,13 +136,15 @@ def fabricate(
     rotations : sequence of float, int or "any"
         Rotations on the sheet, see :func:`gso.workshop.nesting.nest`.
     seconds : float
-        Time for nesting, in all.
+        Time for nesting, in seconds in all.
     formats : sequence of str
         Formats of parts and sheets.
     layers : {"operations", "astm"}
         Names of layers.
     paper : str, optional
         Also write all parts as a PDF on pages of this size, such as "A4".
+    bend_text : bool
+        Also write the direction, angle and radius beside each bend.
     workers : int, optional
         Number of processes; one for each processor when not given, 0 for none.
     scheduler : str, optional
@@ -175,29 +176,29 @@ def fabricate(
     if unit not in MILLIMETRES:
         raise OptionError(f"unknown unit {unit!r}; {choices(unit, MILLIMETRES)}")
     scale = MILLIMETRES[unit]
-    for name in formats:
-        writers.get(name)
     if not isinstance(finish, Finish):
         raise OptionError(f"finish is {finish!r}; it must be a gso.workshop.finish.Finish")
+    drawings = Drawings(tuple(dict.fromkeys(formats)), layers, paper, bend_text)
     most = None
     if sheet is not None:
-        long, wide = (checked_sheet(sheet) / scale).tolist()
-        most = (long, wide)
+        checked_options(sheet, spacing, 0.0, rotations, seconds)
+        most = finish.room(sheet, scale)
     ask = Ask(formulation, max_deviation, max_strain, max_strips, darts, most, min_radius)
     say = callback or (lambda said: None)
     place = Path(os.fsdecode(folder))
-    try:
-        (place / "work").mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise MeshError(f"{place}: {error.strerror}; -o names a folder") from None
     every = designs_of(designs, keep_groups=keep_groups)
     meshes = [design.mesh for design in every]
+    drawn = [
+        (given, check_lines(given, meshes, what, closed=what == "hole"))
+        for given, what in ((marks, "mark"), (holes, "hole"))
+    ]
+    earlier = opened(place, several(designs))
     # Marks are on one of several copies, so that these differ.
     alone = len(marks) or len(holes) or any(len(design.kept) for design in every)
     first = list(range(len(meshes))) if alone else origins(meshes)
-    drawn = [(given, _nearest(meshes, given)) for given in (marks, holes)]
     chosen = sorted(set(first))
-    found, failed = _made(every, chosen, ask, place, workers, scheduler, say)
+    found, failed = made_all(every, chosen, ask, place / WORK, workers, scheduler, say)
+    found = _named(found)
     say("parts")
     parts: list[Part] = []
     records: list[dict[str, Any]] = []
@@ -208,11 +209,11 @@ def fabricate(
             continue
         one = found[k]
         lines = ([x for x, n in zip(given, on, strict=True) if n == k] for given, on in drawn)
-        own = [replace(p, count=len(copies)) for p in parts_of(one, scale, finish, *lines)]
-        panels = scaled(one.panels, scale, finish)
-        records.append(
-            design_record(one, panels, own, scale, finish, copies) | {"digest": digest(meshes[k])}
-        )
+        fit = fitted(one, scale, finish, *lines)
+        own = [replace(part, count=len(copies)) for part in parts_from(fit, finish)]
+        record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
+        record["reasons"] = [*record["reasons"], *refused(fit, ask, finish)]
+        records.append(record)
         parts += own
     parts, same = united(parts)
     for record in records:
@@ -224,6 +225,7 @@ def fabricate(
         "versions": versions(),
         "designs": records,
         "sheets": [],
+        "notes": _notes(records, ask),
         "reasons": [f"{r['name']}: {why}" for r in records for why in r["reasons"]],
     }
     sheets: list[Drawing] = []
@@ -255,82 +257,29 @@ def fabricate(
     certificate["usable"] = not certificate["reasons"]
     certificate["parts"] = sum(part.count for part in parts)
     say("files")
-    files = written(place, parts, sheets, found.values(), certificate, formats, layers, paper)
+    files = written(place, parts, sheets, found.values(), certificate, drawings, earlier)
     certificate["files"] = files
     certificate["seconds"] = time.perf_counter() - clock
-    with io.replacing(place / "certificate.json") as file:
-        file.write(json.dumps(certificate, indent=2).encode() + b"\n")
+    close(place, certificate)
     return Fabrication(place, tuple(parts), tuple(sheets), certificate, tuple(files))
 
 
-def _nearest(meshes: Sequence[Mesh], lines: Sequence[ArrayLike]) -> list[int]:
-    """Return the number of the design that each line is nearest to."""
-    out = []
-    for line in lines:
-        points = np.asarray(line, float)
-        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-            raise OptionError(f"a mark or hole has shape {points.shape}; it must be points (k, 3)")
-        out.append(int(np.argmin([metrics.point_to_surface(points, m).mean() for m in meshes])))
-    return out
+def _named(found: dict[int, Made]) -> dict[int, Made]:
+    """Give the panels of all designs names that differ."""
+    names = iter(different(panel.name for one in found.values() for panel in one.panels))
+    return {
+        k: replace(one, panels=tuple(replace(p, name=next(names)) for p in one.panels))
+        for k, one in found.items()
+    }
 
 
-def _made(
-    designs: Sequence[Design],
-    chosen: Iterable[int],
-    ask: Ask,
-    place: Path,
-    workers: int | None,
-    scheduler: str | None,
-    say: Callable[[str], None],
-) -> tuple[dict[int, Made], dict[int, str]]:
-    """Make designs, or read what an earlier call made; return what failed too."""
-    found: dict[int, Made] = {}
-    failed: dict[int, str] = {}
-    todo = []
-
-    def read(design: Design) -> Made | None:
-        return stored(design.name, key(design, ask), place / "work" / f"{design.name}.npz")
-
-    for k in chosen:
-        one = read(designs[k])
-        if one is None:
-            todo.append(k)
-        else:
-            found[k] = one
-    # The largest first, so that no large one runs alone at the end.
-    todo.sort(key=lambda k: -len(designs[k].mesh.vertices))
-    if workers is None and len(todo) == 1:
-        workers = 0
-    if workers == 0 and scheduler is None:
-        for number, k in enumerate(todo, start=1):
-            own = designs[k]
-            say(f"{own.name}: design {number} of {len(todo)}")
-            try:
-                one = make(own, ask, say)
-            except GSOError as error:
-                failed[k] = str(error)
-                continue
-            store(one, key(own, ask), place / "work" / f"{own.name}.npz")
-            found[k] = one
-        return found, failed
-    work = partial(work_on, ask, str((place / "work").resolve()))
-    items = (designs[k] for k in todo)
-    if scheduler is None:
-        spread = parallel.spread(work, items, workers=workers, caller=False)
-    else:
-        spread = cluster.spread(work, items, scheduler=scheduler)
-    total = len(found) + len(todo)
-    say(f"designs: {len(found)} of {total}")
-    with closing(spread) as results:
-        for done in results:
-            k = todo[done.index]
-            if done.error is not None:
-                failed[k] = done.error
-                continue
-            one = read(designs[k])
-            if one is None:
-                failed[k] = "its file in the folder work is missing; is the folder shared?"
-            else:
-                found[k] = one
-            say(f"designs: {len(found) + len(failed)} of {total}")
-    return found, failed
+def _notes(records: Sequence[dict[str, Any]], ask: Ask) -> list[str]:
+    """Say what is not as a reader might expect, although it is within what was asked."""
+    every = [part for record in records for part in record.get("parts", ())]
+    bare = sum(part["bends"] == 0 for part in every)
+    if ask.formulation != "ruled" or not bare:
+        return []
+    return [
+        f"{bare} of {len(every)} parts have no bend lines: they are flat, or no strip follows them "
+        "closely enough, and they are nearly developable"
+    ]

@@ -64,10 +64,32 @@ class Finish:
                     f"registration is {self.registration!r}; it must be the diameter of holes and "
                     "their distance from the seam"
                 )
+            if pair[0] <= self.kerf:
+                raise OptionError(
+                    f"registration holes of {pair[0]:g} mm are no wider than the kerf of "
+                    f"{self.kerf:g} mm; take a larger diameter"
+                )
         if self.face not in SIDES:
             raise OptionError(f"no face {self.face!r}; {choices(self.face, SIDES)}")
         if self.tabs is not None and self.allowance:
             raise OptionError("tabs and allowance exclude each other; leave one of them out")
+
+    def room(self, sheet: tuple[float, float], scale: float) -> tuple[float, float]:
+        """Return how large patterns may be for a sheet in millimetres, in the design's unit.
+
+        Allowance, tabs and half of the kerf are added about a pattern.
+
+        >>> Finish(kerf=2.0, allowance=9.0).room((1020.0, 520.0), 1000.0)
+        (1.0, 0.5)
+        """
+        about = 2.0 * (self.allowance + (self.tabs or 0.0)) + self.kerf
+        long, wide = (float(side) - about for side in sheet)
+        if min(long, wide) <= 0:
+            raise OptionError(
+                f"{about:g} mm are added about each part, which leaves nothing of the sheet; take "
+                "larger sheets"
+            )
+        return long / scale, wide / scale
 
     def record(self) -> dict[str, Any]:
         """Return it as JSON-compatible values."""

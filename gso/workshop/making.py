@@ -74,15 +74,15 @@ def made(given: Design, ask: Ask, say: Say = lambda said: None) -> Made:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         if ask.formulation == "flatten":
-            return _flattened(given, ask, say)
+            return _checked(_flattened(given, ask, say), ask)
         own = _Target.of(given, ask.distance(design.diagonal))
         whole = None if len(given.kept) else _whole(name, own, ask, say)
         if whole is not None:
-            whole = _sized(whole, ask)
+            whole = _checked(whole, ask)
         if whole is not None and not whole.reasons:
             return whole
         try:
-            parted = _sized(_parted(name, own, ask, say), ask)
+            parted = _checked(_parted(name, own, ask, say), ask)
         except GSOError:
             if whole is None:
                 raise
@@ -120,7 +120,7 @@ def _whole(name: str, design: _Target, ask: Ask, say: Say) -> Made | None:
         record = measured.of_pattern(
             design.mesh, result.mesh, result.pattern, ask, design.allowed, reasons
         )
-        return of_surface(name, result.mesh, result.pattern, record)
+        return _bent(of_surface(name, result.mesh, result.pattern, record))
     try:
         result = optimize(
             design.solved.mesh,
@@ -133,19 +133,29 @@ def _whole(name: str, design: _Target, ask: Ask, say: Say) -> Made | None:
     return of_ruled(name, result, _ruled_record(design, result, ask))
 
 
-def _sized(made: Made, ask: Ask) -> Made:
-    """Add a reason if a pattern is larger than a sheet."""
-    if ask.max_size is None:
-        return made
-    limit = np.sort(ask.max_size)[::-1]
+def _checked(made: Made, ask: Ask) -> Made:
+    """Add a reason if a pattern is larger than a sheet, or a panel bent to a smaller radius."""
+    reasons = made.reasons
+    limit = np.sort(ask.max_size)[::-1] if ask.max_size is not None else np.full(2, np.inf)
     for panel in made.panels:
         size = np.array(rectangle(panel.flat)[1])
         if (size > limit * (1.0 + 1e-9)).any():
             long, wide = size.tolist()
-            why = f"the pattern of {panel.name} is {long:.4g} by {wide:.4g}, larger than a sheet"
-            made.record["reasons"] = [*made.reasons, why]
+            reasons.append(
+                f"the pattern of {panel.name} is {long:.4g} by {wide:.4g}, larger than a sheet "
+                "(in the design's unit)"
+            )
             break
-    return made
+    # Strips keep the smallest radius themselves, or say why not.
+    for panel in made.panels if ask.min_radius is not None else ():
+        radius = np.inf if len(panel.bends) else measured.bend_radius(panel)
+        if ask.min_radius is not None and radius < ask.min_radius:
+            reasons.append(
+                f"{panel.name} is bent to a radius of {radius:.4g}, less than "
+                f"{ask.min_radius:.4g} (in the design's unit)"
+            )
+            break
+    return replace(made, record=made.record | {"reasons": reasons})
 
 
 def _options(ask: Ask) -> Any:
@@ -162,7 +172,13 @@ def _flattened(given: Design, ask: Ask, say: Say) -> Made:
     if pattern is None:
         raise MeshError(f"{name}: a piece cannot be laid flat; {'; '.join(found.reasons)}")
     record = measured.of_pattern(design, found.design, pattern, ask, None, list(found.reasons))
-    return of_surface(name, found.design, pattern, record | {"pieces": len(found)})
+    return _bent(of_surface(name, found.design, pattern, record | {"pieces": len(found)}))
+
+
+def _bent(made: Made) -> Made:
+    """Measure the smallest radius of panels without bend lines."""
+    radius = min(measured.bend_radius(panel) for panel in made.panels)
+    return replace(made, record=made.record | {"bend_radius_min": radius})
 
 
 def _searched(given: Design, ask: Ask, allowed: float | None, say: Say) -> Segmentation:

@@ -10,10 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
+from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
+from gso.metrics import point_to_surface
 from gso.typing import Array, Ints
 from gso.workshop.panels import Panel
-from gso.workshop.part import Part, signed_area
+from gso.workshop.part import signed_area
+
+#: Number of points of a mark along the diagonal of a panel, at least.
+_STEPS = 500
+#: Largest distance of marks and holes from the design, relative to its diagonal.
+_NEAR = 0.01
 
 
 def to_pattern(panels: Sequence[Panel], points: ArrayLike) -> tuple[Ints, Array]:
@@ -64,6 +71,8 @@ def marked(
 ) -> list[list[Array]]:
     """Carry polylines of the surface to the patterns; they are divided where the panel changes.
 
+    Long segments get more points, so that a line follows the surface and ends at the seams.
+
     Parameters
     ----------
     panels : sequence of Panel
@@ -78,9 +87,10 @@ def marked(
         The lines of each panel.
     """
     wanted = [replace(p, flat=flat) for p, flat in zip(panels, flats, strict=True)]
+    most = max(panel.surface.diagonal for panel in panels) / _STEPS
     out: list[list[Array]] = [[] for _ in panels]
     for line in lines:
-        number, flat = to_pattern(wanted, line)
+        number, flat = to_pattern(wanted, _dense(_checked(line, 3), most))
         stops = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
         for a, b in pairwise(stops):
             if b - a > 1:
@@ -88,27 +98,91 @@ def marked(
     return out
 
 
-def with_holes(part: Part, holes: Sequence[Array]) -> Part:
-    """Return a part with more holes: closed polygons (k, 2).
+def cut(
+    panels: Sequence[Panel], holes: Sequence[ArrayLike], flats: Sequence[Array]
+) -> tuple[list[list[Array]], list[str]]:
+    """Carry holes of the surface to the patterns.
+
+    Parameters
+    ----------
+    panels, flats
+        As for :func:`marked`.
+    holes : sequence of array_like, (k, 3)
+        Closed lines: the last point is the first.
+
+    Returns
+    -------
+    holes : list of list of ndarray (k, 2)
+        Those of each panel, clockwise, the first point not repeated.
+    refused : list of str
+        Why other holes cannot be cut.
+    """
+    import shapely
+
+    wanted = [replace(p, flat=flat) for p, flat in zip(panels, flats, strict=True)]
+    shapes = [shapely.Polygon(p.flat[p.loops[0]], [p.flat[x] for x in p.loops[1:]]) for p in wanted]
+    out: list[list[Array]] = [[] for _ in panels]
+    refused = []
+    for hole in holes:
+        line = _checked(hole, 3)
+        number, flat = to_pattern(wanted, line[:-1])
+        panel, ring = panels[number[0]], shapely.Polygon(flat)
+        where = f"the hole at {np.round(line[0], 6).tolist()}"
+        if (number != number[0]).any():
+            other = panels[number[number != number[0]][0]].name
+            refused.append(f"{where} lies across the seam of {panel.name} and {other}; move it")
+        elif not ring.is_valid or ring.area <= 0:
+            refused.append(f"{where} crosses itself or has no area")
+        elif not shapes[number[0]].contains_properly(ring):
+            refused.append(f"{where} is not inside part {panel.name}; move it inwards")
+        else:
+            out[number[0]].append(flat if signed_area(flat) < 0 else flat[::-1])
+    return out, refused
+
+
+def check_lines(
+    lines: Sequence[ArrayLike], meshes: Sequence[Mesh], what: str, *, closed: bool = False
+) -> list[int]:
+    """Return the number of the mesh that each line of points (k, 3) lies on.
 
     Raises
     ------
     OptionError
-        A hole is not inside the part.
+        A line has too few points, is not closed, or is not on a mesh.
     """
-    import shapely
-
-    shape = shapely.Polygon(part.outline, part.holes)
-    own = []
-    for hole in holes:
-        closed = np.allclose(hole[0], hole[-1])
-        ring = hole[:-1] if closed else hole
-        if len(ring) < 3 or not shape.contains(shapely.Polygon(ring)):
+    out = []
+    for k, line in enumerate(lines):
+        points = np.asarray(line, float)
+        least = 4 if closed else 2
+        good = points.ndim == 2 and points.shape[1] == 3 and len(points) >= least
+        if not good or not np.isfinite(points).all():
             raise OptionError(
-                f"a hole is not inside part {part.name}: move it away from seams and the outline"
+                f"{what} {k} has shape {points.shape}; it must be finite points (k, 3), k at "
+                f"least {least}"
             )
-        own.append(ring if signed_area(ring) < 0 else ring[::-1])
-    return replace(part, holes=(*part.holes, *own))
+        away = [point_to_surface(points, mesh) for mesh in meshes]
+        number = int(np.argmin([x.mean() for x in away]))
+        if closed and np.linalg.norm(points[0] - points[-1]) > _NEAR * meshes[number].diagonal:
+            raise OptionError(f"{what} {k} is not closed; its last point must be its first")
+        if away[number].max() > _NEAR * meshes[number].diagonal:
+            raise OptionError(
+                f"{what} {k}: point {int(away[number].argmax())} is {away[number].max():.4g} from "
+                "the surface; put it on the surface"
+            )
+        out.append(number)
+    return out
+
+
+def _dense(line: Array, most: float) -> Array:
+    """Divide the segments of a line that are longer than `most`."""
+    if len(line) < 2:
+        return line
+    size = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    count = np.maximum(np.ceil(size / most), 1).astype(np.int64)
+    first = np.repeat(np.arange(len(size)), count)
+    share = (np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)) / count[first]
+    inner = line[first] + share[:, None] * (line[first + 1] - line[first])
+    return np.concatenate([inner, line[-1:]])
 
 
 def _checked(points: ArrayLike, count: int) -> Array:

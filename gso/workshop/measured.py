@@ -6,13 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from gso import faults, metrics, parametrization
+from gso import faults, metrics, parametrization, rulings
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.validation import have_area
 from gso.pattern import Pattern
 from gso.workshop.asking import Ask
 from gso.workshop.panels import Panel
+
+#: Share of the area whose curvature counts, and the curvature, times the diagonal, up to which a
+#: panel is flat.
+_MOST, _STRAIGHT = 0.99, 1e-6
 
 
 def of_panels(design: Mesh, panels: list[Panel], ask: Ask, allowed: float) -> dict[str, Any]:
@@ -29,9 +33,24 @@ def of_panels(design: Mesh, panels: list[Panel], ask: Ask, allowed: float) -> di
     # Slivers of a small panel may have no area relative to the whole.
     mesh = Mesh(points, table[have_area(table, points) & have_area(table, flat)])
     record = of_pattern(design, mesh, Pattern.whole(mesh, flat), ask, allowed, [])
-    radii = [p.radii for p in panels if len(p.radii)]
-    record["bend_radius_min"] = float(np.concatenate(radii).min()) if radii else np.inf
+    record["bend_radius_min"] = min(bend_radius(panel) for panel in panels)
     return record
+
+
+def bend_radius(panel: Panel) -> float:
+    """Return the smallest radius that a panel is bent to, in its unit.
+
+    Of a panel with bend lines it is that of the bends; otherwise the 1 % of the area that is
+    curved most is left out, as the curvature of single faces is not accurate.
+    """
+    if len(panel.bends):
+        return float(panel.radii.min())
+    shape = rulings.shape_operator(panel.surface)
+    curved = np.abs(shape.curvatures).max(axis=1)
+    order = np.argsort(curved)
+    share = np.cumsum(shape.areas[order]) / shape.areas.sum()
+    most = curved[order[min(int(np.searchsorted(share, _MOST)), len(order) - 1)]]
+    return float(1.0 / most) if most * panel.surface.diagonal > _STRAIGHT else np.inf
 
 
 def of_pattern(
@@ -50,7 +69,10 @@ def of_pattern(
     overlaps = len(faults.overlaps(sheet, pattern.flat))
     flips = int(metrics.flips(sheet, pattern.flat))
     if allowed is not None and far > allowed * (1.0 + 1e-6) and not reasons:
-        reasons.append(f"the surface is up to {far:.4g} from the design, more than {allowed:.4g}")
+        reasons.append(
+            f"the surface is up to {far:.4g} from the design, more than {allowed:.4g} (in the "
+            "design's unit)"
+        )
     if strains["strain_p99"] > ask.max_strain and not reasons:
         reasons.append(
             f"the strain of the patterns is {100 * strains['strain_p99']:.3g} % (99 %), more than "

@@ -103,6 +103,8 @@ def nest(
     seconds : float
         Time in all, about.
     seed : int
+        Of the search of spyrrow, which goes on for the given time: on another machine it may find
+        another nesting.
     method : {"spyrrow", "rectangles"}, optional
         The denser of both when not given.
     callback : callable, optional
@@ -125,7 +127,8 @@ def nest(
     (1, 4, 0.64)
     """
     say = callback or (lambda said: None)
-    room = _checked(parts, sheet, spacing, margin, seconds, method)
+    room = checked_options(sheet, spacing, margin, rotations, seconds)
+    _check_parts(parts, method)
     items = [_item(part, rotations, spacing) for part in parts]
     best = _rectangles(items, room, spacing)
     notes: tuple[str, ...] = ()
@@ -158,23 +161,36 @@ def checked_sheet(sheet: Any) -> Array:
     return size
 
 
-def _checked(
-    parts: Sequence[Part],
+def checked_options(
     sheet: tuple[float, float],
-    spacing: float,
-    margin: float,
-    seconds: float,
-    method: str | None,
+    spacing: float = 0.0,
+    margin: float = 0.0,
+    rotations: Any = (0, 180),
+    seconds: float = 1.0,
 ) -> tuple[float, float]:
-    """Check the options; return the room inside the margin."""
-    import shapely
+    """Check the options of :func:`nest`; return the room inside the margin, in millimetres.
 
+    Raises
+    ------
+    OptionError
+        An option is wrong.
+    """
     size = checked_sheet(sheet)
+    _angles(rotations)
     for name, value in (("spacing", spacing), ("margin", margin)):
         if not 0 <= value < np.inf:
             raise OptionError(f"{name} is {value!r}; it must be a length of 0 or more")
     if not 0 < seconds < np.inf:
         raise OptionError(f"seconds is {seconds!r}; it must be a positive number")
+    long, wide = (size - 2.0 * margin).tolist()
+    if min(long, wide) <= 0:
+        raise OptionError(f"margin is {margin!r}, which leaves nothing of the sheet; lower it")
+    return long, wide
+
+
+def _check_parts(parts: Sequence[Part], method: str | None) -> None:
+    import shapely
+
     if method not in (None, "spyrrow", "rectangles"):
         raise OptionError(f"no method {method!r}; take 'spyrrow' or 'rectangles'")
     if not parts:
@@ -182,10 +198,6 @@ def _checked(
     for part in parts:
         if not shapely.Polygon(part.outline).is_valid:
             raise OptionError(f"part {part.name} cannot be nested: its outline crosses itself")
-    long, wide = (size - 2.0 * margin).tolist()
-    if min(long, wide) <= 0:
-        raise OptionError(f"margin is {margin!r}, which leaves nothing of the sheet; lower it")
-    return long, wide
 
 
 def _item(part: Part, rotations: Any, spacing: float) -> _Item:
@@ -256,8 +268,7 @@ def _rectangles(items: Sequence[_Item], room: tuple[float, float], spacing: floa
             x, y = turned[0]
             raise OptionError(
                 f"part {item.part.name} is {x:.4g} by {y:.4g} mm, larger than the sheet of "
-                f"{room[0]:.4g} by {room[1]:.4g} mm inside its margin: take larger sheets, more "
-                "rotations, or smaller pieces (max_size)"
+                f"{room[0]:.4g} by {room[1]:.4g} mm: take larger sheets or more rotations"
             )
         own = [angles[k] for k in fits]
         copies += [(number, own)] * item.part.count

@@ -8,23 +8,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gso.errors import OptionError
 from gso.pattern import Bend
 from gso.segmentation.sheets import rectangle
 from gso.typing import Array
 from gso.workshop.finish import Finish
-from gso.workshop.marks import marked, with_holes
+from gso.workshop.marks import cut, marked
 from gso.workshop.offsets import offset, with_allowance
 from gso.workshop.panels import Made, Mating, Panel, Side
 from gso.workshop.part import Label, Notch, Part, signed_area
 from gso.workshop.tabs import with_tabs
 from gso.workshop.thickness import thickened
 
-#: Angle, in radians, up to which a bend is not drawn.
-_FLAT = 1e-6
+#: Angle, in radians, from which on a bend is drawn; smaller ones are added to the next.
+_DRAWN = np.radians(0.2)
 #: Corners of the polygon of a registration hole.
 _ROUND = 48
-#: Largest number of notches of a seam, but for one.
-_NOTCHES = 50
+#: Largest number of notches of a seam, but for one, and their distance if there are only holes.
+_NOTCHES, _APART = 50, 50.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,14 +53,39 @@ class Joint:
     first: bool
 
 
-def parts_of(
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """The panels of a design in millimetres, with what is drawn on them.
+
+    Attributes
+    ----------
+    made : Made
+    scale : float
+        Millimetres per unit of length of the design.
+    panels : tuple of Panel
+        With patterns in millimetres, for the thickness of the sheet.
+    marks, holes : list of list of ndarray (k, 2)
+        Those of each panel.
+    refused : list of str
+        Why other holes cannot be cut.
+    """
+
+    made: Made
+    scale: float
+    panels: tuple[Panel, ...]
+    marks: list[list[Array]]
+    holes: list[list[Array]]
+    refused: list[str]
+
+
+def fitted(
     made: Made,
     scale: float,
     finish: Finish,
     marks: Sequence[ArrayLike] = (),
     holes: Sequence[ArrayLike] = (),
-) -> list[Part]:
-    """Make the parts of a design.
+) -> Fitted:
+    """Fit the panels of a design to the sheet, and carry marks and holes to them.
 
     Parameters
     ----------
@@ -70,14 +96,48 @@ def parts_of(
     marks, holes : sequence of array_like, (k, 3)
         Lines to engrave, and closed lines to cut, on the surface.
     """
-    panels = scaled(made.panels, scale, finish)
-    joints: list[list[Joint]] = [[] for _ in panels]
-    for seam in made.matings:
-        for side, first in ((seam.one, True), (seam.two, False)):
-            joints[side.panel].append(_joint(panels[side.panel], seam, side, scale, first))
+    panels = tuple(scaled(made.panels, scale, finish))
     flats = [panel.flat for panel in panels]
-    drawn, cut = (marked(made.panels, lines, flats) for lines in (marks, holes))
-    return [part_of(*own, finish) for own in zip(panels, joints, drawn, cut, strict=True)]
+    drawn = marked(made.panels, marks, flats)
+    return Fitted(made, scale, panels, drawn, *cut(made.panels, holes, flats))
+
+
+def parts_of(
+    made: Made,
+    scale: float,
+    finish: Finish,
+    marks: Sequence[ArrayLike] = (),
+    holes: Sequence[ArrayLike] = (),
+) -> list[Part]:
+    """Make the parts of a design; the parameters are those of :func:`fitted`.
+
+    Raises
+    ------
+    OptionError
+        A hole cannot be cut.
+    """
+    own = fitted(made, scale, finish, marks, holes)
+    if own.refused:
+        raise OptionError(own.refused[0])
+    return parts_from(own, finish)
+
+
+def parts_from(fitted: Fitted, finish: Finish) -> list[Part]:
+    """Make the parts of fitted panels."""
+    panels = fitted.panels
+    joints: list[list[Joint]] = [[] for _ in panels]
+    seams = []
+    for seam in fitted.made.matings:
+        both = []
+        for side, first in ((seam.one, True), (seam.two, False)):
+            joint = _joint(panels[side.panel], seam, side, fitted.scale, first)
+            joints[side.panel].append(joint)
+            both.append((side.panel, joint))
+        seams.append(both)
+    bare = [_bare(*own) for own in zip(panels, fitted.marks, fitted.holes, strict=True)]
+    if finish.registration is not None:
+        bare = _registered(bare, seams, finish, *finish.registration)
+    return [_finished(part, own, finish) for part, own in zip(bare, joints, strict=True)]
 
 
 def scaled(panels: Sequence[Panel], scale: float, finish: Finish) -> list[Panel]:
@@ -89,22 +149,36 @@ def scaled(panels: Sequence[Panel], scale: float, finish: Finish) -> list[Panel]
     return out
 
 
-def part_of(
-    panel: Panel,
-    joints: Sequence[Joint],
-    marks: Sequence[Array],
-    cut: Sequence[Array],
-    finish: Finish,
-) -> Part:
-    """Make the part of one panel, whose pattern is in millimetres, long side along x."""
+def _bare(panel: Panel, marks: Sequence[Array], cut: Sequence[Array]) -> Part:
+    """Make the part of one panel, whose pattern is in millimetres, as it lies there."""
     loops = [panel.flat[loop] for loop in panel.loops]
     outline = loops[0] if signed_area(loops[0]) > 0 else loops[0][::-1]
     holes = [hole if signed_area(hole) < 0 else hole[::-1] for hole in loops[1:]]
-    bends = tuple(b for b in panel.lines if abs(b.angle) > _FLAT)
-    part = with_holes(Part(panel.name, outline, tuple(holes), bends, marks=tuple(marks)), cut)
-    part = replace(part, notches=_notches(joints, finish))
-    if finish.registration is not None:
-        part = _registered(part, *finish.registration)
+    return Part(panel.name, outline, (*holes, *cut), drawn(panel.lines), marks=tuple(marks))
+
+
+def drawn(bends: Sequence[Bend]) -> tuple[Bend, ...]:
+    """Return the bends that are drawn: small ones are added to the next, so that none is lost.
+
+    >>> line = np.zeros((2, 2))
+    >>> some = [Bend(line, np.radians(x), 9.0) for x in (0.15, 0.1, 0.1, -0.1, 5.0)]
+    >>> [round(float(np.degrees(bend.angle)), 2) for bend in drawn(some)]
+    [0.25, 5.0]
+    """
+    out, angle = [], 0.0
+    for bend in bends:
+        angle += bend.angle
+        if abs(angle) >= _DRAWN:
+            out.append(bend._replace(angle=angle))
+            angle = 0.0
+    return tuple(out)
+
+
+def _finished(part: Part, joints: Sequence[Joint], finish: Finish) -> Part:
+    """Add notches, tabs, allowance, kerf and texts to a part, and turn it long side along x."""
+    if finish.notches is not None:
+        spacing = finish.notches
+        part = replace(part, notches=tuple(n for j in joints for n in _notches(j, spacing)))
     if finish.tabs is not None:
         part = with_tabs(part, [j.line for j in joints if j.first], finish.tabs)
     part = part.turned(-rectangle(part.outline)[0])
@@ -189,40 +263,55 @@ def places(length: float, spacing: float) -> Array:
     return length * np.arange(1, count + 1) / (count + 1)
 
 
-def _notches(joints: Sequence[Joint], finish: Finish) -> tuple[Notch, ...]:
-    if finish.notches is None:
-        return ()
-    out = []
-    for joint in joints:
-        if not joint.length > 0:
-            continue
-        at = places(joint.length, finish.notches)
-        # Both sides of a seam have their notches at the same points of the surface.
-        k = np.clip(np.searchsorted(joint.along, at, "right") - 1, 0, len(joint.along) - 2)
-        step = joint.along[k + 1] - joint.along[k]
-        share = np.clip((at - joint.along[k]) / np.maximum(step, 1e-300), 0.0, 1.0)
-        way = joint.line[k + 1] - joint.line[k]
-        points = joint.line[k] + share[:, None] * way
-        inward = np.stack([-way[:, 1], way[:, 0]], axis=1)
-        inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-300)
-        out += [Notch(p, n, str(joint.number)) for p, n in zip(points, inward, strict=True)]
-    return tuple(out)
+def _notches(joint: Joint, spacing: float) -> list[Notch]:
+    """Return the notches of one side, in the order of its line: the other side's are reversed."""
+    if not joint.length > 0:
+        return []
+    at = places(joint.length, spacing)
+    # Both sides of a seam have their notches at the same points of the surface.
+    k = np.clip(np.searchsorted(joint.along, at, "right") - 1, 0, len(joint.along) - 2)
+    step = joint.along[k + 1] - joint.along[k]
+    share = np.clip((at - joint.along[k]) / np.maximum(step, 1e-300), 0.0, 1.0)
+    way = joint.line[k + 1] - joint.line[k]
+    points = joint.line[k] + share[:, None] * way
+    inward = np.stack([-way[:, 1], way[:, 0]], axis=1)
+    inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-300)
+    return [Notch(p, n, str(joint.number)) for p, n in zip(points, inward, strict=True)]
 
 
-def _registered(part: Part, diameter: float, inset: float) -> Part:
-    """Add holes beside the notches, where they are inside the part and apart from each other."""
+def _registered(
+    parts: Sequence[Part],
+    seams: Sequence[Sequence[tuple[int, Joint]]],
+    finish: Finish,
+    diameter: float,
+    inset: float,
+) -> list[Part]:
+    """Add holes beside the notches of each seam, where both sides have room for them."""
     import shapely
 
-    inside = shapely.Polygon(part.outline, part.holes).buffer(-0.75 * diameter)
+    inside = [shapely.Polygon(p.outline, p.holes).buffer(-0.75 * diameter) for p in parts]
     turn = -2.0 * np.pi * np.arange(_ROUND) / _ROUND
     ring = 0.5 * diameter * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    taken: list[Array] = []
-    for notch in part.notches:
-        middle = notch.at + inset * notch.inward
-        near = any(np.linalg.norm(middle - other) < 2.0 * diameter for other in taken)
-        if not near and inside.contains(shapely.Point(middle)):
-            taken.append(middle)
-    return replace(part, holes=(*part.holes, *(ring + middle for middle in taken)))
+    taken: list[list[Array]] = [[] for _ in parts]
+
+    def free(number: int, middle: Array) -> bool:
+        near = any(np.linalg.norm(middle - other) < 2.0 * diameter for other in taken[number])
+        return not near and bool(inside[number].contains(shapely.Point(middle)))
+
+    for seam in seams:
+        sides = [_notches(joint, finish.notches or _APART) for _, joint in seam]
+        for pair in zip(sides[0], reversed(sides[1]), strict=True):
+            middles = [
+                (number, notch.at + inset * notch.inward)
+                for (number, _), notch in zip(seam, pair, strict=True)
+            ]
+            if all(free(*place) for place in middles):
+                for number, middle in middles:
+                    taken[number].append(middle)
+    return [
+        replace(part, holes=(*part.holes, *(ring + middle for middle in own)))
+        for part, own in zip(parts, taken, strict=True)
+    ]
 
 
 def _name(part: Part, height: float) -> Label:

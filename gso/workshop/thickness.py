@@ -35,8 +35,9 @@ class Thickness:
         Inner radius of the tool that folds sharp bends. None: the sheet is rolled, with the radii
         of the surface.
     table : array_like, (k, 2), or None
-        Bend deductions of sharp bends: angles in radians, increasing, and how much shorter the
-        pattern is than both flanges outside, to the apex. Between them it is interpolated.
+        Bend deductions of sharp bends: angles of bending in radians (0 is flat), increasing, and
+        how much shorter the pattern is than both flanges outside, to the apex. Between them it
+        is interpolated, and below the first one it falls to 0 at no bend.
 
     Examples
     --------
@@ -64,10 +65,16 @@ class Thickness:
             raise OptionError(f"the bend radius is {self.radius!r}; it must be 0 or more")
         if self.table is not None:
             rows = np.asarray(self.table, float)
-            good = rows.ndim == 2 and rows.shape[1:] == (2,) and len(rows) >= 1
-            if not (good and np.isfinite(rows).all() and (np.diff(rows[:, 0]) > 0).all()):
+            good = bool(rows.ndim == 2 and rows.shape[1:] == (2,) and len(rows) >= 1)
+            good = good and bool(np.isfinite(rows).all() and (np.diff(rows[:, 0]) > 0).all())
+            if not (good and rows[0, 0] >= 0 and rows[-1, 0] < np.pi):
                 raise OptionError(
-                    "the bend table must have rows of an angle and a deduction, angles increasing"
+                    "the bend table must have rows of an angle of bending, 0 to 180 degrees and "
+                    "increasing, and a deduction"
+                )
+            if self.radius is not None:
+                raise OptionError(
+                    "a bend radius and a bend table exclude each other; leave one of them out"
                 )
 
     def change(self, angle: ArrayLike) -> Array:
@@ -79,27 +86,56 @@ class Thickness:
             In radians, positive for mountain folds.
         """
         turn = np.asarray(angle, float)
-        size, thick = np.abs(turn), self.sheet
-        # Distance of the design's surface from the inner face of the bend.
-        outside = {"middle": 0.5, "outside": 1.0, "inside": 0.0}[self.face]
-        design = thick * np.where(turn >= 0, outside, 1.0 - outside)
+        size, thick, design = np.abs(turn), self.sheet, self.depth(turn)
         if self.table is not None:
             rows = np.asarray(self.table, float)
-            deduction = np.interp(size, *rows.T)
+            deduction = np.interp(size, *np.pad(rows, ((int(rows[0, 0] > 0), 0), (0, 0))).T)
             return np.asarray(2.0 * (thick - design) * np.tan(0.5 * size) - deduction)
         if self.radius is None:
             return np.asarray(size * (self.k * thick - design))
         around = size * (self.radius + self.k * thick)
         return np.asarray(around - 2.0 * (self.radius + design) * np.tan(0.5 * size))
 
+    def depth(self, angle: ArrayLike) -> Array:
+        """Return how far the design's surface is from the inner face of bends of some angles."""
+        outside = {"middle": 0.5, "outside": 1.0, "inside": 0.0}[self.face]
+        return np.asarray(
+            self.sheet * np.where(np.asarray(angle, float) >= 0, outside, 1.0 - outside)
+        )
+
+    def inner(self, angle: ArrayLike, radius: ArrayLike) -> Array:
+        """Return the inner radii of bends, infinite where a bend table leaves them to the tool.
+
+        Parameters
+        ----------
+        angle, radius : array_like
+            Of the bends of the design's surface.
+        """
+        angles, radii = np.broadcast_arrays(np.asarray(angle, float), np.asarray(radius, float))
+        if self.table is not None:
+            return np.full(angles.shape, np.inf)
+        if self.radius is not None:
+            return np.full(angles.shape, float(self.radius))
+        return np.asarray(radii - self.depth(angles))
+
+    def strain(self, curvature: float) -> float:
+        """Return how far the neutral surface of a rolled sheet is strained against the design's.
+
+        >>> Thickness(2.0, k=0.5).strain(0.01), Thickness(2.0, k=0.5, face="inside").strain(0.01)
+        (0.0, 0.01)
+        """
+        away = np.abs(self.k * self.sheet - self.depth([1.0, -1.0])).max()
+        return float(away * curvature)
+
 
 def thickened(panel: Panel, thickness: Thickness) -> Panel:
-    """Return a panel with the pattern of a sheet of some thickness.
+    """Return a panel with the pattern of a sheet of some thickness, and inner radii of bends.
 
     Plates between bends are moved apart or together along the normals of the bends.
     """
     if not len(panel.bends):
         return panel
+    radii = thickness.inner(panel.angles, panel.radii)
     plate, pairs, ends = _plates(panel)
     p, q = panel.flat[ends].transpose(1, 0, 2)
     way = q - p
@@ -116,7 +152,8 @@ def thickened(panel: Panel, thickness: Thickness) -> Panel:
     both = np.unique(np.stack([faces[rows, corner], plate[rows]], axis=1), axis=0)
     np.add.at(total, both[:, 0], shift[both[:, 1]])
     np.add.at(often, both[:, 0], 1.0)
-    return replace(panel, flat=panel.flat + total / np.maximum(often, 1.0)[:, None])
+    flat = panel.flat + total / np.maximum(often, 1.0)[:, None]
+    return replace(panel, flat=flat, radii=radii)
 
 
 def _plates(panel: Panel) -> tuple[Ints, Ints, Ints]:

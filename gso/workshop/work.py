@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
+from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
-from gso import io
-from gso.errors import MeshError
+from gso import cluster, io, parallel
+from gso.errors import GSOError, MeshError
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import digest, plain
 from gso.workshop.designs import Design
@@ -23,7 +27,7 @@ _FORMAT = 2
 def key(design: Design, ask: Ask) -> str:
     """Return what identifies the work on a design: its digest and what was asked."""
     own = [digest(design.mesh), design.kept.tolist()]
-    said = json.dumps([_FORMAT, *own, plain(ask.record())], sort_keys=True)
+    said = json.dumps([_FORMAT, version("gso"), *own, plain(ask.record())], sort_keys=True)
     return hashlib.sha256(said.encode()).hexdigest()
 
 
@@ -51,3 +55,65 @@ def stored(name: str, own: str, path: Path) -> Made | None:
     except (OSError, KeyError, ValueError, MeshError):
         # A file that is missing or damaged is made again.
         return None
+
+
+def made_all(
+    designs: Sequence[Design],
+    chosen: Iterable[int],
+    ask: Ask,
+    folder: Path,
+    workers: int | None,
+    scheduler: str | None,
+    say: Callable[[str], None],
+) -> tuple[dict[int, Made], dict[int, str]]:
+    """Make designs, or read what an earlier call made; return what failed too."""
+    found: dict[int, Made] = {}
+    failed: dict[int, str] = {}
+    todo = []
+
+    def read(design: Design) -> Made | None:
+        return stored(design.name, key(design, ask), folder / f"{design.name}.npz")
+
+    for k in chosen:
+        one = read(designs[k])
+        if one is None:
+            todo.append(k)
+        else:
+            found[k] = one
+    # The largest first, so that no large one runs alone at the end.
+    todo.sort(key=lambda k: -len(designs[k].mesh.vertices))
+    if workers is None and len(todo) == 1:
+        workers = 0
+    if workers == 0 and scheduler is None:
+        for number, k in enumerate(todo, start=1):
+            own = designs[k]
+            say(f"{own.name}: design {number} of {len(todo)}")
+            try:
+                one = made(own, ask, say)
+            except GSOError as error:
+                failed[k] = str(error)
+                continue
+            store(one, key(own, ask), folder / f"{own.name}.npz")
+            found[k] = one
+        return found, failed
+    work = partial(work_on, ask, str(folder.resolve()))
+    items = (designs[k] for k in todo)
+    if scheduler is None:
+        spread = parallel.spread(work, items, workers=workers, caller=False)
+    else:
+        spread = cluster.spread(work, items, scheduler=scheduler)
+    total = len(found) + len(todo)
+    say(f"designs: {len(found)} of {total}")
+    with closing(spread) as results:
+        for done in results:
+            k = todo[done.index]
+            if done.error is not None:
+                failed[k] = done.error
+                continue
+            one = read(designs[k])
+            if one is None:
+                failed[k] = "its file in the folder work is missing; is the folder shared?"
+            else:
+                found[k] = one
+            say(f"designs: {len(found) + len(failed)} of {total}")
+    return found, failed

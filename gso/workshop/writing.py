@@ -2,20 +2,63 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gso import io
 from gso.workshop import writers
+from gso.workshop.folder import CERTIFICATE, PAGE, PAPER
 from gso.workshop.page import page
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
+from gso.workshop.writers.checks import require
+from gso.workshop.writers.layers import layer_set
+from gso.workshop.writers.pdf import check_paper
 
 #: Gap between parts that are drawn side by side, as a share of the largest.
 _GAP = 0.05
-_FOLDERS = ("parts", "sheets", "surfaces")
+
+
+@dataclass(frozen=True)
+class Drawings:
+    """How drawings are written.
+
+    Attributes
+    ----------
+    formats : tuple of str
+    layers : str
+    paper : str or None
+        Of the PDF with all parts; None for none.
+    bend_text : bool
+
+    Raises
+    ------
+    OptionError
+        A format, the layers or the paper are not known.
+    GSOError
+        A package that a format needs is not installed.
+    """
+
+    formats: tuple[str, ...]
+    layers: str = "operations"
+    paper: str | None = None
+    bend_text: bool = False
+
+    def __post_init__(self) -> None:
+        for name in (*self.formats, *(() if self.paper is None else ("pdf",))):
+            package = getattr(writers.get(name), "PACKAGE", None)
+            if package is not None:
+                require(package, f"{name.upper()} files")
+        layer_set(self.layers)
+        if self.paper is not None:
+            check_paper(self.paper)
+
+    def options(self, suffix: str) -> dict[str, Any]:
+        """Return the options of a writer."""
+        out: dict[str, Any] = {"layers": self.layers, "bend_text": self.bend_text}
+        return out | ({"paper": self.paper} if suffix == "pdf" and self.paper else {})
 
 
 def written(
@@ -24,49 +67,38 @@ def written(
     sheets: Sequence[Drawing],
     found: Iterable[Made],
     certificate: dict[str, Any],
-    formats: Sequence[str],
-    layers: str,
-    paper: str | None,
+    drawings: Drawings,
+    earlier: Set[str],
 ) -> list[str]:
-    """Write all files, delete those of an earlier call that are not written again."""
-    earlier = _earlier(place)
+    """Write all files but the certificate; delete earlier ones that are not written again."""
     files: list[str] = []
 
-    def write(drawing: Drawing, name: str, **options: Any) -> None:
+    def write(drawing: Drawing, name: str, suffix: str) -> None:
         (place / name).parent.mkdir(exist_ok=True)
-        writers.write(drawing, place / name, **options)
+        writers.write(drawing, place / name, **drawings.options(suffix))
         files.append(name)
 
-    for suffix in formats:
-        options = {} if suffix == "pdf" else {"layers": layers}
+    for suffix in drawings.formats:
         for part in parts:
-            write(Drawing((part,), title=part.name), f"parts/{part.name}.{suffix}", **options)
+            times = f", {part.count} times" if part.count > 1 else ""
+            drawing = Drawing((part,), title=part.name + times)
+            write(drawing, f"parts/{part.name}.{suffix}", suffix)
         for number, drawing in enumerate(sheets, start=1):
-            write(drawing, f"sheets/sheet-{number}.{suffix}", **options)
-    if paper is not None and parts:
-        write(beside(parts), "parts.pdf", paper=paper)
+            write(drawing, f"sheets/sheet-{number}.{suffix}", suffix)
+    if drawings.paper is not None and parts:
+        write(beside(parts), PAPER, "pdf")
     for one in found:
         for panel in one.panels:
             name = f"surfaces/{panel.name}.obj"
             (place / name).parent.mkdir(exist_ok=True)
             io.write(panel.surface, place / name)
             files.append(name)
-    with io.replacing(place / "index.html") as file:
+    with io.replacing(place / PAGE) as file:
         file.write(page(certificate, parts, sheets).encode())
-    files += ["index.html", "certificate.json"]
+    files += [PAGE, CERTIFICATE]
     for name in earlier - set(files):
         (place / name).unlink(missing_ok=True)
     return files
-
-
-def _earlier(place: Path) -> set[str]:
-    """Return the drawings and surfaces that an earlier call wrote, by its certificate."""
-    try:
-        files = json.loads((place / "certificate.json").read_text(encoding="utf-8"))["files"]
-        kept = {str(name) for name in files}
-    except (OSError, ValueError, KeyError, TypeError):
-        return set()
-    return {n for n in kept if n.count("/") == 1 and n.split("/")[0] in _FOLDERS and ".." not in n}
 
 
 def beside(parts: Sequence[Part]) -> Drawing:

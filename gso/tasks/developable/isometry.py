@@ -231,6 +231,8 @@ def _unrolling(analysis: Analysis, request: Request, opened: parametrization.Ope
         name="unroll",
         own_items=[i for i in stage.own_items if i.term.name in ("isometry", "mapping")],
         variables=partial(flat_image.only_flat, stage.layout),
+        # The surface is no unknown, so that it keeps every bound.
+        bounds=None,
         iterations=max(options.iterations, _UNROLL),
         tolerance=min(options.tolerance, 1e-8),
     )

@@ -1,6 +1,7 @@
 """Writers of flat parts: one file each, chosen by the suffix of the file to be written.
 
-A writer has ``SUFFIX``, with its dot, and ``write(drawing, path, **options)``. It takes its lines
+A writer has ``SUFFIX``, with its dot, ``PACKAGE``, which it needs, and ``write(drawing, path,
+**options)``, whose options ``layers`` and ``bend_text`` every writer has. It takes its lines
 and texts from :mod:`gso.workshop.writers.strokes` and their layers from
 :mod:`gso.workshop.writers.layers`. A new format is one file in this folder.
 """

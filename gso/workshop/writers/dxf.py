@@ -20,6 +20,7 @@ from gso.workshop.writers.layers import layer_set
 from gso.workshop.writers.strokes import Line, Text
 
 SUFFIX = ".dxf"
+PACKAGE = "ezdxf"
 APPLICATION = "GSO"
 """Name of the application under which bends have extended data: a string, ``mountain`` or
 ``valley``; a real (1040), the angle in degrees; a distance (1041), the radius, if there is one."""
@@ -77,7 +78,7 @@ def write(
     >>> [(e.dxftype(), e.dxf.layer) for e in ezdxf.readfile(path).modelspace()]
     [('LWPOLYLINE', 'CUT')]
     """
-    require("ezdxf", "DXF files")
+    require(PACKAGE, "DXF files")
     check_writable(path, (SUFFIX,))
     check(drawing)
     chosen = layer_set(layers)

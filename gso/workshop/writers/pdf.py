@@ -19,6 +19,7 @@ from gso.workshop.writers.layers import Layer, layer_set
 from gso.workshop.writers.tiles import FOOT, Tile, Tiling, tiled
 
 SUFFIX = ".pdf"
+PACKAGE = "reportlab"
 
 #: Width and height of papers in millimetres.
 PAPERS = {
@@ -88,11 +89,10 @@ def write(
     >>> os.path.getsize(path) > 0
     True
     """
-    require("reportlab", "PDF files")
+    require(PACKAGE, "PDF files")
     check_writable(path, (SUFFIX,))
     check(drawing)
-    if not isinstance(paper, str) or paper not in PAPERS:
-        raise OptionError(f"no paper {paper!r}; {choices(paper, PAPERS)}")
+    check_paper(paper)
     chosen = layer_set(layers)
     gap, free = length("overlap", overlap, zero=True), length("margin", margin, zero=True)
     tiling = tiled(drawing, PAPERS[paper], gap, free)
@@ -105,6 +105,12 @@ def write(
     book.close()
     with replacing(path) as file:
         file.write(stream.getvalue())
+
+
+def check_paper(paper: Any) -> None:
+    """Raise an OptionError if there is no such paper."""
+    if not isinstance(paper, str) or paper not in PAPERS:
+        raise OptionError(f"no paper {paper!r}; {choices(paper, PAPERS)}")
 
 
 class _Book:

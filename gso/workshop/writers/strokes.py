@@ -11,6 +11,7 @@ import numpy as np
 
 from gso.pattern import Bend
 from gso.typing import Array
+from gso.workshop.names import different
 from gso.workshop.part import Drawing, Part
 
 # A bend by less is none, in radians.
@@ -178,16 +179,9 @@ def identifiers(parts: Iterable[Part]) -> list[str]:
     >>> identifiers([Part(name, square) for name in ("left/1", "Left 1", "")])
     ['left_1', 'Left_1-2', 'part']
     """
-    taken: set[str] = set()
-    made = []
-    for part in parts:
-        base = re.sub(r"[^\w.-]+", "_", part.name)[:100].strip("_") or "part"
-        name, number = base, 2
-        while name.casefold() in taken:
-            name, number = f"{base}-{number}", number + 1
-        taken.add(name.casefold())
-        made.append(name)
-    return made
+    return different(
+        re.sub(r"[^\w.-]+", "_", part.name)[:100].strip("_") or "part" for part in parts
+    )
 
 
 def printable(text: str) -> str:

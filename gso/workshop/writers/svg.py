@@ -18,6 +18,7 @@ from gso.workshop.writers.layers import Layer, layer_set
 from gso.workshop.writers.strokes import Line, Text
 
 SUFFIX = ".svg"
+PACKAGE = "svgwrite"
 
 # Least line width on paper in millimetres, and the least as a fraction of the larger side.
 _FINEST = 0.1

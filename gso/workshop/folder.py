@@ -1,0 +1,89 @@
+"""The folder of a fabrication: what an earlier run left there, and what must not be replaced."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from gso import io
+from gso.errors import MeshError, OptionError
+from gso.io.convert import Unwelded
+
+#: Folders of drawings and surfaces, the folder of what was made, and files.
+FOLDERS, WORK, CERTIFICATE, PAGE, PAPER = (
+    ("parts", "sheets", "surfaces"),
+    "work",
+    "certificate.json",
+    "index.html",
+    "parts.pdf",
+)
+
+
+def opened(place: Path, inputs: Iterable[Any]) -> set[str]:
+    """Create the folder, or take over that of an earlier run.
+
+    Its certificate says until the end that the run has not ended.
+
+    Parameters
+    ----------
+    place : Path
+    inputs : iterable
+        The designs; those that are files must not be in the folder.
+
+    Returns
+    -------
+    set of str
+        The drawings and surfaces that an earlier run wrote.
+
+    Raises
+    ------
+    MeshError
+        The folder cannot be written to.
+    OptionError
+        It has files that would be replaced and that no earlier run wrote.
+    """
+    where = place.resolve()
+    for one in inputs:
+        source = path_of(one)
+        if source is not None and where in source.resolve().parents:
+            raise OptionError(f"{source} is in the folder {place}; name another folder")
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        ours = (place / WORK).is_dir() or _certificate(place) is not None
+        theirs = [n for n in (*FOLDERS, PAGE, PAPER, CERTIFICATE, WORK) if (place / n).exists()]
+        if theirs and not ours:
+            raise OptionError(
+                f"{place} has {theirs[0]}, which gso fabricate did not write; name another folder"
+            )
+        for name in (*FOLDERS, WORK):
+            if (place / name).exists() and not (place / name).is_dir():
+                raise OptionError(f"{place / name} is a file; remove it or name another folder")
+        (place / WORK).mkdir(exist_ok=True)
+    except OSError as error:
+        raise MeshError(f"{place}: {error.strerror}; -o names a folder") from None
+    files = _certificate(place) or []
+    close(place, {"usable": False, "reasons": ["the run has not ended"], "files": files})
+    return {n for n in files if n.count("/") == 1 and n.split("/")[0] in FOLDERS and ".." not in n}
+
+
+def close(place: Path, certificate: dict[str, Any]) -> None:
+    """Write the certificate."""
+    with io.replacing(place / CERTIFICATE) as file:
+        file.write(json.dumps(certificate, indent=2).encode() + b"\n")
+
+
+def path_of(given: Any) -> Path | None:
+    """Return the file that a design is read from, if it is one."""
+    source = given.surface if isinstance(given, Unwelded) else given
+    return Path(os.fsdecode(source)) if isinstance(source, str | os.PathLike) else None
+
+
+def _certificate(place: Path) -> list[str] | None:
+    """Return the files that an earlier run wrote; None if there was none."""
+    try:
+        return [str(n) for n in json.loads((place / CERTIFICATE).read_text("utf-8"))["files"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
