@@ -167,7 +167,7 @@ class TestSheets:
         (why,) = self.why(flat, sheet=2.5)
         assert "too thick" in why
 
-    def test_seams_that_the_thickness_parts_are_refused(self):
+    def test_seams_that_the_thickness_parts_are_refused(self, strips):
         assert self.why(strips, sheet=1e-4, face="outside") == []
         why = self.why(strips, sheet=0.05, face="outside")
         assert any("the sides of seam" in each for each in why)

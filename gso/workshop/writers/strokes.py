@@ -129,9 +129,7 @@ def texts(part: Part, bend_text: bool = False) -> list[Text]:
     found = [Text(printable(x.text), x.at, x.height, x.angle) for x in part.labels]
     depth = _depth(part)
     height = _BESIDE * depth
-    for notch in part.notches:
-        at = notch.at + (depth + height) * notch.inward
-        found.append(Text(printable(notch.text), at, height))
+    found += _numbers(part, depth, height)
     for bend in _bends(part) if bend_text else []:
         step = bend.line[1] - bend.line[0]
         high = min(_BEND_TEXT, _BEND_SHARE * float(np.hypot(*step)))
@@ -191,6 +189,32 @@ def printable(text: str) -> str:
     'panel 3 x 2'
     """
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def _numbers(part: Part, depth: float, height: float) -> list[Text]:
+    """Place the texts of notches inside the part, beside a notch where it is narrow or holed.
+
+    A text without room is left out; others of its seam have room.
+    """
+    import shapely
+
+    shape = shapely.Polygon(part.outline, part.holes)
+    shapely.prepare(shape)
+    found = []
+    for notch in part.notches:
+        text = printable(notch.text)
+        along = np.array([notch.inward[1], -notch.inward[0]])
+        ends = (
+            0.5
+            * height
+            * np.array([[x, y] for x in (-0.7 * len(text), 0.7 * len(text)) for y in (-1, 1)])
+        )
+        for side in (0.0, 1.5, -1.5):
+            at = notch.at + (depth + height) * notch.inward + side * height * along
+            if shapely.contains_xy(shape, *(at + ends).T).all():
+                found.append(Text(text, at, height))
+                break
+    return found
 
 
 def _line(kind: str, points: Array, closed: bool = False) -> Line:
