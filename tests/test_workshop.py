@@ -291,7 +291,7 @@ class TestParts:
     def test_seams_of_strained_patterns_differ_by_no_more_than_the_strain(self):
         design = dome(17, height=0.6)
         whole = made(Design("dome", design), Ask(formulation="flatten", max_strain=0.02))
-        assert len(whole.panels) > 1
+        assert len(whole.panels) > 1 and not whole.reasons
         for seam in whole.matings:
             most = 2.0 * whole.record["strain_max"] * seam.length
             assert seam.mismatch(whole.panels) <= most

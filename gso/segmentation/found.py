@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gso import parametrization
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.result import Result
@@ -61,13 +62,14 @@ class Segmentation(Pieces):
 
     @property
     def pattern(self) -> Pattern | None:
-        """The patterns of all pieces as one, each in its own place; None if one is missing."""
+        """The patterns of all pieces as one, beside each other; None if one is missing."""
         opened = self.opened
         flat = np.zeros((len(opened.vertex), 2))
-        for part, sheet in zip(self.parts, self.sheets, strict=True):
-            if sheet is None:
-                return None
-            flat[part.vertices] = sheet.flat
+        sheets = [sheet.flat for sheet in self.sheets if sheet is not None]
+        if len(sheets) < len(self.sheets):
+            return None
+        for part, own in zip(self.parts, parametrization.beside(sheets), strict=True):
+            flat[part.vertices] = own
         return Pattern(flat, opened.mesh.faces, opened.vertex, opened.seams)
 
     def alike(self, tolerance: float | None = None) -> list[list[int]]:
