@@ -57,9 +57,14 @@ class TestFolder:
             gso.fabricate(small(), tmp_path / "other", workers=0)
 
     def test_a_design_in_the_folder_is_not_replaced(self, tmp_path):
+        (tmp_path / "surfaces").mkdir()
+        gso.save(small(), tmp_path / "surfaces" / "arch.obj")
+        with pytest.raises(OptionError, match=r"arch\.obj is in .*surfaces, whose files are"):
+            gso.fabricate(tmp_path / "surfaces" / "arch.obj", tmp_path, workers=0)
         gso.save(small(), tmp_path / "arch.obj")
-        with pytest.raises(OptionError, match=r"arch\.obj is in the folder"):
-            gso.fabricate(tmp_path / "arch.obj", tmp_path, workers=0)
+        (tmp_path / "surfaces" / "arch.obj").unlink()
+        (tmp_path / "surfaces").rmdir()
+        assert gso.fabricate(tmp_path / "arch.obj", tmp_path, unit="m", workers=0).usable
 
     def test_a_file_in_the_way_is_named(self, tmp_path):
         (tmp_path / "work").mkdir()

@@ -31,7 +31,7 @@ def opened(place: Path, inputs: Iterable[Any]) -> set[str]:
     ----------
     place : Path
     inputs : iterable
-        The designs; those that are files must not be in the folder.
+        The designs; those that are files must not be among what is replaced.
 
     Returns
     -------
@@ -45,11 +45,14 @@ def opened(place: Path, inputs: Iterable[Any]) -> set[str]:
     OptionError
         It has files that would be replaced and that no earlier run wrote.
     """
-    where = place.resolve()
+    replaced = [(place / name).resolve() for name in (*FOLDERS, WORK)]
     for one in inputs:
         source = path_of(one)
-        if source is not None and where in source.resolve().parents:
-            raise OptionError(f"{source} is in the folder {place}; name another folder")
+        for name in replaced if source is not None else ():
+            if name in source.resolve().parents:
+                raise OptionError(
+                    f"{source} is in {name}, whose files are replaced; name another folder"
+                )
     try:
         place.mkdir(parents=True, exist_ok=True)
         ours = (place / WORK).is_dir() or _certificate(place) is not None
