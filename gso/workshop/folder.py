@@ -48,8 +48,9 @@ def opened(place: Path, inputs: Iterable[Any]) -> set[str]:
     replaced = [(place / name).resolve() for name in (*FOLDERS, WORK)]
     for one in inputs:
         source = path_of(one)
-        for name in replaced if source is not None else ():
-            if name in source.resolve().parents:
+        above = [] if source is None else list(source.resolve().parents)
+        for name in replaced:
+            if name in above:
                 raise OptionError(
                     f"{source} is in {name}, whose files are replaced; name another folder"
                 )
