@@ -49,10 +49,10 @@ def opened(place: Path, inputs: Iterable[Any]) -> set[str]:
     for one in inputs:
         source = path_of(one)
         above = [] if source is None else list(source.resolve().parents)
-        for name in replaced:
-            if name in above:
+        for inner in replaced:
+            if inner in above:
                 raise OptionError(
-                    f"{source} is in {name}, whose files are replaced; name another folder"
+                    f"{source} is in {inner}, whose files are replaced; name another folder"
                 )
     try:
         place.mkdir(parents=True, exist_ok=True)
