@@ -6,11 +6,34 @@ from collections.abc import Callable, Generator, Iterable
 from importlib.util import find_spec
 from typing import Any
 
+from gso import parallel
 from gso.errors import GSOError, SchedulerError
 from gso.parallel import Done
 
 #: Seconds within which a scheduler must answer.
 PATIENCE = 20
+
+
+def either(
+    function: Callable[[Any], Any],
+    pieces: Iterable[Any],
+    *,
+    workers: int | None,
+    scheduler: str | None,
+    caller: bool = True,
+) -> Generator[Done, None, None]:
+    """Apply a function to many items in processes of this machine, or on a cluster.
+
+    Parameters
+    ----------
+    function, pieces, scheduler
+        As for :func:`spread`; no scheduler: processes of this machine.
+    workers, caller
+        As for :func:`gso.parallel.spread`.
+    """
+    if scheduler is not None:
+        return spread(function, pieces, scheduler=scheduler)
+    return parallel.spread(function, pieces, workers=workers, caller=caller)
 
 
 def spread(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
@@ -75,6 +75,72 @@ def spread(
             yield from pool.finished()
     finally:
         pool.close()
+
+
+#: Applies a function to items, and returns the results in order.
+Each = Callable[[Callable[[Any], Any], Sequence[Any]], list[Any]]
+
+
+def here(function: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
+    """Apply a function to items in this process."""
+    return [function(item) for item in items]
+
+
+@contextmanager
+def helpers(workers: int | None) -> Iterator[Each]:
+    """Keep processes for several rounds of work, of which this process does its share.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Number of processes with this one; one for each processor when not given, and 0 or 1 for
+        this one alone.
+
+    Yields
+    ------
+    each : callable
+        Applies a function of one argument, importable by name or a partial of one that is, to
+        items, and returns the results in order. What a function raises is raised here.
+
+    Examples
+    --------
+    >>> with helpers(0) as each:
+    ...     each(abs, [-1, 2])
+    [1, 2]
+    """
+    from multiprocessing import get_context
+
+    count = processors() if workers is None else max(workers, 1)
+    if count == 1:
+        yield here
+        return
+    executor = ProcessPoolExecutor(
+        count - 1, mp_context=get_context("spawn"), initializer=_prepare_worker
+    )
+
+    def each(function: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
+        futures = []
+        try:
+            with _nameless():
+                futures += [executor.submit(function, item) for item in items[1:]]
+        except BrokenProcessPool:
+            return here(function, items)
+        own = {0: function(items[0])} if items else {}
+        for k in range(len(futures), 0, -1):
+            if futures[k - 1].cancel():
+                own[k] = function(items[k])
+        out = []
+        for k, item in enumerate(items):
+            try:
+                out.append(own[k] if k in own else futures[k - 1].result())
+            except BrokenProcessPool:
+                out.append(function(item))
+        return out
+
+    try:
+        yield each
+    finally:
+        executor.shutdown(cancel_futures=True)
 
 
 def processors() -> int:

@@ -25,6 +25,7 @@ def many(
     plots: str | None,
     table: str | None,
     workers: int | None,
+    scheduler: str | None = None,
 ) -> bool:
     """Optimise files into a folder, and return whether all results are usable."""
     outs = _outputs(files, folder, suffix)
@@ -42,7 +43,7 @@ def many(
         workers = workers if workers > 1 else 0  # with one worker, use this process
     records: dict[int, dict[str, Any]] = {}
     with progress.files(len(files)) as bar, report.status_only():
-        for item in job.solve_many(files, workers):
+        for item in job.solve_many(files, workers, scheduler):
             file, out = files[item.index], outs[item.index]
             try:
                 if item.result is None:

@@ -49,6 +49,16 @@ def source(file: str, weld: float | None) -> Any:
     return file if weld is None else Unwelded(file, weld)
 
 
+def here(file: str, weld: float | None) -> Any:
+    """Read a file for workers that cannot; one that cannot be read is left to them to report."""
+    from gso.errors import GSOError
+
+    try:
+        return load(file, weld)
+    except GSOError:
+        return source(file, weld)
+
+
 def spare(inputs: Iterable[str | None], outputs: Iterable[str | None], force: bool) -> None:
     """Raise an error if an output is also an input, through symbolic or hard links too.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from gso import tasks
-from gso.cli.files import source, spare
+from gso.cli.files import here, source, spare
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
@@ -67,16 +67,20 @@ class Job:
 
         return solve(mesh, **self._with_net(), **more)
 
-    def solve_many(self, files: Iterable[str], workers: int | None) -> Iterator[Item]:
+    def solve_many(
+        self, files: Iterable[str], workers: int | None, scheduler: str | None = None
+    ) -> Iterator[Item]:
         """Optimise many surfaces in parallel."""
-        meshes = [source(file, self.weld) for file in files]
+        read = source if scheduler is None else here
+        meshes = (read(file, self.weld) for file in files)
+        spread: dict[str, Any] = {"workers": workers, "scheduler": scheduler}
         if self.method == "tno":
             from gso.tno import optimize_many
 
-            return optimize_many(meshes, workers=workers, **self.keywords)
+            return optimize_many(meshes, **spread, **self.keywords)
         from gso.hybrid import solve_many
 
-        return solve_many(meshes, workers=workers, **self._with_net())
+        return solve_many(meshes, **spread, **self._with_net())
 
     def _with_net(self) -> dict[str, Any]:
         more = {"net": self.net, "polish": self.method != "net", "sparing": self.method == "auto"}

@@ -115,6 +115,9 @@ UNITS = ("um", "mm", "cm", "dm", "m", "in", "ft", "yd")
     help="Processes for many inputs; all cores by default, 0 for none beside this one.",
 )
 @click.option(
+    "--scheduler", metavar="ADDRESS", help="Dask cluster that solves many inputs instead."
+)
+@click.option(
     "--suffix", metavar=".EXT", help="Format of many outputs; that of each input by default."
 )
 @click.option(
@@ -170,10 +173,13 @@ def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
             plots=given["plot"],
             table=given["table"],
             workers=given["workers"],
+            scheduler=given["scheduler"],
         )
     else:
         if given["suffix"] is not None:
             raise OptionError("--suffix is for many inputs; name the format in -o")
+        if given["scheduler"] is not None:
+            raise OptionError("--scheduler is for many inputs; leave it out")
         good = _single(job, names[0], out, given["plot"], given["table"])
     click.get_current_context().exit(0 if good else 1)
 

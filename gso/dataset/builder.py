@@ -18,7 +18,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from gso import cluster, parallel
+from gso import cluster
 from gso.dataset import hdf, manifest, shard
 from gso.dataset.claim import claimed
 from gso.dataset.labels import KINDS, REFERENCES
@@ -216,11 +216,7 @@ def _make(
     if tick is not None:
         tick(what, done, total)
     work = partial(shard.make, recipe, versions())
-    if scheduler is not None:
-        results = cluster.spread(work, missing, scheduler=scheduler)
-    else:
-        results = parallel.spread(work, missing, workers=workers)
-    with closing(results):
+    with closing(cluster.either(work, missing, workers=workers, scheduler=scheduler)) as results:
         for result in results:
             task = missing[result.index]
             if result.error is not None:

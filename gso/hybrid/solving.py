@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from gso import parametrization, tasks
+from gso import cluster, parametrization, tasks
 from gso.components import Component, several
 from gso.constraints import Compiled, compile_constraints, listed
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.hybrid.prediction import Prediction, predictions
 from gso.hybrid.time_model import net_saves_time
 from gso.mesh import Mesh
-from gso.parallel import spread
 from gso.pattern import Pattern
 from gso.result import Result
 from gso.spelling import known_keywords
@@ -139,6 +138,7 @@ def solve_many(
     polish: bool | int = True,
     sparing: bool = False,
     workers: int | None = None,
+    scheduler: str | None = None,
     **keywords: Any,
 ) -> Iterator[Item]:
     """Solve many surfaces: predictions in batches, then :func:`solve` in parallel processes.
@@ -151,6 +151,8 @@ def solve_many(
         As for :func:`solve`; a `callback` is ignored.
     workers : int, optional
         Number of worker processes; the number of cores when not given, 0 to solve in this one.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers solve instead; predictions are made here.
 
     Yields
     ------
@@ -170,7 +172,8 @@ def solve_many(
     worth = partial(net_saves_time, task=task, keywords=keywords, many=True) if sparing else None
     passes, alone = _passes(polish), polish is False
     ask = partial(predictions, task=task, net=net, passes=passes, alone=alone)
-    with closing(spread(work, _started(meshes, worth, ask), workers=workers)) as results:
+    started = _started(meshes, worth, ask)
+    with closing(cluster.either(work, started, workers=workers, scheduler=scheduler)) as results:
         for done in results:
             yield Item(done.index, done.value, done.error)
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
+from gso.parallel import Each, here
 from gso.typing import Array
 
 #: Factors on the cost of edges in regions to avoid, and on edges to follow.
@@ -33,6 +34,7 @@ class Wishes:
     min_size: float | None
     max_size: tuple[float, float] | None
     say: Callable[[str], None]
+    each: Each = here
 
     def __post_init__(self) -> None:
         for name in ("max_strain", "max_deviation", "seam", "min_neck", "min_size"):

@@ -58,7 +58,7 @@ def reshaped(ground: Ground, wishes: Wishes) -> tuple[Candidate, Result | None]:
         cut_open = cuts(ground, wishes, level)
         # An attempt begins with the weight of the distance that the one before ended with.
         begin = tried[-1].proximity / _STRONGER if tried else 1.0
-        tried.append(_attempt(ground, cut_open, level, max(begin, 1.0), allowed, wishes.max_strain))
+        tried.append(_attempt(ground, cut_open, level, max(begin, 1.0), allowed, wishes))
     best = min(
         tried,
         key=lambda a: (
@@ -85,7 +85,7 @@ def _with_straight_seams(
     own = straightened_pieces(ground, best.cut)
     if own is None:
         return best
-    new = _attempt(ground, own, best.level, best.proximity, allowed, wishes.max_strain)
+    new = _attempt(ground, own, best.level, best.proximity, allowed, wishes)
     return new if new.excess <= max(best.excess, 1.0) else best
 
 
@@ -120,9 +120,10 @@ def _attempt(
     level: float,
     proximity: float,
     allowed: float,
-    strain: float,
+    wishes: Wishes,
 ) -> _Attempt:
     """Solve one cut, again with other weights where distance, strain or facets are too large."""
+    strain = wishes.max_strain
     own = replace(Options().for_pieces(), w_proximity=proximity)
     sound = not len(faults.folded(ground.mesh))
     best: _Attempt | None = None
@@ -140,7 +141,8 @@ def _attempt(
         far = max(away.there_max, away.back_max) / allowed
         strained = uneven = 0.0
         if far <= _HOPELESS:
-            strained = strains_of(result.mesh).get("strain_p99", np.inf) / strain
+            strains = strains_of(result.mesh, wishes.each)
+            strained = strains.get("strain_p99", np.inf) / strain
         if far <= 1.0:
             folds = len(faults.folded(shape.design)) if sound else 0
             uneven = max(facet_ratio(result) / FACETS, 1.0 + _FOLD * folds if folds else 0.0)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from gso.errors import ConvergenceWarning, OptionError
 from gso.mesh import Mesh
+from gso.parallel import helpers
 from gso.seams.cutting import cut
 from gso.seams.kinds import Seam
 from gso.seams.pieces import Pieces
@@ -63,6 +64,7 @@ def pieces(
     along: ArrayLike | None = None,
     avoid: ArrayLike | None = None,
     denoise: bool = False,
+    workers: int | None = 0,
     callback: Callable[[str], None] | None = None,
 ) -> Segmentation:
     """Find seams along which a design can be cut into pieces that can be laid flat.
@@ -104,6 +106,9 @@ def pieces(
         Faces that seams should keep away from: indices, or a mask of all faces.
     denoise : bool
         Denoise the design first, such as a scan.
+    workers : int, optional
+        Number of processes, which a search with `max_deviation` uses; one for each processor when
+        None, and 0 for this one alone. The result does not depend on it.
     callback : callable, optional
         Called with what is being done, in words.
 
@@ -159,7 +164,8 @@ def pieces(
             found = _as_is(ground, aim)
             out = packed(found, None, ground, wishes)
         else:
-            out = packed(*reshaped(ground, aim), ground, wishes)
+            with helpers(workers) as each:
+                out = packed(*reshaped(ground, replace(aim, each=each)), ground, wishes)
     reasons = list(out.reasons)
     if said:
         (reasons if reasons else notes).append(said)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from gso import cluster, parallel
+from gso import cluster
 from gso.result import Result
 from gso.spelling import known_keywords
 from gso.tno.optimize import optimize
@@ -74,10 +74,7 @@ def optimize_many(
         # The first surface would exhaust the iterator.
         keywords["constraints"] = list(keywords["constraints"])
     work = partial(_one, keywords)
-    if scheduler is None:
-        spread = parallel.spread(work, meshes, workers=workers)
-    else:
-        spread = cluster.spread(work, meshes, scheduler=scheduler)
+    spread = cluster.either(work, meshes, workers=workers, scheduler=scheduler)
     with closing(spread) as results:
         for done in results:
             yield Item(done.index, done.value, done.error)

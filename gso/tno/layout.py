@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from gso import metrics, parametrization
+import numpy as np
+
+from gso import components, metrics, parametrization
 from gso.constraints import Compiled
 from gso.errors import MeshError
 from gso.mesh import Mesh
+from gso.parallel import Each, here
 from gso.pattern import Pattern
 from gso.tasks.base import Analysis, Request
 from gso.tasks.evaluation import largest_strain
 from gso.tno.normalise import Canonical
 from gso.tno.run import Run
+
+#: Number of groups of components that are laid out apart, and of vertices from which on.
+_GROUPS, _LARGE = 4, 2000
 
 
 def lay_out(
@@ -74,7 +80,38 @@ def lay_out(
     return found
 
 
-def strains_of(surface: Mesh) -> dict[str, float]:
-    """Return mean, 99th percentile and largest strain of a surface's pattern; empty without."""
-    pattern = lay_out(surface)
+def strains_of(surface: Mesh, each: Each = here) -> dict[str, float]:
+    """Return mean, 99th percentile and largest strain of a surface's pattern; empty without.
+
+    Parameters
+    ----------
+    surface : Mesh
+    each : callable
+        What :func:`gso.parallel.helpers` gives, to lay out components in several processes.
+    """
+    label = components.labels(surface)
+    count = min(_GROUPS if len(label) >= _LARGE else 1, int(label.max()) + 1)
+    if count <= 1:
+        return _strains(surface, lay_out(surface))
+    # Groups do not depend on the number of processes, so that neither does the result.
+    # The largest component first, each to the group with the fewest vertices so far.
+    sizes, group = np.bincount(label), np.zeros(label.max() + 1, np.int64)
+    filled = np.zeros(count)
+    for k in np.argsort(-sizes, kind="stable").tolist():
+        group[k] = filled.argmin()
+        filled[group[k]] += sizes[k]
+    parts = components.split(surface, group[label])
+    patterns = each(lay_out, [part.mesh for part in parts])
+    flat = np.zeros((len(surface.vertices), 2))
+    for part, pattern in zip(parts, patterns, strict=True):
+        if pattern is None:
+            return {}
+        if len(pattern.seams):
+            # A component that closes around itself was cut open.
+            return _strains(surface, lay_out(surface))
+        flat[part.vertices] = pattern.flat
+    return metrics.strains(surface, flat)
+
+
+def _strains(surface: Mesh, pattern: Pattern | None) -> dict[str, float]:
     return {} if pattern is None else metrics.strains(pattern.surface(surface), pattern.flat)

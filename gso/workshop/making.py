@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree as Points
 
-from gso import decimation, parametrization
+from gso import decimation, parallel, parametrization
 from gso.errors import ConvergenceWarning, GSOError, MeshError
 from gso.io.surface import welded
 from gso.mesh import Mesh
@@ -29,12 +31,14 @@ from gso.workshop.panels import Made, Mating, Panel, Side
 #: Shares of the allowed distance: what the pieces may use, and within what a strip follows its
 #: piece, so that the two sides of a seam stay together.
 _PIECES, _FOLLOW = 0.9, 0.1
+#: Number of pieces from which on processes make their strips.
+_MANY = 8
 #: Distance of vertices that are merged, relative to the diagonal.
 _SAME = 1e-9
 
 #: Number of triangles that a larger design is decimated to, and the share of the allowed distance
 #: within which.
-_LIGHT, _NEAR = 10_000, 0.35
+_LIGHT, _NEAR = 6_000, 0.35
 
 Say = Callable[[str], None]
 
@@ -56,7 +60,7 @@ class _Target:
         return cls(given.mesh, replace(given, mesh=light), allowed, allowed - away)
 
 
-def made(given: Design, ask: Ask, say: Say = lambda said: None) -> Made:
+def made(given: Design, ask: Ask, say: Say = lambda said: None, workers: int | None = 0) -> Made:
     """Make a design of flat panels within what is asked, or as near to it as possible.
 
     A ruled surface is tried as a whole, and then in pieces; a piece that no single strip follows
@@ -68,6 +72,8 @@ def made(given: Design, ask: Ask, say: Say = lambda said: None) -> Made:
     ask : Ask
     say : callable
         Called with what is being done.
+    workers : int, optional
+        Number of processes for the strips of many pieces; one for each processor when not given.
     """
     given = _welded(given)
     name, design = given.name, given.mesh
@@ -82,7 +88,7 @@ def made(given: Design, ask: Ask, say: Say = lambda said: None) -> Made:
         if whole is not None and not whole.reasons:
             return whole
         try:
-            parted = _checked(_parted(name, own, ask, say), ask)
+            parted = _checked(_parted(name, own, ask, say, workers), ask)
         except GSOError:
             if whole is None:
                 raise
@@ -181,7 +187,9 @@ def _bent(made: Made) -> Made:
     return replace(made, record=made.record | {"bend_radius_min": radius})
 
 
-def _searched(given: Design, ask: Ask, allowed: float | None, say: Say) -> Segmentation:
+def _searched(
+    given: Design, ask: Ask, allowed: float | None, say: Say, workers: int | None = 0
+) -> Segmentation:
     """Search for seams; on triangles they need not follow edge rows."""
     triangles = Mesh(given.mesh.vertices, given.mesh.triangles)
     return search(
@@ -191,14 +199,15 @@ def _searched(given: Design, ask: Ask, allowed: float | None, say: Say) -> Segme
         darts=ask.darts,
         max_size=ask.max_size,
         keep=given.kept if len(given.kept) else None,
+        workers=workers,
         callback=lambda said: say(f"{given.name}: {said}"),
     )
 
 
-def _parted(name: str, design: _Target, ask: Ask, say: Say) -> Made:
+def _parted(name: str, design: _Target, ask: Ask, say: Say, workers: int | None) -> Made:
     """Make the design in pieces: each of them ruled where that is asked and possible."""
     share = _PIECES if ask.formulation == "ruled" else 1.0
-    found = _searched(design.solved, ask, share * design.left, say)
+    found = _searched(design.solved, ask, share * design.left, say, workers)
     if any(sheet is None for sheet in found.sheets):
         raise MeshError(f"{name}: a piece cannot be laid flat; {'; '.join(found.reasons)}")
     panels: list[Panel] = []
@@ -206,14 +215,14 @@ def _parted(name: str, design: _Target, ask: Ask, say: Say) -> Made:
     owner: list[int] = []
     moved = found.opened.mesh.vertices.copy()
     strips = []
-    for number, (piece, part, sheet) in enumerate(
-        zip(found, found.parts, found.sheets, strict=True)
+    results: list[Result | None] = [None] * len(found)
+    if ask.formulation == "ruled":
+        meshes = [piece.mesh for piece in found]
+        results = _strips(name, meshes, ask, _FOLLOW * design.left, say, workers)
+    for number, (piece, part, sheet, result) in enumerate(
+        zip(found, found.parts, found.sheets, results, strict=True)
     ):
         own = f"{name}-{piece.name}" if len(found) > 1 else name
-        result = None
-        if ask.formulation == "ruled":
-            say(f"{own}: strip")
-            result = _strip(piece.mesh, ask, _FOLLOW * design.left)
         if result is None or result.ruled is None or sheet is None:
             panels.append(Panel(own, piece.mesh, sheet.flat))  # type: ignore[union-attr]
             owner.append(number)
@@ -263,7 +272,22 @@ def _ruled_record(design: _Target, result: Result, ask: Ask) -> dict[str, Any]:
     }
 
 
-def _strip(mesh: Mesh, ask: Ask, left: float) -> Result | None:
+def _strips(
+    name: str, meshes: Sequence[Mesh], ask: Ask, left: float, say: Say, workers: int | None
+) -> list[Result | None]:
+    """Make pieces of one strip each, where that is usable within the distance."""
+    out: list[Result | None] = [None] * len(meshes)
+    # Starting processes takes as long as a few strips.
+    workers = workers if len(meshes) >= _MANY else 0
+    work = partial(_strip, ask, left)
+    with closing(parallel.spread(work, meshes, workers=workers, caller=False)) as results:
+        for count, done in enumerate(results, start=1):
+            out[done.index] = done.value
+            say(f"{name}: strip {count} of {len(meshes)}")
+    return out
+
+
+def _strip(ask: Ask, left: float, mesh: Mesh) -> Result | None:
     """Make a piece of one strip; None if that is not usable within the distance."""
     # The piece is developable already: its own normals give the rulings.
     options = replace(_options(ask), max_strips=1, starts=("design",))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gso import cluster, io, parallel
+from gso import cluster, io
 from gso.errors import GSOError, MeshError
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import digest, plain
@@ -82,14 +82,12 @@ def made_all(
             found[k] = one
     # The largest first, so that no large one runs alone at the end.
     todo.sort(key=lambda k: -len(designs[k].mesh.vertices))
-    if workers is None and len(todo) == 1:
-        workers = 0
-    if workers == 0 and scheduler is None:
+    if scheduler is None and (workers == 0 or len(todo) == 1):
         for number, k in enumerate(todo, start=1):
             own = designs[k]
             say(f"{own.name}: design {number} of {len(todo)}")
             try:
-                one = made(own, ask, say)
+                one = made(own, ask, say, workers)
             except GSOError as error:
                 failed[k] = str(error)
                 continue
@@ -98,10 +96,7 @@ def made_all(
         return found, failed
     work = partial(work_on, ask, str(folder.resolve()))
     items = (designs[k] for k in todo)
-    if scheduler is None:
-        spread = parallel.spread(work, items, workers=workers, caller=False)
-    else:
-        spread = cluster.spread(work, items, scheduler=scheduler)
+    spread = cluster.either(work, items, workers=workers, scheduler=scheduler, caller=False)
     total = len(found) + len(todo)
     say(f"designs: {len(found)} of {total}")
     with closing(spread) as results:
