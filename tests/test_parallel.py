@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gso.mesh import Mesh
-from gso.parallel import here, helpers
+from gso.parallel import helpers, here
 from gso.tno.layout import strains_of
 from tests.conftest import sphere_cap
 

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from gso.parallel import Each, here
 from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
 from gso.seams.pieces import Piece, Pieces
@@ -149,12 +150,17 @@ def _factor(ground: Ground, piece: Piece) -> Array | None:
     return ground.factor_of(piece.vertices[piece.mesh.edges])
 
 
+def _identity(piece: Piece) -> bytes:
+    return piece.faces.tobytes() + piece.mesh.faces.tobytes()
+
+
 def measured(
     ground: Ground,
     pieces: Pieces,
     most: tuple[float, float] | None = None,
     say: Said | None = None,
     limit: float = np.inf,
+    each: Each = here,
 ) -> Candidate:
     """Lay pieces flat, and cut those that overlap themselves or are larger than a sheet.
 
@@ -169,12 +175,19 @@ def measured(
         Called with what is being done.
     limit : float
         Strain from which on a piece is enough to give up: the others then have no pattern.
+    each : callable
+        What :func:`gso.parallel.helpers` gives, to lay pieces flat in several processes.
     """
     known: dict[bytes, Sheet | None] = {}
     for _ in range(_ROUNDS):
+        if each is not here and limit == np.inf:
+            todo = {_identity(p): p.mesh for p in pieces if _identity(p) not in known}
+            if say is not None:
+                say(f"patterns of {len(todo)} pieces")
+            known |= zip(todo, each(flattened, list(todo.values())), strict=True)
         sheets: list[Sheet | None] = []
         for number, piece in enumerate(pieces):
-            name = piece.faces.tobytes() + piece.mesh.faces.tobytes()
+            name = _identity(piece)
             if name not in known:
                 if say is not None:
                     say(f"pattern {number + 1} of {len(pieces)}")

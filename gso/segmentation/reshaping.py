@@ -69,7 +69,7 @@ def reshaped(ground: Ground, wishes: Wishes) -> tuple[Candidate, Result | None]:
     best = _with_straight_seams(ground, best, wishes, allowed)
     shape = best.pieces
     surface = ground.moved(shape.design)
-    found = measured(surface, shape, wishes.max_size, wishes.say)
+    found = measured(surface, shape, wishes.max_size, wishes.say, each=wishes.each)
     if wishes.darts and found.strain <= wishes.max_strain:
         found = joined(surface, found, wishes.max_strain, neck_of(ground, wishes), wishes)
     return found, best.result
