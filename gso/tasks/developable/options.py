@@ -49,10 +49,15 @@ class Options(BaseOptions):
         Iterations on the coarsest grid; half as many with `x0`.
     coarse_size : int
         Largest side of the coarsest grid; a grid that small is halved once.
+    free_size : int
+        Largest side of the coarser grids on which vertices are free; on finer ones the unknowns
+        are normal offsets, which are cheaper. With "free" the vertices are free on all of them,
+        and with `x0` on the coarsest only.
     between_iterations : int
-        Iterations on each grid between the coarsest and the design's own, where the unknowns
-        are normal offsets. With "free" and without `x0` the vertices are free there too and
-        take `iterations`, halved from grid to grid on fine grids.
+        Iterations on each grid between the coarsest and the design's own.
+    refining_iterations : int
+        Iterations on the design's own grid where it follows two or more coarser ones; half as many
+        again where it follows more, except with "free", where each takes half as many.
     by_component : bool
         Weigh each of several components that constraints join for its own size and curvature;
         otherwise for those of the whole mesh, as for the pieces of one design.
@@ -65,7 +70,9 @@ class Options(BaseOptions):
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
         "fast": {
             "iterations": 4,
-            "coarse_iterations": 8,
+            "coarse_iterations": 10,
+            "between_iterations": 5,
+            "refining_iterations": 3,
             "w_curvature": 1.15e-3,
             "w_fairness": 8.2e-6,
         },
@@ -73,6 +80,8 @@ class Options(BaseOptions):
         "accurate": {
             "iterations": 14,
             "coarse_iterations": 12,
+            "between_iterations": 6,
+            "refining_iterations": 10,
             "variables": "free",
             "w_curvature": 8.9e-4,
             "w_fairness": 9.0e-6,
@@ -91,8 +100,10 @@ class Options(BaseOptions):
     variables: str = "normal"
     controls: int = 16
     coarse_iterations: int = 12
-    coarse_size: int = 32
-    between_iterations: int = 6
+    coarse_size: int = 24
+    free_size: int = 32
+    between_iterations: int = 4
+    refining_iterations: int = 6
     by_component: bool = True
     developable_below: float = 1e-3
 

@@ -182,29 +182,31 @@ def _falling(options: Options) -> tuple[Absolute, ...]:
 def _iterations(options: Options, coarser_grids: int) -> int:
     """Compute the iterations on a grid that follows `coarser_grids` coarser ones.
 
-    Offsets take 1.5 times as many from the second refinement on, as fine grids converge more
-    slowly. Free vertices are costly on very fine grids: from the third refinement on, each grid
+    Offsets take 1.5 times as many from the third refinement on, as fine grids converge more
+    slowly. Free vertices are costly on very fine grids: from the fourth refinement on, each grid
     takes half the iterations of the one before, but not fewer than 5.
     """
+    if coarser_grids < 2:
+        return options.iterations
+    most = options.refining_iterations
     if options.variables != "free":
-        return options.iterations * 3 // 2 if coarser_grids > 1 else options.iterations
-    return max(options.iterations >> max(coarser_grids - 2, 0), min(options.iterations, 5))
+        return most * 3 // 2 if coarser_grids > 2 else most
+    return max(most >> max(coarser_grids - 3, 0), min(most, 5))
 
 
 def _coarse_stage(analysis: Analysis, request: Request, level: Mesh, number: int) -> Stage:
     """Plan the stage of a coarser grid, with free vertices on the coarsest.
 
-    The other grids use free vertices if the last stage does and the start is cold, else normal
-    offsets, which are cheaper. With `max_displacement` all use normal offsets.
+    So are those of the next ones up to `free_size`, and of all if the last stage's are, unless
+    there is a warm start. With `max_displacement` all use normal offsets.
     """
     o = request.options
     first, begun = number == 0, request.start is not None
-    free_between = o.variables == "free" and not begun
-    if first:
-        iterations = o.coarse_iterations // 2 if begun else o.coarse_iterations
-    else:
-        iterations = _iterations(o, number) if free_between else o.between_iterations
-    kind = "free" if first or free_between else "normal"
+    small = max(level.grid_shape or (0,)) <= o.free_size
+    iterations = o.coarse_iterations if first else o.between_iterations
+    if first and begun:
+        iterations //= 2
+    kind = "free" if first or (not begun and (small or o.variables == "free")) else "normal"
     if request.max_displacement is not None:
         kind = "normal"
     return Stage(
