@@ -56,8 +56,8 @@ class Options(BaseOptions):
     between_iterations : int
         Iterations on each grid between the coarsest and the design's own.
     refining_iterations : int
-        Iterations on the design's own grid where it follows two or more coarser ones; half as many
-        again where it follows more, except with "free", where each takes half as many.
+        Iterations on the design's own grid where it follows two or three coarser ones; fewer
+        where it follows more.
     by_component : bool
         Weigh each of several components that constraints join for its own size and curvature;
         otherwise for those of the whole mesh, as for the pieces of one design.

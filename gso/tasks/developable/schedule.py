@@ -182,15 +182,15 @@ def _falling(options: Options) -> tuple[Absolute, ...]:
 def _iterations(options: Options, coarser_grids: int) -> int:
     """Compute the iterations on a grid that follows `coarser_grids` coarser ones.
 
-    Offsets take 1.5 times as many from the third refinement on, as fine grids converge more
-    slowly. Free vertices are costly on very fine grids: from the fourth refinement on, each grid
-    takes half the iterations of the one before, but not fewer than 5.
+    From the fourth refinement on they are fewer, as coarser grids have found nearly all of the
+    displacement: two thirds as many of offsets, and half as many from grid to grid, but not fewer
+    than 5, of free vertices, which are costly there.
     """
     if coarser_grids < 2:
         return options.iterations
     most = options.refining_iterations
     if options.variables != "free":
-        return most * 3 // 2 if coarser_grids > 2 else most
+        return max(most * 2 // 3, min(most, 3)) if coarser_grids > 3 else most
     return max(most >> max(coarser_grids - 3, 0), min(most, 5))
 
 

@@ -81,7 +81,7 @@ class Elements(Values):
 
     def __init__(self, item: Weighted, variables: Variables):
         super().__init__(item, variables.layout)
-        self._pull, self.columns = _pull_back(self.gather, variables)
+        self._pull, self.columns = _pull_back(self.gather, self.shape, variables)
         self._chain = _Chain(self._pull, self.gather.shape)
 
     def linearise(self, coordinates: Array) -> tuple[Array, Array]:
@@ -183,7 +183,7 @@ class _Chain:
         return True, begin, unknown.astype(np.int64), by_coordinate.data[order]
 
 
-def _pull_back(gather: Ints, variables: Variables):
+def _pull_back(gather: Ints, shape: tuple[int, ...], variables: Variables):
     """Return the map from derivatives by coordinates to those by unknowns, and the unknowns.
 
     The map is None where every coordinate is a single unknown or fixed. The unknowns (q, e)
@@ -196,6 +196,9 @@ def _pull_back(gather: Ints, variables: Variables):
         return None, chosen[gather]
     from scipy.sparse import csr_matrix
 
+    direct = _by_point(gather, shape, variables)
+    if direct is not None:
+        return direct
     k, count = gather.shape
     part = variables.basis[gather.T.ravel()].tocoo()
     element = part.row // k
@@ -209,6 +212,35 @@ def _pull_back(gather: Ints, variables: Variables):
     pull = csr_matrix(
         (part.data, (place[at] * count + element, (part.row % k) * count + element)),
         shape=(q * count, k * count),
+    )
+    return pull, columns
+
+
+def _by_point(gather: Ints, shape: tuple[int, ...], variables: Variables):
+    """Return map and unknowns where every point moves with one unknown, as along a normal.
+
+    None where that is not so, or where two points of an element share their unknown.
+    """
+    from scipy.sparse import csr_matrix
+
+    basis, (k, count), dim = variables.basis, gather.shape, shape[0]
+    each = np.diff(basis.indptr)
+    if each.max(initial=0) > 1 or any(d != dim for d in shape):
+        return None
+    unknown, share = np.full(len(each), variables.size), np.zeros(len(each))
+    unknown[each > 0], share[each > 0] = basis.indices, basis.data
+    by_point = unknown[gather].reshape(k // dim, dim, count)
+    columns = by_point.min(axis=1)
+    if not ((by_point == columns[:, None]) | (by_point == variables.size)).all():
+        return None
+    ordered = np.sort(columns, axis=0)
+    if ((ordered[1:] == ordered[:-1]) & (ordered[1:] < variables.size)).any():
+        return None
+    place = (np.arange(k) * count).reshape(-1, 1, dim) + np.arange(count)[:, None]
+    values = share[gather].reshape(k // dim, dim, count).transpose(0, 2, 1)
+    pull = csr_matrix(
+        (values.ravel(), place.ravel(), dim * np.arange(columns.size + 1)),
+        shape=(columns.size, k * count),
     )
     return pull, columns
 
