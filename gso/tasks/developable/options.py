@@ -48,16 +48,16 @@ class Options(BaseOptions):
     coarse_iterations : int
         Iterations on the coarsest grid; half as many with `x0`.
     coarse_size : int
-        Largest side of the coarsest grid; a grid that small is halved once.
+        Largest side of the coarsest grid without `x0`; a grid that small is halved once.
     free_size : int
         Largest side of the coarser grids on which vertices are free; on finer ones the unknowns
-        are normal offsets, which are cheaper. With "free" the vertices are free on all of them,
-        and with `x0` on the coarsest only.
+        are normal offsets, which are cheaper. With "free" the vertices are free on all of them.
+        With `x0` it is the largest side of the coarsest grid, the only one with free vertices.
     between_iterations : int
         Iterations on each grid between the coarsest and the design's own.
     refining_iterations : int
-        Iterations on the design's own grid where it follows two or three coarser ones; fewer
-        where it follows more.
+        Iterations on the design's own grid where it follows two or three coarser ones without
+        `x0`; fewer where it follows more.
     by_component : bool
         Weigh each of several components that constraints join for its own size and curvature;
         otherwise for those of the whole mesh, as for the pieces of one design.

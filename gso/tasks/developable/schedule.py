@@ -91,7 +91,9 @@ def _levels(analysis: Analysis, request: Request) -> list[Mesh]:
         return []
     if request.start is not None and request.max_displacement is not None:
         return []
-    return coarser(mesh, request.options.coarse_size)
+    o = request.options
+    # A warm start has the large displacements already, which the coarsest grids are for.
+    return coarser(mesh, o.coarse_size if request.start is None else o.free_size)
 
 
 def _starts(analysis: Analysis, request: Request, levels: list[Mesh]) -> list[Mesh]:
@@ -166,7 +168,8 @@ def _stages(analysis: Analysis, request: Request, coarser_grids: int) -> list[St
             return [first, last]
         start = mesh.vertices if request.start is None else request.start
         return [constrained.approach(analysis, start), first, last]
-    last = stage(o.variables, _iterations(o, coarser_grids), falling)
+    most = _iterations(o, coarser_grids, request.start is not None)
+    last = stage(o.variables, most, falling)
     if o.variables == "free" and request.start is not None:
         # Normal offsets remove most of the remaining energy at a third of the cost.
         first = stage("normal", _OFFSETS_FIRST, falling)
@@ -179,14 +182,16 @@ def _falling(options: Options) -> tuple[Absolute, ...]:
     return tuple(Absolute(factor * options.eps) for factor in (10.0, 3.0, 1.0))
 
 
-def _iterations(options: Options, coarser_grids: int) -> int:
+def _iterations(options: Options, coarser_grids: int, begun: bool) -> int:
     """Compute the iterations on a grid that follows `coarser_grids` coarser ones.
+
+    `begun` is whether there is a warm start, which has been solved on fewer coarser grids.
 
     From the fourth refinement on they are fewer, as coarser grids have found nearly all of the
     displacement: two thirds as many of offsets, and half as many from grid to grid, but not fewer
     than 5, of free vertices, which are costly there.
     """
-    if coarser_grids < 2:
+    if coarser_grids < 2 or begun:
         return options.iterations
     most = options.refining_iterations
     if options.variables != "free":

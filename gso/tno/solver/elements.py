@@ -224,6 +224,8 @@ def _by_point(gather: Ints, shape: tuple[int, ...], variables: Variables):
     from scipy.sparse import csr_matrix
 
     basis, (k, count), dim = variables.basis, gather.shape, shape[0]
+    if basis is None:
+        return None
     each = np.diff(basis.indptr)
     if each.max(initial=0) > 1 or any(d != dim for d in shape):
         return None
