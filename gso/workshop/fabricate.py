@@ -266,10 +266,12 @@ def fabricate(
 
 def _named(found: dict[int, Made]) -> dict[int, Made]:
     """Give the panels of all designs names that differ."""
-    names = iter(different(panel.name for one in found.values() for panel in one.panels))
+    # In the order of the designs, whichever of them an earlier run had made.
+    ordered = dict(sorted(found.items()))
+    names = iter(different(panel.name for one in ordered.values() for panel in one.panels))
     return {
         k: replace(one, panels=tuple(replace(p, name=next(names)) for p in one.panels))
-        for k, one in found.items()
+        for k, one in ordered.items()
     }
 
 
