@@ -17,8 +17,9 @@ from gso.typing import Array, Ints
 from gso.workshop.panels import Panel
 from gso.workshop.part import signed_area
 
-#: Number of points of a mark along the diagonal of a panel, at least.
-_STEPS = 500
+#: Number of points of a mark along the diagonal of a panel, at least, before those are left out
+#: from which the line is less than a share of its size away.
+_STEPS, _CHORD = 4000, 1e-5
 #: Largest distance of marks and holes from the design, relative to its diagonal.
 _NEAR = 0.01
 
@@ -86,6 +87,8 @@ def marked(
     list of list of ndarray (k, 2)
         The lines of each panel.
     """
+    import shapely
+
     wanted = [replace(p, flat=flat) for p, flat in zip(panels, flats, strict=True)]
     most = max(panel.surface.diagonal for panel in panels) / _STEPS
     out: list[list[Array]] = [[] for _ in panels]
@@ -94,7 +97,8 @@ def marked(
         stops = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
         for a, b in pairwise(stops):
             if b - a > 1:
-                out[int(number[a])].append(flat[a:b])
+                way = shapely.LineString(flat[a:b]).simplify(_CHORD * np.ptp(flat[a:b]))
+                out[int(number[a])].append(np.asarray(way.coords))
     return out
 
 
