@@ -25,7 +25,8 @@ figcaption { font-size: 12px; }
 svg { border: 1px solid #ddd; background: #fff; }
 path, line { fill: none; stroke-width: 1px; vector-effect: non-scaling-stroke; }
 text { font-family: sans-serif; text-anchor: middle; dominant-baseline: central; }
-.legend span { margin-right: 1.5em; white-space: nowrap; } .legend i { display: inline-block; width: 2em;
+.legend span { margin-right: 1.5em; white-space: nowrap; }
+.legend i { display: inline-block; width: 2em;
 border-top-style: solid; border-top-width: 3px; vertical-align: middle; margin-right: 0.4em; }
 """
 #: Kinds of lines, what they mean, and how they are drawn beyond their colour in drawings.
