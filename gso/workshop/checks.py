@@ -87,14 +87,14 @@ def _bends_too_near(panel: Panel, sheet: Thickness) -> str | None:
     one, two = one[other], two[other]
     if not len(one):
         return None
-    lack: Array = 0.5 * (wide[one] + wide[two]) - shapely.distance(middle[one], segments[two])
-    k = int(lack.argmax())
-    if lack[k] <= 0.0:
+    apart: Array = shapely.distance(middle[one], segments[two])
+    needed = 0.5 * (wide[one] + wide[two])
+    k = int((needed - apart).argmax())
+    if needed[k] <= apart[k]:
         return None
-    apart = float(shapely.distance(middle[one[k]], segments[two[k]]))
     return (
-        f"{panel.name}: two bends are {apart:.3g} mm apart, and folded with a radius of "
-        f"{sheet.radius:g} mm they need {apart + lack[k]:.3g} mm"
+        f"{panel.name}: two bends are {apart[k]:.3g} mm apart, and folded with a radius of "
+        f"{sheet.radius:g} mm they need {needed[k]:.3g} mm"
     )
 
 
@@ -103,13 +103,14 @@ def _of_seams(own: Fitted, ask: Ask, sheet: Thickness) -> list[str]:
     worst, why = 0.0, []
     for seam in own.made.matings:
         bound = own.scale * (seam.mismatch(own.made.panels) + ask.max_strain * seam.length)
-        more = seam.mismatch(own.panels) - bound - _SEAM * sheet.sheet
+        apart = seam.mismatch(own.panels)
+        more = apart - bound - _SEAM * sheet.sheet
         if more > worst:
             names = _names(own.panels, (seam.one.panel, seam.two.panel))
             worst = more
             why = [
-                f"the sides of seam {seam.number} of {names} differ by "
-                f"{seam.mismatch(own.panels):.3g} mm in a sheet of {sheet.sheet:g} mm"
+                f"the sides of seam {seam.number} of {names} differ by {apart:.3g} mm in a sheet "
+                f"of {sheet.sheet:g} mm"
             ]
     return why
 

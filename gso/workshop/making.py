@@ -152,13 +152,14 @@ def _checked(made: Made, ask: Ask) -> Made:
                 "(in the design's unit)"
             )
             break
+    least = ask.min_radius or 0.0
     # Strips keep the smallest radius themselves, or say why not.
-    for panel in made.panels if ask.min_radius is not None else ():
+    for panel in made.panels if least > 0.0 else ():
         radius = np.inf if len(panel.bends) else measured.bend_radius(panel)
-        if ask.min_radius is not None and radius < ask.min_radius:
+        if radius < least:
             reasons.append(
-                f"{panel.name} is bent to a radius of {radius:.4g}, less than "
-                f"{ask.min_radius:.4g} (in the design's unit)"
+                f"{panel.name} is bent to a radius of {radius:.4g}, less than {least:.4g} (in the "
+                "design's unit)"
             )
             break
     return replace(made, record=made.record | {"reasons": reasons})
@@ -182,7 +183,7 @@ def _flattened(given: Design, ask: Ask, say: Say) -> Made:
 
 
 def _bent(made: Made) -> Made:
-    """Measure the smallest radius of panels without bend lines."""
+    """Measure the smallest radius of all panels."""
     radius = min(measured.bend_radius(panel) for panel in made.panels)
     return replace(made, record=made.record | {"bend_radius_min": radius})
 
@@ -250,7 +251,7 @@ def _parted(name: str, design: _Target, ask: Ask, say: Say, workers: int | None)
     seams = found.opened.seams
     gap = np.linalg.norm(moved[seams[:, 0]] - moved[seams[:, 1]], axis=2).max(initial=0.0)
     record |= {"pieces": len(found), "strips": strips, "seam_gap": float(gap), "reasons": reasons}
-    return Made(name, tuple(panels), numbered(matings), record)
+    return _bent(Made(name, tuple(panels), numbered(matings), record))
 
 
 def _ruled_record(design: _Target, result: Result, ask: Ask) -> dict[str, Any]:

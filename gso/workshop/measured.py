@@ -32,9 +32,7 @@ def of_panels(design: Mesh, panels: list[Panel], ask: Ask, allowed: float) -> di
     flat = np.concatenate(parametrization.beside([p.flat for p in panels]))
     # Slivers of a small panel may have no area relative to the whole.
     mesh = Mesh(points, table[have_area(table, points) & have_area(table, flat)])
-    record = of_pattern(design, mesh, Pattern.whole(mesh, flat), ask, allowed, [])
-    record["bend_radius_min"] = min(bend_radius(panel) for panel in panels)
-    return record
+    return of_pattern(design, mesh, Pattern.whole(mesh, flat), ask, allowed, [])
 
 
 def bend_radius(panel: Panel) -> float:

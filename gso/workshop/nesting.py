@@ -144,7 +144,7 @@ def nest(
     return _result(best, sheet, margin, "rectangles", notes)
 
 
-def checked_sheet(sheet: Any) -> Array:
+def _checked_sheet(sheet: Any) -> Array:
     """Return length and width of a sheet as an array (2,).
 
     Raises
@@ -175,7 +175,7 @@ def checked_options(
     OptionError
         An option is wrong.
     """
-    size = checked_sheet(sheet)
+    size = _checked_sheet(sheet)
     _angles(rotations)
     for name, value in (("spacing", spacing), ("margin", margin)):
         if not 0 <= value < np.inf:

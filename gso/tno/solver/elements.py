@@ -191,14 +191,15 @@ def _pull_back(gather: Ints, shape: tuple[int, ...], variables: Variables):
     """
     if variables.basis is None:
         return None, gather
-    chosen = _chosen(variables)
-    if chosen is not None:
-        return None, chosen[gather]
     from scipy.sparse import csr_matrix
 
-    direct = _by_point(gather, shape, variables)
-    if direct is not None:
-        return direct
+    single = _single(variables.basis)
+    if single is not None:
+        if (variables.basis.data == 1.0).all():
+            return None, single[0][gather]
+        direct = _by_point(gather, shape, variables.size, *single)
+        if direct is not None:
+            return direct
     k, count = gather.shape
     part = variables.basis[gather.T.ravel()].tocoo()
     element = part.row // k
@@ -216,27 +217,23 @@ def _pull_back(gather: Ints, shape: tuple[int, ...], variables: Variables):
     return pull, columns
 
 
-def _by_point(gather: Ints, shape: tuple[int, ...], variables: Variables):
+def _by_point(gather: Ints, shape: tuple[int, ...], size: int, unknown: Ints, share: Array):
     """Return map and unknowns where every point moves with one unknown, as along a normal.
 
-    None where that is not so, or where two points of an element share their unknown.
+    `size` is the number of unknowns; the last two are what :func:`_single` returns. None where
+    points move otherwise, or where two points of an element share their unknown.
     """
     from scipy.sparse import csr_matrix
 
-    basis, (k, count), dim = variables.basis, gather.shape, shape[0]
-    if basis is None:
+    (k, count), dim = gather.shape, shape[0]
+    if any(d != dim for d in shape):
         return None
-    each = np.diff(basis.indptr)
-    if each.max(initial=0) > 1 or any(d != dim for d in shape):
-        return None
-    unknown, share = np.full(len(each), variables.size), np.zeros(len(each))
-    unknown[each > 0], share[each > 0] = basis.indices, basis.data
     by_point = unknown[gather].reshape(k // dim, dim, count)
     columns = by_point.min(axis=1)
-    if not ((by_point == columns[:, None]) | (by_point == variables.size)).all():
+    if not ((by_point == columns[:, None]) | (by_point == size)).all():
         return None
     ordered = np.sort(columns, axis=0)
-    if ((ordered[1:] == ordered[:-1]) & (ordered[1:] < variables.size)).any():
+    if ((ordered[1:] == ordered[:-1]) & (ordered[1:] < size)).any():
         return None
     place = (np.arange(k) * count).reshape(-1, 1, dim) + np.arange(count)[:, None]
     values = share[gather].reshape(k // dim, dim, count).transpose(0, 2, 1)
@@ -247,14 +244,14 @@ def _by_point(gather: Ints, shape: tuple[int, ...], variables: Variables):
     return pull, columns
 
 
-def _chosen(variables: Variables) -> Ints | None:
-    """Return the unknown that each coordinate equals; None unless each is one, or fixed."""
-    basis = variables.basis
-    if basis is None:
-        return np.arange(variables.size)
+def _single(basis: Any) -> tuple[Ints, Array] | None:
+    """Return the unknown of each coordinate, or their number if it is fixed, and its share.
+
+    None if a coordinate depends on several.
+    """
     count = np.diff(basis.indptr)
-    if count.max(initial=0) > 1 or not (basis.data == 1.0).all():
+    if count.max(initial=0) > 1:
         return None
-    chosen = np.full(len(count), variables.size)
-    chosen[count > 0] = basis.indices
-    return chosen
+    unknown, share = np.full(len(count), basis.shape[1]), np.zeros(len(count))
+    unknown[count > 0], share[count > 0] = basis.indices, basis.data
+    return unknown, share

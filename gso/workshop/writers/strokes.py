@@ -21,6 +21,7 @@ _NOTCH = 4.0
 _SHARE = 0.1
 # Height of texts beside notches, as a fraction of the notches' length.
 _BESIDE = 0.75
+_CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 # Height of texts beside bends in millimetres, and its largest fraction of the bend's length.
 _BEND_TEXT = 3.0
 _BEND_SHARE = 0.08
@@ -204,11 +205,8 @@ def _numbers(part: Part, depth: float, height: float) -> list[Text]:
     for notch in part.notches:
         text = printable(notch.text)
         along = np.array([notch.inward[1], -notch.inward[0]])
-        ends = (
-            0.5
-            * height
-            * np.array([[x, y] for x in (-0.7 * len(text), 0.7 * len(text)) for y in (-1, 1)])
-        )
+        # A letter is about 0.7 of its height wide.
+        ends = 0.5 * height * _CORNERS * [0.7 * len(text), 1.0]
         for side in (0.0, 1.5, -1.5):
             at = notch.at + (depth + height) * notch.inward + side * height * along
             if shapely.contains_xy(shape, *(at + ends).T).all():
