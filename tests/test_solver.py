@@ -170,15 +170,22 @@ def test_held_coordinates_stay():
 
 
 def test_the_sorting_and_the_table_analysis_agree(monkeypatch):
-    from gso.tno.solver import assembly as module
+    from gso.tno.solver import ranking
 
     rng = np.random.default_rng(3)
-    column = rng.integers(0, 40, 500)
-    row = np.minimum(column + rng.integers(0, 6, 500), 40)
-    table = module._places(column, row, 40)
-    monkeypatch.setattr(module, "_LARGEST_TABLE", 0)
-    for a, b in zip(table, module._places(column, row, 40), strict=True):
+    columns = rng.integers(0, 40, 500) + rng.integers(0, 6, (4, 500))
+    groups = [ranking.Pairs.of(np.minimum(columns, 40), 40)]
+    table = ranking.ranked(groups, 40)
+    monkeypatch.setattr(ranking, "_LARGEST_TABLE", 0)
+    for a, b in zip(table, ranking.ranked(groups, 40), strict=True):
         np.testing.assert_array_equal(a, b)
+    (places,), low, high = table
+    first, second = np.triu_indices(4)
+    pairs = np.sort(columns[[first, second]], axis=0)
+    known = len(low) > places.T
+    np.testing.assert_array_equal(known, pairs[1] < 40)
+    np.testing.assert_array_equal([low, high], np.unique(pairs[:, known], axis=1))
+    np.testing.assert_array_equal(pairs[:, known], [low[places.T[known]], high[places.T[known]]])
 
 
 @pytest.mark.parametrize("held_ids", [[], [0, 5]])

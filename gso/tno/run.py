@@ -18,7 +18,7 @@ from gso.tasks.base import Options, Plan, Request, Solution, Stage, same
 from gso.tno.solver import Callback, Minimum, Timings, minimise
 from gso.tno.solver.augmented_lagrangian import tighten
 from gso.tno.solver.minimiser import says_no
-from gso.tno.solver.problem import Problem, energies
+from gso.tno.solver.problem import Problem, energies, most
 from gso.typing import Array
 from gso.unknowns import control_points
 
@@ -194,6 +194,8 @@ class Run:
         coordinates, entered = plan.start, None
         least = 0.0 if plan.cold_start is None else self.tolerance
         stages = plan.stages
+        # Coarser grids use the kernels of the finest, which are compiled if that one is large.
+        many = most((stage.items, stage.layout) for stage in stages)
         for number, stage in enumerate(stages):
             clock = time.perf_counter()
             entered, coordinates = coordinates, stage.enter(coordinates)
@@ -207,6 +209,7 @@ class Run:
                 replace(stage, tolerance=max(stage.tolerance, least)),
                 place=(number, len(stages)),
                 reserved=reserved,
+                many=many,
             )
             coordinates, minimum = solve(coordinates)
             if minimum.status is Status.CANCELLED:
@@ -237,6 +240,7 @@ class Run:
         items: Any = None,
         place: tuple[int, int] = (0, 1),
         reserved: int = 0,
+        many: Any = None,
     ) -> tuple[Array, Minimum]:
         """Minimise the objective of one stage from coordinates.
 
@@ -254,11 +258,13 @@ class Run:
             Index and number of stages, for the callback.
         reserved : int
             Iterations of the budget to leave for later stages.
+        many : dict, optional
+            As for :class:`gso.tno.solver.problem.Problem`.
         """
         clock = time.perf_counter()
         variables = stage.unknowns(coordinates)
         again = items is not None
-        problem = Problem(items if again else stage.items, variables, stage.limits)
+        problem = Problem(items if again else stage.items, variables, stage.limits, many=many)
         x = variables.project(coordinates)
         bounds = None if stage.bounds is None else stage.bounds(coordinates)
         if bounds is not None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -51,10 +52,18 @@ class Layout:
             start += count * dim
         return out
 
-    def columns(self, name: str, rows: Ints) -> Ints:
-        """Return the positions (..., dim) in the coordinate vector of rows (...) of a block."""
+    def rows(self, name: str, index: Ints) -> Ints:
+        """Return the positions (k * dim, e) in the coordinate vector of k rows (e, k) of a block.
+
+        >>> Layout.of(9, "flat").rows("flat", np.array([[0, 4]]))
+        array([[0],
+               [1],
+               [8],
+               [9]])
+        """
         start, _, dim = self.where(name)
-        return start + np.asarray(rows)[..., None] * dim + np.arange(dim)
+        first = np.asarray(index, np.int64).T * dim + start
+        return (first[:, None] + np.arange(dim)[:, None]).reshape(-1, first.shape[1])
 
     def pack(self, blocks: dict[str, Array]) -> Array:
         """Concatenate arrays (count, dim) by block into the coordinate vector."""
@@ -88,6 +97,20 @@ class Variables:
         self.basis = basis
         self.offset = offset
         self.size = layout.size if basis is None else int(basis.shape[1])
+
+    @cached_property
+    def single(self) -> tuple[Ints, Array] | tuple[None, None]:
+        """The unknown of each coordinate and its share; None where one depends on several.
+
+        The unknown of a fixed coordinate is the number of unknowns.
+        """
+        basis: Any = self.basis
+        count = np.diff(basis.indptr)
+        if count.max(initial=0) > 1:
+            return None, None
+        unknown, share = np.full(len(count), basis.shape[1]), np.zeros(len(count))
+        unknown[count > 0], share[count > 0] = basis.indices, basis.data
+        return unknown, share
 
     def points(self, x: Array) -> Array:
         """Map unknowns x to the coordinate vector."""

@@ -9,8 +9,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gso.linalg.base import Pattern
+from gso.tno.solver.ranking import Pairs, ranked
 from gso.typing import Array, Ints
 
 
@@ -32,17 +34,14 @@ class Places:
 
     Attributes
     ----------
-    scatter : ndarray of int, (pairs * e,)
-        The place of each entry, ordered as by :func:`products`.
+    by_element : ndarray of int, (e, pairs)
+        The place of each entry, by pairs a <= b of unknowns in the order of :func:`products`.
     repeated : ndarray of int
-        Which of these count twice.
-    count : int
-        Number of elements.
+        Which entries of :attr:`scatter` count twice.
     """
 
-    scatter: Ints
+    by_element: NDArray[np.int32]
     repeated: Ints
-    count: int
 
     @property
     def doubled(self) -> bool:
@@ -50,9 +49,9 @@ class Places:
         return bool(len(self.repeated))
 
     @cached_property
-    def by_element(self) -> Ints:
-        """The places (e, pairs), element by element."""
-        return np.ascontiguousarray(self.scatter.reshape(-1, self.count).T)
+    def scatter(self) -> Ints:
+        """The place of each entry, (pairs * e,), ordered as by :func:`products`."""
+        return self.by_element.T.astype(np.int64).ravel()
 
 
 @dataclass
@@ -95,56 +94,13 @@ def assemble(n: int, columns: list[Ints], quadratic) -> Assembly:
 
 def _analysed(n: int, columns: list[Ints], quadratic: Any) -> Assembly:
     """Compute the position in the matrix of every product of two unknowns of an element."""
-    # Half as wide, which takes half of the time and memory on large meshes.
-    kind = np.int32 if n < _NARROW else np.int64
-    lows, highs = [], []
-    for own in columns:
-        c = own.astype(kind)
-        a, b = np.triu_indices(c.shape[0])
-        low, high = np.minimum(c[a], c[b]).ravel(), np.maximum(c[a], c[b]).ravel()
-        # Padding (index n) is written to an entry past the end.
-        low[high == n] = n
-        lows.append(low)
-        highs.append(high)
-    every = np.arange(n, dtype=kind)
-    lows += [np.repeat(every, np.diff(quadratic.indptr)), every]
-    highs += [quadratic.indices.astype(kind), every]
-    splits = np.cumsum([len(x) for x in lows])[:-1]
-    place, column, row = _places(np.concatenate(lows), np.concatenate(highs), n)
-    keep = column < n
-    indptr = np.searchsorted(column[keep], np.arange(n + 1))
-    *scatter, fixed, diagonal = np.split(place, splits)
-    pattern = Pattern(n, indptr, row[keep])
-    places = [
-        Places(own, _repeated(c), c.shape[1]) for own, c in zip(scatter, columns, strict=True)
-    ]
-    return Assembly(pattern, places, fixed, diagonal)
-
-
-#: Largest table, columns times diagonals, for which :func:`_places` does not sort, and number of
-#: unknowns up to which their indices have 32 bits.
-_LARGEST_TABLE, _NARROW = 200_000_000, 2**31 - 2
-
-
-def _places(column: Ints, row: Ints, n: int) -> tuple[Ints, Ints, Ints]:
-    """Rank every (column, row) among the distinct pairs, sorted by column then row; return both.
-
-    Matrices with few diagonals (grids) are marked in a table; the pairs of others are sorted.
-    """
-    distance = row - column
-    used = np.bincount(distance) > 0
-    count = int(used.sum())
-    if (n + 1) * count > _LARGEST_TABLE:
-        every, place = np.unique(column * np.int64(n + 1) + row, return_inverse=True)
-        return place, every // (n + 1), every % (n + 1)
-    slot = (np.cumsum(used) - 1).astype(column.dtype)
-    at = column * count + slot[distance]
-    mark = np.zeros((n + 1) * count, bool)
-    mark[at] = True
-    found = np.flatnonzero(mark)
-    rank = np.cumsum(mark, dtype=np.int32)
-    columns, which = np.divmod(found, count)
-    return rank[at].astype(np.int64) - 1, columns, columns + np.flatnonzero(used)[which]
+    every = np.arange(n)
+    constant = Pairs(np.repeat(every, np.diff(quadratic.indptr))[None], quadratic.indices[None], n)
+    groups = [*(Pairs.of(own, n) for own in columns), constant, Pairs(every[None], every[None], n)]
+    (*own, fixed, diagonal), column, row = ranked(groups, n)
+    pattern = Pattern(n, np.searchsorted(column, np.arange(n + 1)), row)
+    places = [Places(at, _repeated(c)) for at, c in zip(own, columns, strict=True)]
+    return Assembly(pattern, places, *(x[:, 0].astype(np.int64) for x in (fixed, diagonal)))
 
 
 def products(slope: Array, weight: Array) -> Array:

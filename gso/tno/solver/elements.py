@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from gso.energy.base import Weighted
+from gso.energy.base import Residual, Term, Weighted
 from gso.energy.losses import Loss
 from gso.tno.solver import loops
 from gso.tno.solver.assembly import Places, products
+from gso.tno.solver.chain import chained
 from gso.tno.solver.kernels import geometric_stiffness, kernel
-from gso.typing import Array, Ints
+from gso.typing import Array
 from gso.unknowns import Layout, Variables
 
 #: Elements per block of the compiled loops: their Jacobians then stay in the processor's cache.
@@ -22,23 +22,36 @@ _BLOCK = 2048
 
 
 _NONE = np.empty((0, 0))
-_NO_INTS = np.empty(0, np.int64)
+_ALL = slice(None)
+
+#: Residual function, dimensions of the points, number of constants.
+Kind = tuple[Residual, tuple[int, ...], int]
+
+
+def kind(term: Term, layout: Layout) -> Kind:
+    """Return the kind of a term's elements: terms of one kind share their kernels."""
+    shape = [layout.where(block)[2] for block, index in term.stencil for _ in range(index.shape[1])]
+    return term.residual, tuple(shape), len(term.constants)
 
 
 class Values:
-    """One weighted term on given coordinates: gathers, residuals, energy."""
+    """One weighted term on given coordinates: gathers, residuals, energy.
 
-    def __init__(self, item: Weighted, layout: Layout):
+    Parameters
+    ----------
+    item : Weighted
+    layout : Layout
+    many : int
+        Number of elements for which kernels are chosen, if that is more than the term's own.
+    """
+
+    def __init__(self, item: Weighted, layout: Layout, many: int = 0):
         term = item.term
-        columns, shape = [], []
-        for block, index in term.stencil:
-            dim = layout.where(block)[2]
-            shape += [dim] * index.shape[1]
-            columns.append(layout.columns(block, index).reshape(len(index), -1))
         self.item, self.layout = item, layout
-        self.gather = np.ascontiguousarray(np.concatenate(columns, axis=1).T)
+        self.many = max(many, term.count)
+        self.gather = np.concatenate([layout.rows(block, index) for block, index in term.stencil])
         self.constants = term.constants if term.constants.size else np.empty((0, term.count))
-        self.shape = tuple(shape)
+        self.shape = kind(term, layout)[1]
         self.weights = term.weights
 
     def refreshed(self, coordinates: Array) -> Any:
@@ -58,7 +71,7 @@ class Values:
     def residual(self, coordinates: Array) -> Array:
         """Residuals (r, e)."""
         key = self.item.term.residual, self.shape, len(self.constants)
-        loop = loops.residual(*key, self.item.term.count)
+        loop = loops.residual(*key, self.many)
         if loop is None:
             return kernel(*key, False)(coordinates[self.gather], self.constants)[0]
         out = np.empty((loop.rows, self.item.term.count))
@@ -79,16 +92,15 @@ class Values:
 class Elements(Values):
     """One weighted term on given unknowns, with the Jacobian by the unknowns (chain rule)."""
 
-    def __init__(self, item: Weighted, variables: Variables):
-        super().__init__(item, variables.layout)
-        self._pull, self.columns = _pull_back(self.gather, self.shape, variables)
-        self._chain = _Chain(self._pull, self.gather.shape)
+    def __init__(self, item: Weighted, variables: Variables, many: int = 0):
+        super().__init__(item, variables.layout, many)
+        self._chain, self.columns = chained(self.gather, self.shape, variables)
 
-    def linearise(self, coordinates: Array) -> tuple[Array, Array]:
-        """Return residuals (r, e) and their Jacobian by the element's unknowns (r, q, e)."""
+    def linearise(self, coordinates: Array, at: slice = _ALL) -> tuple[Array, Array]:
+        """Return residuals (r, e) and their Jacobian by the unknowns (r, q, e) of some elements."""
         run = kernel(self.item.term.residual, self.shape, len(self.constants), True)
-        value, slope = run(coordinates[self.gather], self.constants)
-        return value, self._pulled(slope)
+        value, slope = run(coordinates[self.gather[:, at]], self.constants[:, at])
+        return value, self._chain.pulled(slope, at)
 
     def add(self, coordinates: Array, places: Places, gradient: Array, values: Array) -> float:
         """Add gradient and Gauss-Newton matrix, and return the energy.
@@ -104,17 +116,18 @@ class Elements(Values):
         term, loss = self.item.term, self.item.loss
         factor = self.item.weight * self.weights
         key = self.shape, len(self.constants)
-        loop = loops.jacobian(term.residual, *key, term.count)
-        bend = None if term.vectors is None else loops.stiffness(term.vectors, *key, term.count)
+        loop = loops.jacobian(term.residual, *key, self.many)
+        bend = None if term.vectors is None else loops.stiffness(term.vectors, *key, self.many)
         if loop is None or (bend is None and term.vectors is not None):
             return self._add(coordinates, places, gradient, values, factor)
         count, q = term.count, len(self.columns)
         residual = np.empty((loop.rows, count))
         given = coordinates, self.gather, self._constants
         slope = np.empty((min(_BLOCK, count), loop.rows * len(self.gather)))
-        target = (factor, self.columns, places.by_element, places.doubled, *self._chain.parts)
-        chained = self._pull is not None
-        add = loops.adder(loop.rows, len(self.gather), q, chained)
+        rule = self._chain.kind
+        target = (factor, self.columns, places.by_element, places.doubled)
+        target = (*target, rule, self.gather, *self._chain.parts)
+        add = loops.adder(loop.rows, len(self.gather), q, rule)
         for start in range(0, count, _BLOCK):
             stop = min(start + _BLOCK, count)
             loop.run(*given, start, stop, residual, slope)
@@ -127,7 +140,7 @@ class Elements(Values):
                 bend.run(*given, start, stop, length, turn)
                 push = np.maximum(first[: bend.rows], 0.0)
                 none = np.zeros_like(push)
-                turned = loops.adder(bend.rows, len(self.gather), q, chained)
+                turned = loops.adder(bend.rows, len(self.gather), q, rule)
                 turned(turn, none, push, *target, start, gradient, values, work)
         return self.energy(residual)
 
@@ -153,105 +166,4 @@ class Elements(Values):
         if vectors is None:
             return None
         run = geometric_stiffness(vectors, self.shape, len(self.constants))
-        return self._pulled(run(coordinates[self.gather], self.constants)[1])
-
-    def _pulled(self, slope: Array) -> Array:
-        if self._pull is None:
-            return slope
-        q = len(self.columns)
-        return np.stack([(self._pull @ s.ravel()).reshape(q, -1) for s in slope])
-
-
-class _Chain:
-    """The chain rule, element by element."""
-
-    def __init__(self, pull: Any, shape: tuple[int, int]):
-        self._pull, self._shape = pull, shape
-
-    @cached_property
-    def parts(self) -> tuple[bool, Ints, Ints, Array]:
-        """Whether there is one; begin, unknown and share of the parts of each coordinate."""
-        if self._pull is None:
-            return False, _NO_INTS, _NO_INTS, np.empty(0)
-        by_coordinate = self._pull.tocsc()
-        k, count = self._shape
-        size = np.diff(by_coordinate.indptr).reshape(k, count).T
-        begin = np.r_[0, np.cumsum(size)]
-        order = np.repeat(by_coordinate.indptr[:-1].reshape(k, count).T.ravel(), size.ravel())
-        order = order + np.arange(begin[-1]) - np.repeat(begin[:-1], size.ravel())
-        unknown = by_coordinate.indices[order] // count
-        return True, begin, unknown.astype(np.int64), by_coordinate.data[order]
-
-
-def _pull_back(gather: Ints, shape: tuple[int, ...], variables: Variables):
-    """Return the map from derivatives by coordinates to those by unknowns, and the unknowns.
-
-    The map is None where every coordinate is a single unknown or fixed. The unknowns (q, e)
-    of each element are padded with `variables.size`.
-    """
-    if variables.basis is None:
-        return None, gather
-    from scipy.sparse import csr_matrix
-
-    single = _single(variables.basis)
-    if single is not None:
-        if (variables.basis.data == 1.0).all():
-            return None, single[0][gather]
-        direct = _by_point(gather, shape, variables.size, *single)
-        if direct is not None:
-            return direct
-    k, count = gather.shape
-    part = variables.basis[gather.T.ravel()].tocoo()
-    element = part.row // k
-    key, at = np.unique(element * np.int64(variables.size) + part.col, return_inverse=True)
-    owner, column = key // variables.size, key % variables.size
-    start = np.searchsorted(owner, np.arange(count + 1))
-    place = np.arange(len(key)) - start[owner]
-    q = int(np.diff(start).max()) if len(key) else 1
-    columns = np.full((q, count), variables.size)
-    columns[place, owner] = column
-    pull = csr_matrix(
-        (part.data, (place[at] * count + element, (part.row % k) * count + element)),
-        shape=(q * count, k * count),
-    )
-    return pull, columns
-
-
-def _by_point(gather: Ints, shape: tuple[int, ...], size: int, unknown: Ints, share: Array):
-    """Return map and unknowns where every point moves with one unknown, as along a normal.
-
-    `size` is the number of unknowns; the last two are what :func:`_single` returns. None where
-    points move otherwise, or where two points of an element share their unknown.
-    """
-    from scipy.sparse import csr_matrix
-
-    (k, count), dim = gather.shape, shape[0]
-    if any(d != dim for d in shape):
-        return None
-    by_point = unknown[gather].reshape(k // dim, dim, count)
-    columns = by_point.min(axis=1)
-    if not ((by_point == columns[:, None]) | (by_point == size)).all():
-        return None
-    ordered = np.sort(columns, axis=0)
-    if ((ordered[1:] == ordered[:-1]) & (ordered[1:] < size)).any():
-        return None
-    place = (np.arange(k) * count).reshape(-1, 1, dim) + np.arange(count)[:, None]
-    values = share[gather].reshape(k // dim, dim, count).transpose(0, 2, 1)
-    pull = csr_matrix(
-        (values.ravel(), place.ravel(), dim * np.arange(columns.size + 1)),
-        shape=(columns.size, k * count),
-    )
-    return pull, columns
-
-
-def _single(basis: Any) -> tuple[Ints, Array] | None:
-    """Return the unknown of each coordinate, or their number if it is fixed, and its share.
-
-    None if a coordinate depends on several.
-    """
-    count = np.diff(basis.indptr)
-    if count.max(initial=0) > 1:
-        return None
-    unknown, share = np.full(len(count), basis.shape[1]), np.zeros(len(count))
-    unknown[count > 0], share[count > 0] = basis.indices, basis.data
-    return unknown, share
+        return self._chain.pulled(run(coordinates[self.gather], self.constants)[1])

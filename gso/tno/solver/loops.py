@@ -59,16 +59,17 @@ def stiffness(vectors: Residual, shape: tuple[int, ...], constants: int, count: 
     return _loop(vectors, shape, constants, "stiffness") if _pays(count) else None
 
 
-def adder(rows: int, wide: int, size: int, chained: bool) -> Any:
+def adder(rows: int, wide: int, size: int, kind: int) -> Any:
     """Return :func:`added` compiled for elements of one kind.
 
     Parameters
     ----------
     rows, wide, size : int
         Number of residuals, coordinates and unknowns of an element.
-    chained : bool
+    kind : int
+        Of the chain rule.
     """
-    return _adder(rows, wide, size, chained) or added
+    return _adder(rows, wide, size, kind) or added
 
 
 def _pays(count: int) -> bool:
@@ -94,14 +95,15 @@ def _loop(function: Residual, shape: tuple[int, ...], constants: int, kind: str)
 
 
 @lru_cache(maxsize=256)
-def _adder(rows: int, wide: int, size: int, chained: bool) -> Any:
+def _adder(rows: int, wide: int, size: int, kind: int) -> Any:
     # With numbers in place of these names the compiler unrolls the inner loops.
     source = inspect.getsource(added).replace("def added(", "def kernel(")
     for line, value in (
         ("rows, count = first.shape", f"rows, count = {rows}, first.shape[1]"),
         ("wide = slope.shape[1] // rows", f"wide = {wide}"),
         ("size = columns.shape[0]", f"size = {size}"),
-        ("if chained:", f"if {chained}:"),
+        ("if kind == 1:", f"if {kind == 1}:"),
+        ("elif kind == 2:", f"elif {kind == 2}:"),
     ):
         if line not in source:
             raise BackendError(f"the loop has no line {line!r}")
@@ -126,7 +128,8 @@ def added(
     columns,
     places,
     doubled,
-    chained,
+    kind,
+    gather,
     begin,
     unknown,
     share,
@@ -151,11 +154,15 @@ def added(
         Places of the entries of all elements' matrices.
     doubled : bool
         Whether an unknown may occur twice in an element.
-    chained : bool
-        Whether coordinates are sums of unknowns: the parts of coordinate k of element e are those
-        from ``begin[e * wide + k]`` on, where wide is the number of coordinates.
+    kind : int
+        Of the chain rule: 0 where coordinates are unknowns, 1 where each point moves with one, 2
+        where coordinates are sums of unknowns.
+    gather : ndarray of int, (k, e)
+        Coordinates of all elements.
     begin, unknown, share : ndarray
-        Begin of the parts, the place in the element of each part's unknown, and its factor.
+        1: `share` is the derivative of every coordinate by its unknown. 2: the parts of
+        coordinate k of element e are those from ``begin[e * wide + k]`` on, where wide is the
+        number of coordinates; the place in the element of each part's unknown, and its factor.
     start : int
     gradient, values : ndarray
         What is added to.
@@ -167,7 +174,15 @@ def added(
     size = columns.shape[0]
     for i in range(count):
         e = start + i
-        if chained:
+        if kind == 1:
+            dim = wide // size
+            for r in range(rows):
+                for a in range(size):
+                    total = 0.0
+                    for d in range(a * dim, a * dim + dim):
+                        total += slope[i, r * wide + d] * share[gather[d, e]]
+                    work[r, a] = total
+        elif kind == 2:
             work[:] = 0.0
             for k in range(wide):
                 for t in range(begin[e * wide + k], begin[e * wide + k + 1]):

@@ -5,10 +5,9 @@ The sparsity pattern of the matrix is computed once; an evaluation only fills in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,8 @@ from gso.energy.base import Limit, Weighted
 from gso.energy.losses import Loss
 from gso.linalg.base import Pattern
 from gso.tno.solver.assembly import Assembly, assemble
-from gso.tno.solver.elements import Elements, Values
+from gso.tno.solver.elements import Elements, Kind, Values, kind
+from gso.tno.solver.quadratic import Quadratic
 from gso.typing import Array, Ints
 from gso.unknowns import Layout, Variables
 
@@ -34,6 +34,9 @@ class Problem:
         Bounds on a step, see :data:`Limit`.
     like : Problem, optional
         A problem whose sparsity pattern is reused if it is the same.
+    many : dict, optional
+        Numbers of elements by :func:`kind` for which kernels are chosen, if they are more than
+        the problem's own; see :func:`most`.
     """
 
     def __init__(
@@ -42,12 +45,18 @@ class Problem:
         variables: Variables,
         limits: Sequence[Limit] = (),
         like: Problem | None = None,
+        many: Mapping[Kind, int] | None = None,
     ):
         self.variables = variables
         self.limits = tuple(limits)
         used = _counted(items)
-        self._elements = [Elements(i, variables) for i in used if not i.quadratic]
-        self._quadratic = _Quadratic(
+        more = {} if many is None else many
+        self._elements = [
+            Elements(i, variables, more.get(kind(i.term, variables.layout), 0))
+            for i in used
+            if not i.quadratic
+        ]
+        self._quadratic = Quadratic(
             [Elements(i, variables) for i in used if i.quadratic], variables
         )
         if like is not None and self._sparsity_of(like):
@@ -136,63 +145,14 @@ class Problem:
         return min(1.0, *(limit(coordinates, direction) for limit in self.limits))
 
 
-class _Quadratic:
-    """The sum of the quadratic terms: ``|A x - b|^2 / 2`` with constant A and b."""
-
-    def __init__(self, elements: list[Elements], variables: Variables):
-        from scipy.sparse import csr_matrix
-
-        n = variables.size
-        rows, columns, entries, rhs, self.slices = [], [], [], [], []
-        zero = np.zeros(n)
-        start = variables.points(zero)
-        base = 0
-        for element in elements:
-            residual, slope = element.linearise(start)
-            root = np.sqrt(element.item.weight * element.weights)
-            r, _, count = slope.shape
-            row = base + np.arange(r * count).reshape(r, 1, count)
-            keep = (slope != 0) & (element.columns < n)
-            rows.append(np.broadcast_to(row, slope.shape)[keep])
-            columns.append(np.broadcast_to(element.columns, slope.shape)[keep])
-            entries.append((slope * root)[keep])
-            rhs.append(-(residual * root).ravel())
-            self.slices.append((element.item.term.name, slice(base, base + r * count)))
-            base += r * count
-        join = np.concatenate
-        self.a = csr_matrix(
-            (join(entries), (join(rows), join(columns))) if base else ([], ([], [])),
-            shape=(base, n),
-        )
-        self.b = join(rhs) if base else np.zeros(0)
-        self.at = self.a.T.tocsr()
-
-    @cached_property
-    def matrix(self) -> Any:
-        """Lower triangle of ``A^T A``, CSC with sorted rows."""
-        from scipy.sparse import tril
-
-        lower = tril((self.at @ self.a).tocsc(), format="csc")
-        lower.sort_indices()
-        return lower
-
-    def _residual(self, x: Array) -> Array:
-        return self.a @ x - self.b
-
-    def energy(self, x: Array) -> float:
-        r = self._residual(x)
-        return 0.5 * float(r @ r)
-
-    def energy_and_gradient(self, x: Array) -> tuple[float, Array]:
-        r = self._residual(x)
-        return 0.5 * float(r @ r), self.at @ r
-
-    def by_term(self, x: Array) -> dict[str, float]:
-        r = self._residual(x)
-        out: dict[str, float] = {}
-        for name, part in self.slices:
-            out[name] = out.get(name, 0.0) + 0.5 * float(r[part] @ r[part])
-        return out
+def most(problems: Iterable[tuple[Sequence[Weighted], Layout]]) -> dict[Kind, int]:
+    """Return the largest number of elements of each kind in problems of given terms and layouts."""
+    out: dict[Kind, int] = {}
+    for items, layout in problems:
+        for item in items:
+            own = kind(item.term, layout)
+            out[own] = max(out.get(own, 0), item.term.count)
+    return out
 
 
 def energies(items: Sequence[Weighted], layout: Layout, coordinates: Array) -> dict[str, float]:
