@@ -317,10 +317,22 @@ def _grid_template(height: int, width: int) -> Mesh:
     """Build a flat grid with precomputed connectivity, shared by all grids of this size."""
     rows, columns = np.mgrid[:height, :width]
     flat = np.stack([rows, columns, np.zeros_like(rows)], axis=-1).reshape(-1, 3)
-    mesh = Mesh(flat, topology.grid_faces(height, width))
-    mesh.__dict__["grid_index"] = np.arange(height * width).reshape(height, width)
+    faces = topology.grid_faces(height, width)
+    # These faces need no checks.
+    mesh = Mesh.__new__(Mesh)
+    mesh.__dict__.update(
+        vertices=flat.astype(np.float64),
+        faces=faces,
+        given_notes=(),
+        notes=(),
+        attributes=None,
+        grid_index=np.arange(height * width).reshape(height, width),
+    )
+    for array in (mesh.vertices, faces):
+        array.flags.writeable = False
     for name in _CONNECTIVITY:
-        getattr(mesh, name)
+        if name != "triangle_edges" or len(faces) <= _SMALL_GRID:
+            getattr(mesh, name)
     return mesh
 
 
@@ -340,5 +352,7 @@ _CONNECTIVITY = (
     "boundary_loops",
     "components",
 )
+#: Faces of a grid up to which the half-edges of its triangulation are kept for other grids.
+_SMALL_GRID = 100_000
 #: Number of touching components per face from which on a mesh counts as a polygon soup.
 _HEAP = 0.4

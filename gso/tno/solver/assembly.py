@@ -21,11 +21,13 @@ def _repeated(columns: Ints) -> Ints:
 
     Such a pair contributes to the diagonal of the matrix twice.
     """
-    a, b = np.triu_indices(columns.shape[0])
-    apart = np.flatnonzero(a != b)
-    same = columns[a[apart]] == columns[b[apart]]
-    which, element = np.nonzero(same)
-    return apart[which] * columns.shape[1] + element
+    q, count = columns.shape
+    found, start = [np.empty(0, np.int64)], 0
+    for a in range(q):
+        which, element = np.nonzero(columns[a + 1 :] == columns[a])
+        found.append((start + 1 + which) * count + element)
+        start += q - a
+    return np.concatenate(found)
 
 
 @dataclass
