@@ -24,9 +24,13 @@ def vertex_normals(mesh: Mesh) -> Array:
     # A triangle belongs to both triangulations, so it counts twice.
     whole[~topology.are_quads(mesh.faces)] *= 2.0
     tri = topology.corner_triangles(topology.by_size(mesh.faces)[0])
-    corner = geometry.area_vectors(v, tri)
-    at, area = np.r_[he.origin, tri[:, 0]], np.concatenate([whole[he.face], corner])
-    total = np.stack([np.bincount(at, area[:, d], len(v)) for d in range(3)], axis=1)
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    up = np.broadcast_to([0.0, 0.0, 1.0], total.shape)
-    return np.divide(total, length, out=up.copy(), where=length > 0)
+    corner, first = geometry.area_vectors(v, tri), np.ascontiguousarray(tri[:, 0])
+    n = len(v)
+    x, y, z = total = [
+        np.bincount(he.origin, whole[:, d][he.face], n) + np.bincount(first, corner[:, d], n)
+        for d in range(3)
+    ]
+    length = np.sqrt(x * x + y * y + z * z)
+    none = length == 0
+    z[none] = length[none] = 1.0
+    return np.stack([c / length for c in total], axis=1)
