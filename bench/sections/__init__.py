@@ -11,6 +11,7 @@ SUBJECTS = (
     "tno",
     "cost",
     "jiang",
+    "session",
     "hybrid",
     "net",
     "borders",

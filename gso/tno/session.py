@@ -42,7 +42,9 @@ class Session:
     task is iterated, from the current surface. The session keeps the sparsity pattern of its
     equations and their symbolic factorisation, so a frame costs one or two iterations. Hard
     handles are at their positions after every :meth:`move`, up to rounding; the iterations
-    then adapt the rest of the surface. The components of a mesh are solved together, each
+    then adapt the rest of the surface. By "curvature" the first iteration after a move changes
+    offsets along the normals only, for a faster answer; all others move the vertices freely. The
+    components of a mesh are solved together, each
     with weights by its own size.
 
     Parameters
@@ -59,6 +61,7 @@ class Session:
     analyses : int
         Number of symbolic factorisations so far: one, and one more for each
         :meth:`constrain` that changes the sparsity pattern, such as by fixing other vertices.
+        By "curvature" there is another one for the first iteration after a move.
 
     Raises
     ------
@@ -103,8 +106,11 @@ class Session:
         self.analyses = 0
         self._constraints: list[Constraint] = []
         self._spread: ThinPlateField | None = None
-        self._solver: Any = None
-        self._problem: Problem | None = None
+        #: Problem and solver of the stage's unknowns, and of those while handles move.
+        self._kept: dict[bool, tuple[Problem, Any]] = {}
+        #: Whether the current unknowns are those while handles move, and one has moved since the
+        #: last iteration.
+        self._moving = self._moved = False
         self._direction = METHODS[self._options.method].direction()
         self._x0 = self._frame.start(x0, flat=False)
         self._run: Any = None
@@ -147,7 +153,8 @@ class Session:
             self._stage = replace(stage, imposed=stage.imposed.moved(compiled))
         held, after = compiled.pinned_positions
         self._follow(held, after - before)
-        self._pose()
+        self._pose(moving=True)
+        self._moved = True
         self._left_to_do()
 
     def constrain(self, constraints: Sequence[Constraint]) -> None:
@@ -188,7 +195,15 @@ class Session:
         if not isinstance(iterations, int | np.integer) or iterations < 1:
             raise OptionError(f"iterations is {iterations!r}; it must be 1 or more")
         if self._stage is not None:
-            self._iterate(self._stage, int(iterations), 0.0)
+            left = int(iterations)
+            if self._moved and self._moving:
+                self._iterate(self._stage, 1, 0.0)
+                self._left_to_do()
+                left -= 1
+            self._moved = False
+            if left:
+                self._at_rest()
+                self._iterate(self._stage, left, 0.0)
             blocks = self._stage.layout.split(self._coordinates)
             for item in self._stage.items:
                 if item.term.multipliers is not None:
@@ -230,6 +245,7 @@ class Session:
         """Iterate from the current surface until the stage converges."""
         stage = self._stage
         if stage is not None:
+            self._at_rest()
             minimum = self._iterate(stage, _SETTLED, stage.tolerance)
             before = self._coordinates
             solve = partial(self._run.minimise, self._options, stage)
@@ -242,13 +258,14 @@ class Session:
 
     def result(self) -> Result:
         """Return the current surface as a result, like that of :func:`gso.tno.optimize`."""
+        self._at_rest()
         plan, stage, at = self._plan, self._stage, self._coordinates
         solution = Solution(
             plan.layout.split(plan.finish(at)),
             self._status,
             {"objective": 0.0} if stage is None else objective(stage, at),
             at,
-            backend="" if stage is None else self._solver.name,
+            backend="" if stage is None else self._kept[False][1].name,
             notes=tuple(plan.notes),
             details=dict(plan.details),
             cut=plan.cut,
@@ -308,25 +325,34 @@ class Session:
         surface = self._coordinates[start : start + count * dim].reshape(count, dim)
         surface += self._spread(displacement)
 
-    def _pose(self) -> None:
-        """Rebuild the problem for the current constraints and coordinates."""
+    def _at_rest(self) -> None:
+        """Return to the stage's own unknowns."""
+        if self._moving:
+            self._pose()
+
+    def _pose(self, *, moving: bool = False) -> None:
+        """Rebuild the problem for the current constraints and coordinates.
+
+        `moving` is whether to take the unknowns for the first iteration after a move.
+        """
         stage = self._stage
+        self._moving = moving and stage is not None and stage.moving is not None
         if stage is None:
-            self._problem = None
             return
-        before = self._problem
-        variables = stage.unknowns(self._coordinates)
-        self._problem = Problem(stage.items, variables, stage.limits, like=before)
-        if before is None or self._problem.pattern is not before.pattern:
-            self._solver = linalg.choose(self._problem.pattern, self._options.backend)
+        variables = stage.unknowns(self._coordinates, moving=self._moving)
+        before, solver = self._kept.get(self._moving, (None, None))
+        problem = Problem(stage.items, variables, stage.limits, like=before)
+        if before is None or problem.pattern is not before.pattern:
+            solver = linalg.choose(problem.pattern, self._options.backend)
             self.analyses += 1
+        self._kept[self._moving] = problem, solver
         self._x = variables.project(self._coordinates)
         self._coordinates = variables.points(self._x)
         self._bounds = None if stage.bounds is None else stage.bounds(self._coordinates)
 
     def _iterate(self, stage: Stage, iterations: int, tolerance: float) -> Minimum:
         """Iterate a stage from the current unknowns; the current problem must be its own."""
-        problem: Any = self._problem
+        problem, solver = self._kept[self._moving]
         minimum = minimise(
             problem,
             self._x,
@@ -335,7 +361,7 @@ class Session:
             continuation=stage.continuation[-1:],
             continued=stage.continued,
             bounds=self._bounds,
-            solver=self._solver,
+            solver=solver,
             direction=self._direction,
             threads=self._options.threads,
             name=stage.name,

@@ -153,6 +153,7 @@ def _stages(analysis: Analysis, request: Request, coarser_grids: int) -> list[St
             continued="curvature",
             bounds=bounds,
             imposed=analysis.imposed,
+            moving=partial(_unknowns, "normal", mesh, o) if kind == "free" else None,
         )
 
     final = falling[-1:]
