@@ -239,16 +239,23 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
     return keywords
 
 
+#: Vertices up to which a single surface is optimised without compiled loops.
+_SMALL = 20_000
+
+
 def _single(job: Job, file: str, out: str, plot: str | None, table: str | None) -> bool:
     """Optimise one surface, and return whether the result is usable."""
     from gso.cli import report
     from gso.cli.progress import iterations
+    from gso.tno.solver import loops
 
     job.check(out, plot)
     job.spare([file], out, plot, table)
     mesh = files.load(file, job.weld)
     _check_grid(mesh, out)
-    with iterations() as callback, report.status_only():
+    # For one solve of a small mesh, loading compiled loops takes longer than they save.
+    small = len(mesh.vertices) <= _SMALL
+    with iterations() as callback, report.status_only(), loops.without(small):
         result = job.solve(mesh, callback=callback)
     job.write(result, out, plot)
     record = report.record(file, out, result, job.named)

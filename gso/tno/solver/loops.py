@@ -10,6 +10,9 @@ from __future__ import annotations
 import inspect
 import logging
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
@@ -27,6 +30,7 @@ VARIABLE = "GSO_KERNELS"
 _LEAST = 3000
 
 _log = logging.getLogger("gso")
+_without: ContextVar[bool] = ContextVar("without", default=False)
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,16 @@ class Loop:
 
     run: Any
     rows: int
+
+
+@contextmanager
+def without(active: bool = True) -> Iterator[None]:
+    """Evaluate all terms by NumPy if `active`, unless the environment variable says otherwise."""
+    before = _without.set(active)
+    try:
+        yield
+    finally:
+        _without.reset(before)
 
 
 def residual(function: Residual, shape: tuple[int, ...], constants: int, count: int) -> Loop | None:
@@ -73,7 +87,7 @@ def adder(rows: int, wide: int, size: int, kind: int) -> Any:
 
 
 def _pays(count: int) -> bool:
-    choice = os.environ.get(VARIABLE, "")
+    choice = os.environ.get(VARIABLE, "") or ("numpy" if _without.get() else "")
     if choice == "numpy" or not _installed():
         return False
     return choice == "numba" or count >= _LEAST
