@@ -10,6 +10,7 @@ from typing import Any
 SUBJECTS = (
     "tno",
     "cost",
+    "speed",
     "jiang",
     "session",
     "hybrid",
