@@ -19,7 +19,7 @@ def available() -> bool:
 def cost(pattern: Pattern) -> float:
     """As measured on grids, with the load of the MKL."""
     density = pattern.nnz / max(pattern.size, 1)
-    return 2e-3 + 1.1e-8 * pattern.size**1.25 * density
+    return 2e-3 + 1.1e-9 * pattern.size**1.4 * density**1.3
 
 
 class Solver:
