@@ -17,11 +17,30 @@ SMALLEST = 20
 
 @lru_cache(maxsize=64)
 def _matrix(source: int, target: int) -> Array:
-    """Return the not-a-knot cubic spline interpolation matrix of `source` to `target` samples."""
-    from scipy.interpolate import make_interp_spline
+    """Return the not-a-knot cubic spline interpolation matrix of `source` to `target` samples.
 
-    spline = make_interp_spline(np.linspace(0, 1, source), np.eye(source), k=min(3, source - 1))
-    return spline(np.linspace(0, 1, target))
+    It is that of ``scipy.interpolate.make_interp_spline``, which takes a fifth of a second to load.
+    """
+    x = np.linspace(0, source - 1, target)
+    if source < 4:
+        powers = np.vander(np.arange(source, dtype=float))
+        return np.vander(x, source) @ np.linalg.inv(powers)
+    # Second derivatives (bends) at the samples, from those of the values.
+    bends, second = np.zeros((source, source)), np.zeros((source, source))
+    inner = np.arange(1, source - 1)
+    for step, bend, value in ((-1, 1.0, 6.0), (0, 4.0, -12.0), (1, 1.0, 6.0)):
+        bends[inner, inner + step], second[inner, inner + step] = bend, value
+    bends[0, :3] = bends[-1, -3:] = 1.0, -2.0, 1.0
+    bends = np.linalg.solve(bends, second)
+    below = np.minimum(x.astype(int), source - 2)
+    t = (x - below)[:, None]
+    own, unit = 1.0 - t, np.eye(source)
+    return (
+        own * unit[below]
+        + t * unit[below + 1]
+        + (own**3 - own) / 6.0 * bends[below]
+        + (t**3 - t) / 6.0 * bends[below + 1]
+    )
 
 
 def resample(values: Array, height: int, width: int) -> Array:

@@ -499,3 +499,17 @@ def test_other_tasks_make_no_splines(tmp_path):
     done = CliRunner().invoke(main, ["optimize", *words])
     assert done.exit_code != 0
     assert "--task developable" in done.output
+
+
+@pytest.mark.parametrize(("source", "target"), [(3, 7), (4, 9), (20, 32), (64, 20), (9, 9)])
+def test_grids_are_resampled_by_the_not_a_knot_spline(source, target):
+    from scipy.interpolate import make_interp_spline
+
+    values = np.random.default_rng(source).random((source, source, 2))
+    expected = values
+    for _ in range(2):
+        x = np.linspace(0, 1, source)
+        spline = make_interp_spline(x, expected, k=min(3, source - 1))
+        expected = spline(np.linspace(0, 1, target)).swapaxes(0, 1)
+    found = gso.hierarchy.resample(values, target, target)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
