@@ -8,6 +8,7 @@ and that nobody else can write to; elsewhere functions are compiled again by eac
 from __future__ import annotations
 
 import hashlib
+import inspect
 import logging
 import os
 import sys
@@ -17,10 +18,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from gso.tno.solver.arctan2 import arctan2
+
 _log = logging.getLogger("gso")
 _HEAD = """import numpy as np
 from numba import njit
 
+
+@njit(error_model="numpy")
+{arctan2}
 
 @njit(error_model="numpy", nogil=True, cache={cache})
 """
@@ -32,11 +38,11 @@ def compiled(source: str) -> Any:
     Parameters
     ----------
     source : str
-        Its source; ``np`` is NumPy.
+        Its source; ``np`` is NumPy, and ``arctan2`` is :func:`gso.tno.solver.arctan2.arctan2`.
     """
     folder = _folder()
     if folder is not None:
-        text = _HEAD.format(cache=True) + source
+        text = _head(cache=True) + source
         path = folder / f"kernel_{_digest(text)}.py"
         try:
             new = _written(path, text)
@@ -48,8 +54,12 @@ def compiled(source: str) -> Any:
             return _imported(path)
     _say()
     scope: dict[str, Any] = {}
-    exec(compile(_HEAD.format(cache=False) + source, "<gso kernel>", "exec"), scope)
+    exec(compile(_head(cache=False) + source, "<gso kernel>", "exec"), scope)
     return scope["kernel"]
+
+
+def _head(*, cache: bool) -> str:
+    return _HEAD.format(arctan2=inspect.getsource(arctan2), cache=cache)
 
 
 @lru_cache(maxsize=1)

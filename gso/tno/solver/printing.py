@@ -118,6 +118,7 @@ _SCALAR = {
     "multiply": "{0} * {1}",
     "divide": "{0} / {1}",
     "negative": "-{0}",
+    "arctan2": "arctan2({0}, {1})",
     "square": "{0} * {0}",
     "reciprocal": "1.0 / {0}",
     "less": "1.0 if {0} < {1} else 0.0",
@@ -131,14 +132,14 @@ _SCALAR = {
 
 
 class _Scalars:
-    """Statements on the numbers of one element, the e-th."""
+    """Statements on the numbers of one element, the t-th of a tile."""
 
     def __init__(self) -> None:
         self.used: dict[str, str] = {}
+        self.stored: list[tuple[int, int]] = []
 
     def given(self, array: str, index: int) -> str:
-        place = f"p[gather[{index}, e]]" if array == "x" else f"c[{index}, e]"
-        return self.used.setdefault(place, f"{array}{index}")
+        return self.used.setdefault(f"t{array}[{index}, t]", f"{array}{index}")
 
     def slot(self, index: int) -> str:
         return f"w{index}"
@@ -150,7 +151,30 @@ class _Scalars:
         return f"w{slot} = {form.format(*said)}"
 
     def store(self, output: int, index: int, operand: str) -> str:
-        return f"r[{index}, e] = {operand}" if output == 0 else f"J[e - start, {index}] = {operand}"
+        self.stored.append((output, index))
+        return f"out[{len(self.stored) - 1}, t] = {operand}"
+
+
+#: Elements per tile of a compiled loop.
+_TILE = 32
+
+_LOOP = """
+def kernel(p, gather, c, start, stop, r, J):
+    tx, tc = np.empty(({coordinates}, {tile})), np.empty(({constants}, {tile}))
+    out = np.empty(({outputs}, {tile}))
+    for first in range(start, stop, {tile}):
+        count = min({tile}, stop - first)
+        for k in range({coordinates}):
+            for t in range({tile}):
+                tx[k, t] = p[gather[k, first + min(t, count - 1)]]
+        for k in range({constants}):
+            for t in range({tile}):
+                tc[k, t] = c[k, first + min(t, count - 1)]
+        for t in range({tile}):
+{body}
+        for t in range(count):
+{stores}
+"""
 
 
 def loop_source(function: Any) -> str:
@@ -158,10 +182,27 @@ def loop_source(function: Any) -> str:
 
     p : coordinates; gather : (k, e) numbers of them; c : constants (c, e); r : residuals (r, e);
     J : Jacobians (stop - start, r * k) of the elements from `start` on.
+
+    The elements are evaluated in tiles. Inputs and outputs of a tile are copied, so that nothing
+    keeps the compiler from using vector instructions.
     """
     style = _Scalars()
     lines = printed(function, style)
     loads = [f"{name} = {place}" for place, name in style.used.items()]
-    body = "".join(f"        {line}\n" for line in [*loads, *lines] or ["pass"])
-    head = "def kernel(p, gather, c, start, stop, r, J):\n    for e in range(start, stop):\n"
-    return head + body
+    places = ["r[{0}, first + t]", "J[first + t - start, {0}]"]
+    stores = [
+        f"{places[output].format(index)} = out[{k}, t]"
+        for k, (output, index) in enumerate(style.stored)
+    ]
+    body, ends = (
+        "\n".join(f"{12 * ' '}{line}" for line in some or ["pass"])
+        for some in ([*loads, *lines], sorted(stores))
+    )
+    return _LOOP.format(
+        tile=_TILE,
+        coordinates=function.size1_in(0),
+        constants=function.size1_in(1),
+        outputs=len(style.stored),
+        body=body,
+        stores=ends,
+    ).lstrip()
