@@ -10,12 +10,14 @@ import numpy as np
 from gso import metrics as measure
 from gso.energy import fairness
 from gso.mesh import Mesh
-from gso.smoothing import smooth_grid
+from gso.smoothing import estimate_sigma, smooth_grid
 from gso.tasks import base
 from gso.typing import Array
 
 #: Gaussian curvature at which the fairness term preserves half of the design's own bending.
 FLAT_CURVATURE = 0.02
+#: Share of that curvature below which the curvature of the noise does not count.
+_CLEAN = 0.05
 
 
 class Shape:
@@ -53,6 +55,10 @@ class Shape:
         mesh = self.mesh
         if mesh.grid is None:
             return mesh, 0.0
+        sigma = estimate_sigma(mesh.grid)
+        # The curvature of noise grows with the square of the resolution.
+        if sigma * max(mesh.grid.shape) ** 2 < _CLEAN * FLAT_CURVATURE:
+            return mesh, sigma
         smoothed = smooth_grid(mesh.grid, order=4)
         return mesh.replaced(smoothed.points.reshape(-1, 3)), smoothed.sigma
 
