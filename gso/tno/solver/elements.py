@@ -193,11 +193,11 @@ def _pull_back(gather: Ints, shape: tuple[int, ...], variables: Variables):
         return None, gather
     from scipy.sparse import csr_matrix
 
-    single = _single(variables.basis)
-    if single is not None:
+    found = single(variables.basis)
+    if found is not None:
         if (variables.basis.data == 1.0).all():
-            return None, single[0][gather]
-        direct = _by_point(gather, shape, variables.size, *single)
+            return None, found[0][gather]
+        direct = _by_point(gather, shape, variables.size, *found)
         if direct is not None:
             return direct
     k, count = gather.shape
@@ -220,7 +220,7 @@ def _pull_back(gather: Ints, shape: tuple[int, ...], variables: Variables):
 def _by_point(gather: Ints, shape: tuple[int, ...], size: int, unknown: Ints, share: Array):
     """Return map and unknowns where every point moves with one unknown, as along a normal.
 
-    `size` is the number of unknowns; the last two are what :func:`_single` returns. None where
+    `size` is the number of unknowns; the last two are what :func:`single` returns. None where
     points move otherwise, or where two points of an element share their unknown.
     """
     from scipy.sparse import csr_matrix
@@ -244,7 +244,7 @@ def _by_point(gather: Ints, shape: tuple[int, ...], size: int, unknown: Ints, sh
     return pull, columns
 
 
-def _single(basis: Any) -> tuple[Ints, Array] | None:
+def single(basis: Any) -> tuple[Ints, Array] | None:
     """Return the unknown of each coordinate, or their number if it is fixed, and its share.
 
     None if a coordinate depends on several.
