@@ -10,6 +10,7 @@ from typing import Any
 SUBJECTS = (
     "tno",
     "cost",
+    "batch",
     "jiang",
     "hybrid",
     "net",

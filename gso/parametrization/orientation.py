@@ -74,9 +74,7 @@ def degenerate(points: Sequence[Vec], directions: Sequence[Vec]) -> Any:
     points, directions : three tuples (x, y) of arrays or tensors
         Corners, and their displacements by a full step.
     """
-    e, f, de, df = (
-        sub(corners[k], corners[0]) for corners in (points, directions) for k in (1, 2)
-    )
+    e, f, de, df = (sub(corners[k], corners[0]) for corners in (points, directions) for k in (1, 2))
     c = _cross(e, f)
     b = _cross(e, df) + _cross(de, f)
     a = _cross(de, df)

@@ -20,9 +20,7 @@ def __getattr__(name: str) -> Any:
     from gso.errors import BackendError
 
     if find_spec("torch") is None:
-        raise BackendError(
-            'batched solves need torch: pip install ".[net]" in the folder of gso'
-        )
+        raise BackendError('batched solves need torch: pip install ".[net]" in the folder of gso')
     value = import_module("gso.tno.batched.optimize").optimize_batch
     globals()[name] = value
     return value

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from gso.errors import BackendError
 from gso.linalg.base import Pattern
 from gso.typing import Ints
 
@@ -93,7 +93,6 @@ class BlockBanded:
         m, band = blocks.size, blocks.band + 1
         row, column = pattern.indices[order], pattern.columns[order]
         block, below = column // m, row // m - column // m
-        self._entries = len(order)
         # Diagonal blocks have both triangles.
         twin = np.flatnonzero((below == 0) & (row != column))
         self._twin = torch.as_tensor(twin, device=device)
@@ -102,16 +101,14 @@ class BlockBanded:
         self._panel = torch.as_tensor(panel, device=device)
         self._place = torch.as_tensor(place, device=device)
         self._storage: Tensor | None = None
-        self._failed: Tensor | None = None
-
-    @cached_property
-    def _padding(self) -> int:
-        """Rows of the last block that are past the matrix."""
-        return self.blocks.size * self.blocks.count - self.unknowns
 
     def factor(self, values: Tensor) -> Tensor:
-        """Factor matrices with the values (nnz, B); return the mask (B,) of those that are not
-        positive definite to working precision.
+        """Factor matrices, and return the mask (B,) of those that are not positive definite.
+
+        Parameters
+        ----------
+        values : Tensor, (nnz, B)
+            Entries of the lower triangles.
         """
         m, count, band = self.blocks.size, self.blocks.count, self.blocks.band
         surfaces = values.shape[1]
@@ -124,8 +121,8 @@ class BlockBanded:
         a = self._storage
         flat = a.view(count * (band + 1), surfaces, m * m)
         flat[self._panel, :, self._place] = torch.cat([values, values.index_select(0, self._twin)])
-        if self._padding:
-            a[-1, 0].diagonal(dim1=-2, dim2=-1)[:, m - self._padding :] = 1.0
+        # Rows past the matrix are those of the identity.
+        a[-1, 0].diagonal(dim1=-2, dim2=-1)[:, self.unknowns - (count - 1) * m :] = 1.0
         failed = torch.zeros(surfaces, dtype=torch.int32, device=values.device)
         for k in range(count):
             lower, info = torch.linalg.cholesky_ex(a[k, 0])
@@ -134,9 +131,7 @@ class BlockBanded:
             beyond = min(band, count - 1 - k)
             for d in range(1, beyond + 1):
                 # X L^T = A, as a solve from the right.
-                a[k, d] = torch.linalg.solve_triangular(
-                    lower.mT, a[k, d], upper=True, left=False
-                )
+                a[k, d] = torch.linalg.solve_triangular(lower.mT, a[k, d], upper=True, left=False)
             for d in range(1, beyond + 1):
                 for e in range(1, d + 1):
                     a[k + e, d - e].baddbmm_(a[k, d], a[k, e].mT, alpha=-1.0)
@@ -144,8 +139,9 @@ class BlockBanded:
 
     def solve(self, rhs: Tensor) -> Tensor:
         """Solve for the right-hand sides (n, B), one for each matrix."""
+        if self._storage is None:
+            raise BackendError("there is no factorisation to solve with")
         a = self._storage
-        assert a is not None
         m, count, band = self.blocks.size, self.blocks.count, self.blocks.band
         x = rhs.new_zeros((rhs.shape[1], count * m, 1))
         x[:, : self.unknowns, 0] = rhs.T

@@ -185,7 +185,11 @@ def solved(asked: Asked, designs: Array, workers: int | None = 0) -> Iterator[Re
     there = asked.device.partition(":")[0] != "cpu"
     together = _TOGETHER
     if there:
-        together = int(np.clip(_MOST_THERE // max(designs[0].size // 3, 1), 1, _TOGETHER_THERE)) if len(designs) else 1
+        together = (
+            int(np.clip(_MOST_THERE // max(designs[0].size // 3, 1), 1, _TOGETHER_THERE))
+            if len(designs)
+            else 1
+        )
     pieces = [designs[k : k + together] for k in range(0, len(designs), together)]
     if workers is None:
         workers = _paying(len(pieces))
@@ -197,7 +201,7 @@ def solved(asked: Asked, designs: Array, workers: int | None = 0) -> Iterator[Re
     share = -(-len(designs) // (workers * -(-len(pieces) // workers)))
     pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
     done: dict[int, Any] = {}
-    work = partial(_together, asked)
+    work = partial(_measured, asked)
     with closing(spread(work, pieces, workers=min(workers, len(pieces)), caller=False)) as results:
         for one in results:
             if one.error is not None:
@@ -205,6 +209,15 @@ def solved(asked: Asked, designs: Array, workers: int | None = 0) -> Iterator[Re
             done[one.index] = one.value
     for k in range(len(pieces)):
         yield from done.pop(k)
+
+
+def _measured(asked: Asked, designs: Array) -> list[Result | GSOError]:
+    """Solve designs in a worker process, and compute their metrics there."""
+    found = _together(asked, designs)
+    for result in found:
+        if isinstance(result, Result):
+            result.metrics  # noqa: B018
+    return found
 
 
 def _paying(pieces: int) -> int:
@@ -243,6 +256,7 @@ def _together(asked: Asked, designs: Array) -> list[Result | GSOError]:
             else:
                 groups.setdefault(key, []).append((index, begun))
         for group in groups.values():
+            found: Sequence[Result | GSOError]
             try:
                 found = _solved([begun for _, begun in group], asked)
             except stages.Unbatchable:
@@ -317,14 +331,10 @@ def _solved(group: list[_Begun], asked: Asked) -> list[Result]:
             setattr(run.timings, phase, seconds / len(group))
         run.timings.setup += begun.seconds
         solution = run.concluded(begun.plan, state)
-        result = packed(
-            asked.task, asked.formulation, begun.design, begun.frame, solution, run
-        )
+        result = packed(asked.task, asked.formulation, begun.design, begun.frame, solution, run)
         if asked.verdict:
             scale = begun.frame.frame.scale
-            result = judged(
-                result, requirements(begun.frame.mesh, Compiled(), scale)
-            )
+            result = judged(result, requirements(begun.frame.mesh, Compiled(), scale))
         result.seconds["total"] = begun.seconds + each + time.perf_counter() - clock
         out.append(result)
     return out

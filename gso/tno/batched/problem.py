@@ -59,9 +59,7 @@ class Structure:
         scatter = [places.scatter for places in made.places]
         split = len(varying)
         self.entries = Sums(_joined(scatter[:split]), self.pattern.nnz, device)
-        self.gradient = Sums(
-            _joined([c.ravel() for c in (*varying, *constant)]), n, device
-        )
+        self.gradient = Sums(_joined([c.ravel() for c in (*varying, *constant)]), n, device)
         self._fixed = Sums(_joined(scatter[split:]), self.pattern.nnz, device)
         order = self.entries.order
         self._from_fixed = _inverse(self._fixed.order)[order]
@@ -101,8 +99,8 @@ def _structure(n: int, terms: Sequence[Term], device: torch.device) -> Structure
         digest.update(np.ascontiguousarray(term.columns).data)
     key = digest.digest()
     if key not in _structures:
-        kinds = [[t.columns for t in terms if t.quadratic is q] for q in (False, True)]
-        _structures[key] = Structure(n, *kinds, device)
+        varying, fixed = ([t.columns for t in terms if t.quadratic is q] for q in (False, True))
+        _structures[key] = Structure(n, varying, fixed, device)
         while len(_structures) > _KEPT:
             _structures.popitem(last=False)
     _structures.move_to_end(key)
@@ -169,9 +167,7 @@ class Problem:
         for sizes in ([len(t.columns) for t in terms], [t.pairs for t in terms]):
             shapes = [(size, t.count, self.surfaces) for size, t in zip(sizes, terms, strict=True)]
             rows = [a * b for a, b, _ in shapes]
-            whole = torch.empty(
-                sum(rows), self.surfaces, dtype=torch.float64, device=self._device
-            )
+            whole = torch.empty(sum(rows), self.surfaces, dtype=torch.float64, device=self._device)
             parts = [p.view(s) for p, s in zip(whole.split(rows), shapes, strict=True)]
             out.append((whole, parts))
         return out[0], out[1]

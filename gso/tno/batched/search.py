@@ -34,32 +34,25 @@ def direction(
     used = own > 0
     typical = torch.where(used, own, 0.0).sum(dim=0) / used.sum(dim=0).clamp(min=1)
     typical = typical.clamp(min=1e-300)
-    out = torch.zeros_like(gradient)
+    out = torch.empty_like(gradient)
     which = torch.arange(gradient.shape[1], device=gradient.device)
-    while True:
-        here = own.index_select(1, which) + (damping * typical)[which]
-        some = values.index_select(1, which)
-        some.index_copy_(0, diagonal, here)
-        slope = gradient.index_select(1, which)
-        failed = solver.factor(some)
-        found = -solver.solve(slope)
-        failed |= ~(torch.isfinite(found).all(dim=0) & ((found * slope).sum(dim=0) <= 0))
-        out[:, which] = torch.where(failed, 0.0, found)
-        left = which[failed]
-        if not len(left):
-            return out
-        damping = torch.where(torch.isin(which_all(damping), left), raised(damping), damping)
-        hopeless = damping[left] > HOPELESS
-        given_up = left[hopeless]
-        out[:, given_up] = -gradient[:, given_up] / own[:, given_up].amax(dim=0).clamp(min=1e-300)
-        which = left[~hopeless]
-        if not len(which):
-            return out
-
-
-def which_all(values: Tensor) -> Tensor:
-    """Return the numbers of the surfaces."""
-    return torch.arange(values.shape[-1], device=values.device)
+    while len(which):
+        diagonals = own + damping * typical
+        values.index_copy_(0, diagonal, diagonals)
+        failed = solver.factor(values)
+        found = -solver.solve(gradient)
+        failed |= ~(torch.isfinite(found).all(dim=0) & ((found * gradient).sum(dim=0) <= 0))
+        damping = raised(damping)
+        hopeless = failed & (damping > HOPELESS)
+        # The gradient's direction, where no damping helps.
+        steepest = -gradient / diagonals.amax(dim=0).clamp(min=1e-300)
+        out[:, which] = torch.where(hopeless, steepest, found)
+        left = torch.nonzero(failed & ~hopeless).ravel()
+        if len(left):
+            values, gradient, own = (t.index_select(1, left) for t in (values, gradient, own))
+            damping, typical = damping[left], typical[left]
+        which = which[left]
+    return out
 
 
 def armijo(
@@ -101,7 +94,11 @@ def armijo(
             length = torch.where(good, t, length)
         else:
             taken = which[good]
-            reached[:, taken], value[taken], length[taken] = candidate[:, good], found[good], t[good]
+            reached[:, taken], value[taken], length[taken] = (
+                candidate[:, good],
+                found[good],
+                t[good],
+            )
         t = shorter(t, rise, down)
         left = torch.nonzero(~good & (t >= least)).ravel()
         if not len(left):

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from gso.parametrization.orientation import Orientation
 from gso.status import Progress, Status
@@ -110,17 +111,12 @@ def solve(
         stages = [plan.stages[number] for plan in plans]
         entered = coordinates
         coordinates = [s.enter(c) for s, c in zip(stages, coordinates, strict=True)]
-        variables = [s.unknowns(c) for s, c in zip(stages, coordinates, strict=True)]
-        first = stages[0]
-        unknowns = Unknowns.stacked(variables, device)
-        items = [[i for i in s.own_items if i.weight > 0 and i.term.count] for s in stages]
-        problem = Problem(items, first.layout, unknowns, first.limits, device)
-        start = [v.project(c) for v, c in zip(variables, coordinates, strict=True)]
-        losses = [stacked_loss(each, device) for each in zip(*(s.continuation for s in stages))]
+        problem, start, losses = begun(stages, coordinates, device)
         timings.setup += time.perf_counter() - clock
+        first = stages[0]
         minima = minimise(
             problem,
-            columns(start, device),
+            start,
             iterations=first.iterations,
             tolerance=first.tolerance,
             continuation=losses,
@@ -128,7 +124,7 @@ def solve(
             method=method,
             timings=timings,
         )
-        coordinates = list(unknowns.points(minima.x).cpu().numpy().T.copy())
+        coordinates = list(problem.unknowns.points(minima.x).cpu().numpy().T.copy())
         found = _minima(minima, first, (number, count), f"blocks ({device})")
         for history, one in zip(histories, found, strict=True):
             history += one.history
@@ -140,6 +136,26 @@ def solve(
     return reached, iterations.tolist(), timings
 
 
+def begun(
+    stages: Sequence[Stage], coordinates: Sequence[Array], device: torch.device
+) -> tuple[Problem, Tensor, list[Any]]:
+    """Return the problem of one stage of each surface, its start (n, B), and its continuation.
+
+    Raises
+    ------
+    Unbatchable
+        The surfaces cannot be solved together.
+    """
+    variables = [s.unknowns(c) for s, c in zip(stages, coordinates, strict=True)]
+    items = [[i for i in s.own_items if i.weight > 0 and i.term.count] for s in stages]
+    first = stages[0]
+    unknowns = Unknowns.stacked(variables, device)
+    problem = Problem(items, first.layout, unknowns, first.limits, device)
+    start = [v.project(c) for v, c in zip(variables, coordinates, strict=True)]
+    by_iteration = zip(*(s.continuation for s in stages), strict=True)
+    return problem, columns(start, device), [stacked_loss(each, device) for each in by_iteration]
+
+
 def _minima(minima: Minima, stage: Stage, place: tuple[int, int], backend: str) -> list[Minimum]:
     """Convert the results of a stage to those of each surface."""
     energies, steps = (torch.stack(h).cpu().numpy() for h in (minima.energies, minima.steps))
@@ -149,7 +165,13 @@ def _minima(minima: Minima, stage: Stage, place: tuple[int, int], backend: str) 
     for k, last in enumerate(done):
         history = [
             Progress(
-                *place, i, stage.iterations, float(energies[i, k]), {}, float(steps[i, k]), stage.name
+                *place,
+                i,
+                stage.iterations,
+                float(energies[i, k]),
+                {},
+                float(steps[i, k]),
+                stage.name,
             )
             for i in range(last + 1)
         ]

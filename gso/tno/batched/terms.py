@@ -46,9 +46,9 @@ class Unknowns:
     """
 
     size: int
-    of: Tensor | None = None
-    share: Tensor | None = None
-    offset: Tensor | None = None
+    of: Any = None
+    share: Any = None
+    offset: Any = None
 
     @classmethod
     def stacked(cls, each: Sequence[Variables], device: torch.device) -> Unknowns:
@@ -65,16 +65,18 @@ class Unknowns:
         found = [single(v.basis) for v in each]
         shares = []
         for variables, one in zip(each, found, strict=True):
-            if one is None or variables.size != first.size or not np.array_equal(one[0], found[0][0]):  # type: ignore[index]
+            if one is None or found[0] is None or variables.size != first.size:
+                raise Unbatchable
+            of = found[0][0]
+            if not np.array_equal(one[0], of):
                 raise Unbatchable
             shares.append(one[1])
-        of = found[0][0]  # type: ignore[index]
         if (of >= first.size).any():
             raise Unbatchable
         return cls(
             first.size,
             torch.as_tensor(of.astype(np.int64), device=device),
-            columns([*shares], device),
+            columns(shares, device),
             columns([v.offset for v in each], device),
         )
 
@@ -157,7 +159,7 @@ class Term:
         self.term, self.name, self.shape = term, term.name, tuple(shape)
         self.quadratic = items[0].quadratic
         self._gather = torch.as_tensor(gather, device=device)
-        self.constants = columns([self._constants(i) for i in items], device)
+        self.constants = columns([_constants(i) for i in items], device)
         self.factor = columns([i.weight * i.term.weights for i in items], device)
         self.loss = stacked_loss([i.loss for i in items], device)
         self._slope: Tensor | None = None
@@ -165,10 +167,6 @@ class Term:
         self.columns = gather
         if unknowns.of is not None:
             self.columns = _by_point(gather, self.shape, unknowns.of.cpu().numpy())
-
-    def _constants(self, item: Weighted) -> Array:
-        given = item.term.constants
-        return given if given.size else np.empty((0, item.term.count))
 
     @cached_property
     def count(self) -> int:
@@ -269,6 +267,11 @@ class Term:
         r, k, *rest = slope.shape
         parts = (slope * moved).view(r, k // dim, dim, *rest)
         return parts.sum(dim=2)
+
+
+def _constants(item: Weighted) -> Array:
+    given = item.term.constants
+    return given if given.size else np.empty((0, item.term.count))
 
 
 def _by_point(gather: Ints, shape: tuple[int, ...], of: Ints) -> Ints:

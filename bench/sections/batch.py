@@ -1,0 +1,76 @@
+"""Many surfaces in one batch on tensors, compared with one after the other in processes."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from harness import table, timed
+
+import gso
+from gso.dataset import bezier
+from gso.parallel import processors
+from gso.tno.solver import loops
+
+#: Relative change of one axis by which the natural sensitivity of a solve is measured.
+_STRETCH = 1e-6
+#: Relative difference of energies above which a surface counts as another solution.
+_OTHER = 0.01
+
+
+def batches(count: int = 256, device: str = "cpu", seed: int = 31) -> dict[str, Any]:
+    """Compare optimize_batch with optimize_many on random surfaces of the dataset, 64 x 64."""
+    designs = np.stack([s.sample(64) for s in bezier.generate(count, seed=seed)])
+    stretched = designs * np.array([1.0 + _STRETCH, 1.0, 1.0])
+    workers = processors()
+    os.environ.setdefault(loops.VARIABLE, "numba" if loops._installed() else "numpy")
+
+    def many(task: str, points: np.ndarray) -> np.ndarray:
+        found = {
+            item.index: item.result
+            for item in gso.tno.optimize_many(points, task=task, workers=workers, verdict=False)
+        }
+        return _energies([found[k] for k in range(len(points))])
+
+    def batch(task: str, points: np.ndarray) -> np.ndarray:
+        own = None if device == "cpu" else 0
+        return _energies(gso.tno.optimize_batch(points, task=task, device=device, workers=own))
+
+    out, rows = {}, []
+    for task in ("developable", "flatten"):
+        # Kernels are printed and compiled at first use.
+        many(task, designs[:2]), batch(task, designs[:2])
+        reference, usual = timed(many, task, designs)
+        energies, seconds = timed(batch, task, designs)
+        shaken = many(task, stretched)
+        off, natural = (_off(e, reference) for e in (energies, shaken))
+        out[task] = {
+            "s, processes": usual,
+            "s, batch": seconds,
+            "ratio": seconds / usual,
+            "median difference %": 100.0 * float(np.median(off)),
+            "largest %": 100.0 * float(off.max()),
+            "over 1 %": int((off > _OTHER).sum()),
+            "over 1 %, stretched": int((natural > _OTHER).sum()),
+        }
+        rows.append([task, *out[task].values()])
+    table(
+        f"{count} surfaces 64 x 64: a batch on {device!r}, and {workers} processes; energies "
+        "relative to the latter's",
+        ["task", *out["flatten"]],
+        rows,
+    )
+    return out
+
+
+def _energies(results: list[Any]) -> np.ndarray:
+    return np.array([sum(result.energy.values()) for result in results])
+
+
+def _off(energies: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Return relative differences; a design that is good already has no energy."""
+    return np.abs(energies - reference) / np.where(reference > 0, reference, 1.0)
+
+
+SECTIONS = (batches,)
