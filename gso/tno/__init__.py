@@ -13,14 +13,13 @@ __all__ = ["Session", "Start", "check", "optimize", "optimize_batch", "optimize_
 def __getattr__(name: str) -> Any:
     if name != "optimize_batch":
         raise AttributeError(f"module 'gso.tno' has no attribute {name!r}")
-    # Imported on first use, as it loads PyTorch.
     from importlib import import_module
-    from importlib.util import find_spec
 
-    from gso.errors import BackendError
-
-    if find_spec("torch") is None:
-        raise BackendError('batched solves need torch: pip install ".[net]" in the folder of gso')
+    # Imported on first use, as it loads PyTorch.
     value = import_module("gso.tno.batched.optimize").optimize_batch
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

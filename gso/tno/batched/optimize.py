@@ -116,7 +116,7 @@ def optimize_batch(
     designs = _designs(points)
     asked = checked(task, formulation, options, device, verdict)
     out: list[Result] = []
-    for index, found in enumerate(solved(asked, designs, workers)):
+    for index, found in enumerate(solved(asked, list(designs), workers)):
         if isinstance(found, GSOError):
             raise type(found)(f"surface {index}: {found}")
         out.append(found)
@@ -180,16 +180,15 @@ def _designs(points: Any) -> Array:
     return designs
 
 
-def solved(asked: Asked, designs: Array, workers: int | None = 0) -> Iterator[Result | GSOError]:
-    """Solve designs (B, H, W, 3), and yield their results, or their errors, in order."""
+def solved(
+    asked: Asked, designs: Sequence[Any], workers: int | None = 0
+) -> Iterator[Result | GSOError]:
+    """Solve grids of one size, arrays (H, W, 3) or meshes; yield results or errors in order."""
     there = asked.device.partition(":")[0] != "cpu"
     together = _TOGETHER
-    if there:
-        together = (
-            int(np.clip(_MOST_THERE // max(designs[0].size // 3, 1), 1, _TOGETHER_THERE))
-            if len(designs)
-            else 1
-        )
+    if there and len(designs):
+        vertices = np.size(getattr(designs[0], "vertices", designs[0])) // 3
+        together = max(min(_MOST_THERE // vertices, _TOGETHER_THERE), 1)
     pieces = [designs[k : k + together] for k in range(0, len(designs), together)]
     if workers is None:
         workers = _paying(len(pieces))
@@ -211,7 +210,7 @@ def solved(asked: Asked, designs: Array, workers: int | None = 0) -> Iterator[Re
         yield from done.pop(k)
 
 
-def _measured(asked: Asked, designs: Array) -> list[Result | GSOError]:
+def _measured(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
     """Solve designs in a worker process, and compute their metrics there."""
     found = _together(asked, designs)
     for result in found:
@@ -239,20 +238,20 @@ class _Begun:
     seconds: float
 
 
-def _together(asked: Asked, designs: Array) -> list[Result | GSOError]:
-    """Solve designs (B, H, W, 3) in one batch for each structure that their stages have."""
+def _together(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
+    """Solve designs in one batch for each structure that their stages have."""
     out: list[Any] = [None] * len(designs)
     groups: dict[bytes, list[tuple[int, _Begun]]] = {}
     with _one_thread(asked.device), blas_threads(asked.options.threads):
-        for index, points in enumerate(designs):
+        for index, given in enumerate(designs):
             try:
-                begun = _begun(asked, points)
+                begun = _begun(asked, given)
             except GSOError as error:
                 out[index] = error
                 continue
             key = stages.structure(begun.plan)
             if key is None:
-                out[index] = _alone(asked, points)
+                out[index] = _alone(asked, given)
             else:
                 groups.setdefault(key, []).append((index, begun))
         for group in groups.values():
@@ -278,11 +277,11 @@ def _one_thread(device: str) -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def _begun(asked: Asked, points: Array) -> _Begun:
+def _begun(asked: Asked, given: Any) -> _Begun:
     from gso.io import as_mesh
 
     clock = time.perf_counter()
-    design = as_mesh(points)
+    design = as_mesh(given)
     design.check_joined()
     frame = Canonical(design)
     flat = getattr(asked.module, "BLOCK", "surface") == "flat"
@@ -293,7 +292,7 @@ def _begun(asked: Asked, points: Array) -> _Begun:
     return _Begun(design, frame, run, request, plan, time.perf_counter() - clock)
 
 
-def _alone(asked: Asked, points: Array) -> Result | GSOError:
+def _alone(asked: Asked, given: Any) -> Result | GSOError:
     """Solve a surface by itself."""
     import warnings
 
@@ -304,7 +303,7 @@ def _alone(asked: Asked, points: Array) -> Result | GSOError:
             # The status says the same.
             warnings.simplefilter("ignore", ConvergenceWarning)
             return optimize(
-                points,
+                given,
                 task=asked.task,
                 formulation=asked.formulation,
                 options=asked.options,
