@@ -34,6 +34,7 @@ class Kernel:
         scope: dict[str, Any] = {"torch": torch}
         exec(compile(self.source, "<gso kernel>", "exec"), scope)
         self._run = scope["kernel"]
+        self._numbers: dict[torch.device, tuple[Tensor, ...]] = {}
 
     def __call__(self, x: Tensor, c: Tensor) -> tuple[Tensor, Tensor]:
         """Evaluate elements.
@@ -55,8 +56,10 @@ class Kernel:
         residual = x.new_empty((self.rows, *shape))
         slope = x.new_empty((self.rows * self.columns, *shape))
         work = x.new_empty((self.slots, *shape))
-        numbers = x.new_tensor(self.numbers)
-        self._run(*(array.unbind() for array in (x, c, residual, slope, work, numbers)))
+        if x.device not in self._numbers:
+            self._numbers[x.device] = x.new_tensor(self.numbers).unbind()
+        arrays = (array.unbind() for array in (x, c, residual, slope, work))
+        self._run(*arrays, self._numbers[x.device])
         return residual, slope.view(self.rows, self.columns, *shape)
 
 

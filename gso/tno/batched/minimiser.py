@@ -134,7 +134,7 @@ def minimise(
 
 def _keep_best(out: Minima, live: Tensor, x: Tensor, value: Tensor) -> None:
     """Take the points with less energy than the best ones so far."""
-    better = torch.nonzero(value < out.energy[live]).ravel()
-    at = live[better]
-    out.energy[at] = value[better]
-    out.x[:, at] = x.index_select(1, better)
+    best = out.energy.index_select(0, live)
+    better = value < best
+    out.energy.index_copy_(0, live, torch.where(better, value, best))
+    out.x.index_copy_(1, live, torch.where(better, x, out.x.index_select(1, live)))

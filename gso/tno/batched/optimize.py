@@ -33,8 +33,8 @@ from gso.typing import Array
 
 #: Formulations whose stages can be solved in batches, by task.
 FORMULATIONS = {"developable": ("curvature",), "flatten": ("strain", "lengths")}
-#: Surfaces solved together on a processor and on a graphics processor, and largest number of
-#: vertices of all of them.
+#: Surfaces solved together on a processor, and most surfaces and vertices of them together on a
+#: graphics processor.
 _TOGETHER, _TOGETHER_THERE, _MOST_THERE = 16, 256, 1 << 20
 
 
@@ -146,7 +146,7 @@ def checked(
             "use gso.tno.optimize_many"
         )
     try:
-        torch.empty(0, device=device)
+        torch.zeros(1, dtype=torch.float64, device=device).item()
     except (RuntimeError, AssertionError, TypeError) as error:
         reason = str(error).splitlines()[0]
         raise OptionError(f"device {device!r} cannot be used ({reason}); take 'cpu'") from None
@@ -314,12 +314,20 @@ def _alone(asked: Asked, given: Any) -> Result | GSOError:
 
 
 def _solved(group: list[_Begun], asked: Asked) -> list[Result]:
-    """Solve surfaces whose stages have one structure."""
+    """Solve surfaces whose stages have one structure, in halves where memory is short."""
     clock = time.perf_counter()
-    device = torch.device(asked.device)
-    reached, iterations, timings = stages.solve(
-        [begun.plan for begun in group], asked.options.method, device
-    )
+    plans, half = [begun.plan for begun in group], len(group) // 2
+    try:
+        reached, iterations, timings = stages.solve(
+            plans, asked.options.method, torch.device(asked.device)
+        )
+    except torch.cuda.OutOfMemoryError:
+        if not half:
+            raise
+        reached = []
+    if not reached:
+        torch.cuda.empty_cache()
+        return _solved(group[:half], asked) + _solved(group[half:], asked)
     each = (time.perf_counter() - clock) / len(group)
     out = []
     for begun, state, count in zip(group, reached, iterations, strict=True):

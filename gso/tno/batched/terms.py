@@ -24,7 +24,7 @@ from gso.unknowns import Layout, Variables
 
 #: Numbers per row of a block of elements: on a processor its work arrays then stay in the cache,
 #: on a graphics processor they fit into memory.
-_BLOCK, _LARGE_BLOCK = 8192, 1 << 21
+_BLOCK, _LARGE_BLOCK = 16384, 1 << 21
 
 
 class Unbatchable(Exception):
