@@ -20,9 +20,13 @@ from tests.conftest import cylinder, saddle
 
 torch = pytest.importorskip("torch")
 
-from gso.tno.batched import cholesky, optimize, search, stages  # noqa: E402
+from gso.linalg import banded as lapack  # noqa: E402
+from gso.tno.batched import cholesky, search, stages  # noqa: E402
+from gso.tno.batched.asked import checked  # noqa: E402
+from gso.tno.batched.batches import solved  # noqa: E402
 from gso.tno.batched.sums import Sums  # noqa: E402
-from gso.tno.batched.terms import Unbatchable  # noqa: E402
+from gso.tno.batched.unknowns import Unbatchable  # noqa: E402
+from gso.tno.solver.directions import GaussNewton  # noqa: E402
 
 CPU = torch.device("cpu")
 SIZE = 33
@@ -150,12 +154,8 @@ def test_only_indefinite_matrices_are_damped():
     for k in (0, 2):
         exact = -np.linalg.solve(dense(pattern, values[:, k]), gradient[:, k].numpy())
         np.testing.assert_allclose(found[:, k], exact, rtol=1e-6)
-    from gso.tno.solver.directions import GaussNewton
-
     own = np.ascontiguousarray(values[:, 1])
-    from gso.linalg import banded as backend
-
-    wanted = GaussNewton().step(backend.Solver(pattern), own, diagonal, gradient[:, 1].numpy())
+    wanted = GaussNewton().step(lapack.Solver(pattern), own, diagonal, gradient[:, 1].numpy())
     np.testing.assert_allclose(found[:, 1], wanted, rtol=1e-8)
 
 
@@ -412,5 +412,5 @@ def test_unknowns_that_cannot_be_stacked(designs):
 def test_solved_yields_errors_in_place(designs):
     bad = designs.copy()
     bad[1] = 0.5
-    found = list(optimize.solved(optimize.checked("flatten"), bad))
+    found = list(solved(checked("flatten"), bad))
     assert [isinstance(one, gso.MeshError) for one in found] == [False, True, False, False]

@@ -107,7 +107,7 @@ def build(
         )
     if device is not None and scheduler is None:
         # The import needs PyTorch.
-        from gso.tno.batched.optimize import checked
+        from gso.tno.batched.asked import checked
 
         checked(device=device)
     place = Path(folder)

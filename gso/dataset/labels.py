@@ -129,7 +129,8 @@ def solve_many(kind: str, points: Array, device: str | None = None) -> list[Labe
     """
     if device is None or kind not in BATCHED:
         return [solve(kind, p) for p in points]
-    from gso.tno.batched.optimize import checked, solved
+    from gso.tno.batched.asked import checked
+    from gso.tno.batched.batches import solved
 
     asked = checked(device=device, **KINDS[kind].arguments)
     designs: list[Mesh | GSOError] = [_or_error(Mesh.from_grid, p, weld=False) for p in points]

@@ -17,7 +17,8 @@ from gso.linalg.base import Pattern
 from gso.parametrization.orientation import SAFETY, Orientation, degenerate
 from gso.tno.batched.cholesky import BlockBanded, divide
 from gso.tno.batched.sums import Sums
-from gso.tno.batched.terms import Term, Unbatchable, Unknowns
+from gso.tno.batched.terms import Term
+from gso.tno.batched.unknowns import Unbatchable, Unknowns
 from gso.tno.solver.assembly import assemble
 from gso.typing import Ints
 from gso.unknowns import Layout

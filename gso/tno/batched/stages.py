@@ -17,7 +17,8 @@ from gso.tasks.base import Plan, Stage
 from gso.tno.batched import minimiser
 from gso.tno.batched.minimiser import Minima, minimise
 from gso.tno.batched.problem import Problem
-from gso.tno.batched.terms import Unbatchable, Unknowns, columns, stacked_loss
+from gso.tno.batched.terms import stacked_loss
+from gso.tno.batched.unknowns import Unbatchable, Unknowns, columns
 from gso.tno.run import Reached
 from gso.tno.solver import Minimum, Timings
 from gso.typing import Array
@@ -29,40 +30,39 @@ _STATUSES = {
 }
 
 
-def structure(plan: Plan) -> bytes | None:
+def structure(plan: Plan) -> bytes:
     """Return a key that is the same for plans that can be solved together.
 
-    None if a plan cannot be solved in a batch.
+    Raises
+    ------
+    Unbatchable
+        There is nothing to solve, or something that batches do not have.
     """
     if not plan.stages or plan.spline is not None or plan.convert is not None:
-        return None
+        raise Unbatchable
     digest = hashlib.blake2b()
     for stage in plan.stages:
-        parts = _described(stage)
-        if parts is None:
-            return None
-        for part in parts:
+        for part in _described(stage):
             digest.update(part if isinstance(part, bytes) else repr(part).encode())
             digest.update(b";")
     return digest.digest()
 
 
-def _described(stage: Stage) -> list[Any] | None:
-    """Return all of a stage that must be the same in a batch; None if it has other things."""
-    if stage.bounds is not None or stage.finished is not None:
-        return None
-    if stage.imposed is not None and not stage.imposed.constraints.empty:
-        return None
+def _described(stage: Stage) -> list[Any]:
+    """Return all of a stage that must be the same in a batch."""
+    constrained = stage.imposed is not None and not stage.imposed.constraints.empty
+    if stage.bounds is not None or stage.finished is not None or constrained:
+        raise Unbatchable
     out: list[Any] = [stage.layout.blocks, stage.iterations, stage.tolerance, stage.continued]
     out += [type(loss) for loss in stage.continuation]
     for limit in stage.limits:
         if not isinstance(limit, Orientation):
-            return None
+            raise Unbatchable
         out += [limit.start, limit.corners.tobytes()]
     for item in stage.own_items:
         term = item.term
         if term.refresh is not None or term.multipliers is not None:
-            return None
+            raise Unbatchable
         used = item.weight > 0 and term.count > 0
         out += [term.name, used, item.quadratic, type(item.loss), len(term.constants)]
         out += [_name(term.residual), _name(term.vectors)]
@@ -177,6 +177,3 @@ def _minima(minima: Minima, stage: Stage, place: tuple[int, int], backend: str) 
         ]
         out.append(Minimum(x[k], energy[k], _STATUSES[codes[k]], last, backend, history))
     return out
-
-
-__all__ = ["Unbatchable", "solve", "structure"]
