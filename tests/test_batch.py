@@ -395,7 +395,7 @@ def test_on_a_graphics_processor(task, designs):
     again = gso.tno.optimize_batch(designs, task=task, device="cuda")
     here = gso.tno.optimize_batch(designs, task=task, workers=0)
     np.testing.assert_allclose(energies(there), energies(here), rtol=1e-5)
-    assert energies(there) == energies(again)
+    np.testing.assert_allclose(energies(there), energies(again), rtol=1e-12)
     assert "cuda" in there[0].backend
 
 

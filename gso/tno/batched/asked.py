@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any
 
 import torch
 
-from gso import tasks
 from gso.errors import OptionError
 from gso.tasks.base import Options
 from gso.tno.optimize import check
@@ -26,11 +24,6 @@ class Asked:
     options: Options
     device: str
     verdict: bool
-
-    @property
-    def module(self) -> ModuleType:
-        """The task."""
-        return tasks.get(self.task)
 
 
 def checked(

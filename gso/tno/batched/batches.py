@@ -140,12 +140,12 @@ def _begun(asked: Asked, given: Any) -> _Begun:
     design = as_mesh(given)
     if design.grid_index is None:
         raise Unbatchable
-    frame = Canonical(design)
-    flat = getattr(asked.module, "BLOCK", "surface") == "flat"
-    analysis = tasks.analyse(asked.module, frame.mesh, Compiled(flat=flat))
-    run = Run(asked.module, analysis)
+    frame, module = Canonical(design), tasks.get(asked.task)
+    flat = getattr(module, "BLOCK", "surface") == "flat"
+    analysis = tasks.analyse(module, frame.mesh, Compiled(flat=flat))
+    run = Run(module, analysis)
     request = Request(asked.options.in_unit(frame.frame.scale), asked.formulation)
-    plan = asked.module.plan(analysis, request)
+    plan = module.plan(analysis, request)
     return _Begun(design, frame, run, plan, time.perf_counter() - clock)
 
 

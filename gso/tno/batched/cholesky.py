@@ -101,6 +101,7 @@ class BlockBanded:
         self._panel = torch.as_tensor(panel, device=device)
         self._place = torch.as_tensor(place, device=device)
         self._storage: Tensor | None = None
+        self._diagonal: list[Tensor] = []
 
     def factor(self, values: Tensor) -> Tensor:
         """Factor matrices, and return the mask (B,) of those that are not positive definite.
@@ -124,14 +125,16 @@ class BlockBanded:
         # Rows past the matrix are those of the identity.
         a[-1, 0].diagonal(dim1=-2, dim2=-1)[:, self.unknowns - (count - 1) * m :] = 1.0
         failed = torch.zeros(surfaces, dtype=torch.int32, device=values.device)
+        self._diagonal = []
         for k in range(count):
             lower, info = torch.linalg.cholesky_ex(a[k, 0])
-            a[k, 0] = lower
+            self._diagonal.append(lower)
             failed += info.abs()
             beyond = min(band, count - 1 - k)
             for d in range(1, beyond + 1):
-                # X L^T = A, as a solve from the right.
-                a[k, d] = torch.linalg.solve_triangular(lower.mT, a[k, d], upper=True, left=False)
+                # X L^T = A, in place.
+                turned = a[k, d].mT
+                torch.linalg.solve_triangular(lower, turned, upper=False, out=turned)
             for d in range(1, beyond + 1):
                 for e in range(1, d + 1):
                     a[k + e, d - e].baddbmm_(a[k, d], a[k, e].mT, alpha=-1.0)
@@ -148,7 +151,7 @@ class BlockBanded:
         x = x.view(-1, count, m, 1)
         parts = list(x.unbind(1))
         for k in range(count):
-            here = torch.linalg.solve_triangular(a[k, 0], parts[k], upper=False)
+            here = torch.linalg.solve_triangular(self._diagonal[k], parts[k], upper=False)
             parts[k] = here
             for d in range(1, min(band, count - 1 - k) + 1):
                 parts[k + d] = torch.baddbmm(parts[k + d], a[k, d], here, alpha=-1.0)
@@ -156,5 +159,5 @@ class BlockBanded:
             here = parts[k]
             for d in range(1, min(band, count - 1 - k) + 1):
                 here = torch.baddbmm(here, a[k, d].mT, parts[k + d], alpha=-1.0)
-            parts[k] = torch.linalg.solve_triangular(a[k, 0].mT, here, upper=True)
+            parts[k] = torch.linalg.solve_triangular(self._diagonal[k].mT, here, upper=True)
         return torch.cat(parts, dim=1)[:, : self.unknowns, 0].T.contiguous()
