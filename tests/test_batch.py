@@ -409,6 +409,33 @@ def test_unknowns_that_cannot_be_stacked(designs):
         stages.begun(own, [p.reshape(-1) for p in designs[:2]], CPU)
 
 
+def test_a_batch_is_halved_where_memory_is_short(designs, monkeypatch):
+    real, sizes = stages.solve, []
+
+    def small(plans, *given):
+        sizes.append(len(plans))
+        if len(plans) > 1:
+            raise torch.cuda.OutOfMemoryError
+        return real(plans, *given)
+
+    wanted = gso.tno.optimize_batch(designs[:3], task="flatten", workers=0)
+    monkeypatch.setattr(stages, "solve", small)
+    found = gso.tno.optimize_batch(designs[:3], task="flatten", workers=0)
+    assert sizes == [3, 1, 2, 1, 1]
+    np.testing.assert_allclose(energies(found), energies(wanted), rtol=1e-9)
+
+
+def test_what_fails_in_a_batch_is_solved_alone(designs, monkeypatch):
+    def fail(*given):
+        raise gso.MeshError("some surface has no image")
+
+    monkeypatch.setattr(stages, "solve", fail)
+    found = gso.tno.optimize_batch(designs[:2], task="flatten", workers=0)
+    assert [one.backend for one in found] == [
+        gso.tno.optimize(p, task="flatten", verdict=False).backend for p in designs[:2]
+    ]
+
+
 def test_solved_yields_errors_in_place(designs):
     bad = designs.copy()
     bad[1] = 0.5
