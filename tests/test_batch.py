@@ -12,16 +12,20 @@ import gso
 from gso import tasks
 from gso.constraints import Compiled
 from gso.dataset import bezier
+from gso.energy import registry
 from gso.linalg.base import Pattern
 from gso.tasks.base import Request
 from gso.tno.normalise import Canonical
+from gso.tno.solver import kernels
 from gso.tno.solver.problem import Problem
-from tests.conftest import cylinder, saddle
+from gso.unknowns.base import DIMENSIONS
+from tests.conftest import cylinder, meshes, saddle
 
 torch = pytest.importorskip("torch")
 
 from gso.linalg import banded as lapack  # noqa: E402
 from gso.tno.batched import cholesky, search, stages  # noqa: E402
+from gso.tno.batched import kernels as on_tensors  # noqa: E402
 from gso.tno.batched.asked import checked  # noqa: E402
 from gso.tno.batched.batches import solved  # noqa: E402
 from gso.tno.batched.sums import Sums  # noqa: E402
@@ -30,6 +34,14 @@ from gso.tno.solver.directions import GaussNewton  # noqa: E402
 
 CPU = torch.device("cpu")
 SIZE = 33
+
+
+TERMS = [
+    pytest.param(term, id=f"{name}-{kind}-{k}")
+    for name, module in registry().items()
+    for kind, mesh in meshes().items()
+    for k, term in enumerate(module.examples(mesh))
+]
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +71,25 @@ CASES = {
     "lengths": ("flatten", {"formulation": "lengths"}, None),
     "strained": ("flatten", {}, (3.0, 3.2)),
 }
+
+
+@pytest.mark.parametrize("term", TERMS)
+def test_kernels_are_those_of_the_solver(term):
+    shape = tuple(DIMENSIONS[block] for block, index in term.stencil for _ in range(index.shape[1]))
+    rng = np.random.default_rng(0)
+    x = rng.standard_normal((sum(shape), 40))
+    c = 0.5 + rng.random((len(term.constants), 40))
+    given = torch.as_tensor(x).view(-1, 8, 5), torch.as_tensor(c).view(-1, 8, 5)
+    pairs = [("kernel", term.residual, (False,)), ("kernel", term.residual, (True,))]
+    if term.vectors is not None:
+        pairs.append(("geometric_stiffness", term.vectors, ()))
+    for name, function, more in pairs:
+        key = function, shape, len(c), *more
+        wanted = getattr(kernels, name)(*key)(x, c)
+        found = getattr(on_tensors, name)(*key)(*given)
+        for a, b in zip(found, wanted, strict=True):
+            assert a.shape == (*b.shape[:-1], 8, 5)
+            np.testing.assert_allclose(a.reshape(b.shape), b, rtol=1e-11, atol=1e-12)
 
 
 def close(found, wanted):
@@ -286,6 +317,16 @@ def test_other_unknowns_and_methods(designs):
             [gso.tno.optimize(p, options=options, verdict=False) for p in designs[:2]]
         )
         np.testing.assert_allclose(found, wanted, rtol=1e-5)
+
+
+@pytest.mark.parametrize("changed", [{"norm": "l1"}, {"norm": "l2"}, {"w_fairness": 1e-4}])
+@pytest.mark.parametrize("formulation", ["strain", "lengths"])
+def test_other_norms(formulation, changed, designs):
+    asked = {"task": "flatten", "formulation": formulation}
+    asked["options"] = gso.FlattenOptions(**changed)
+    found = energies(gso.tno.optimize_batch(designs[:2], workers=0, **asked))
+    wanted = energies([gso.tno.optimize(p, verdict=False, **asked) for p in designs[:2]])
+    np.testing.assert_allclose(found, wanted, rtol=1e-5)
 
 
 def test_verdict(designs):

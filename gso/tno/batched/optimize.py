@@ -30,10 +30,10 @@ def optimize_batch(
     """Make many grids of one size developable, or flatten them, in batches on PyTorch tensors.
 
     The objective and the stages are those of :func:`gso.tno.optimize`, and so are the results,
-    up to rounding errors and what the iterations make of them. A result does not depend on the
-    other surfaces. On a graphics processor all surfaces are solved together. Surfaces whose
-    stages differ from those of the others, such as noisy or closed ones, are solved in smaller
-    batches, or one by one.
+    up to rounding errors and what the iterations make of them. But for these, a result does not
+    depend on the other surfaces. On a graphics processor all surfaces are solved together.
+    Surfaces whose stages differ from those of the others, such as noisy or closed ones, are
+    solved in smaller batches, or one by one.
 
     Parameters
     ----------
