@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import resource
 from collections.abc import Callable
 from typing import Any
@@ -13,7 +12,6 @@ from harness import table, timed
 import gso
 from gso.dataset import bezier
 from gso.parallel import processors
-from gso.tno.solver import loops
 
 #: Relative change of one axis by which the natural sensitivity of a solve is measured.
 _STRETCH = 1e-6
@@ -21,12 +19,11 @@ _STRETCH = 1e-6
 _OTHER = 0.01
 
 
-def batches(count: int = 256, device: str = "cpu", seed: int = 31) -> dict[str, Any]:
-    """Compare optimize_batch with optimize_many on random surfaces of the dataset, 64 x 64."""
-    designs = np.stack([s.sample(64) for s in bezier.generate(count, seed=seed)])
+def batches(n: int = 256, device: str = "cpu", seed: int = 31) -> dict[str, Any]:
+    """Compare optimize_batch with optimize_many on n random surfaces of the dataset, 64 x 64."""
+    designs = np.stack([s.sample(64) for s in bezier.generate(n, seed=seed)])
     stretched = designs * np.array([1.0 + _STRETCH, 1.0, 1.0])
     workers = processors()
-    os.environ.setdefault(loops.VARIABLE, "numba" if loops._installed() else "numpy")
 
     def many(task: str, points: np.ndarray) -> np.ndarray:
         found = {
@@ -59,7 +56,7 @@ def batches(count: int = 256, device: str = "cpu", seed: int = 31) -> dict[str, 
         }
         rows.append([task, *out[task].values()])
     table(
-        f"{count} surfaces 64 x 64: a batch on {device!r}, and {workers} processes; energies "
+        f"{n} surfaces 64 x 64: a batch on {device!r}, and {workers} processes; energies "
         "relative to the latter's",
         ["task", *out["flatten"]],
         rows,
