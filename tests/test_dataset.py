@@ -605,8 +605,9 @@ class TestDevice:
                 else:
                     # The residual of the spline is zero up to rounding errors.
                     size = max(np.abs(array[:]).max(), 1e-6)
-                    off = np.abs(here[name][:] - array[:]) / size
-                    assert np.quantile(off, 0.95) < 1e-4, name
+                    off = (np.abs(here[name][:] - array[:]) / size).reshape(len(array), -1)
+                    # On a few surfaces the iterations amplify rounding errors.
+                    assert (off.max(axis=1) < 1e-6).mean() > 0.8, name
 
     def test_a_build_goes_on_where_it_was(self, batched, tmp_path):
         place = tmp_path / "set"
