@@ -67,6 +67,13 @@ def quick(tmp_path_factory):
     return dataset.build(tmp_path_factory.mktemp("quick"), QUICK, workers=0)
 
 
+@pytest.fixture(scope="session")
+def batched(tmp_path_factory):
+    """The set of 64 surfaces with labels from batches."""
+    pytest.importorskip("torch")
+    return dataset.build(tmp_path_factory.mktemp("batched"), TINY, device="cpu", workers=0)
+
+
 class TestScreen:
     def test_surfaces_are_the_same_in_any_company(self):
         some = [screen.surface(3, k) for k in range(40)]
@@ -567,7 +574,9 @@ class TestSurvival:
     def test_other_versions_do_not_mix(self, quick, tmp_path, monkeypatch):
         shutil.copytree(quick.path, tmp_path / "set")
         versions = gso.dataset.recipe.versions()
-        monkeypatch.setattr("gso.dataset.builder.versions", lambda: versions | {"numpy": "0.1"})
+        monkeypatch.setattr(
+            "gso.dataset.builder.versions", lambda device: versions | {"numpy": "0.1"}
+        )
         # What is complete stays as it is, whatever is installed now.
         dataset.build(tmp_path / "set", QUICK)
         (tmp_path / "set" / "test" / "00000.h5").unlink()
@@ -577,6 +586,65 @@ class TestSurvival:
         task = gso.dataset.shard.Task("train", 0, (1,))
         with pytest.raises(DatasetError, match=r"train/00000.h5.*numpy .* instead of 0.1"):
             gso.dataset.shard.make(QUICK, versions | {"numpy": "0.1"}, task)
+
+
+class TestDevice:
+    """Labels from batches."""
+
+    def test_labels_are_nearly_the_same(self, tiny, batched):
+        assert batched.manifest["device"] == "cpu"
+        assert "torch" in batched.manifest["versions"]
+        assert "device" not in tiny.manifest
+        for split, there in tiny.items():
+            here = batched[split]
+            assert here.arrays.keys() == there.arrays.keys()
+            for name, array in there.arrays.items():
+                assert (here[name].shape, here[name].dtype) == (array.shape, array.dtype)
+                if name.startswith(("status", "surface", "features", "id")):
+                    assert (here[name][:] == array[:]).mean() > 0.95
+                else:
+                    # The residual of the spline is zero up to rounding errors.
+                    size = max(np.abs(array[:]).max(), 1e-6)
+                    off = (np.abs(here[name][:] - array[:]) / size).reshape(len(array), -1)
+                    # On a few surfaces the iterations amplify rounding errors.
+                    assert (off.max(axis=1) < 1e-6).mean() > 0.8, name
+
+    def test_a_build_goes_on_where_it_was(self, batched, tmp_path):
+        place = tmp_path / "set"
+        shutil.copytree(batched.path, place)
+        before = digests(place)
+        (place / "test" / "00000.h5").unlink()
+        dataset.build(place, TINY, device="cpu", workers=0)
+        assert digests(place) == before
+
+    def test_devices_do_not_mix(self, batched, quick, tmp_path):
+        for made, recipe, device in ((batched, TINY, None), (quick, QUICK, "cpu")):
+            place = tmp_path / str(device)
+            shutil.copytree(made.path, place)
+            (place / "test" / "00000.h5").unlink()
+            with pytest.raises(DatasetError, match="a set with device"):
+                dataset.build(place, recipe, device=device, workers=0)
+
+    def test_a_surface_that_fails_leaves_the_others(self):
+        pytest.importorskip("torch")
+        points = shapes.sample("torus", seed=0, size=16)[:3].copy()
+        points[1] = 0.0
+        found = labels.solve_many("strain", points, "cpu")
+        assert [label.status == labels.FAILED for label in found] == [False, True, False]
+        alone = labels.solve("strain", points[2])
+        np.testing.assert_allclose(found[2].arrays["strain"], alone.arrays["strain"], atol=1e-6)
+
+    def test_a_device_that_is_not_there_is_refused(self, tmp_path):
+        torch = pytest.importorskip("torch")
+        if torch.cuda.is_available():
+            pytest.skip("CUDA is there")
+        with pytest.raises(OptionError, match="device 'cuda' cannot be used"):
+            dataset.build(tmp_path / "set", QUICK, device="cuda")
+        given = ["dataset", "build", "-o", str(tmp_path / "set"), "--device", "cuda"]
+        result = CliRunner().invoke(main, given)
+        assert result.exit_code != 0
+        assert "device 'cuda'" in result.output + str(result.exception)
+        assert not (tmp_path / "set").exists()
 
 
 class TestReference:

@@ -11,6 +11,7 @@ SUBJECTS = (
     "tno",
     "cost",
     "speed",
+    "batch",
     "jiang",
     "session",
     "hybrid",

@@ -61,6 +61,9 @@ def dataset() -> None:
 )
 @click.option("--workers", metavar="N", type=click.IntRange(0), help="Processes; all cores.")
 @click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that does the work instead.")
+@click.option(
+    "--device", metavar="NAME", help="cpu, cuda ...: label in batches there (needs PyTorch)."
+)
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 def build(out: str, quiet: bool, **given: Any) -> None:
     """Build a dataset of surfaces in the folder DIR.
@@ -86,6 +89,7 @@ def build(out: str, quiet: bool, **given: Any) -> None:
             reference_splits=given["reference_splits"],
             workers=given["workers"],
             scheduler=given["scheduler"],
+            device=given["device"],
             tick=bars.tick,
         )
     if quiet:

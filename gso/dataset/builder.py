@@ -47,6 +47,7 @@ def build(
     reference_splits: Iterable[str] = ("test",),
     workers: int | None = None,
     scheduler: str | None = None,
+    device: str | None = None,
     tick: Tick | None = None,
 ) -> Dataset:
     """Build a dataset, or its missing files.
@@ -66,6 +67,10 @@ def build(
         Number of worker processes; the number of cores by default, 0 for this process only.
     scheduler : str, optional
         Address of a Dask cluster that does the work instead.
+    device : str, optional
+        "cpu", "cuda" ...: label the surfaces of each file in a batch, by
+        :func:`gso.tno.optimize_batch`. The labels are the same up to rounding errors and what
+        the iterations make of them. Reference labels are made one by one.
     tick : callable, optional
         Progress callback, called with the name of the counted items, the number done and the
         total number.
@@ -77,11 +82,14 @@ def build(
     Raises
     ------
     OptionError
-        A reference or split is unknown.
+        A reference or split is unknown, or there is no such device.
+    BackendError
+        A device is given, and PyTorch is not installed.
     DatasetError
-        The folder holds something else or another recipe, another build is running in it,
-        package versions have changed since the build began, the disk is full, or a worker
-        process died repeatedly on the same file. Complete files are kept.
+        The folder holds something else, another recipe or labels made on another device,
+        another build is running in it, package versions have changed since the build began,
+        the disk is full, or a worker process died repeatedly on the same file. Complete files
+        are kept.
 
     Examples
     --------
@@ -97,14 +105,19 @@ def build(
         raise DatasetError(
             'datasets need h5py and filelock: pip install ".[dataset]" in the folder of gso'
         )
+    if device is not None and scheduler is None:
+        # The import needs PyTorch.
+        from gso.tno.batched.asked import checked
+
+        checked(device=device)
     place = Path(folder)
     with claimed(place):
         with _kept():
-            record = _begin(place, recipe)
+            record = _begin(place, recipe, device)
         bad = manifest.damaged(place, record)
         if record["complete"] and wanted <= manifest.pairs(record) and not bad:
             return Dataset(place)
-        _check_same(place, record, "versions", versions(), _OTHER_VERSIONS)
+        _check_same(place, record, "versions", versions(device), _OTHER_VERSIONS)
         wanted |= manifest.pairs(record)
         with blas_threads(1):
             selection = select(
@@ -116,7 +129,8 @@ def build(
         everything = list(tasks(recipe, selection, wanted))
         for part in (shard.LABELS, *REFERENCES):
             todo = [task for task in everything if task.part == part]
-            _make(place, recipe, todo, set(bad), workers, scheduler, tick)
+            work = partial(shard.make, recipe, versions(device), device=device)
+            _make(place, work, todo, set(bad), workers, scheduler, tick)
         with _kept():
             record = _listed(place, record, recipe, everything, wanted, selection.drawn)
             record["summary"] = summarise(Dataset(place, record))
@@ -144,22 +158,24 @@ def tasks(
             yield from (shard.Task(split, number, some, part) for part in parts)
 
 
-def _begin(folder: Path, recipe: Recipe) -> dict[str, Any]:
+def _begin(folder: Path, recipe: Recipe, device: str | None) -> dict[str, Any]:
     """Return the existing manifest, or write and return that of a new dataset.
 
     Raises
     ------
     DatasetError
-        The existing manifest has another recipe.
+        The existing manifest has another recipe, or labels made on another device.
     """
     record = {
         "format": manifest.FORMAT,
         "recipe": recipe.as_dict(),
-        "versions": versions(),
+        "versions": versions(device),
         "references": {},
         "files": [],
         "complete": False,
     }
+    if device is not None:
+        record["device"] = device.partition(":")[0]
     # A JSON round trip converts tuples to lists, for comparison with a manifest from disk.
     record = json.loads(json.dumps(record))
     if not (folder / manifest.NAME).exists():
@@ -167,6 +183,11 @@ def _begin(folder: Path, recipe: Recipe) -> dict[str, Any]:
         return record
     there = manifest.load(folder)
     _check_same(folder, there, "recipe", record["recipe"], _OTHER_RECIPE)
+    made, asked = there.get("device"), record.get("device")
+    if made != asked:
+        raise DatasetError(
+            f"{folder} holds a set with device {made!r}, not {asked!r}; {_OTHER_RECIPE}"
+        )
     return there
 
 
@@ -198,7 +219,7 @@ def _references(
 
 def _make(
     place: Path,
-    recipe: Recipe,
+    work: Callable[[shard.Task], bytes],
     todo: list[shard.Task],
     bad: set[str],
     workers: int | None,
@@ -215,7 +236,6 @@ def _make(
     what = f"surfaces with {missing[0].part}" if reference else "surfaces labelled"
     if tick is not None:
         tick(what, done, total)
-    work = partial(shard.make, recipe, versions())
     with closing(cluster.either(work, missing, workers=workers, scheduler=scheduler)) as results:
         for result in results:
             task = missing[result.index]
@@ -283,7 +303,8 @@ def _listed(
         name: [s for s in recipe.splits if (name, s) in references]
         for name in sorted({name for name, _ in references})
     }
-    return {key: record[key] for key in ("format", "recipe", "versions")} | {
+    kept = ("format", "recipe", "versions", "device")
+    return {key: record[key] for key in kept if key in record} | {
         "references": splits,
         "reference_options": {name: KINDS[name].options for name in splits},
         "splits": recipe.splits,

@@ -103,15 +103,62 @@ def solve(kind: str, points: Array) -> Label:
             # The stored status says the same.
             warnings.simplefilter("ignore", ConvergenceWarning)
             result = tno.optimize(mesh, verdict=False, **what.arguments)
-        known = _measured(result)
-        return Label(
-            what.arrays(result),
-            {name: float(known.get(name, np.nan)) for name in what.metrics},
-            result.status.name,
-        )
+        return _labelled(kind, result)
     except GSOError:
-        nowhere = {name: np.full(s, np.nan) for name, s in shapes(kind, len(points)).items()}
-        return Label(nowhere, dict.fromkeys(what.metrics, np.nan), FAILED)
+        return _failed(kind, len(points))
+
+
+def solve_many(kind: str, points: Array, device: str | None = None) -> list[Label]:
+    """Label surfaces (B, H, W, 3) of the unit ball.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of the labels.
+    points : ndarray, (B, H, W, 3)
+    device : str, optional
+        Where to solve them in batches, for the kinds in :data:`BATCHED`; one by one when not
+        given.
+
+    Raises
+    ------
+    BackendError
+        PyTorch is not installed.
+    OptionError
+        There is no such device.
+    """
+    if device is None or kind not in BATCHED:
+        return [solve(kind, p) for p in points]
+    from gso.tno.batched.asked import checked
+    from gso.tno.batched.batches import solved
+
+    asked = checked(device=device, **KINDS[kind].arguments)
+    designs: list[Mesh | GSOError] = [_or_error(Mesh.from_grid, p, weld=False) for p in points]
+    results = solved(asked, [d for d in designs if isinstance(d, Mesh)])
+    found = [next(results) if isinstance(d, Mesh) else d for d in designs]
+    labels = [_or_error(_labelled, kind, f) if isinstance(f, Result) else f for f in found]
+    return [x if isinstance(x, Label) else _failed(kind, points.shape[1]) for x in labels]
+
+
+def _or_error(function: Callable[..., Any], *given: Any, **keywords: Any) -> Any:
+    """Call a function, and return what it raises on purpose."""
+    try:
+        return function(*given, **keywords)
+    except GSOError as error:
+        return error
+
+
+def _labelled(kind: str, result: Result) -> Label:
+    """Return the label that a result gives."""
+    what, known = KINDS[kind], _measured(result)
+    metrics = {name: float(known.get(name, np.nan)) for name in what.metrics}
+    return Label(what.arrays(result), metrics, result.status.name)
+
+
+def _failed(kind: str, size: int) -> Label:
+    """Return the label of a surface, size x size, on which the solver raised an error."""
+    nowhere = {name: np.full(s, np.nan) for name, s in shapes(kind, size).items()}
+    return Label(nowhere, dict.fromkeys(KINDS[kind].metrics, np.nan), FAILED)
 
 
 def _measured(result: Result) -> dict[str, float]:
@@ -208,6 +255,8 @@ def _jiang(result: Result) -> dict[str, Array]:
 
 #: Labels that a recipe may give to every surface.
 LABELS = ("developable", "strain", "lengths")
+#: Kinds of labels that can be made in batches.
+BATCHED = ("developable", "strain", "lengths")
 #: Reference labels, made only for requested splits.
 REFERENCES = ("jiang2020",)
 

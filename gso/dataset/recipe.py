@@ -93,10 +93,13 @@ class Recipe:
         )
 
 
-def versions() -> dict[str, str]:
-    """Return the versions that may affect the bytes; "" for a package that is not installed."""
+def versions(device: str | None = None) -> dict[str, str]:
+    """Return the versions that may affect the bytes; "" for a package that is not installed.
+
+    With a device, on which surfaces are solved in batches, they include PyTorch's.
+    """
     found = {"python": platform.python_version(), "machine": platform.machine()}
-    for name in _PACKAGES:
+    for name in (*_PACKAGES, *(() if device is None else ("torch",))):
         try:
             found[name] = version(name)
         except PackageNotFoundError:

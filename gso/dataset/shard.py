@@ -55,7 +55,9 @@ class Task:
         return f"{self.split}/{self.number:05d}{suffix}.h5"
 
 
-def make(recipe: Recipe, expected: dict[str, str], task: Task) -> bytes:
+def make(
+    recipe: Recipe, expected: dict[str, str], task: Task, *, device: str | None = None
+) -> bytes:
     """Make the content of a file.
 
     Parameters
@@ -66,13 +68,15 @@ def make(recipe: Recipe, expected: dict[str, str], task: Task) -> bytes:
         Versions with which the dataset was begun (:func:`gso.dataset.recipe.versions`).
     task : Task
         The file to make.
+    device : str, optional
+        Where to solve its surfaces in batches; one by one when not given.
 
     Raises
     ------
     DatasetError
         The versions in this process differ from `expected`.
     """
-    here = versions()
+    here = versions(device)
     differing = [
         f"{k} {here.get(k)} instead of {v}" for k, v in expected.items() if here.get(k) != v
     ]
@@ -83,7 +87,7 @@ def make(recipe: Recipe, expected: dict[str, str], task: Task) -> bytes:
     with _alone, blas_threads(1):
         points = surfaces(recipe, task.split, task.ids)
         if task.part != LABELS:
-            return pack(_labelled(task.part, points))
+            return pack(_labelled(task.part, points, device))
         screened = points
         if recipe.size != screen.SIZE:
             screened = surfaces(recipe, task.split, task.ids, screen.SIZE)
@@ -95,7 +99,7 @@ def make(recipe: Recipe, expected: dict[str, str], task: Task) -> bytes:
         if task.split == noise.SPLIT:
             arrays["noise"] = noise.draw(recipe.seed, task.ids, recipe.size)
         for kind in recipe.labels:
-            arrays |= _labelled(kind, points)
+            arrays |= _labelled(kind, points, device)
         return pack(arrays)
 
 
@@ -107,9 +111,9 @@ def surfaces(recipe: Recipe, split: str, ids: tuple[int, ...], size: int | None 
     return bezier.sample_many([screen.surface(recipe.seed, k) for k in ids], size)
 
 
-def _labelled(kind: str, points: Array) -> dict[str, np.ndarray]:
+def _labelled(kind: str, points: Array, device: str | None) -> dict[str, np.ndarray]:
     """Label the surfaces of a file; return arrays, metrics and statuses of a kind of label."""
-    found = [labels.solve(kind, p) for p in points]
+    found = labels.solve_many(kind, points, device)
     # Single precision changes no metric of the labels by more than a thousandth. References
     # need double precision: their surface and flat image are isometric to a few parts in 1e6.
     dtype = np.float64 if kind in labels.REFERENCES else np.float32

@@ -1,14 +1,13 @@
 """Loss functions of residuals: squared, absolute, and robust by distance.
 
-Like residuals, values are written for any kind of number; training evaluates them on tensors.
+Like residuals they are written for any kind of number; training and batched solves evaluate
+them on tensors. Residuals then are (r, e, ...), and parameters may differ along the last axes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Protocol
-
-import numpy as np
 
 from gso.geometry import ops
 from gso.typing import Array
@@ -32,7 +31,7 @@ class Squared:
         return 0.5 * r * r
 
     def weights(self, r: Array) -> tuple[Array, Array]:
-        return r, np.ones_like(r)
+        return r, ops.like(r, 1.0)
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ class Absolute:
         return ops.sqrt(r * r + self.eps**2) - self.eps
 
     def weights(self, r: Array) -> tuple[Array, Array]:
-        w = 1.0 / np.sqrt(r * r + self.eps**2)
+        w = 1.0 / ops.sqrt(r * r + self.eps**2)
         return r * w, w
 
 
@@ -68,5 +67,5 @@ class Distance:
         return self.eps * (self._root(r) - self.eps)
 
     def weights(self, r: Array) -> tuple[Array, Array]:
-        w = np.broadcast_to(self.eps / self._root(r), r.shape)
-        return r * w, w
+        w = self.eps / self._root(r)
+        return r * w, ops.like(r, w)

@@ -92,7 +92,7 @@ class TwoPowerLoss:
         return self.knee ** (self.p - self.q)
 
     def _squares(self, r: Array) -> tuple[Array, Array]:
-        parts = r.reshape(3, -1, r.shape[1])
+        parts = r.reshape(3, -1, *r.shape[1:])
         return parts, 0.5 / self.level**2 * (parts * parts).sum(axis=0)
 
     def value(self, r: Array) -> Array:
@@ -107,12 +107,12 @@ class TwoPowerLoss:
     def weights(self, r: Array) -> tuple[Array, Array]:
         """Return the derivative, and the curvature without negative part and cross terms."""
         parts, y = self._squares(r)
-        held = np.minimum(y, (_STEEPEST * self.knee) ** 2)
+        held = ops.minimum(y, (_STEEPEST * self.knee) ** 2)
         low = (y + self.eps**2) ** (0.5 * self.p - 1.0)
         first = low + self.peak * held ** (0.5 * self.q - 1.0)
         growth = (0.5 * self.p - 1.0) * low / (y + self.eps**2)
         rising = (0.5 * self.q - 1.0) * self.peak * held ** (0.5 * self.q - 2.0)
-        growth = np.maximum(growth + np.where(y > held, 0.0, rising), 0.0) / self.level**2
+        growth = ops.maximum(growth + ops.where(y > held, 0.0, rising), 0.0) / self.level**2
         return (first * parts).reshape(r.shape), (first + growth * parts**2).reshape(r.shape)
 
 
@@ -134,7 +134,7 @@ class PowerLoss:
     q: float
 
     def _squares(self, r: Array) -> tuple[Array, Array]:
-        parts = r.reshape(3, -1, r.shape[1])
+        parts = r.reshape(3, -1, *r.shape[1:])
         return parts, 0.5 / self.scale**2 * (parts * parts).sum(axis=0)
 
     def value(self, r: Array) -> Array:

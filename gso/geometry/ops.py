@@ -1,4 +1,4 @@
-"""Square root, atan2, minimum and stack for NumPy, torch and CasADi numbers.
+"""Square root, atan2, minimum, maximum, where and stack for NumPy, torch and CasADi numbers.
 
 The module is found from the type of the argument, so neither torch nor casadi is imported
 here: a caller with such a number has imported its package already.
@@ -48,6 +48,31 @@ def minimum(x: Any, y: Any) -> Any:
     if mod.__name__ != "torch":
         return mod.fmin(x, y)
     return mod.minimum(x, y) if _module_of(y) is mod else mod.clamp(x, max=y)
+
+
+def maximum(x: Any, y: Any) -> Any:
+    """Return the larger of two numbers."""
+    mod = _module_of(x)
+    if mod is None:
+        return np.maximum(x, y)
+    if mod.__name__ != "torch":
+        return mod.fmax(x, y)
+    return mod.maximum(x, y) if _module_of(y) is mod else mod.clamp(x, min=y)
+
+
+def where(condition: Any, x: Any, y: Any) -> Any:
+    """Return x where a condition on NumPy arrays or torch tensors holds, and y elsewhere."""
+    mod = _module_of(condition)
+    return np.where(condition, x, y) if mod is None else mod.where(condition, x, y)
+
+
+def like(x: Any, values: Any) -> Any:
+    """Broadcast values to the shape of a NumPy array or torch tensor x."""
+    mod = _module_of(x)
+    if mod is None:
+        return np.broadcast_to(np.asarray(values, x.dtype), x.shape)
+    given = values if _module_of(values) is mod else mod.as_tensor(values).to(x)
+    return given.expand(x.shape)
 
 
 def stack(arrays: Sequence[Any]) -> Any:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
-from gso.energy import Limit
+from gso.geometry import ops, sub
+from gso.geometry.vector import Vec
 from gso.typing import Array, Ints
 from gso.unknowns import Layout
 
@@ -12,12 +17,38 @@ from gso.unknowns import Layout
 SAFETY = 0.9
 
 
-def orientation(triangles: Ints, layout: Layout) -> Limit:
+@dataclass(frozen=True, eq=False)
+class Orientation:
+    """A limit on steps so that no triangle of the block "flat" collapses or inverts.
+
+    Attributes
+    ----------
+    corners : ndarray of int, (3, t)
+        Corners of the triangles, anticlockwise where a triangle is not inverted.
+    start, count : int
+        Place of the block in the coordinate vector, and its number of vertices.
+    """
+
+    corners: Ints
+    start: int
+    count: int
+
+    def __call__(self, coordinates: Array, direction: Array) -> float:
+        """Return the largest step, at most 1."""
+        part = slice(self.start, self.start + 2 * self.count)
+        flat, moved = (
+            np.ascontiguousarray(c[part].reshape(-1, 2).T) for c in (coordinates, direction)
+        )
+        at, along = ([tuple(p[:, k]) for k in self.corners] for p in (flat, moved))
+        with np.errstate(invalid="ignore"):
+            steps = degenerate(at, along)
+        return float(min(1.0, SAFETY * steps.min(initial=np.inf)))
+
+
+def orientation(triangles: Ints, layout: Layout) -> Orientation:
     """Limit steps so that no triangle of the block "flat" collapses or inverts.
 
-    Along a step the signed area of a triangle is quadratic in the step length. The step is
-    limited to :data:`SAFETY` times the smallest positive root over all triangles (Smith and
-    Schaefer 2015, Bijective parameterization with free boundaries, section 3.3).
+    The step is limited to :data:`SAFETY` times that at which the first triangle degenerates.
     Triangles that are inverted already are ignored.
 
     Parameters
@@ -28,31 +59,30 @@ def orientation(triangles: Ints, layout: Layout) -> Limit:
         Layout of the coordinate vector.
     """
     start, count, _ = layout.where("flat")
-    part = slice(start, start + 2 * count)
-    corners = np.ascontiguousarray(triangles.T)
-
-    def limit(coordinates: Array, direction: Array) -> float:
-        e, f = _edges(coordinates[part], corners)
-        de, df = _edges(direction[part], corners)
-        c = _cross(e, f)
-        b = _cross(e, df) + _cross(de, f)
-        a = _cross(de, df)
-        # 2c / (sqrt(b^2 - 4ac) - b) is the smallest positive root, if there is one.
-        with np.errstate(invalid="ignore"):
-            steepness = np.sqrt(b * b - 4.0 * a * c) - b
-        falling = (steepness > 0) & (c > 0)
-        if not falling.any():
-            return 1.0
-        return float(min(1.0, SAFETY * (2.0 * c[falling] / steepness[falling]).min()))
-
-    return limit
+    return Orientation(np.ascontiguousarray(triangles.T), start, count)
 
 
-def _edges(flat: Array, corners: Ints) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    x, y = np.ascontiguousarray(flat.reshape(-1, 2).T)
-    px, py = x[corners[0]], y[corners[0]]
-    return (x[corners[1]] - px, y[corners[1]] - py), (x[corners[2]] - px, y[corners[2]] - py)
+def degenerate(points: Sequence[Vec], directions: Sequence[Vec]) -> Any:
+    """Compute the step at which each triangle degenerates; infinity where none does.
+
+    Along a step the signed area of a triangle is quadratic in the step length; this is the
+    smallest positive root (Smith and Schaefer 2015, Bijective parameterization with free
+    boundaries, section 3.3). It is infinite for triangles that are inverted already.
+
+    Parameters
+    ----------
+    points, directions : three tuples (x, y) of arrays or tensors
+        Corners, and their displacements by a full step.
+    """
+    e, f, de, df = (sub(corners[k], corners[0]) for corners in (points, directions) for k in (1, 2))
+    c = _cross(e, f)
+    b = _cross(e, df) + _cross(de, f)
+    a = _cross(de, df)
+    # 2c / (sqrt(b^2 - 4ac) - b) is the smallest positive root, if there is one.
+    steepness = (b * b - 4.0 * a * c) ** 0.5 - b
+    falling = (steepness > 0) & (c > 0)
+    return ops.where(falling, 2.0 * c / ops.where(falling, steepness, 1.0), float("inf"))
 
 
-def _cross(a: tuple[Array, Array], b: tuple[Array, Array]) -> Array:
+def _cross(a: Vec, b: Vec) -> Any:
     return a[0] * b[1] - a[1] * b[0]

@@ -132,7 +132,10 @@ class Run:
     def _solution(self, plan: Plan, options: Options) -> Solution:
         if not plan.stages:
             return _finished(plan, plan.start, plan.status or Status.CONVERGED)
-        reached = self.through(plan, options)
+        return self.concluded(plan, self.through(plan, options))
+
+    def concluded(self, plan: Plan, reached: Reached) -> Solution:
+        """Return the solution of a plan whose stages have been solved."""
         coordinates, energy = _guard(plan, reached.stage, reached.coordinates)
         status = reached.minimum.status
         if plan.status is not None and status is not Status.CANCELLED:

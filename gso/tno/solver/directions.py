@@ -6,11 +6,24 @@ from typing import Any
 
 import numpy as np
 
+from gso.geometry import ops
 from gso.linalg import SingularError
 from gso.typing import Array, Ints
 
 #: Relative damping above which an indefinite matrix is given up for the gradient direction.
-_HOPELESS = 1e3
+HOPELESS = 1e3
+
+
+def raised(damping: Any) -> Any:
+    """Return the damping after a failed factorisation; of a number or a tensor."""
+    return ops.maximum(10.0 * damping, 1e-12)
+
+
+def adapted(damping: Any, step: Any) -> Any:
+    """Return Levenberg-Marquardt's damping after a step: less after full ones, more after short."""
+    less = ops.maximum(damping / 5.0, 1e-12)
+    more = ops.minimum(8.0 * ops.maximum(damping, 1e-9), 1.0)
+    return ops.where(step >= 1.0, less, ops.where(step < 0.3, more, damping))
 
 
 class GaussNewton:
@@ -50,8 +63,8 @@ class GaussNewton:
                     return direction
             except SingularError:
                 pass
-            damping = max(10.0 * damping, 1e-12)
-            if damping > _HOPELESS:
+            damping = float(raised(damping))
+            if damping > HOPELESS:
                 return -gradient / float(values[diagonal].max())
 
     def accepted(self, step: float) -> None:
@@ -66,7 +79,4 @@ class LevenbergMarquardt(GaussNewton):
 
     def accepted(self, step: float) -> None:
         """Adapt the damping to the accepted step length."""
-        if step >= 1.0:
-            self.damping = max(self.damping / 5.0, 1e-12)
-        elif step < 0.3:
-            self.damping = min(max(self.damping, 1e-9) * 8.0, 1.0)
+        self.damping = float(adapted(self.damping, step))

@@ -3,10 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
-import numpy as np
-
+from gso.geometry import ops
 from gso.typing import Array
+
+#: Required share of the linear decrease, and smallest step that is tried.
+DECREASE, SHORTEST = 1e-4, 1e-4
+
+
+def shorter(step: Any, rise: Any, slope: Any) -> Any:
+    """Return the step to try after one that did not lower the energy enough.
+
+    It is the minimum of the parabola through the two known values and the slope, clipped to
+    between a tenth and a half of the last step.
+
+    Parameters
+    ----------
+    step : float or tensor
+        The last step.
+    rise : float or tensor
+        Energy there minus that at the start; infinite where it is not finite.
+    slope : float or tensor
+        Slope of the energy times the step.
+    """
+    fitted = -slope * step / ops.maximum(2.0 * (rise - slope), 1e-300)
+    fitted = ops.minimum(ops.maximum(fitted, 0.1 * step), 0.5 * step)
+    return ops.where(rise < float("inf"), fitted, 0.3 * step)
 
 
 def armijo(
@@ -18,16 +41,15 @@ def armijo(
     *,
     project: Callable[[Array], Array] | None = None,
     longest: float = 1.0,
-    decrease: float = 1e-4,
-    shortest: float = 1e-4,
+    decrease: float = DECREASE,
+    shortest: float = SHORTEST,
 ) -> tuple[Array, float, float]:
     """Backtrack from the longest step until the energy falls in proportion to the slope.
 
     With bounds, trial points are projected onto them (Bertsekas 1982) and the slope is
     that of the projected step.
 
-    The next step is the minimum of the parabola through the two known values and the slope,
-    clipped to between a tenth and a half of the last step.
+    :func:`shorter` gives the next step.
 
     Parameters
     ----------
@@ -57,9 +79,5 @@ def armijo(
         value = energy(candidate)
         if value <= start + decrease * slope:
             return candidate, value, t
-        if np.isfinite(value):
-            fitted = -slope * t / max(2.0 * (value - start - slope), 1e-300)
-            t = float(np.clip(fitted, 0.1 * t, 0.5 * t))
-        else:
-            t *= 0.3
+        t = float(shorter(t, value - start, slope))
     return x, start, 0.0

@@ -6,12 +6,23 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from gso.geometry import ops
 from gso.status import Status
 from gso.tno.solver.directions import GaussNewton, LevenbergMarquardt
 from gso.tno.solver.line_search import armijo
 
 #: Energy (dimensionless) that counts as zero.
 _NOTHING = 1e-20
+
+
+def falls(before: Any, after: Any, step: Any, expected: Any, tolerance: float) -> tuple[Any, Any]:
+    """Return whether the energy falls enough to go on, and whether the solve has converged if not.
+
+    The arguments are those of :func:`relative_decrease`, or tensors of them.
+    """
+    least = tolerance * abs(before)
+    # A rejected step is no failure if the predicted decrease is negligible.
+    return before - after > least, (step > 0) | (expected <= ops.maximum(least, _NOTHING))
 
 
 def relative_decrease(
@@ -35,11 +46,10 @@ def relative_decrease(
     Status or None
         None to continue.
     """
-    if before - after > tolerance * abs(before):
+    enough, well = falls(before, after, step, expected, tolerance)
+    if enough:
         return None
-    # A rejected step is no failure if the predicted decrease is negligible.
-    done_well = step > 0 or expected <= max(tolerance * abs(before), _NOTHING)
-    return Status.CONVERGED if done_well else Status.STALLED
+    return Status.CONVERGED if well else Status.STALLED
 
 
 @dataclass(frozen=True)

@@ -112,6 +112,47 @@ def numpy_source(function: Any) -> str:
     return "def kernel(x, c, r, J, w):\n" + "".join(f"    {line}\n" for line in lines or ["pass"])
 
 
+class _Tensors:
+    """Statements on PyTorch tensors; numbers in the graph become tensors, by their values."""
+
+    def __init__(self) -> None:
+        self.numbers: dict[str, str] = {}
+
+    def given(self, array: str, index: int) -> str:
+        return f"{array}[{index}]"
+
+    def slot(self, index: int) -> str:
+        return f"w[{index}]"
+
+    def _tensor(self, operand: str) -> str:
+        if operand.endswith("]"):
+            return operand
+        return self.numbers.setdefault(operand, f"k[{len(self.numbers)}]")
+
+    def step(self, name: str, slot: int, operands: list[str]) -> str:
+        said = ", ".join(map(self._tensor, operands))
+        return f"torch.{_TORCH.get(name, name)}({said}, out=w[{slot}])"
+
+    def store(self, output: int, index: int, operand: str) -> str:
+        return f"{'rJ'[output]}[{index}].copy_({self._tensor(operand)})"
+
+
+#: PyTorch's names of NumPy's ufuncs, where they differ.
+_TORCH = {"equal": "eq"}
+
+
+def torch_source(function: Any) -> tuple[str, list[float]]:
+    """Return the source of ``kernel(x, c, r, J, w, k)`` on tensors, and the numbers k it needs.
+
+    x, c, r, J, w and k are sequences of tensors: coordinates, constants, residuals, entries of
+    the Jacobian, work slots, and numbers without dimensions.
+    """
+    style = _Tensors()
+    lines = printed(function, style)
+    body = "".join(f"    {line}\n" for line in lines or ["pass"])
+    return "def kernel(x, c, r, J, w, k):\n" + body, [float(text) for text in style.numbers]
+
+
 _SCALAR = {
     "add": "{0} + {1}",
     "subtract": "{0} - {1}",

@@ -1,0 +1,163 @@
+"""Cholesky factorisation of many block-banded matrices at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from gso.errors import BackendError
+from gso.linalg.base import Pattern
+from gso.typing import Ints
+
+#: Time per floating-point operation of a factorisation and of a triangular solve, relative to a
+#: product; and that of calling them, as a number of operations. Measured on a processor.
+_FACTOR, _SOLVE, _CALL = 6.0, 2.5, 3e5
+#: Smallest blocks, most blocks over which the band is divided, and most bytes of one matrix.
+_SMALLEST, _DEEPEST, _LARGEST = 8, 6, 2e8
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Division of a banded matrix into square blocks.
+
+    Attributes
+    ----------
+    size : int
+        Rows of a block.
+    count : int
+        Blocks along the diagonal; the last one may have rows past the matrix.
+    band : int
+        Blocks below each diagonal block that may have entries.
+    """
+
+    size: int
+    count: int
+    band: int
+
+    @property
+    def cost(self) -> float:
+        """Approximate time of a factorisation, in operations of a product."""
+        p, cube = self.band, float(self.size) ** 3
+        calls = 2 + p + p * (p + 1) / 2
+        each = (_FACTOR / 3 + _SOLVE * p + p * (p + 1)) * cube + _CALL * calls
+        return self.count * each
+
+    @property
+    def bytes(self) -> int:
+        """Memory of one matrix."""
+        return 8 * self.count * (self.band + 1) * self.size**2
+
+
+def divide(pattern: Pattern) -> Blocks | None:
+    """Divide a matrix into blocks such that its factorisation is fast; None if it is too large.
+
+    On grids numbered row by row a block has the unknowns of a row.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        Sparsity pattern of the lower triangle.
+    """
+    n, band = pattern.size, max(pattern.bandwidth, 1)
+    # Products of blocks of odd sizes are slower.
+    sizes = {8 * -(-band // (8 * k)) for k in range(1, _DEEPEST + 1)}
+    # Blocks that divide the matrix evenly are those of whole rows.
+    sizes |= {size for size in range(_SMALLEST, 2 * band + 1) if n % size == 0}
+    found = []
+    for size in sorted(min(max(size, _SMALLEST), n) for size in sizes):
+        apart = int((pattern.indices // size - pattern.columns // size).max(initial=0))
+        found.append(Blocks(size, -(-n // size), apart))
+    best = min(found, key=lambda blocks: blocks.cost)
+    return best if best.bytes <= _LARGEST else None
+
+
+class BlockBanded:
+    """Symmetric positive definite matrices with one block-banded pattern.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        Sparsity pattern of the lower triangle.
+    order : ndarray of int, (nnz,)
+        Entry of the pattern that each row of the values given to :meth:`factor` is.
+    blocks : Blocks
+        The division of the matrix.
+    device : torch.device
+    """
+
+    def __init__(self, pattern: Pattern, order: Ints, blocks: Blocks, device: torch.device):
+        self.blocks, self.unknowns = blocks, pattern.size
+        m, band = blocks.size, blocks.band + 1
+        row, column = pattern.indices[order], pattern.columns[order]
+        block, below = column // m, row // m - column // m
+        # Diagonal blocks have both triangles.
+        twin = np.flatnonzero((below == 0) & (row != column))
+        self._twin = torch.as_tensor(twin, device=device)
+        panel = np.r_[block * band + below, (block * band)[twin]]
+        place = np.r_[(row % m) * m + column % m, ((column % m) * m + row % m)[twin]]
+        self._panel = torch.as_tensor(panel, device=device)
+        self._place = torch.as_tensor(place, device=device)
+        self._storage: Tensor | None = None
+        self._diagonal: list[Tensor] = []
+
+    def factor(self, values: Tensor) -> Tensor:
+        """Factor matrices, and return the mask (B,) of those that are not positive definite.
+
+        Parameters
+        ----------
+        values : Tensor, (nnz, B)
+            Entries of the lower triangles.
+        """
+        m, count, band = self.blocks.size, self.blocks.count, self.blocks.band
+        surfaces = values.shape[1]
+        shape = (count, band + 1, surfaces, m, m)
+        if self._storage is None or self._storage.shape != shape:
+            self._storage = None
+            self._storage = values.new_zeros(shape)
+        else:
+            self._storage.zero_()
+        a = self._storage
+        flat = a.view(count * (band + 1), surfaces, m * m)
+        flat[self._panel, :, self._place] = torch.cat([values, values.index_select(0, self._twin)])
+        # Rows past the matrix are those of the identity.
+        a[-1, 0].diagonal(dim1=-2, dim2=-1)[:, self.unknowns - (count - 1) * m :] = 1.0
+        failed = torch.zeros(surfaces, dtype=torch.int32, device=values.device)
+        self._diagonal = []
+        for k in range(count):
+            lower, info = torch.linalg.cholesky_ex(a[k, 0])
+            self._diagonal.append(lower)
+            failed += info.abs()
+            beyond = min(band, count - 1 - k)
+            for d in range(1, beyond + 1):
+                # X L^T = A, in place.
+                turned = a[k, d].mT
+                torch.linalg.solve_triangular(lower, turned, upper=False, out=turned)
+            for d in range(1, beyond + 1):
+                for e in range(1, d + 1):
+                    a[k + e, d - e].baddbmm_(a[k, d], a[k, e].mT, alpha=-1.0)
+        return failed > 0
+
+    def solve(self, rhs: Tensor) -> Tensor:
+        """Solve for the right-hand sides (n, B), one for each matrix."""
+        if self._storage is None:
+            raise BackendError("there is no factorisation to solve with")
+        a = self._storage
+        m, count, band = self.blocks.size, self.blocks.count, self.blocks.band
+        x = rhs.new_zeros((rhs.shape[1], count * m, 1))
+        x[:, : self.unknowns, 0] = rhs.T
+        x = x.view(-1, count, m, 1)
+        parts = list(x.unbind(1))
+        for k in range(count):
+            here = torch.linalg.solve_triangular(self._diagonal[k], parts[k], upper=False)
+            parts[k] = here
+            for d in range(1, min(band, count - 1 - k) + 1):
+                parts[k + d] = torch.baddbmm(parts[k + d], a[k, d], here, alpha=-1.0)
+        for k in range(count - 1, -1, -1):
+            here = parts[k]
+            for d in range(1, min(band, count - 1 - k) + 1):
+                here = torch.baddbmm(here, a[k, d].mT, parts[k + d], alpha=-1.0)
+            parts[k] = torch.linalg.solve_triangular(self._diagonal[k].mT, here, upper=True)
+        return torch.cat(parts, dim=1)[:, : self.unknowns, 0].T.contiguous()

@@ -1,0 +1,112 @@
+"""The solve of many grids of one size in batches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+
+from gso.errors import GSOError, MeshError
+from gso.result import Result
+from gso.spelling import known_keywords
+from gso.tno.batched.asked import checked
+from gso.tno.batched.batches import solved
+from gso.typing import Array
+
+
+@known_keywords()
+def optimize_batch(
+    points: Any,
+    *,
+    task: str = "developable",
+    formulation: str | None = None,
+    options: Any = None,
+    device: str = "cpu",
+    workers: int | None = None,
+    verdict: bool = False,
+) -> list[Result]:
+    """Make many grids of one size developable, or flatten them, in batches on PyTorch tensors.
+
+    The objective and the stages are those of :func:`gso.tno.optimize`, and so are the results,
+    up to rounding errors and what the iterations make of them. But for these, a result does not
+    depend on the other surfaces. On a graphics processor all surfaces are solved together.
+    Surfaces whose stages differ from those of the others, such as noisy or closed ones, are
+    solved in smaller batches, or one by one.
+
+    Parameters
+    ----------
+    points : array_like or Tensor, (B, H, W, 3)
+        The designs, in any unit of length; each may be in its own.
+    task : {"developable", "flatten"}
+        What to do.
+    formulation : str, optional
+        "curvature" for `developable`; "strain" (default) or "lengths" for `flatten`.
+    options : str or Options, optional
+        "fast", "balanced" (default), "accurate", or an options dataclass of the task. The linear
+        backend and the number of threads in it are not used.
+    device : str
+        PyTorch's name of the device: "cpu", "cuda", "cuda:1" ...
+    workers : int, optional
+        "cpu": number of worker processes; as many as save time when not given, 0 for none.
+    verdict : bool
+        Judge the results, and flatten developable ones to measure their strain. This is done
+        surface by surface on the processor.
+
+    Returns
+    -------
+    list of Result
+        In the order of the designs. Their `seconds` are a share of those of their batch.
+
+    Raises
+    ------
+    MeshError
+        The designs are not grids of one size, or one cannot be used; the message has its index.
+    OptionError
+        An option is unknown, has no batched solve, or the device does not exist.
+
+    Examples
+    --------
+    >>> import numpy as np, gso
+    >>> u, v = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
+    >>> saddles = np.stack([np.stack([u, v, s * u * v], axis=-1) for s in (0.2, 0.3)])
+    >>> results = gso.tno.optimize_batch(saddles, workers=0)
+    >>> [r.metrics["loss_gc"] < r.metrics["loss_gc_before"] for r in results]
+    [True, True]
+    """
+    designs = _designs(points)
+    asked = checked(task, formulation, options, device, verdict)
+    out: list[Result] = []
+    for index, found in enumerate(solved(asked, list(designs), workers)):
+        if isinstance(found, GSOError):
+            raise type(found)(f"surface {index}: {found}")
+        out.append(found)
+    return out
+
+
+def _designs(points: Any) -> Array:
+    """Return designs (B, H, W, 3) as an array, or say what is wrong with which."""
+    if isinstance(points, torch.Tensor):
+        points = points.detach().cpu().numpy()
+    try:
+        designs = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        designs = None
+    if designs is None:
+        shapes = [np.shape(p) for p in points] if isinstance(points, Sequence) else []
+        odd = next((k for k, s in enumerate(shapes) if s != shapes[0]), None)
+        if odd is not None:
+            raise MeshError(
+                f"surface {odd} has shape {shapes[odd]} and surface 0 has {shapes[0]}; a batch "
+                "has grids of one size, others are solved by gso.tno.optimize_many"
+            )
+        raise MeshError("the surfaces must be an array of numbers (B, H, W, 3)")
+    if designs.ndim != 4 or designs.shape[-1] != 3:
+        raise MeshError(f"expected a batch of grids (B, H, W, 3), not {designs.shape}")
+    bad = ~np.isfinite(designs).all(axis=(1, 2, 3))
+    if bad.any():
+        k = int(bad.argmax())
+        i, j = np.argwhere(~np.isfinite(designs[k]).all(axis=-1))[0]
+        raise MeshError(f"surface {k}: grid vertex ({i}, {j}) is not finite")
+    return designs

@@ -1,0 +1,484 @@
+"""Batched solves: the same objective and results as one surface at a time."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import gso
+from gso import tasks
+from gso.constraints import Compiled
+from gso.dataset import bezier
+from gso.energy import registry
+from gso.linalg.base import Pattern
+from gso.tasks.base import Request
+from gso.tno.normalise import Canonical
+from gso.tno.solver import kernels
+from gso.tno.solver.problem import Problem
+from gso.unknowns.base import DIMENSIONS
+from tests.conftest import cylinder, meshes, saddle
+
+torch = pytest.importorskip("torch")
+
+from gso.linalg import banded as lapack  # noqa: E402
+from gso.tno.batched import cholesky, search, stages  # noqa: E402
+from gso.tno.batched import kernels as on_tensors  # noqa: E402
+from gso.tno.batched.asked import checked  # noqa: E402
+from gso.tno.batched.batches import solved  # noqa: E402
+from gso.tno.batched.sums import Sums  # noqa: E402
+from gso.tno.batched.unknowns import Unbatchable  # noqa: E402
+from gso.tno.solver.directions import GaussNewton  # noqa: E402
+
+CPU = torch.device("cpu")
+SIZE = 33
+
+
+TERMS = [
+    pytest.param(term, id=f"{name}-{kind}-{k}")
+    for name, module in registry().items()
+    for kind, mesh in meshes().items()
+    for k, term in enumerate(module.examples(mesh))
+]
+
+
+@pytest.fixture(scope="module")
+def designs():
+    return np.stack([s.sample(SIZE) for s in bezier.generate(4, seed=11)])
+
+
+def planned(task, points, **request):
+    module = tasks.get(task)
+    mesh = Canonical(gso.Mesh.from_grid(points)).mesh
+    formulation, kind = tasks.choose(module, request.pop("formulation", None), None)
+    options = kind.coerce(request.pop("options", None))
+    analysis = tasks.analyse(module, mesh, Compiled(flat=task == "flatten"))
+    return module.plan(analysis, Request(options, formulation, **request))
+
+
+def bump(n, height):
+    """A surface far from any plane: its flat image needs the stages against collapse."""
+    u, v = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")
+    return np.stack([u, v, height * np.exp(-3.0 * (u * u + v * v))], axis=-1)
+
+
+CASES = {
+    "developable": ("developable", {}, None),
+    "accurate": ("developable", {"options": "accurate"}, None),
+    "flatten": ("flatten", {}, None),
+    "lengths": ("flatten", {"formulation": "lengths"}, None),
+    "strained": ("flatten", {}, (3.0, 3.2)),
+}
+
+
+@pytest.mark.parametrize("term", TERMS)
+def test_kernels_are_those_of_the_solver(term):
+    shape = tuple(DIMENSIONS[block] for block, index in term.stencil for _ in range(index.shape[1]))
+    rng = np.random.default_rng(0)
+    x = rng.standard_normal((sum(shape), 40))
+    c = 0.5 + rng.random((len(term.constants), 40))
+    given = torch.as_tensor(x).view(-1, 8, 5), torch.as_tensor(c).view(-1, 8, 5)
+    pairs = [("kernel", term.residual, (False,)), ("kernel", term.residual, (True,))]
+    if term.vectors is not None:
+        pairs.append(("geometric_stiffness", term.vectors, ()))
+    for name, function, more in pairs:
+        key = function, shape, len(c), *more
+        wanted = getattr(kernels, name)(*key)(x, c)
+        found = getattr(on_tensors, name)(*key)(*given)
+        for a, b in zip(found, wanted, strict=True):
+            assert a.shape == (*b.shape[:-1], 8, 5)
+            np.testing.assert_allclose(a.reshape(b.shape), b, rtol=1e-11, atol=1e-12)
+
+
+def close(found, wanted):
+    np.testing.assert_allclose(found, wanted, rtol=1e-10, atol=1e-10 * np.abs(wanted).max())
+
+
+def lower(pattern, values):
+    from scipy.sparse import csc_matrix
+
+    return csc_matrix((values, pattern.indices, pattern.indptr), shape=(pattern.size,) * 2)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_energy_gradient_and_matrix_are_those_of_the_solver(name, designs):
+    task, request, heights = CASES[name]
+    points = designs[:2] if heights is None else np.stack([bump(21, h) for h in heights])
+    plans = [planned(task, p, **request) for p in points]
+    assert len({stages.structure(plan) for plan in plans}) == 1
+    rng = np.random.default_rng(0)
+    coordinates = [plan.start for plan in plans]
+    for own in zip(*(plan.stages for plan in plans), strict=True):
+        coordinates = [s.enter(c) for s, c in zip(own, coordinates, strict=True)]
+        problem, x, losses = stages.begun(own, coordinates, CPU)
+        x = x + 1e-4 * torch.as_tensor(rng.standard_normal(x.shape))
+        for number, loss in enumerate(losses or [None]):
+            here = problem if loss is None else problem.with_loss(own[0].continued, loss)
+            energy, gradient, values = here.linearise(x)
+            step = torch.as_tensor(rng.standard_normal(x.shape))
+            longest = here.largest_step(x, step)
+            order = np.argsort(here.structure.entries.order)
+            for k, stage in enumerate(own):
+                one = Problem(stage.items, stage.unknowns(coordinates[k]), stage.limits)
+                if loss is not None:
+                    one = one.with_loss(stage.continued, stage.continuation[number])
+                wanted = one.linearise(x[:, k].numpy())
+                assert float(energy[k]) == pytest.approx(wanted[0], rel=1e-12)
+                close(gradient[:, k].numpy(), wanted[1])
+                # The patterns differ by entries that are always zero.
+                matrix = lower(here.structure.pattern, values[:, k].numpy()[order])
+                difference = matrix - lower(one.pattern, wanted[2])
+                assert abs(difference).max() <= 1e-10 * np.abs(wanted[2]).max()
+                assert float(here.energy(x)[k]) == pytest.approx(wanted[0], rel=1e-12)
+                limit = one.largest_step(x[:, k].numpy(), step[:, k].numpy())
+                assert float(longest[k]) == pytest.approx(limit, rel=1e-12)
+        some = problem.of_surfaces(torch.tensor([1]))
+        np.testing.assert_allclose(some.energy(x[:, 1:]), problem.energy(x)[1:], rtol=1e-13)
+
+
+def banded(n, band, seed, count=3):
+    """A band pattern, and values of positive definite matrices, (nnz, count)."""
+    rows = [np.arange(j, min(j + band + 1, n)) for j in range(n)]
+    indptr = np.r_[0, np.cumsum([len(r) for r in rows])]
+    pattern = Pattern(n, indptr, np.concatenate(rows))
+    values = np.random.default_rng(seed).standard_normal((pattern.nnz, count))
+    values[indptr[:-1]] += 4.0 * band + 6.0
+    return pattern, values
+
+
+def dense(pattern, values):
+    out = np.zeros((pattern.size, pattern.size))
+    out[pattern.indices, pattern.columns] = values
+    return out + np.tril(out, -1).T
+
+
+@pytest.mark.parametrize(("n", "band"), [(60, 7), (61, 10), (5, 4), (40, 1), (96, 50)])
+def test_factorisation_solves(n, band):
+    pattern, values = banded(n, band, 3)
+    order = np.random.default_rng(0).permutation(pattern.nnz)
+    blocks = cholesky.divide(pattern)
+    solver = cholesky.BlockBanded(pattern, order, blocks, CPU)
+    rhs = np.random.default_rng(1).standard_normal((n, 3))
+    for _ in range(2):
+        assert not solver.factor(torch.as_tensor(values[order])).any()
+        x = solver.solve(torch.as_tensor(rhs)).numpy()
+        for k in range(3):
+            np.testing.assert_allclose(dense(pattern, values[:, k]) @ x[:, k], rhs[:, k], atol=1e-9)
+
+
+def test_only_indefinite_matrices_are_damped():
+    pattern, values = banded(48, 6, 5)
+    diagonal = pattern.indptr[:-1]
+    values[diagonal[17], 1] = -30.0
+    solver = cholesky.BlockBanded(pattern, np.arange(pattern.nnz), cholesky.divide(pattern), CPU)
+    assert solver.factor(torch.as_tensor(values)).tolist() == [False, True, False]
+    gradient = torch.as_tensor(np.random.default_rng(2).standard_normal((48, 3)))
+    found = search.direction(
+        solver,
+        torch.as_tensor(values.copy()),
+        torch.as_tensor(diagonal),
+        gradient,
+        torch.full((3,), 1e-9, dtype=torch.float64),
+    )
+    for k in (0, 2):
+        exact = -np.linalg.solve(dense(pattern, values[:, k]), gradient[:, k].numpy())
+        np.testing.assert_allclose(found[:, k], exact, rtol=1e-6)
+    own = np.ascontiguousarray(values[:, 1])
+    wanted = GaussNewton().step(lapack.Solver(pattern), own, diagonal, gradient[:, 1].numpy())
+    np.testing.assert_allclose(found[:, 1], wanted, rtol=1e-8)
+
+
+def test_a_hopeless_matrix_gives_the_gradient():
+    pattern, values = banded(24, 3, 5, 1)
+    values[:] = 0.0
+    values[pattern.indptr[:-1]] = -1.0
+    values[0] = 1e-12
+    solver = cholesky.BlockBanded(pattern, np.arange(pattern.nnz), cholesky.divide(pattern), CPU)
+    gradient = torch.ones(24, 1, dtype=torch.float64)
+    found = search.direction(
+        solver,
+        torch.as_tensor(values),
+        torch.as_tensor(pattern.indptr[:-1]),
+        gradient,
+        torch.zeros(1, dtype=torch.float64),
+    )
+    assert (found < 0).all()
+    assert float(found.std()) == 0.0
+
+
+def test_sums_add_every_row():
+    targets = np.random.default_rng(0).integers(0, 9, 200)
+    rows = torch.as_tensor(np.random.default_rng(1).standard_normal((200, 3)))
+    sums = Sums(targets, 11, CPU)
+    wanted = np.zeros((11, 3))
+    np.add.at(wanted, targets, rows.numpy())
+    np.testing.assert_allclose(sums(rows), wanted[sums.order], atol=1e-12)
+
+
+def energies(results):
+    return [sum(r.energy.values()) for r in results]
+
+
+@pytest.mark.parametrize(
+    ("task", "options"),
+    [
+        ("developable", "balanced"),
+        ("developable", "fast"),
+        pytest.param("developable", "accurate", marks=pytest.mark.slow),
+        ("flatten", "balanced"),
+        pytest.param("flatten", "accurate", marks=pytest.mark.slow),
+    ],
+)
+def test_results_are_those_of_single_solves(task, options, designs):
+    batch = gso.tno.optimize_batch(designs, task=task, options=options, workers=0)
+    for design, found in zip(designs, batch, strict=True):
+        one = gso.tno.optimize(design, task=task, options=options, verdict=False)
+        assert found.status is one.status
+        assert found.iterations == one.iterations
+        assert sum(found.energy.values()) == pytest.approx(sum(one.energy.values()), rel=1e-6)
+        assert found.energy.keys() == one.energy.keys()
+        assert len(found.history) == len(one.history)
+        assert found.history[0].energy == pytest.approx(one.history[0].energy, rel=1e-9)
+        assert found.history[-1].name == one.history[-1].name
+        shape = "flat" if task == "flatten" else "mesh"
+        a, b = (getattr(r, shape) for r in (found, one))
+        a, b = (x.vertices if shape == "mesh" else x for x in (a, b))
+        np.testing.assert_allclose(a, b, atol=1e-4)
+        assert found.seconds["total"] > 0
+        assert "cpu" in found.backend
+
+
+@pytest.mark.parametrize("task", ["developable", "flatten"])
+def test_a_result_does_not_depend_on_the_batch(task, designs):
+    together = gso.tno.optimize_batch(designs, task=task, workers=0)
+    for order in ([2], [3, 2], [2, 0, 1]):
+        other = gso.tno.optimize_batch(designs[order], task=task, workers=0)
+        np.testing.assert_allclose(
+            energies(other), [energies(together)[k] for k in order], rtol=1e-9
+        )
+
+
+def test_units_and_positions_do_not_matter(designs):
+    scales = np.array([1.0, 1000.0, 1e-3, 7.0])[:, None, None, None]
+    moved = gso.tno.optimize_batch(scales * designs + 50.0 * scales, workers=0)
+    still = gso.tno.optimize_batch(designs, workers=0)
+    np.testing.assert_allclose(energies(moved), energies(still), rtol=1e-6)
+
+
+def tube(n=SIZE):
+    """A cylinder that nearly closes: it meets itself along a seam of the grid."""
+    t = np.linspace(0.0, 2.0 * np.pi, n)
+    return np.stack(
+        np.broadcast_arrays(np.cos(t)[:, None], np.sin(t)[:, None], np.linspace(0, 2, n)), -1
+    )
+
+
+def odd_ones(n=SIZE):
+    flat = np.dstack([*np.mgrid[:n, :n] / (n - 1.0), np.zeros((n, n))])
+    noisy = cylinder(n) + 1e-3 * np.random.default_rng(0).standard_normal((n, n, 3))
+    pole = saddle(n)
+    pole[0] = pole[0].mean(axis=0)
+    return {"flat": flat, "noisy": noisy, "pole": pole, "tube": tube(n), "bump": bump(n, 3.0)}
+
+
+@pytest.mark.parametrize("task", ["developable", "flatten"])
+def test_surfaces_with_other_stages_are_solved_too(task, designs):
+    some = np.stack([designs[0], *odd_ones().values(), designs[1]])
+    for design, found in zip(some, gso.tno.optimize_batch(some, task=task, workers=0), strict=True):
+        one = gso.tno.optimize(design, task=task, verdict=False)
+        assert found.status is one.status
+        assert (found.pattern is None) == (one.pattern is None)
+        assert sum(found.energy.values()) == pytest.approx(
+            sum(one.energy.values()), rel=1e-3, abs=1e-12
+        )
+        assert found.notes == one.notes
+
+
+@pytest.mark.parametrize(("height", "width"), [(5, 4), (21, 40), (40, 21), (3, 3)])
+def test_other_shapes_of_grids(height, width):
+    some = np.stack([saddle(height, width, s) for s in (0.3, 0.5)])
+    for task in ("developable", "flatten"):
+        found = energies(gso.tno.optimize_batch(some, task=task, workers=0))
+        wanted = energies([gso.tno.optimize(p, task=task, verdict=False) for p in some])
+        np.testing.assert_allclose(found, wanted, rtol=1e-6)
+
+
+def test_other_unknowns_and_methods(designs):
+    for options in (
+        gso.DevelopableOptions(variables="spline"),
+        gso.DevelopableOptions(variables="surface"),
+        gso.DevelopableOptions(method="gauss-newton"),
+        gso.DevelopableOptions(iterations=0, coarse_iterations=1),
+    ):
+        found = energies(gso.tno.optimize_batch(designs[:2], options=options, workers=0))
+        wanted = energies(
+            [gso.tno.optimize(p, options=options, verdict=False) for p in designs[:2]]
+        )
+        np.testing.assert_allclose(found, wanted, rtol=1e-5)
+
+
+@pytest.mark.parametrize("changed", [{"norm": "l1"}, {"norm": "l2"}, {"w_fairness": 1e-4}])
+@pytest.mark.parametrize("formulation", ["strain", "lengths"])
+def test_other_norms(formulation, changed, designs):
+    asked = {"task": "flatten", "formulation": formulation}
+    asked["options"] = gso.FlattenOptions(**changed)
+    found = energies(gso.tno.optimize_batch(designs[:2], workers=0, **asked))
+    wanted = energies([gso.tno.optimize(p, verdict=False, **asked) for p in designs[:2]])
+    np.testing.assert_allclose(found, wanted, rtol=1e-5)
+
+
+def test_verdict(designs):
+    found = gso.tno.optimize_batch(designs[:1], workers=0, verdict=True)[0]
+    one = gso.tno.optimize(designs[0])
+    assert (found.usable, found.reasons) == (one.usable, one.reasons)
+    assert found.pattern is not None
+
+
+@pytest.mark.slow
+def test_worker_processes_give_the_same(designs):
+    some = np.concatenate([designs, 1.5 * designs, designs[:1]])
+    here = gso.tno.optimize_batch(some, task="flatten", workers=0)
+    spread = gso.tno.optimize_batch(some, task="flatten", workers=2)
+    np.testing.assert_allclose(energies(spread), energies(here), rtol=1e-9)
+
+
+def test_an_empty_batch():
+    assert gso.tno.optimize_batch(np.zeros((0, 9, 9, 3))) == []
+
+
+def test_tensors_are_taken(designs):
+    found = gso.tno.optimize_batch(torch.as_tensor(designs[:1]), task="flatten", workers=0)
+    assert found[0].flat.shape == (SIZE * SIZE, 2)
+
+
+class TestRefused:
+    def test_one_surface(self, designs):
+        with pytest.raises(
+            gso.MeshError, match=r"batch of grids \(B, H, W, 3\), not \(33, 33, 3\)"
+        ):
+            gso.tno.optimize_batch(designs[0])
+
+    def test_different_sizes(self):
+        with pytest.raises(gso.MeshError, match=r"surface 2 has shape \(5, 6, 3\) and surface 0"):
+            gso.tno.optimize_batch([saddle(5), saddle(5), saddle(5, 6)])
+
+    def test_no_numbers(self):
+        with pytest.raises(gso.MeshError, match="array of numbers"):
+            gso.tno.optimize_batch("panel.obj")
+
+    def test_not_finite(self, designs):
+        bad = designs.copy()
+        bad[2, 3, 4] = np.nan
+        with pytest.raises(gso.MeshError, match=r"surface 2: grid vertex \(3, 4\) is not finite"):
+            gso.tno.optimize_batch(bad)
+
+    def test_a_surface_without_extent(self, designs):
+        bad = designs.copy()
+        bad[1] = 0.5
+        with pytest.raises(gso.MeshError, match="surface 1: "):
+            gso.tno.optimize_batch(bad, workers=0)
+
+    def test_grids_without_a_solve(self):
+        with pytest.raises(gso.MeshError, match="surface 0: "):
+            gso.tno.optimize_batch(np.zeros((1, 2, 2, 3)), workers=0)
+
+    @pytest.mark.parametrize(
+        "what",
+        [
+            {"task": "denoise"},
+            {"task": "developable", "formulation": "isometry"},
+            {"task": "developable", "options": "jiang2020"},
+            {"task": "developable", "formulation": "ruled"},
+            {"task": "flatten", "formulation": "minimax"},
+            {"task": "bend"},
+        ],
+    )
+    def test_what_has_no_batched_solve(self, what, designs):
+        with pytest.raises(gso.OptionError, match=r"not solved in batches.*optimize_many"):
+            gso.tno.optimize_batch(designs, **what)
+
+    def test_unknown_device(self, designs):
+        with pytest.raises(gso.OptionError, match="device 'quantum' cannot be used"):
+            gso.tno.optimize_batch(designs, device="quantum")
+
+    @pytest.mark.skipif(torch.cuda.is_available(), reason="CUDA is there")
+    def test_a_device_that_is_not_there(self, designs):
+        with pytest.raises(gso.OptionError, match="device 'cuda' cannot be used"):
+            gso.tno.optimize_batch(designs, device="cuda")
+
+    def test_a_misspelt_option(self, designs):
+        with pytest.raises(gso.OptionError, match="did you mean 'device'"):
+            gso.tno.optimize_batch(designs, devise="cpu")
+
+    def test_options_of_single_solves(self, designs):
+        with pytest.raises(gso.OptionError, match="takes no 'max_deviation'"):
+            gso.tno.optimize_batch(designs, max_deviation=0.1)
+
+
+def test_without_torch():
+    code = (
+        "import importlib.util as u; real = u.find_spec\n"
+        "u.find_spec = lambda name, *a: None if name == 'torch' else real(name, *a)\n"
+        "import gso\n"
+        "try: gso.tno.optimize_batch\n"
+        "except gso.BackendError as error: print(error)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert 'need torch: pip install ".[net]"' in done.stdout
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs CUDA")
+@pytest.mark.parametrize("task", ["developable", "flatten"])
+def test_on_a_graphics_processor(task, designs):
+    there = gso.tno.optimize_batch(designs, task=task, device="cuda")
+    again = gso.tno.optimize_batch(designs, task=task, device="cuda")
+    here = gso.tno.optimize_batch(designs, task=task, workers=0)
+    np.testing.assert_allclose(energies(there), energies(here), rtol=1e-5)
+    np.testing.assert_allclose(energies(there), energies(again), rtol=1e-12)
+    assert "cuda" in there[0].backend
+
+
+def test_unknowns_that_cannot_be_stacked(designs):
+    plans = [
+        planned("developable", p, options=gso.DevelopableOptions(variables="spline"))
+        for p in designs[:2]
+    ]
+    own = [plan.stages[-1] for plan in plans]
+    with pytest.raises(Unbatchable):
+        stages.begun(own, [p.reshape(-1) for p in designs[:2]], CPU)
+
+
+def test_a_batch_is_halved_where_memory_is_short(designs, monkeypatch):
+    real, sizes = stages.solve, []
+
+    def small(plans, *given):
+        sizes.append(len(plans))
+        if len(plans) > 1:
+            raise torch.cuda.OutOfMemoryError
+        return real(plans, *given)
+
+    wanted = gso.tno.optimize_batch(designs[:3], task="flatten", workers=0)
+    monkeypatch.setattr(stages, "solve", small)
+    found = gso.tno.optimize_batch(designs[:3], task="flatten", workers=0)
+    assert sizes == [3, 1, 2, 1, 1]
+    np.testing.assert_allclose(energies(found), energies(wanted), rtol=1e-9)
+
+
+def test_what_fails_in_a_batch_is_solved_alone(designs, monkeypatch):
+    def fail(*given):
+        raise gso.MeshError("some surface has no image")
+
+    monkeypatch.setattr(stages, "solve", fail)
+    found = gso.tno.optimize_batch(designs[:2], task="flatten", workers=0)
+    assert [one.backend for one in found] == [
+        gso.tno.optimize(p, task="flatten", verdict=False).backend for p in designs[:2]
+    ]
+
+
+def test_solved_yields_errors_in_place(designs):
+    bad = designs.copy()
+    bad[1] = 0.5
+    found = list(solved(checked("flatten"), bad))
+    assert [isinstance(one, gso.MeshError) for one in found] == [False, True, False, False]
