@@ -26,12 +26,12 @@ def _matrix(source: int, target: int) -> Array:
         powers = np.vander(np.arange(source, dtype=float))
         return np.vander(x, source) @ np.linalg.inv(powers)
     # Second derivatives (bends) at the samples, from those of the values.
-    bends, second = np.zeros((source, source)), np.zeros((source, source))
+    rule, second = np.zeros((source, source)), np.zeros((source, source))
     inner = np.arange(1, source - 1)
     for step, bend, value in ((-1, 1.0, 6.0), (0, 4.0, -12.0), (1, 1.0, 6.0)):
-        bends[inner, inner + step], second[inner, inner + step] = bend, value
-    bends[0, :3] = bends[-1, -3:] = 1.0, -2.0, 1.0
-    bends = np.linalg.solve(bends, second)
+        rule[inner, inner + step], second[inner, inner + step] = bend, value
+    rule[0, :3] = rule[-1, -3:] = 1.0, -2.0, 1.0
+    bends = np.linalg.solve(rule, second)
     below = np.minimum(x.astype(int), source - 2)
     t = (x - below)[:, None]
     own, unit = 1.0 - t, np.eye(source)

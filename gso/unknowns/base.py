@@ -99,7 +99,7 @@ class Variables:
         self.size = layout.size if basis is None else int(basis.shape[1])
 
     @cached_property
-    def single(self) -> tuple[Ints, Array] | tuple[None, None]:
+    def single(self) -> tuple[Ints, Array] | None:
         """The unknown of each coordinate and its share; None where one depends on several.
 
         The unknown of a fixed coordinate is the number of unknowns.
@@ -107,7 +107,7 @@ class Variables:
         basis: Any = self.basis
         count = np.diff(basis.indptr)
         if count.max(initial=0) > 1:
-            return None, None
+            return None
         unknown, share = np.full(len(count), basis.shape[1]), np.zeros(len(count))
         unknown[count > 0], share[count > 0] = basis.indices, basis.data
         return unknown, share

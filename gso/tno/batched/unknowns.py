@@ -49,12 +49,12 @@ class Unknowns:
         first = each[0]
         if first.basis is None:
             return cls(first.size)
-        of, shares = first.single[0], []
+        shares = []
         for variables in each:
-            own, share = variables.single
-            if of is None or own is None or variables.size != first.size:
+            if first.single is None or variables.single is None or variables.size != first.size:
                 raise Unbatchable
-            if not np.array_equal(own, of):
+            of, share = variables.single
+            if not np.array_equal(of, first.single[0]):
                 raise Unbatchable
             shares.append(share)
         if (of >= first.size).any():

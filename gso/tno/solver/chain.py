@@ -110,8 +110,8 @@ def chained(gather: Ints, shape: tuple[int, ...], variables: Variables) -> tuple
     """
     if variables.basis is None:
         return Same(), gather
-    unknown, share = variables.single
-    if unknown is not None:
+    if variables.single is not None:
+        unknown, share = variables.single
         if (variables.basis.data == 1.0).all():
             return Same(), unknown[gather]
         direct = _by_point(gather, shape, variables.size, unknown, share)

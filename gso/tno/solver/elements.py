@@ -125,8 +125,10 @@ class Elements(Values):
         given = coordinates, self.gather, self._constants
         slope = np.empty((min(_BLOCK, count), loop.rows * len(self.gather)))
         rule = self._chain.kind
-        target = (factor, self.columns, places.by_element, places.doubled)
-        target = (*target, rule, self.gather, *self._chain.parts)
+        target = (
+            *(factor, self.columns, places.by_element, places.doubled),
+            *(rule, self.gather, *self._chain.parts),
+        )
         add = loops.adder(loop.rows, len(self.gather), q, rule)
         for start in range(0, count, _BLOCK):
             stop = min(start + _BLOCK, count)

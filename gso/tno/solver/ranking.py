@@ -102,19 +102,20 @@ def _by_table(groups: list[Pairs], size: int, used: Any) -> tuple[list[Int32], I
     rank = np.cumsum(mark, dtype=np.int32)
     rank -= 1
     rank[size * count :] = len(found)
-    places = [np.empty(group.shape, np.int32) for group in groups]
+    places: list[Int32] = [np.empty(group.shape, np.int32) for group in groups]
     for own, group in zip(places, groups, strict=True):
         for at, low, high in group.blocks():
             own[at] = rank[low * np.int32(count) + slot[high - low]].T
-    low, which = np.divmod(found, count)
-    return places, low, low + np.flatnonzero(used)[which]
+    column, which = np.divmod(found, count)
+    return places, column, column + np.flatnonzero(used)[which]
 
 
 def _by_sorting(groups: list[Pairs], size: int) -> tuple[list[Int32], Ints, Ints]:
     """Sort the entries by counting: first by the higher unknown, then by the lower one."""
     total = sum(e * m for e, m in (group.shape for group in groups))
     low, high = np.empty(total, np.int32), np.empty(total, np.int32)
-    start, places = 0, []
+    start = 0
+    places: list[Int32] = []
     rank = np.empty(total, np.int32)
     for group in groups:
         e, m = group.shape
