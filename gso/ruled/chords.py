@@ -56,7 +56,7 @@ def chords(
     places : ndarray, (n, 2)
         Its vertices in the plane.
     """
-    outline, normals = resampled(domain.flat[domain.outline], _COUNT)
+    outline, normals = resampled(domain.around, _COUNT)
     beyond = outline + domain.margin * normals
     price, normal = prices(domain, outline)
     for segment in () if given is None else given:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from functools import cached_property
 
 import numpy as np
 
@@ -19,6 +20,8 @@ _MARGIN = 0.018
 _ALIKE = 1e-3
 #: Largest number of points of a lattice around the outline, relative to those wanted inside.
 _SPARSE = 16.0
+#: Area of a slot, by the square of the margin, from which on rulings may cross it.
+_SLOT = 1.0
 #: Distances below this share of the margin are rounding errors.
 _TINY = 1e-9
 
@@ -54,6 +57,27 @@ class Domain:
         self.outline: Ints = np.roll(loop, -_start(flat[loop]))
         way = np.roll(flat[loop], -1, axis=0) - flat[loop]
         self.margin = _MARGIN * float(lengths(way).sum())
+
+    @cached_property
+    def around(self) -> Array:
+        """Outline (m, 2) in the plane, without narrow slots, which rulings may cross."""
+        import shapely
+
+        own = shapely.Polygon(self.flat[self.outline])
+        if not own.is_valid:
+            return self.flat[self.outline]
+        # Mitred corners stay as they are; what is narrower than twice the margin is filled.
+        filled = own.buffer(self.margin, join_style="mitre").buffer(
+            -self.margin, join_style="mitre"
+        )
+        more = shapely.get_parts(shapely.difference(filled, own))
+        slots = more[shapely.area(more) > _SLOT * self.margin**2]
+        whole = shapely.union_all([own, *slots])
+        if not len(slots) or whole.geom_type != "Polygon":
+            return self.flat[self.outline]
+        loop = np.asarray(shapely.normalize(whole).exterior.coords)[:-1]
+        loop = loop if enclosed_area(loop) > 0 else loop[::-1]
+        return np.roll(loop, -_start(loop), axis=0)
 
     def with_normals(self, normals: Array) -> Domain:
         """Return the same domain with other normals (n, 3) at the vertices."""
