@@ -119,9 +119,11 @@ def build(
     dim = 2 if block == "flat" else 3
     wanted = np.zeros((dim, len(stencil)))
     if reference is not None:
-        wanted = np.einsum("ke,ekd->de", coefficients, reference[stencil])
+        wanted = sum(
+            c * reference.T[:, ids] for c, ids in zip(coefficients, stencil.T, strict=True)
+        )
         if share is not None:
-            wanted *= share[stencil].mean(axis=1)
+            wanted *= sum(share[ids] for ids in stencil.T) / stencil.shape[1]
     count = len(stencil) if mesh.has_triangles else len(stencil) / 2
     return Term(
         "fairness",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.util import find_spec
 
 import numpy as np
@@ -11,6 +12,7 @@ from gso.linalg.base import Pattern, SingularError
 PACKAGE = "pypardiso"
 
 
+@cache
 def available() -> bool:
     """Whether pypardiso is installed."""
     return find_spec("pypardiso") is not None

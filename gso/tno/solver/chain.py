@@ -53,9 +53,12 @@ class ByPoint(Same):
 
     def pulled(self, slope: Array, at: slice = _ALL) -> Array:
         gather = self._gather[:, at]
-        shape = len(gather) // self._dim, self._dim, gather.shape[1]
         product = slope * self._share[gather]
-        return product.reshape(len(slope), *shape).sum(axis=2)
+        by_point = product.reshape(len(slope), -1, self._dim, gather.shape[1])
+        out = by_point[:, :, 0].copy()
+        for d in range(1, self._dim):
+            out += by_point[:, :, d]
+        return out
 
 
 class Sums(Same):

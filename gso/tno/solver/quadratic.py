@@ -48,13 +48,14 @@ class Quadratic:
         )
         self.a = csr_matrix((data, columns, np.r_[0, np.cumsum(sizes)]), shape=(base, n))
         self.b = rhs
+        self._at = self.a.T
 
     @cached_property
     def matrix(self) -> Any:
         """Lower triangle of ``A^T A``, CSC with sorted rows."""
         from scipy.sparse import tril
 
-        lower = tril((self.a.T @ self.a).tocsc(), format="csc")
+        lower = tril((self._at @ self.a).tocsc(), format="csc")
         lower.sort_indices()
         return lower
 
@@ -69,7 +70,7 @@ class Quadratic:
     def energy_and_gradient(self, x: Array) -> tuple[float, Array]:
         """Return value and gradient at unknowns x."""
         r = self._residual(x)
-        return 0.5 * float(r @ r), self.a.T @ r
+        return 0.5 * float(r @ r), self._at @ r
 
     def by_term(self, x: Array) -> dict[str, float]:
         """Return the value by the name of the term."""
@@ -89,6 +90,6 @@ def _blocks(element: Elements, start: Array, n: int) -> Iterator[tuple[Array, In
         by_row = (slope * root[at]).transpose(0, 2, 1)
         columns = np.broadcast_to(element.columns[:, at].T, by_row.shape)
         keep = (by_row != 0) & (columns < n)
-        sizes = keep.sum(axis=2, dtype=np.int32).ravel()
+        sizes = sum(keep[..., k].astype(np.int32) for k in range(keep.shape[2])).ravel()
         rhs = -(residual * root[at]).ravel()
         yield by_row[keep], columns[keep].astype(np.int32), sizes, rhs
