@@ -20,14 +20,18 @@ from gso.typing import Array, Ints
 
 Mask = NDArray[np.bool_]
 
-#: Largest number of rounds, and the share of vertices that a round must remove for another one.
-_ROUNDS, _LEAST = 40, 0.01
+#: Largest number of rounds. Shapes may become worse after a round that removes less than this
+#: share of the vertices.
+_ROUNDS, _FEW = 60, 0.05
 #: Sweeps of the search for an independent set in a round.
 _SWEEPS = 3
 #: Smallest cosine of the angle by which a triangle's normal may turn in a collapse.
 _TURN = 0.5
-#: Smallest shape of a new triangle, 1 if equilateral and 0 if without area.
-_SHAPE = 0.2
+#: Smallest shape of a new triangle, 1 if equilateral and 0 if without area, in the first rounds
+#: and at last.
+_SHAPE, _LEAST = 0.25, 0.05
+#: The same for a flip, relative to the mean of the two triangles.
+_FLAT = 0.8
 #: Smallest cosine of the angle by which the boundary may turn at a vertex that is removed.
 _STRAIGHT = 0.7
 
@@ -79,21 +83,76 @@ def thinned(points: Array, triangles: Ints, count: int, keep: Ints | None = None
     held[[] if keep is None else keep] = True
     # A fixed seed: the same mesh has the same coarser meshes.
     order = np.random.default_rng(0).permutation(len(points))
+    least = _SHAPE
     for _ in range(_ROUNDS):
         surplus = len(ids) - count
         if surplus <= 0:
             break
-        into = _collapsed(points[ids], faces, order[ids], held[ids], surplus)
-        removed = np.flatnonzero(into != np.arange(len(ids)))
-        if len(removed) < _LEAST * min(surplus, len(ids)):
-            break
+        into = _collapsed(points[ids], faces, order[ids], held[ids], surplus, least)
+        left = into == np.arange(len(ids))
+        removed = len(ids) - int(left.sum())
+        if removed < _FEW * min(surplus, len(ids)):
+            if least < _LEAST:
+                break
+            least *= 0.5
         faces = into[faces]
         whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-        left = np.ones(len(ids), bool)
-        left[removed] = False
         number = np.cumsum(left) - 1
         faces, ids = number[faces[whole]], ids[left]
+        faces = flipped(points[ids], faces)
     return Thinned(ids, faces)
+
+
+def flipped(points: Array, faces: Ints) -> Ints:
+    """Flip edges of a triangle mesh towards a Delaunay triangulation, in one pass.
+
+    An edge is flipped where its opposite angles sum to more than 180 degrees, unless the new
+    triangles would turn away from the old ones. No triangle takes part in two flips.
+    """
+    n, count = len(points), len(faces)
+    origin, dest, apex = (np.roll(faces, -k, axis=1).ravel() for k in range(3))
+    low, high = np.minimum(origin, dest), np.maximum(origin, dest)
+    key = low * n + high
+    order = np.argsort(key)
+    ranked = key[order]
+    (at,) = np.nonzero(ranked[1:] == ranked[:-1])
+    one, two = order[at], order[at + 1]
+    a, b, c, d = origin[one], dest[one], apex[one], apex[two]
+    p, q, r, s = (points[x] for x in (a, b, c, d))
+    first, second = (_dot(p - x, q - x) for x in (r, s))
+    left, right = _cross(q - p, r - p), _cross(p - q, s - q)
+    size = [np.sqrt(_dot(x, x)) for x in (left, right)]
+    # The sine of the sum of both angles is negative.
+    excess = -(first * size[1] + second * size[0])
+    lengths = _dot(q - p, q - p)
+    (wanted,) = np.nonzero(excess > 1e-6 * lengths**2)
+    wanted = wanted[(c != d)[wanted]]
+    p, q, r, s = (x[wanted] for x in (p, q, r, s))
+    normal = left[wanted] + right[wanted]
+    turned = [_cross(p - r, s - r), _cross(q - s, r - s)]
+    whole = np.sqrt(_dot(normal, normal))
+    fine = np.ones(len(wanted), bool)
+    for new in turned:
+        fine &= _dot(new, normal) > _FLAT * np.sqrt(_dot(new, new)) * whole
+    for old in (left[wanted], right[wanted]):
+        fine &= _dot(old, normal) > _FLAT * np.sqrt(_dot(old, old)) * whole
+    made = np.minimum(c, d)[wanted] * n + np.maximum(c, d)[wanted]
+    fine &= ~_among(ranked, made)
+    wanted, made = wanted[fine], made[fine]
+    # Each triangle, and each new edge, goes to the flip that gains most.
+    rank = np.argsort(np.argsort(-excess[wanted], kind="stable"))
+    t, u = one[wanted] // 3, two[wanted] // 3
+    best = np.full(count, len(wanted))
+    np.minimum.at(best, t, rank)
+    np.minimum.at(best, u, rank)
+    chosen = (best[t] == rank) & (best[u] == rank)
+    _, once = np.unique(made[chosen], return_index=True)
+    wanted = wanted[np.flatnonzero(chosen)[once]]
+    out = faces.copy()
+    a, b, c, d = a[wanted], b[wanted], c[wanted], d[wanted]
+    out[one[wanted] // 3] = np.stack([c, a, d], axis=1)
+    out[two[wanted] // 3] = np.stack([d, b, c], axis=1)
+    return out
 
 
 class _Links(NamedTuple):
@@ -139,7 +198,7 @@ def _among(sorted_keys: Ints, keys: Ints) -> Mask:
     return sorted_keys[at] == keys
 
 
-def _collapsed(points: Array, faces: Ints, order: Ints, held: Mask, most: int) -> Ints:
+def _collapsed(points: Array, faces: Ints, order: Ints, held: Mask, most: int, least: float) -> Ints:
     """Return the vertex (n,) that each one is collapsed into; itself where it stays."""
     n = len(points)
     links = _links(faces, n)
@@ -149,7 +208,7 @@ def _collapsed(points: Array, faces: Ints, order: Ints, held: Mask, most: int) -
     centre = np.flatnonzero(_independent(links, order, may, n))
     if not len(centre):
         return into
-    centre, target, shape = _best_targets(points, links, centre, border)
+    centre, target, shape = _best_targets(points, links, centre, border, least)
     centre, target, shape = _safe(links, centre, target, shape, border, n)
     if len(centre) > most:
         first = np.argsort(-shape, kind="stable")[:most]
@@ -187,7 +246,7 @@ def _independent(links: _Links, order: Ints, may: Mask, n: int) -> Mask:
 
 
 def _best_targets(
-    points: Array, links: _Links, centre: Ints, border: Mask
+    points: Array, links: _Links, centre: Ints, border: Mask, least: float
 ) -> tuple[Ints, Ints, Array]:
     """Return vertices that can be removed, their best target, and the worst new shape there."""
     degree = np.diff(links.start)[centre]
@@ -217,8 +276,7 @@ def _best_targets(
     area = np.sqrt(np.einsum("kd,kd->k", new, new))
     turn = np.einsum("kd,kd->k", old, new)
     bent = turn < _TURN * area * np.sqrt(np.einsum("kd,kd->k", old, old))
-    squares = sum(np.einsum("kd,kd->k", x, x) for x in (side, points[j] - a, points[j] - b))
-    shape = 2.0 * np.sqrt(3.0) * area / np.maximum(squares, 1e-300)
+    shape = _shape(area, side, points[j] - a, points[j] - b)
     shape[bent] = 0.0
     shape[gone] = 2.0
     at = np.cumsum(count) - count
@@ -226,9 +284,19 @@ def _best_targets(
     # The best target of each vertex: the last one in increasing order of shape.
     ranked = np.lexsort([worst, which])
     last = ranked[np.r_[which[ranked][1:] != which[ranked][:-1], True]]
-    good = (worst[last] > _SHAPE) & (worst[last] <= 1.0)
+    good = (worst[last] > least) & (worst[last] <= 1.0)
     last = last[good]
     return centre[which[last]], target[last], worst[last]
+
+
+def _shape(area: Array, *sides: Array) -> Array:
+    """Return the shapes of triangles from their doubled areas and their sides (k, 3)."""
+    squares = sum(np.einsum("kd,kd->k", x, x) for x in sides)
+    return np.asarray(2.0 * np.sqrt(3.0) * area / np.maximum(squares, 1e-300))
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.einsum("kd,kd->k", a, b)
 
 
 def _cross(a: Array, b: Array) -> Array:

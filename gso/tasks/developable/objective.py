@@ -35,6 +35,12 @@ TYPICAL_BENDING = 5.0
 #: Factor on the weight of curvature on meshes that are not grids: more curvature remains there,
 #: around irregular vertices and for lack of a coarse-to-fine sequence.
 GENERAL = 1.8
+#: Factors on weights on coarser meshes of triangles. Irregular triangles can hide curvature in
+#: folds that finer meshes do not have; these weights lead to less energy on the design's own mesh.
+COARSE_CURVATURE, COARSE_FAIRNESS = 1.5, 3.0
+#: The mean of squared second differences along both polylines of quads is twice that across the
+#: edges of triangles, in the mean over all directions.
+_QUADS = 2.0
 
 
 def adapted_weights(options: Options, curved: Any, bending: Any) -> tuple[Any, Any]:
@@ -74,6 +80,11 @@ def _terms(
         # The bound keeps the result close, so the other terms can be stronger.
         w_curvature, w_fairness = 4.5 * w_curvature, 3.0 * w_fairness
         w_proximity = 0.3 * w_proximity
+    if mesh is not design and mesh.grid_index is None:
+        w_curvature *= COARSE_CURVATURE
+        w_fairness *= COARSE_FAIRNESS
+        if not design.has_triangles:
+            w_fairness *= _QUADS
     normals = vertex_normals(mesh)
     near = proximity.build(mesh, normals, tangential=o.tangential)
     items = [Weighted(t, w_curvature, Absolute(o.eps)) for t in curvature.build(mesh)]
@@ -87,7 +98,10 @@ def _terms(
 
 
 def _resampled(source: Mesh, target: Mesh) -> Array:
-    """Resample the vertices of one grid at the resolution of another, row by row."""
+    """Resample the vertices of one grid at the resolution of another, row by row.
+
+    Meshes that are not grids have no smoothed vertices: their own are returned.
+    """
     if source.grid is None or target.grid_shape is None:
-        return source.vertices
+        return target.vertices
     return resample(source.grid, *target.grid_shape).reshape(-1, 3)

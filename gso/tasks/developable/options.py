@@ -58,6 +58,9 @@ class Options(BaseOptions):
     refining_iterations : int
         Iterations on the design's own grid where it follows two or three coarser ones without
         `x0`; fewer where it follows more.
+    coarse_vertices : int
+        Meshes that are not grids are solved on coarser meshes first if they have more vertices
+        than this.
     by_component : bool
         Weigh each of several components that constraints join for its own size and curvature;
         otherwise for those of the whole mesh, as for the pieces of one design.
@@ -104,6 +107,7 @@ class Options(BaseOptions):
     free_size: int = 32
     between_iterations: int = 4
     refining_iterations: int = 6
+    coarse_vertices: int = 10_000
     by_component: bool = True
     developable_below: float = 1e-3
 
