@@ -33,6 +33,9 @@ _COARSEST = 4000
 FREE_VERTICES = 20_000
 #: Longest side of grids that are solved under constraints on their own vertices only.
 _SHORT = 64
+#: Factor on the number of vertices above which other meshes have coarser ones, under constraints.
+#: These cost energy: around held vertices the lowest one has folds as fine as the mesh.
+_CONSTRAINED = 4
 #: Parts of constraints with at most so many vertices keep them on coarser meshes.
 _FEW = 100
 
@@ -92,7 +95,8 @@ def levels(analysis: Analysis, request: Request) -> list[Level]:
         return [own]
     if mesh.grid_index is not None:
         return _resampled(own, request) if max(mesh.grid_shape or ()) > _SHORT else [own]
-    return _thinned(own) if len(mesh.vertices) > request.options.coarse_vertices else [own]
+    least = request.options.coarse_vertices * (1 if free else _CONSTRAINED)
+    return _thinned(own) if len(mesh.vertices) > least else [own]
 
 
 def _resampled(own: Level, request: Request) -> list[Level]:

@@ -14,6 +14,7 @@ beyond. The elongation of an edge is zero within a range of length ratios.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from gso import metrics as measure
@@ -37,6 +38,7 @@ TYPICAL_BENDING = 5.0
 GENERAL = 1.8
 #: Factors on weights on coarser meshes of triangles. Irregular triangles can hide curvature in
 #: folds that finer meshes do not have; these weights lead to less energy on the design's own mesh.
+#: Under constraints they would not.
 COARSE_CURVATURE, COARSE_FAIRNESS = 1.5, 3.0
 #: The mean of squared second differences along both polylines of quads is twice that across the
 #: edges of triangles, in the mean over all directions.
@@ -56,6 +58,8 @@ def objective(analysis: Analysis, request: Request, mesh: Mesh) -> list[Weighted
     """
     if not request.options.by_component or not parted(analysis.mesh):
         shape = analysis.shape
+        if mesh is not shape.mesh and mesh.grid_index is None:
+            request = _on_triangles(request, analysis)
         return _terms(request, shape.mesh, shape.curvature, shape.bending, shape.smooth, mesh)
 
     def make(own: Mesh) -> list[Weighted]:
@@ -64,6 +68,20 @@ def objective(analysis: Analysis, request: Request, mesh: Mesh) -> list[Weighted
         return _terms(request, own, curved, shape.bending, shape.smooth, own)
 
     return per_component.objective(mesh, make)
+
+
+def _on_triangles(request: Request, analysis: Analysis) -> Request:
+    """Return a request with the weights for a coarser mesh of triangles."""
+    o = request.options
+    fairness = 1.0 if analysis.mesh.has_triangles else _QUADS
+    curvature = 1.0
+    if analysis.constraints.empty:
+        curvature, fairness = COARSE_CURVATURE, COARSE_FAIRNESS * fairness
+    weights = {
+        "w_curvature": curvature * o.w_curvature,
+        "w_fairness": fairness * o.w_fairness,
+    }
+    return replace(request, options=replace(o, **weights))
 
 
 def _terms(
@@ -80,11 +98,6 @@ def _terms(
         # The bound keeps the result close, so the other terms can be stronger.
         w_curvature, w_fairness = 4.5 * w_curvature, 3.0 * w_fairness
         w_proximity = 0.3 * w_proximity
-    if mesh is not design and mesh.grid_index is None:
-        w_curvature *= COARSE_CURVATURE
-        w_fairness *= COARSE_FAIRNESS
-        if not design.has_triangles:
-            w_fairness *= _QUADS
     normals = vertex_normals(mesh)
     near = proximity.build(mesh, normals, tangential=o.tangential)
     items = [Weighted(t, w_curvature, Absolute(o.eps)) for t in curvature.build(mesh)]

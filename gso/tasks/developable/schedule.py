@@ -26,7 +26,7 @@ from gso.tasks.developable.objective import objective
 from gso.tasks.developable.options import Options
 from gso.tasks.imposed import Imposed
 from gso.typing import Array
-from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets
+from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets, tangents
 
 #: A design counts as a developable surface with noise if smoothing leaves at most this share of
 #: its curvature. Displacements are then bounded by this many standard deviations of the noise.
@@ -37,6 +37,10 @@ NOISE_REACH = 2.8
 _OFFSETS_FIRST = 12
 #: Half the factor on the iterations on the coarsest mesh where that is not a grid.
 _LONGER = 3
+#: Kinds of unknowns: displacements along one of two tangents.
+TANGENTS = ("first tangent", "second tangent")
+#: Sweeps over normals and both tangents where the vertices around held ones are to be free.
+_SWEEPS = 4
 #: Tolerance of all stages but the last.
 _LOOSE = 1e-3
 
@@ -108,6 +112,8 @@ def _unknowns(kind: str, mesh: Mesh, options: Options, coordinates: Array) -> Va
         return free(layout)
     points = coordinates.reshape(-1, 3)
     normals = vertex_normals(mesh.replaced(points))
+    if kind in TANGENTS:
+        return normal_offsets(layout, points, tangents(normals)[TANGENTS.index(kind)])
     shape = mesh.grid_shape
     if kind == "spline" and shape is not None:
         controls = (min(options.controls, shape[0]), min(options.controls, shape[1]))
@@ -143,9 +149,11 @@ def _stages(analysis: Analysis, request: Request, coarser_meshes: int) -> list[S
         # Only offsets along normals have bounds. The second stage uses updated normals.
         return [stage("normal", o.iterations, losses) for losses in (falling, final)]
     if coarser_meshes and not constraints.empty:
-        # Vertices with given positions have them already: the others can move along normals.
-        pinned = pinned_only(constraints) and o.variables != "free"
-        return [stage("normal" if pinned else "free", most, final)]
+        if mesh.grid_index is not None or o.variables == "free" or not pinned_only(constraints):
+            return [stage("free", most, final)]
+        # Normal offsets alone would leave the tangential displacements to the coarser meshes.
+        sweep = [stage("normal", 2, final), *(stage(kind, 1, final) for kind in TANGENTS)]
+        return [*_SWEEPS * sweep, stage("normal", most // 2, final)]
     if cold or not constraints.empty:
         bound = not constraints.empty
         first = stage("free" if bound else "normal", 15, falling)
