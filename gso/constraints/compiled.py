@@ -108,7 +108,8 @@ class Compiled:
         found = [(part, part.on(transfer)) for part in self.parts]
         if any(part.hard and copy is None for part, copy in found):
             return None
-        return replace(self, parts=tuple(copy for _, copy in found if copy is not None))
+        kept = (copy for _, copy in found if copy is not None and copy.count)
+        return replace(self, parts=tuple(kept))
 
     @property
     def links(self) -> Ints:

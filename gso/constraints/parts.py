@@ -42,10 +42,10 @@ class Part:
         raise NotImplementedError
 
     def on(self, transfer: Transfer) -> Part | None:
-        """Return equations like these on a coarser copy of the design; None if there are none.
+        """Return equations like these on a coarser copy of the design; None if it has none.
 
-        They lead the solve on coarser meshes, so they may be approximate. Without them a soft part
-        is left out there. With a hard part without them the design has no coarser meshes.
+        They lead the solve on coarser meshes, so they may be approximate. A soft part without them
+        is left out there. A hard part without them means that the solve has no coarser meshes.
         """
         return None
 
@@ -217,9 +217,9 @@ class OnPlane(Part):
     def kept(self, rows: NDArray[np.bool_]) -> OnPlane:
         return replace(self, ids=self.ids[rows])
 
-    def on(self, transfer: Transfer) -> OnPlane | None:
-        ids, _ = _kept(transfer, self.ids)
-        return replace(self, ids=ids) if len(ids) else None
+    def on(self, transfer: Transfer) -> OnPlane:
+        # A plane of symmetry may lie between two rows of vertices.
+        return replace(self, ids=_kept(transfer, self.ids)[0])
 
     def violation(self, points: Array) -> Array:
         return np.abs((points[self.ids] - self.anchor) @ self.normal)

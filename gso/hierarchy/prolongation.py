@@ -28,7 +28,8 @@ class Prolongation:
         mean over the given vertices of |u - given|^2 + reach^4 mean |second differences of u|^2
 
     so that rigid motions and affine maps are reproduced. It has no kinks along the coarse edges,
-    which barycentric interpolation would have, and no length above the largest one given.
+    which barycentric interpolation would have, and no length above the largest one given and that
+    of the affine map.
 
     Parameters
     ----------
@@ -91,11 +92,15 @@ class Prolongation:
         rest[self.ids] = displacement - affine(points[self.ids])
         if held is not None:
             rest[self.held] += _HELD * (held - affine(points[self.held]))
-        field = self._solver.solve(rest) + affine(points)
+        base = affine(points)
+        field = self._solver.solve(rest) + base
         field[~self.mesh.used] = 0.0
         length = np.linalg.norm(field, axis=1, keepdims=True)
         largest = displacement if held is None else np.concatenate([displacement, held])
-        most = np.linalg.norm(largest, axis=1).max(initial=0.0)
+        most = np.maximum(
+            np.linalg.norm(largest, axis=1).max(initial=0.0),
+            np.linalg.norm(base, axis=1, keepdims=True),
+        )
         return field * np.minimum(1.0, most / np.maximum(length, 1e-300))
 
 

@@ -198,7 +198,9 @@ def _among(sorted_keys: Ints, keys: Ints) -> Mask:
     return sorted_keys[at] == keys
 
 
-def _collapsed(points: Array, faces: Ints, order: Ints, held: Mask, most: int, least: float) -> Ints:
+def _collapsed(
+    points: Array, faces: Ints, order: Ints, held: Mask, most: int, least: float
+) -> Ints:
     """Return the vertex (n,) that each one is collapsed into; itself where it stays."""
     n = len(points)
     links = _links(faces, n)

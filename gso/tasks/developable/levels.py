@@ -145,7 +145,9 @@ def _thinned(own: Level) -> list[Level]:
         steps.append(light.ids)
         found.append(Level(copy, copy, constraints))
     finer = [own, *found][: len(steps)]
-    linked = [Level(x.mesh, x.begin, x.constraints, ids) for x, ids in zip(finer, steps, strict=True)]
+    linked = [
+        Level(x.mesh, x.begin, x.constraints, ids) for x, ids in zip(finer, steps, strict=True)
+    ]
     return [*found[-1:], *linked[::-1]] if found else [own]
 
 

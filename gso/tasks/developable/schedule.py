@@ -40,7 +40,7 @@ _LONGER = 3
 #: Kinds of unknowns: displacements along one of two tangents.
 TANGENTS = ("first tangent", "second tangent")
 #: Sweeps over normals and both tangents where the vertices around held ones are to be free.
-_SWEEPS = 4
+_SWEEPS = 3
 #: Tolerance of all stages but the last.
 _LOOSE = 1e-3
 
