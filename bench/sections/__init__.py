@@ -10,6 +10,7 @@ from typing import Any
 SUBJECTS = (
     "tno",
     "cost",
+    "large",
     "jiang",
     "hybrid",
     "net",
