@@ -150,7 +150,9 @@ def _stages(analysis: Analysis, request: Request, coarser_meshes: int) -> list[S
         return [stage("normal", o.iterations, losses) for losses in (falling, final)]
     if coarser_meshes and not constraints.empty:
         if mesh.grid_index is not None or o.variables == "free" or not pinned_only(constraints):
-            return [stage("free", most, final)]
+            # Constraints that are terms repeat the stage until they hold.
+            repeated = any(p.hard and not p.linear for p in constraints.parts)
+            return [stage("free", most if repeated else o.iterations, final)]
         # Normal offsets alone would leave the tangential displacements to the coarser meshes.
         sweep = [stage("normal", 2, final), *(stage(kind, 1, final) for kind in TANGENTS)]
         return [*_SWEEPS * sweep, stage("normal", most // 2, final)]
