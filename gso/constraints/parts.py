@@ -350,8 +350,7 @@ class Lengths(Part):
         count = np.bincount(self.pairs.ravel(), minlength=n)
         mean = np.bincount(self.pairs.ravel(), np.repeat(factor, 2), n) / np.maximum(count, 1)
         edges = transfer.coarse.edges
-        # Vertices of one pair only are ends of bars or of curves, not of a net of edges.
-        edges = edges[(count[near[edges]] > 2).all(axis=1)]
+        edges = edges[(count[near[edges]] > 0).all(axis=1)]
         first, second = transfer.coarse.vertices[edges].transpose(1, 0, 2)
         lengths = np.linalg.norm(first - second, axis=1) * mean[near[edges]].mean(axis=1)
         ends = transfer.place(self.pairs)
