@@ -12,6 +12,7 @@ SUBJECTS = (
     "cost",
     "speed",
     "batch",
+    "large",
     "jiang",
     "session",
     "hybrid",

@@ -14,6 +14,7 @@ from gso.constraints.conflicts import check
 from gso.constraints.linear import Reduction, reduce
 from gso.constraints.parts import Part, Pins
 from gso.errors import OptionError
+from gso.hierarchy import Transfer
 from gso.mesh import Frame, Mesh
 from gso.typing import Array, Ints
 
@@ -98,6 +99,17 @@ class Compiled:
     def mapped(self, frame: Frame, order: Ints) -> Compiled:
         """Return the constraints in the unit of a frame, with vertex i numbered ``order[i]``."""
         return replace(self, parts=tuple(p.mapped(frame, order) for p in self.parts))
+
+    def on(self, transfer: Transfer) -> Compiled | None:
+        """Return the constraints on a coarser copy of the design.
+
+        None where a hard part cannot be imposed on it; soft ones are then left out.
+        """
+        found = [(part, part.on(transfer)) for part in self.parts]
+        if any(part.hard and copy is None for part, copy in found):
+            return None
+        kept = (copy for _, copy in found if copy is not None and copy.count)
+        return replace(self, parts=tuple(kept))
 
     @property
     def links(self) -> Ints:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gso import geometry
 from gso.energy import Term, Weighted, curve, equation, length, planarity, position
 from gso.energy.multipliers import STIFF, hardened
+from gso.hierarchy import Transfer
 from gso.mesh import Frame
 from gso.mesh.polyline import Polylines
 from gso.typing import Array, Ints
@@ -39,6 +40,14 @@ class Part:
     def kept(self, rows: NDArray[np.bool_]) -> Part:
         """Return the part with only those equations that a mask (k,) selects."""
         raise NotImplementedError
+
+    def on(self, transfer: Transfer) -> Part | None:
+        """Return equations like these on a coarser copy of the design; None if it has none.
+
+        They lead the solve on coarser meshes, so they may be approximate. A soft part without them
+        is left out there. A hard part without them means that the solve has no coarser meshes.
+        """
+        return None
 
     def violation(self, points: Array) -> Array:
         """Return the violation of each equation (a length) by vertices (n, dim)."""
@@ -103,6 +112,12 @@ class Pins(Part):
     def kept(self, rows: NDArray[np.bool_]) -> Pins:
         return replace(self, ids=self.ids[rows], positions=self.positions[rows])
 
+    def on(self, transfer: Transfer) -> Pins | None:
+        ids, rows = _kept(transfer, self.ids)
+        if not len(ids):
+            return None
+        return replace(self, ids=ids, positions=self.positions[rows] + transfer.shift[ids])
+
     def violation(self, points: Array) -> Array:
         return np.linalg.norm(points[self.ids] - self.positions, axis=1)
 
@@ -146,6 +161,13 @@ class Relations(Part):
 
     def kept(self, rows: NDArray[np.bool_]) -> Relations:
         return replace(self, first=self.first[rows], second=self.second[rows])
+
+    def on(self, transfer: Transfer) -> Relations | None:
+        first, second = transfer.place(self.first), transfer.place(self.second)
+        # A vertex whose partner is not in the coarser mesh would be free.
+        if ((first < 0) != (second < 0)).any() or not (first >= 0).any():
+            return None
+        return replace(self, first=first[first >= 0], second=second[first >= 0])
 
     def violation(self, points: Array) -> Array:
         image = self.anchor + (points[self.first] - self.anchor) @ self.matrix.T
@@ -195,6 +217,10 @@ class OnPlane(Part):
     def kept(self, rows: NDArray[np.bool_]) -> OnPlane:
         return replace(self, ids=self.ids[rows])
 
+    def on(self, transfer: Transfer) -> OnPlane:
+        # A plane of symmetry may lie between two rows of vertices.
+        return replace(self, ids=_kept(transfer, self.ids)[0])
+
     def violation(self, points: Array) -> Array:
         return np.abs((points[self.ids] - self.anchor) @ self.normal)
 
@@ -224,6 +250,10 @@ class OnLines(Part):
 
     def kept(self, rows: NDArray[np.bool_]) -> OnLines:
         return replace(self, ids=self.ids[rows])
+
+    def on(self, transfer: Transfer) -> OnLines | None:
+        ids, _ = _kept(transfer, self.ids)
+        return replace(self, ids=ids) if len(ids) else None
 
     def violation(self, points: Array) -> Array:
         return np.linalg.norm(
@@ -268,6 +298,15 @@ class Planar(Part):
     def kept(self, rows: NDArray[np.bool_]) -> Planar:
         return replace(self, quads=self.quads[rows])
 
+    def on(self, transfer: Transfer) -> Planar | None:
+        """Constrain the quads of the copy whose corners are all corners of these quads."""
+        faces = transfer.coarse.faces
+        if faces.shape[1] == 3:
+            return None
+        ids, _ = _kept(transfer, np.unique(self.quads))
+        inner = np.isin(faces, ids).all(axis=1)
+        return replace(self, quads=faces[inner]) if inner.any() else None
+
     def violation(self, points: Array) -> Array:
         corners = (tuple(points[self.quads[:, k]].T) for k in range(4))
         return np.abs(geometry.diagonal_distance(*corners))
@@ -298,6 +337,31 @@ class Lengths(Part):
     def kept(self, rows: NDArray[np.bool_]) -> Lengths:
         return replace(self, pairs=self.pairs[rows], lengths=self.lengths[rows])
 
+    def on(self, transfer: Transfer) -> Lengths | None:
+        """Constrain the edges of the copy, and pairs of its vertices that are in the design's.
+
+        Lengths of edges change by the same factors as those of the design's edges around them.
+        """
+        points, near = transfer.fine.vertices, transfer.near
+        a, b = self.pairs.T
+        usual = np.linalg.norm(points[a] - points[b], axis=1)
+        factor = self.lengths / np.maximum(usual, 1e-300)
+        n = len(points)
+        count = np.bincount(self.pairs.ravel(), minlength=n)
+        mean = np.bincount(self.pairs.ravel(), np.repeat(factor, 2), n) / np.maximum(count, 1)
+        edges = transfer.coarse.edges
+        edges = edges[(count[near[edges]] > 0).all(axis=1)]
+        first, second = transfer.coarse.vertices[edges].transpose(1, 0, 2)
+        lengths = np.linalg.norm(first - second, axis=1) * mean[near[edges]].mean(axis=1)
+        ends = transfer.place(self.pairs)
+        both = (ends >= 0).all(axis=1)
+        first, second = transfer.coarse.vertices[ends[both]].transpose(1, 0, 2)
+        bars = np.linalg.norm(first - second, axis=1) * factor[both]
+        pairs = np.concatenate([edges, ends[both]])
+        if not len(pairs):
+            return None
+        return replace(self, pairs=pairs, lengths=np.concatenate([lengths, bars]))
+
     def violation(self, points: Array) -> Array:
         a, b = (points[self.pairs[:, k]] for k in (0, 1))
         return np.abs(np.linalg.norm(a - b, axis=1) - self.lengths)
@@ -313,6 +377,13 @@ class Lengths(Part):
 
     def soft_term(self, block: str) -> Term:
         return length.build(self.pairs, self.lengths, block=block)
+
+
+def _kept(transfer: Transfer, ids: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+    """Return the vertices of a copy that stand for some of the vertices `ids`, and which."""
+    places = transfer.place(ids)
+    rows = places >= 0
+    return places[rows], rows
 
 
 def _imposed(term: Term, part: Part, block: str) -> list[Weighted]:

@@ -99,6 +99,7 @@ class Run:
         self.lay_out = lay_out
         self.start_refused = ""
         self._planned: tuple[Request, Plan] | None = None
+        self._problem: Problem | None = None
         self.history: list[Progress] = []
         self.timings = Timings()
         self.iterations = 0
@@ -219,6 +220,9 @@ class Run:
                 break
             if stage.finished is not None and stage.finished(coordinates):
                 break
+            # Stages of another mesh have another pattern.
+            if not last and stages[number + 1].layout != stage.layout:
+                self._problem = None
         after = stages[number + 1 :]
         if minimum.status is Status.CANCELLED:
             # Transfer the coordinates to the last stage without solving.
@@ -232,6 +236,7 @@ class Run:
                 minimum,
                 lambda items, at: solve(at, items=items),
             )
+        self._problem = None
         return Reached(stage, coordinates, None if after else entered, minimum)
 
     def minimise(
@@ -267,7 +272,12 @@ class Run:
         clock = time.perf_counter()
         variables = stage.unknowns(coordinates)
         again = items is not None
-        problem = Problem(items if again else stage.items, variables, stage.limits, many=many)
+        # The stage before may have the same sparsity pattern, as with other directions of offsets.
+        before, self._problem = self._problem, None
+        wanted = items if again else stage.items
+        problem = Problem(wanted, variables, stage.limits, like=before, many=many)
+        del before
+        self._problem = problem
         x = variables.project(coordinates)
         bounds = None if stage.bounds is None else stage.bounds(coordinates)
         if bounds is not None:

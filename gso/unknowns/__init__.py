@@ -5,6 +5,7 @@ from gso.unknowns.framed import ALONG, ball_bounds, framed_displacements
 from gso.unknowns.free import free
 from gso.unknowns.normal import normal_offsets
 from gso.unknowns.spline import control_points, spline_offsets, spline_surface
+from gso.unknowns.tangents import tangents
 
 __all__ = [
     "ALONG",
@@ -17,4 +18,5 @@ __all__ = [
     "normal_offsets",
     "spline_offsets",
     "spline_surface",
+    "tangents",
 ]

@@ -36,8 +36,12 @@ def polyline_crosses(he: HalfEdges, faces: Ints) -> Ints:
     crosses = np.stack([he.origin[ok], he.dest[ok], he.dest[ahead], left, right], axis=1)
     swap = crosses[:, 0] > crosses[:, 2]
     crosses[swap] = crosses[swap][:, [2, 1, 0, 3, 4]]
-    _, once = np.unique(crosses[:, :3], axis=0, return_index=True)
-    return crosses[once]
+    # Sorting by two keys is several times faster than np.unique of rows.
+    order = np.lexsort([crosses[:, 2], crosses[:, 0] * len(he.face_count) + crosses[:, 1]])
+    crosses = crosses[order]
+    new = np.ones(len(crosses), bool)
+    new[1:] = (crosses[1:, :3] != crosses[:-1, :3]).any(axis=1)
+    return crosses[new]
 
 
 def hinges(he: HalfEdges) -> Ints:

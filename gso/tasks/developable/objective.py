@@ -14,6 +14,7 @@ beyond. The elongation of an edge is zero within a range of length ratios.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from gso import metrics as measure
@@ -35,6 +36,13 @@ TYPICAL_BENDING = 5.0
 #: Factor on the weight of curvature on meshes that are not grids: more curvature remains there,
 #: around irregular vertices and for lack of a coarse-to-fine sequence.
 GENERAL = 1.8
+#: Factors on weights on coarser meshes of triangles. Irregular triangles can hide curvature in
+#: folds that finer meshes do not have; these weights lead to less energy on the design's own mesh.
+#: Under constraints they would not.
+COARSE_CURVATURE, COARSE_FAIRNESS = 1.5, 3.0
+#: The mean of squared second differences along both polylines of quads is twice that across the
+#: edges of triangles, in the mean over all directions.
+_QUADS = 2.0
 
 
 def adapted_weights(options: Options, curved: Any, bending: Any) -> tuple[Any, Any]:
@@ -50,6 +58,8 @@ def objective(analysis: Analysis, request: Request, mesh: Mesh) -> list[Weighted
     """
     if not request.options.by_component or not parted(analysis.mesh):
         shape = analysis.shape
+        if mesh is not shape.mesh and mesh.grid_index is None:
+            request = _on_triangles(request, analysis)
         return _terms(request, shape.mesh, shape.curvature, shape.bending, shape.smooth, mesh)
 
     def make(own: Mesh) -> list[Weighted]:
@@ -58,6 +68,20 @@ def objective(analysis: Analysis, request: Request, mesh: Mesh) -> list[Weighted
         return _terms(request, own, curved, shape.bending, shape.smooth, own)
 
     return per_component.objective(mesh, make)
+
+
+def _on_triangles(request: Request, analysis: Analysis) -> Request:
+    """Return a request with the weights for a coarser mesh of triangles."""
+    o = request.options
+    fairness = 1.0 if analysis.mesh.has_triangles else _QUADS
+    curvature = 1.0
+    if analysis.constraints.empty:
+        curvature, fairness = COARSE_CURVATURE, COARSE_FAIRNESS * fairness
+    weights = {
+        "w_curvature": curvature * o.w_curvature,
+        "w_fairness": fairness * o.w_fairness,
+    }
+    return replace(request, options=replace(o, **weights))
 
 
 def _terms(
@@ -87,7 +111,10 @@ def _terms(
 
 
 def _resampled(source: Mesh, target: Mesh) -> Array:
-    """Resample the vertices of one grid at the resolution of another, row by row."""
+    """Resample the vertices of one grid at the resolution of another, row by row.
+
+    Meshes that are not grids have no smoothed vertices: their own are returned.
+    """
     if source.grid is None or target.grid_shape is None:
-        return source.vertices
+        return target.vertices
     return resample(source.grid, *target.grid_shape).reshape(-1, 3)

@@ -41,12 +41,14 @@ class Options(BaseOptions):
         Unknowns of the last stage: offsets along normals, free vertices, or (on grids) a
         coarse bicubic field of offsets, which cannot crumple. With "surface" (on grids) they are
         the control points of a bicubic B-spline surface, returned as the result's `spline`.
-        Except with "surface", `max_deviation` implies offsets along normals, and constraints
-        imply free vertices and no coarser grids.
+        Except with "surface", `max_deviation` implies offsets along normals. Constraints imply
+        free vertices; on meshes that are not grids, where only positions of vertices are given and
+        coarser meshes come first, offsets along normals and tangents in turn.
     controls : int
         "spline", "surface": control points along each side; fewer on small grids.
     coarse_iterations : int
-        Iterations on the coarsest grid; half as many with `x0`.
+        Iterations on the coarsest grid; half as many with `x0`, and half as many again on meshes
+        that are not grids.
     coarse_size : int
         Largest side of the coarsest grid without `x0`; a grid that small is halved once.
     free_size : int
@@ -58,6 +60,9 @@ class Options(BaseOptions):
     refining_iterations : int
         Iterations on the design's own grid where it follows two or three coarser ones without
         `x0`; fewer where it follows more.
+    coarse_vertices : int
+        Meshes that are not grids are solved on coarser meshes of triangles first if they have more
+        vertices than this, or than four times as many under constraints.
     by_component : bool
         Weigh each of several components that constraints join for its own size and curvature;
         otherwise for those of the whole mesh, as for the pieces of one design.
@@ -105,6 +110,7 @@ class Options(BaseOptions):
     free_size: int = 32
     between_iterations: int = 4
     refining_iterations: int = 6
+    coarse_vertices: int = 10_000
     by_component: bool = True
     developable_below: float = 1e-3
 

@@ -1,29 +1,32 @@
-"""The stages of the formulation "curvature": coarse grids first, the design's vertices last."""
+"""The stages of the formulation "curvature": coarser meshes first, the design's vertices last."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from gso import metrics as measure
 from gso.energy.losses import Absolute
 from gso.errors import MeshError
-from gso.hierarchy import coarser, prolong_displacement, resample_like
 from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
 from gso.status import Status
 from gso.tasks import constrained
+from gso.tasks.base import Analysis as Coarse
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.developable import spline_stage
 from gso.tasks.developable.analysis import FLAT_CURVATURE, Analysis
 from gso.tasks.developable.bounds import check_handles, inside, offset_bounds, radius
+from gso.tasks.developable.levels import FREE_VERTICES, Level, levels, pinned_only
 from gso.tasks.developable.objective import objective
 from gso.tasks.developable.options import Options
+from gso.tasks.imposed import Imposed
 from gso.typing import Array
-from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets
+from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets, tangents
 
 #: A design counts as a developable surface with noise if smoothing leaves at most this share of
 #: its curvature. Displacements are then bounded by this many standard deviations of the noise.
@@ -32,6 +35,12 @@ NOISE_REACH = 2.8
 
 #: Iterations with normal offsets between a warm start and the stage of free vertices.
 _OFFSETS_FIRST = 12
+#: Half the factor on the iterations on the coarsest mesh where that is not a grid.
+_LONGER = 3
+#: Kinds of unknowns: displacements along one of two tangents.
+TANGENTS = ("first tangent", "second tangent")
+#: Sweeps over normals and both tangents where the vertices around held ones are to be free.
+_SWEEPS = 3
 #: Tolerance of all stages but the last.
 _LOOSE = 1e-3
 
@@ -58,16 +67,18 @@ def plan(analysis: Analysis, request: Request) -> Plan:
         request = replace(request, max_displacement=bound)
         if spline is None:
             notes.append("the design is developable but for noise: it moves no further than that")
-    levels = _levels(analysis, request)
-    starts = _starts(analysis, request, levels)
-    stages = [_coarse_stage(analysis, request, level, k) for k, level in enumerate(levels)]
-    stages += _stages(analysis, request, len(levels))
-    for k in range(len(levels)):
-        enter = partial(_carry, starts[k], starts[k + 1], radius(request))
+    *coarse, own = levels(analysis, request)
+    stages = [_coarse_stage(analysis, request, level, k) for k, level in enumerate(coarse)]
+    stages += _stages(analysis, request, len(coarse))
+    for k, (before, level) in enumerate(pairwise([*coarse, own])):
+        enter = partial(level.entered, before, radius(request))
         stages[k + 1] = replace(stages[k + 1], enter=enter)
+    if coarse and not constraints.empty:
+        first = Coarse(coarse[0].mesh, coarse[0].constraints)
+        stages.insert(0, constrained.approach(first, coarse[0].mesh.vertices))
     if spline is not None:
         stages.append(spline_stage.stage(stages[-1], mesh, spline))
-    begin = starts[0].vertices if levels else inside(start, mesh, radius(request))
+    begin = coarse[0].begin.vertices if coarse else inside(start, mesh, radius(request))
     free_to_return = constraints.empty
     free_to_return &= request.start is None or request.max_displacement is None
     fallback = start.ravel()
@@ -82,31 +93,6 @@ def plan(analysis: Analysis, request: Request) -> Plan:
         spline=spline,
         cold_start=None if request.start is None else mesh.vertices.ravel,
     )
-
-
-def _levels(analysis: Analysis, request: Request) -> list[Mesh]:
-    """Return the coarser copies of the design on which to solve first, coarsest first."""
-    mesh = analysis.mesh
-    if mesh.grid_index is None or not analysis.constraints.empty:
-        return []
-    if request.start is not None and request.max_displacement is not None:
-        return []
-    o = request.options
-    # A warm start has the large displacements already, which the coarsest grids are for.
-    return coarser(mesh, o.coarse_size if request.start is None else o.free_size)
-
-
-def _starts(analysis: Analysis, request: Request, levels: list[Mesh]) -> list[Mesh]:
-    """Return the surfaces to start from on each coarser grid and on the design's own.
-
-    A warm start keeps its fine detail: only the displacements found on the coarser grids are
-    interpolated and added to it. They correct its low-frequency error, which would take many
-    iterations on the fine grid, at a fraction of the cost.
-    """
-    if request.start is None:
-        return [*levels, analysis.mesh]
-    begun = analysis.mesh.replaced(request.start)
-    return [*resample_like(levels, begun), begun]
 
 
 def _nothing_inside(mesh: Mesh) -> MeshError:
@@ -126,6 +112,8 @@ def _unknowns(kind: str, mesh: Mesh, options: Options, coordinates: Array) -> Va
         return free(layout)
     points = coordinates.reshape(-1, 3)
     normals = vertex_normals(mesh.replaced(points))
+    if kind in TANGENTS:
+        return normal_offsets(layout, points, tangents(normals)[TANGENTS.index(kind)])
     shape = mesh.grid_shape
     if kind == "spline" and shape is not None:
         controls = (min(options.controls, shape[0]), min(options.controls, shape[1]))
@@ -133,12 +121,12 @@ def _unknowns(kind: str, mesh: Mesh, options: Options, coordinates: Array) -> Va
     return normal_offsets(layout, points, normals)
 
 
-def _stages(analysis: Analysis, request: Request, coarser_grids: int) -> list[Stage]:
+def _stages(analysis: Analysis, request: Request, coarser_meshes: int) -> list[Stage]:
     """Plan the stages on the design's own vertices."""
     o, mesh, constraints = request.options, analysis.mesh, analysis.constraints
     items = objective(analysis, request, mesh)
     bounds = offset_bounds(mesh, radius(request), constraints.hard_ids)
-    cold = request.start is None and mesh.grid_index is None
+    cold = request.start is None and mesh.grid_index is None and not coarser_meshes
     falling = _falling(o) if cold else (Absolute(o.eps),)
 
     def stage(kind: str, iterations: int, losses: Sequence[Absolute]) -> Stage:
@@ -157,9 +145,18 @@ def _stages(analysis: Analysis, request: Request, coarser_grids: int) -> list[St
         )
 
     final = falling[-1:]
+    most = _iterations(o, coarser_meshes, request.start is not None)
     if request.max_displacement is not None:
         # Only offsets along normals have bounds. The second stage uses updated normals.
         return [stage("normal", o.iterations, losses) for losses in (falling, final)]
+    if coarser_meshes and not constraints.empty:
+        if mesh.grid_index is not None or o.variables == "free" or not pinned_only(constraints):
+            # Constraints that are terms repeat the stage until they hold.
+            repeated = any(p.hard and not p.linear for p in constraints.parts)
+            return [stage("free", most if repeated else o.iterations, final)]
+        # Normal offsets alone would leave the tangential displacements to the coarser meshes.
+        sweep = [stage("normal", 2, final), *(stage(kind, 1, final) for kind in TANGENTS)]
+        return [*_SWEEPS * sweep, stage("normal", most // 2, final)]
     if cold or not constraints.empty:
         bound = not constraints.empty
         first = stage("free" if bound else "normal", 15, falling)
@@ -169,7 +166,6 @@ def _stages(analysis: Analysis, request: Request, coarser_grids: int) -> list[St
             return [first, last]
         start = mesh.vertices if request.start is None else request.start
         return [constrained.approach(analysis, start), first, last]
-    most = _iterations(o, coarser_grids, request.start is not None)
     last = stage(o.variables, most, falling)
     if o.variables == "free" and request.start is not None:
         # Normal offsets remove most of the remaining energy at a third of the cost.
@@ -183,53 +179,53 @@ def _falling(options: Options) -> tuple[Absolute, ...]:
     return tuple(Absolute(factor * options.eps) for factor in (10.0, 3.0, 1.0))
 
 
-def _iterations(options: Options, coarser_grids: int, begun: bool) -> int:
-    """Compute the iterations on a grid that follows `coarser_grids` coarser ones.
+def _iterations(options: Options, coarser_meshes: int, begun: bool) -> int:
+    """Compute the iterations on a mesh that follows `coarser_meshes` coarser ones.
 
     `begun` is whether there is a warm start, which has been solved on fewer coarser grids.
 
-    From the fourth refinement on they are fewer, as coarser grids have found nearly all of the
-    displacement: two thirds as many of offsets, and half as many from grid to grid, but not fewer
+    From the fourth refinement on they are fewer, as coarser meshes have found nearly all of the
+    displacement: two thirds as many of offsets, and half as many from mesh to mesh, but not fewer
     than 5, of free vertices, which are costly there.
     """
-    if coarser_grids < 2 or begun:
+    if coarser_meshes < 2 or begun:
         return options.iterations
     most = options.refining_iterations
     if options.variables != "free":
-        return max(most * 2 // 3, min(most, 3)) if coarser_grids > 3 else most
-    return max(most >> max(coarser_grids - 3, 0), min(most, 5))
+        return max(most * 2 // 3, min(most, 3)) if coarser_meshes > 3 else most
+    return max(most >> max(coarser_meshes - 3, 0), min(most, 5))
 
 
-def _coarse_stage(analysis: Analysis, request: Request, level: Mesh, number: int) -> Stage:
-    """Plan the stage of a coarser grid, with free vertices on the coarsest.
+def _coarse_stage(analysis: Analysis, request: Request, level: Level, number: int) -> Stage:
+    """Plan the stage of a coarser mesh, with free vertices on the coarsest.
 
-    So are those of the next ones up to `free_size`, and of all if the last stage's are, unless
-    there is a warm start. With `max_displacement` all use normal offsets.
+    So are those of the next ones up to `free_size` on grids, and up to `FREE_VERTICES` on others;
+    and of all if the last stage's are, unless there is a warm start, and under constraints that
+    are not positions of vertices. With `max_displacement` all use normal offsets.
     """
-    o = request.options
+    o, mesh = request.options, level.mesh
     first, begun = number == 0, request.start is not None
-    small = max(level.grid_shape or (0,)) <= o.free_size
+    grid = mesh.grid_shape
+    small = max(grid) <= o.free_size if grid else len(mesh.vertices) <= FREE_VERTICES
     iterations = o.coarse_iterations if first else o.between_iterations
     if first and begun:
         iterations //= 2
-    kind = "free" if first or (not begun and (small or o.variables == "free")) else "normal"
+    if first and not grid:
+        iterations = _LONGER * iterations // 2
+    loose = small or o.variables == "free" or not pinned_only(level.constraints)
+    kind = "free" if first or (not begun and loose) else "normal"
     if request.max_displacement is not None:
         kind = "normal"
+    fall = not begun and (first or not grid)
     return Stage(
-        "x".join(map(str, level.grid_shape or ())),
-        _layout(level),
-        objective(analysis, request, level),
-        partial(_unknowns, kind, level, o),
+        f"{grid[0]}x{grid[1]}" if grid else f"{len(mesh.faces):,} triangles",
+        _layout(mesh),
+        objective(analysis, request, mesh),
+        partial(_unknowns, kind, mesh, o),
         iterations=iterations,
         tolerance=_LOOSE,
-        continuation=_falling(o) if first and not begun else (Absolute(o.eps),),
+        continuation=_falling(o) if fall else (Absolute(o.eps),),
         continued="curvature",
-        bounds=offset_bounds(level, radius(request)),
+        bounds=offset_bounds(mesh, radius(request), level.constraints.hard_ids),
+        imposed=None if level.constraints.empty else Imposed(level.constraints),
     )
-
-
-def _carry(coarse: Mesh, fine: Mesh, bound: float | None, coordinates: Array) -> Array:
-    """Interpolate the displacement of a coarse grid and add it to a finer one."""
-    return inside(
-        prolong_displacement(coarse, fine, coordinates.reshape(-1, 3)), fine, bound
-    ).ravel()
