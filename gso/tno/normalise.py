@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gso.constraints import Compiled, Constraint, compile_constraints
 from gso.errors import MeshError
-from gso.mesh import Frame, Mesh
+from gso.mesh import Frame, Mesh, topology
 from gso.typing import Array
 
 
@@ -31,7 +31,7 @@ class Canonical:
         if not self.frame.scale > 0:
             raise MeshError("all vertices are at one point")
         n = len(design.vertices)
-        if design.grid_index is None:
+        if design.grid_index is None or _row_by_row(design):
             self.order = np.arange(n)
             self.mesh = design.replaced(self.frame.to_unit(design.vertices))
         else:
@@ -73,6 +73,12 @@ class Canonical:
         new = np.empty(len(there), np.int64)
         new[users] = own
         return new
+
+
+def _row_by_row(mesh: Mesh) -> bool:
+    """Return whether a grid has the numbering and the faces that grids are solved with."""
+    height, width = mesh.grid_shape or (0, 0)
+    return np.array_equal(mesh.faces, topology.grid_faces(height, width))
 
 
 def given_points(
