@@ -29,7 +29,17 @@ class Shape:
     @cached_property
     def curvature(self) -> float:
         """Mean |K|, averaged over both triangulations of the quads."""
-        return measure.loss_gc_mean(self.mesh, scale=1.0)
+        inside = self._absolute[~np.isnan(self._absolute)]
+        return float(inside.mean()) if inside.size else 0.0
+
+    @cached_property
+    def own_bending(self) -> Array:
+        """Share (n,) of its own bending that each vertex should keep, see :func:`own_bending`."""
+        return own_bending(self.smooth, self._absolute if self.smooth is self.mesh else None)
+
+    @cached_property
+    def _absolute(self) -> Array:
+        return absolute_curvature(self.mesh)
 
     @cached_property
     def bending(self) -> float:
@@ -72,13 +82,19 @@ class Analysis(base.Analysis):
         return Shape(self.mesh)
 
 
-def own_bending(mesh: Mesh) -> Array:
+def absolute_curvature(mesh: Mesh) -> Array:
+    """Return |K| (n,), averaged over both triangulations of the quads; NaN on the boundary."""
+    return 0.5 * (np.abs(measure.curvature(mesh)) + np.abs(measure.curvature(mesh, 1)))
+
+
+def own_bending(mesh: Mesh, absolute: Array | None = None) -> Array:
     """Compute the share (n,) of its own bending that each vertex of a smooth design should keep.
 
     The share is near one where the design is developable already, so that fairness does not
-    shrink its border, and near zero where the design has Gaussian curvature.
+    shrink its border, and near zero where the design has Gaussian curvature. `absolute` is the
+    :func:`absolute_curvature`, if it is known.
     """
-    k = 0.5 * (np.abs(measure.curvature(mesh)) + np.abs(measure.curvature(mesh, 1)))
+    k = absolute_curvature(mesh) if absolute is None else absolute.copy()
     grid = mesh.grid_index
     if grid is not None:
         inner = grid[1:-1, 1:-1]

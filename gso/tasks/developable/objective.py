@@ -60,12 +60,11 @@ def objective(analysis: Analysis, request: Request, mesh: Mesh) -> list[Weighted
         shape = analysis.shape
         if mesh is not shape.mesh and mesh.grid_index is None:
             request = _on_triangles(request, analysis)
-        return _terms(request, shape.mesh, shape.curvature, shape.bending, shape.smooth, mesh)
+        return _terms(request, shape, shape.curvature, mesh)
 
     def make(own: Mesh) -> list[Weighted]:
         shape = Shape(own)
-        curved = measure.loss_gc_worst(own, scale=1.0)
-        return _terms(request, own, curved, shape.bending, shape.smooth, own)
+        return _terms(request, shape, measure.loss_gc_worst(own, scale=1.0), own)
 
     return per_component.objective(mesh, make)
 
@@ -84,12 +83,10 @@ def _on_triangles(request: Request, analysis: Analysis) -> Request:
     return replace(request, options=replace(o, **weights))
 
 
-def _terms(
-    request: Request, design: Mesh, curved: float, bending: float, smooth: Mesh, mesh: Mesh
-) -> list[Weighted]:
+def _terms(request: Request, shape: Shape, curved: float, mesh: Mesh) -> list[Weighted]:
     """Build the terms of one component, on its own mesh or on a coarser copy of it."""
     o = request.options
-    w_curvature, w_fairness = adapted_weights(o, max(curved, 1e-3), bending)
+    w_curvature, w_fairness = adapted_weights(o, max(curved, 1e-3), shape.bending)
     w_curvature *= (
         request.weight_factor if mesh.grid_index is not None else GENERAL * request.weight_factor
     )
@@ -101,9 +98,13 @@ def _terms(
     normals = vertex_normals(mesh)
     near = proximity.build(mesh, normals, tangential=o.tangential)
     items = [Weighted(t, w_curvature, Absolute(o.eps)) for t in curvature.build(mesh)]
-    if mesh is not design:
+    smooth = shape.smooth
+    if mesh is shape.mesh:
+        share = shape.own_bending
+    else:
         smooth = mesh.replaced(_resampled(smooth, mesh))
-    fair = fairness.build(mesh, reference=smooth.vertices, share=own_bending(smooth))
+        share = own_bending(smooth)
+    fair = fairness.build(mesh, reference=smooth.vertices, share=share)
     items.append(Weighted(fair, w_fairness))
     items.append(Weighted(near, w_proximity, Distance(o.quadratic_below)))
     items.append(Weighted(elongation.build(mesh), o.w_elongation))
