@@ -35,7 +35,7 @@ class Solver:
         self._matrix = spmatrix(
             1.0,
             matrix(pattern.indices.astype(np.int64)),
-            matrix(pattern.columns.astype(np.int64)),
+            matrix(np.repeat(np.arange(pattern.size), np.diff(pattern.indptr))),
             (pattern.size, pattern.size),
         )
         self._symbolic = cholmod.symbolic(self._matrix)
