@@ -114,6 +114,8 @@ def build(
     with claimed(place):
         with _kept():
             record = _begin(place, recipe, device)
+        # A set goes on with the device that it was begun with.
+        device = record.get("device") if device is None else device
         bad = manifest.damaged(place, record)
         if record["complete"] and wanted <= manifest.pairs(record) and not bad:
             return Dataset(place)
@@ -184,9 +186,11 @@ def _begin(folder: Path, recipe: Recipe, device: str | None) -> dict[str, Any]:
     there = manifest.load(folder)
     _check_same(folder, there, "recipe", record["recipe"], _OTHER_RECIPE)
     made, asked = there.get("device"), record.get("device")
-    if made != asked:
+    if asked is not None and made != asked:
+        begun = "without --device" if made is None else f"with --device {made}"
         raise DatasetError(
-            f"{folder} holds a set with device {made!r}, not {asked!r}; {_OTHER_RECIPE}"
+            f"{folder} holds a set that was begun {begun}, not with --device {asked}; "
+            f"{_OTHER_RECIPE}"
         )
     return there
 

@@ -43,7 +43,7 @@ def differences(mesh: Mesh) -> tuple[Ints, Array]:
     """
     v = mesh.vertices
     if mesh.has_triangles:
-        return _hinge_differences(mesh)
+        return hinge_differences(mesh)
     if mesh.grid_index is not None:
         ids = mesh.grid_index
         rows = np.stack([ids[:-2], ids[1:-1], ids[2:]], axis=-1).reshape(-1, 3)
@@ -72,7 +72,8 @@ def spacing(along: Any, across: Any, shape: Sequence[int]) -> tuple[Any, Any]:
     return mean * excess / (shape[0] - 1), mean / excess / (shape[1] - 1)
 
 
-def _hinge_differences(mesh: Mesh) -> tuple[Ints, Array]:
+def hinge_differences(mesh: Mesh) -> tuple[Ints, Array]:
+    """Return the second differences across the edges of a triangulation, as :func:`differences`."""
     stencil = topology.hinges(mesh.triangle_edges)
     a, b, c, d = (mesh.vertices[stencil[:, k]] for k in range(4))
     edge = b - a

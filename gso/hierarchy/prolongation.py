@@ -38,7 +38,7 @@ class Prolongation:
     ids : ndarray of int, (m,)
         The vertices with given displacements, each once; three or more.
     held : ndarray of int, (h,), optional
-        Vertices at which the field takes a value exactly, up to 1e-3 of the difference; it then
+        Vertices at which the field takes a value, up to a thousandth of the difference; it then
         has no kinks around vertices that constraints fix.
 
     Examples
@@ -61,7 +61,8 @@ class Prolongation:
 
         mesh, ids = self.mesh, self.ids
         n = len(mesh.vertices)
-        stencil, coefficients = fairness.differences(mesh)
+        # Across the edges of the triangulation: polylines do not reach every vertex.
+        stencil, coefficients = fairness.hinge_differences(mesh)
         count, width = stencil.shape
         bend = csr_matrix(
             (coefficients.T.ravel(), stencil.ravel(), width * np.arange(count + 1)),
@@ -69,8 +70,7 @@ class Prolongation:
         )
         ends = mesh.vertices[mesh.edges]
         edge2 = float(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1).mean())
-        # Spacing of the given vertices: their number is that of all vertices, divided by its ratio
-        # to the mean edge, squared.
+        # The squared spacing of the m given vertices among n: edge^2 n / m.
         reach4 = (_REACH**2 * edge2 * n / len(ids)) ** 2
         given = np.zeros(n)
         given[ids] = 1.0

@@ -25,13 +25,12 @@ Mask = NDArray[np.bool_]
 _ROUNDS, _FEW = 60, 0.05
 #: Sweeps of the search for an independent set in a round.
 _SWEEPS = 3
-#: Smallest cosine of the angle by which a triangle's normal may turn in a collapse.
-_TURN = 0.5
+#: Smallest cosine of the angle by which a triangle's normal may turn in a collapse, and by which
+#: those of two triangles may differ from their mean where the edge between them is flipped.
+_TURN, _FLIP_TURN = 0.5, 0.8
 #: Smallest shape of a new triangle, 1 if equilateral and 0 if without area, in the first rounds
 #: and at last.
 _SHAPE, _LEAST = 0.25, 0.05
-#: The same for a flip, relative to the mean of the two triangles.
-_FLAT = 0.8
 #: Smallest cosine of the angle by which the boundary may turn at a vertex that is removed.
 _STRAIGHT = 0.7
 
@@ -92,9 +91,9 @@ def thinned(points: Array, triangles: Ints, count: int, keep: Ints | None = None
         left = into == np.arange(len(ids))
         removed = len(ids) - int(left.sum())
         if removed < _FEW * min(surplus, len(ids)):
-            if least < _LEAST:
+            if least <= _LEAST:
                 break
-            least *= 0.5
+            least = max(0.5 * least, _LEAST)
         faces = into[faces]
         whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
         number = np.cumsum(left) - 1
@@ -133,9 +132,9 @@ def flipped(points: Array, faces: Ints) -> Ints:
     whole = np.sqrt(_dot(normal, normal))
     fine = np.ones(len(wanted), bool)
     for new in turned:
-        fine &= _dot(new, normal) > _FLAT * np.sqrt(_dot(new, new)) * whole
+        fine &= _dot(new, normal) > _FLIP_TURN * np.sqrt(_dot(new, new)) * whole
     for old in (left[wanted], right[wanted]):
-        fine &= _dot(old, normal) > _FLAT * np.sqrt(_dot(old, old)) * whole
+        fine &= _dot(old, normal) > _FLIP_TURN * np.sqrt(_dot(old, old)) * whole
     made = np.minimum(c, d)[wanted] * n + np.maximum(c, d)[wanted]
     fine &= ~_among(ranked, made)
     wanted, made = wanted[fine], made[fine]

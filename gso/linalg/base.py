@@ -45,9 +45,11 @@ class Pattern:
     @cached_property
     def bandwidth(self) -> int:
         """Largest distance of an entry from the diagonal, in the given order."""
+        if not self.nnz:
+            return 0
         # The last entry of a column is the farthest from the diagonal.
         last = self.indices[self.indptr[1:] - 1]
-        return int((last - np.arange(self.size)).max()) if self.nnz else 0
+        return int((last - np.arange(self.size)).max())
 
 
 @lru_cache(maxsize=1)

@@ -196,6 +196,8 @@ class Plan:
     convert : callable, optional
         Makes the result from the solution of the stages, unless the solve was cancelled. Its
         second argument is told each iteration, and returns whether to go on.
+    edited : Stage, optional
+        What a session iterates while handles move; the last stage where not given.
     """
 
     layout: Layout
@@ -212,6 +214,7 @@ class Plan:
     start_refused: str = ""
     cut: Cut | None = None
     convert: Callable[[Solution, Callable[[Progress], bool]], Solution] | None = None
+    edited: Stage | None = None
 
 
 @dataclass

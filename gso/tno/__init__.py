@@ -7,7 +7,8 @@ from gso.tno.optimize import check, optimize
 from gso.tno.session import Session
 from gso.tno.start import Start
 
-__all__ = ["Session", "Start", "check", "optimize", "optimize_batch", "optimize_many"]
+#: ``optimize_batch`` is not among them, as it needs PyTorch.
+__all__ = ["Session", "Start", "check", "optimize", "optimize_many"]
 
 
 def __getattr__(name: str) -> Any:
@@ -22,4 +23,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted([*__all__, "optimize_batch"])

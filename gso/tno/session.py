@@ -42,8 +42,10 @@ class Session:
     task is iterated, from the current surface. The session keeps the sparsity pattern of its
     equations and their symbolic factorisation, so a frame costs one or two iterations. Hard
     handles are at their positions after every :meth:`move`, up to rounding; the iterations
-    then adapt the rest of the surface. By "curvature" the first iteration after a move changes
-    offsets along the normals only, for a faster answer; all others move the vertices freely. The
+    then adapt the rest of the surface. By "curvature", on meshes of more than 2,000 vertices, the
+    first iteration after a move changes offsets along the normals only, for a faster answer; all
+    others move the vertices freely. Take two iterations a frame, or iterate while the handles rest,
+    for a lower energy; so that hard lengths and planes hold, all iterations are free there. The
     components of a mesh are solved together, each
     with weights by its own size.
 
@@ -61,7 +63,7 @@ class Session:
     analyses : int
         Number of symbolic factorisations so far: one, and one more for each
         :meth:`constrain` that changes the sparsity pattern, such as by fixing other vertices.
-        By "curvature" there is another one for the first iteration after a move.
+        There is another one where the first iteration after a move has other unknowns.
 
     Raises
     ------
@@ -108,9 +110,10 @@ class Session:
         self._spread: ThinPlateField | None = None
         #: Problem and solver of the stage's unknowns, and of those while handles move.
         self._kept: dict[bool, tuple[Problem, Any]] = {}
-        #: Whether the current unknowns are those while handles move, and one has moved since the
-        #: last iteration.
-        self._moving = self._moved = False
+        #: Whether the current unknowns are those for the first iteration after a move.
+        self._moving = False
+        #: Whether a handle has moved since the last iteration.
+        self._moved = False
         self._direction = METHODS[self._options.method].direction()
         self._x0 = self._frame.start(x0, flat=False)
         self._run: Any = None
@@ -172,6 +175,7 @@ class Session:
         c = self._compiled
         self._follow(c.hard_ids, c.hard_positions - self._surface[c.hard_ids])
         self._pose()
+        self._moved = False
         self._left_to_do()
 
     def step(self, iterations: int = 1) -> Array:
@@ -201,9 +205,10 @@ class Session:
                 self._left_to_do()
                 left -= 1
             self._moved = False
-            if left:
-                self._at_rest()
-                self._iterate(self._stage, left, 0.0)
+            if not left:
+                return self.vertices
+            self._at_rest()
+            self._iterate(self._stage, left, 0.0)
             blocks = self._stage.layout.split(self._coordinates)
             for item in self._stage.items:
                 if item.term.multipliers is not None:
@@ -258,7 +263,6 @@ class Session:
 
     def result(self) -> Result:
         """Return the current surface as a result, like that of :func:`gso.tno.optimize`."""
-        self._at_rest()
         plan, stage, at = self._plan, self._stage, self._coordinates
         solution = Solution(
             plan.layout.split(plan.finish(at)),
@@ -311,7 +315,7 @@ class Session:
             run.continue_from(self._run)
         self._run = run
         self._compiled, self._constraints, self._spread = compiled, given, None
-        self._stage = plan.stages[-1] if plan.stages else None
+        self._stage = plan.edited or (plan.stages[-1] if plan.stages else None)
         return plan
 
     def _follow(self, ids: Ints, displacement: Array) -> None:

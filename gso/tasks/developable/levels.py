@@ -34,7 +34,8 @@ FREE_VERTICES = 20_000
 #: Longest side of grids that are solved under constraints on their own vertices only.
 _SHORT = 96
 #: Factor on the number of vertices above which other meshes have coarser ones, under constraints.
-#: These cost energy: around held vertices the lowest one has folds as fine as the mesh.
+#: With coarser meshes the solve ends in a minimum of higher energy: around held vertices the lowest
+#: minimum has folds as fine as the mesh.
 _CONSTRAINED = 4
 #: Parts of constraints with at most so many vertices keep them on coarser meshes.
 _FEW = 100

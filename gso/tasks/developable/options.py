@@ -47,8 +47,8 @@ class Options(BaseOptions):
     controls : int
         "spline", "surface": control points along each side; fewer on small grids.
     coarse_iterations : int
-        Iterations on the coarsest grid; half as many with `x0`, and half as many again on meshes
-        that are not grids.
+        Iterations on the coarsest grid; half as many with `x0`, one and a half times as many on
+        meshes that are not grids.
     coarse_size : int
         Largest side of the coarsest grid without `x0`; a grid that small is halved once.
     free_size : int

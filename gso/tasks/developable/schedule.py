@@ -10,13 +10,13 @@ from itertools import pairwise
 import numpy as np
 
 from gso import metrics as measure
+from gso.constraints import Compiled
 from gso.energy.losses import Absolute
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
 from gso.status import Status
-from gso.tasks import constrained
-from gso.tasks.base import Analysis as Coarse
+from gso.tasks import base, constrained
 from gso.tasks.base import Plan, Request, Stage
 from gso.tasks.developable import spline_stage
 from gso.tasks.developable.analysis import FLAT_CURVATURE, Analysis
@@ -35,8 +35,10 @@ NOISE_REACH = 2.8
 
 #: Iterations with normal offsets between a warm start and the stage of free vertices.
 _OFFSETS_FIRST = 12
-#: Half the factor on the iterations on the coarsest mesh where that is not a grid.
-_LONGER = 3
+#: Factor on the iterations on the coarsest mesh where that is not a grid.
+_LONGER = 1.5
+#: Vertices above which the first iteration after a handle has moved changes offsets only.
+_QUICK = 2000
 #: Kinds of unknowns: displacements along one of two tangents.
 TANGENTS = ("first tangent", "second tangent")
 #: Sweeps over normals and both tangents where the vertices around held ones are to be free.
@@ -74,10 +76,18 @@ def plan(analysis: Analysis, request: Request) -> Plan:
         enter = partial(level.entered, before, radius(request))
         stages[k + 1] = replace(stages[k + 1], enter=enter)
     if coarse and not constraints.empty:
-        first = Coarse(coarse[0].mesh, coarse[0].constraints)
+        first = base.Analysis(coarse[0].mesh, coarse[0].constraints)
         stages.insert(0, constrained.approach(first, coarse[0].mesh.vertices))
     if spline is not None:
         stages.append(spline_stage.stage(stages[-1], mesh, spline))
+    edited = None
+    if coarse and not constraints.empty and stages[-1].name == "normal":
+        edited = replace(
+            stages[-1],
+            name="free",
+            variables=partial(_unknowns, "free", mesh, options),
+            moving=stages[-1].variables,
+        )
     begin = coarse[0].begin.vertices if coarse else inside(start, mesh, radius(request))
     free_to_return = constraints.empty
     free_to_return &= request.start is None or request.max_displacement is None
@@ -92,6 +102,7 @@ def plan(analysis: Analysis, request: Request) -> Plan:
         fallback=fallback if free_to_return else None,
         spline=spline,
         cold_start=None if request.start is None else mesh.vertices.ravel,
+        edited=edited,
     )
 
 
@@ -128,6 +139,9 @@ def _stages(analysis: Analysis, request: Request, coarser_meshes: int) -> list[S
     bounds = offset_bounds(mesh, radius(request), constraints.hard_ids)
     cold = request.start is None and mesh.grid_index is None and not coarser_meshes
     falling = _falling(o) if cold else (Absolute(o.eps),)
+    # On small meshes free vertices are fast enough, and offsets alone cannot meet lengths.
+    quick = len(mesh.vertices) > _QUICK and not _repeated(constraints)
+    moving = partial(_unknowns, "normal", mesh, o) if quick else None
 
     def stage(kind: str, iterations: int, losses: Sequence[Absolute]) -> Stage:
         return Stage(
@@ -141,7 +155,7 @@ def _stages(analysis: Analysis, request: Request, coarser_meshes: int) -> list[S
             continued="curvature",
             bounds=bounds,
             imposed=analysis.imposed,
-            moving=partial(_unknowns, "normal", mesh, o) if kind == "free" else None,
+            moving=moving if kind == "free" else None,
         )
 
     final = falling[-1:]
@@ -151,9 +165,7 @@ def _stages(analysis: Analysis, request: Request, coarser_meshes: int) -> list[S
         return [stage("normal", o.iterations, losses) for losses in (falling, final)]
     if coarser_meshes and not constraints.empty:
         if mesh.grid_index is not None or o.variables == "free" or not pinned_only(constraints):
-            # Constraints that are terms repeat the stage until they hold.
-            repeated = any(p.hard and not p.linear for p in constraints.parts)
-            return [stage("free", most if repeated else o.iterations, final)]
+            return [stage("free", most if _repeated(constraints) else o.iterations, final)]
         # Normal offsets alone would leave the tangential displacements to the coarser meshes.
         sweep = [stage("normal", 2, final), *(stage(kind, 1, final) for kind in TANGENTS)]
         return [*_SWEEPS * sweep, stage("normal", most // 2, final)]
@@ -172,6 +184,11 @@ def _stages(analysis: Analysis, request: Request, coarser_meshes: int) -> list[S
         first = stage("normal", _OFFSETS_FIRST, falling)
         return [replace(first, tolerance=_LOOSE), last]
     return [last]
+
+
+def _repeated(constraints: Compiled) -> bool:
+    """Return whether hard constraints are terms, for which the last stage is repeated."""
+    return any(p.hard and not p.linear for p in constraints.parts)
 
 
 def _falling(options: Options) -> tuple[Absolute, ...]:
@@ -211,7 +228,7 @@ def _coarse_stage(analysis: Analysis, request: Request, level: Level, number: in
     if first and begun:
         iterations //= 2
     if first and not grid:
-        iterations = _LONGER * iterations // 2
+        iterations = int(_LONGER * iterations)
     loose = small or o.variables == "free" or not pinned_only(level.constraints)
     kind = "free" if first or (not begun and loose) else "normal"
     if request.max_displacement is not None:

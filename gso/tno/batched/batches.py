@@ -24,6 +24,7 @@ from gso.result import Result
 from gso.tasks.base import Plan, Request
 from gso.tno.batched import stages
 from gso.tno.batched.asked import Asked
+from gso.tno.batched.problem import forget
 from gso.tno.batched.unknowns import Unbatchable
 from gso.tno.judged import judged, requirements
 from gso.tno.normalise import Canonical
@@ -33,7 +34,7 @@ from gso.tno.run import Run
 
 #: Surfaces solved together on a processor, and most surfaces and vertices of them together on a
 #: graphics processor.
-_TOGETHER, _TOGETHER_THERE, _MOST_THERE = 16, 256, 1 << 20
+_BATCH, _GPU_BATCH, _GPU_VERTICES = 16, 256, 1 << 20
 #: Number of pieces from which worker processes save time.
 _WORTH = 4
 
@@ -42,11 +43,13 @@ def solved(
     asked: Asked, designs: Sequence[Any], workers: int | None = 0
 ) -> Iterator[Result | GSOError]:
     """Solve grids of one size, arrays (H, W, 3) or meshes; yield results or errors in order."""
+    if not len(designs):
+        return
     there = asked.device.partition(":")[0] != "cpu"
-    together = _TOGETHER
-    if there and len(designs):
+    together = _BATCH
+    if there:
         vertices = np.size(getattr(designs[0], "vertices", designs[0])) // 3
-        together = max(min(_MOST_THERE // vertices, _TOGETHER_THERE), 1)
+        together = max(min(_GPU_VERTICES // max(vertices, 1), _GPU_BATCH), 1)
     pieces = [designs[k : k + together] for k in range(0, len(designs), together)]
     if workers is None:
         workers = _paying(len(pieces))
@@ -176,10 +179,12 @@ def _solved(group: list[_Begun], asked: Asked) -> list[Result]:
         )
     except torch.cuda.OutOfMemoryError:
         if not half:
-            raise
+            # It is then solved by itself, on the processor.
+            raise Unbatchable from None
         reached = []
     if not reached:
         # Outside the handler, which would keep the tensors alive.
+        forget()
         torch.cuda.empty_cache()
         return _solved(group[:half], asked) + _solved(group[half:], asked)
     each = (time.perf_counter() - clock) / len(group)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from gso.errors import GSOError, MeshError
+from gso.errors import GSOError, MeshError, OptionError
 from gso.result import Result
 from gso.spelling import known_keywords
 from gso.tno.batched.asked import checked
@@ -32,6 +32,7 @@ def optimize_batch(
     The objective and the stages are those of :func:`gso.tno.optimize`, and so are the results,
     up to rounding errors and what the iterations make of them. But for these, a result does not
     depend on the other surfaces. On a graphics processor all surfaces are solved together.
+    On a processor PyTorch uses one thread of this process for as long as it runs.
     Surfaces whose stages differ from those of the others, such as noisy or closed ones, are
     solved in smaller batches, or one by one.
 
@@ -57,7 +58,8 @@ def optimize_batch(
     Returns
     -------
     list of Result
-        In the order of the designs. Their `seconds` are a share of those of their batch.
+        In the order of the designs. Their `seconds` are a share of those of their batch. There
+        are no warnings: the status of each says whether it has converged.
 
     Raises
     ------
@@ -75,6 +77,8 @@ def optimize_batch(
     >>> [r.metrics["loss_gc"] < r.metrics["loss_gc_before"] for r in results]
     [True, True]
     """
+    if workers is not None and (not isinstance(workers, int) or workers < 0):
+        raise OptionError(f"workers is {workers!r}; it must be a whole number of 0 or more")
     designs = _designs(points)
     asked = checked(task, formulation, options, device, verdict)
     out: list[Result] = []
@@ -102,6 +106,8 @@ def _designs(points: Any) -> Array:
                 "has grids of one size, others are solved by gso.tno.optimize_many"
             )
         raise MeshError("the surfaces must be an array of numbers (B, H, W, 3)")
+    if designs.shape == (0,):
+        return np.zeros((0, 3, 3, 3))
     if designs.ndim != 4 or designs.shape[-1] != 3:
         raise MeshError(f"expected a batch of grids (B, H, W, 3), not {designs.shape}")
     bad = ~np.isfinite(designs).all(axis=(1, 2, 3))

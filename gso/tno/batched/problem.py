@@ -6,6 +6,7 @@ import hashlib
 from collections import OrderedDict
 from collections.abc import Sequence
 from copy import copy
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from gso.unknowns import Layout
 #: Structures that are kept for the next batch.
 _KEPT = 24
 _structures: OrderedDict[bytes, Structure] = OrderedDict()
+_lock = Lock()
 
 
 class Structure:
@@ -99,13 +101,22 @@ def _structure(n: int, terms: Sequence[Term], device: torch.device) -> Structure
         digest.update(f"{term.quadratic} {term.columns.shape}".encode())
         digest.update(np.ascontiguousarray(term.columns).data)
     key = digest.digest()
-    if key not in _structures:
+    with _lock:
+        found = _structures.pop(key, None)
+    if found is None:
         varying, fixed = ([t.columns for t in terms if t.quadratic is q] for q in (False, True))
-        _structures[key] = Structure(n, varying, fixed, device)
+        found = Structure(n, varying, fixed, device)
+    with _lock:
+        _structures[key] = found
         while len(_structures) > _KEPT:
             _structures.popitem(last=False)
-    _structures.move_to_end(key)
-    return _structures[key]
+    return found
+
+
+def forget() -> None:
+    """Forget the structures of former batches, to have their memory back."""
+    with _lock:
+        _structures.clear()
 
 
 class Problem:

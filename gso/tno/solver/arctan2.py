@@ -6,6 +6,8 @@ from __future__ import annotations
 def arctan2(y, x):
     """Return the angle of the vector (x, y) in radians, to 5e-16; written for Numba.
 
+    Components must be finite and below 1e307; the sign of zero does not count.
+
     The ratio of the smaller to the larger component is reduced to at most tan(pi/8), where the
     arctangent is a polynomial (minimax, error 1e-18). It is inlined in loops over elements: the
     C library's function would keep the compiler from evaluating several elements at once.

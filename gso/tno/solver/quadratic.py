@@ -89,8 +89,9 @@ def _blocks(element: Elements, start: Array, n: int) -> Iterator[tuple[Array, In
         residual, slope = element.linearise(start, at)
         by_row = (slope * root[at]).transpose(0, 2, 1)
         columns = np.broadcast_to(element.columns[:, at].T, by_row.shape)
-        # Derivatives that are zero in all elements; single zeros would change the pattern.
-        keep = (by_row != 0).any(axis=1, keepdims=True) & (columns < n)
+        # Drop derivatives that are zero in all elements of the block. Dropping single zeros would
+        # make the sparsity pattern depend on the surface.
+        keep = (slope != 0).any(axis=2)[:, None] & (columns < n)
         sizes = sum(keep[..., k].astype(np.int32) for k in range(keep.shape[2])).ravel()
         rhs = -(residual * root[at]).ravel()
         yield by_row[keep], columns[keep].astype(np.int32), sizes, rhs

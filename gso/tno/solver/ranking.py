@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.errors import MeshError
 from gso.typing import Ints
 
 Int32 = NDArray[np.int32]
@@ -113,6 +114,11 @@ def _by_table(groups: list[Pairs], size: int, used: Any) -> tuple[list[Int32], I
 def _by_sorting(groups: list[Pairs], size: int) -> tuple[list[Int32], Ints, Ints]:
     """Sort the entries by counting: first by the higher unknown, then by the lower one."""
     total = sum(e * m for e, m in (group.shape for group in groups))
+    if total >= 2**31:
+        raise MeshError(
+            f"the matrices of the elements have {total:.2g} entries, more than 2e9: the mesh is "
+            "too large; decimate it, or cut it into pieces"
+        )
     low, high = np.empty(total, np.int32), np.empty(total, np.int32)
     start = 0
     places: list[Int32] = []
