@@ -27,7 +27,7 @@ from gso.linalg import banded as lapack  # noqa: E402
 from gso.tno.batched import cholesky, search, stages  # noqa: E402
 from gso.tno.batched import kernels as on_tensors  # noqa: E402
 from gso.tno.batched.asked import checked  # noqa: E402
-from gso.tno.batched.batches import solved  # noqa: E402
+from gso.tno.batched.batches import solve_all  # noqa: E402
 from gso.tno.batched.sums import Sums  # noqa: E402
 from gso.tno.batched.unknowns import Unbatchable  # noqa: E402
 from gso.tno.solver.directions import GaussNewton  # noqa: E402
@@ -112,7 +112,7 @@ def test_energy_gradient_and_matrix_are_those_of_the_solver(name, designs):
     coordinates = [plan.start for plan in plans]
     for own in zip(*(plan.stages for plan in plans), strict=True):
         coordinates = [s.enter(c) for s, c in zip(own, coordinates, strict=True)]
-        problem, x, losses = stages.begun(own, coordinates, CPU)
+        problem, x, losses = stages.stacked_problem(own, coordinates, CPU)
         x = x + 1e-4 * torch.as_tensor(rng.standard_normal(x.shape))
         for number, loss in enumerate(losses or [None]):
             here = problem if loss is None else problem.with_loss(own[0].continued, loss)
@@ -447,7 +447,7 @@ def test_unknowns_that_cannot_be_stacked(designs):
     ]
     own = [plan.stages[-1] for plan in plans]
     with pytest.raises(Unbatchable):
-        stages.begun(own, [p.reshape(-1) for p in designs[:2]], CPU)
+        stages.stacked_problem(own, [p.reshape(-1) for p in designs[:2]], CPU)
 
 
 def test_a_batch_is_halved_where_memory_is_short(designs, monkeypatch):
@@ -480,5 +480,5 @@ def test_what_fails_in_a_batch_is_solved_alone(designs, monkeypatch):
 def test_solved_yields_errors_in_place(designs):
     bad = designs.copy()
     bad[1] = 0.5
-    found = list(solved(checked("flatten"), bad))
+    found = list(solve_all(checked("flatten"), bad))
     assert [isinstance(one, gso.MeshError) for one in found] == [False, True, False, False]

@@ -130,11 +130,11 @@ def solve_many(kind: str, points: Array, device: str | None = None) -> list[Labe
     if device is None or kind not in BATCHED:
         return [solve(kind, p) for p in points]
     from gso.tno.batched.asked import checked
-    from gso.tno.batched.batches import solved
+    from gso.tno.batched.batches import solve_all
 
     asked = checked(device=device, **KINDS[kind].arguments)
     designs: list[Mesh | GSOError] = [_or_error(Mesh.from_grid, p, weld=False) for p in points]
-    results = solved(asked, [d for d in designs if isinstance(d, Mesh)])
+    results = solve_all(asked, [d for d in designs if isinstance(d, Mesh)])
     found = [next(results) if isinstance(d, Mesh) else d for d in designs]
     labels = [_or_error(_labelled, kind, f) if isinstance(f, Result) else f for f in found]
     return [x if isinstance(x, Label) else _failed(kind, points.shape[1]) for x in labels]

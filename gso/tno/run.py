@@ -18,7 +18,7 @@ from gso.tasks.base import Options, Plan, Request, Solution, Stage, same
 from gso.tno.solver import Callback, Minimum, Timings, minimise
 from gso.tno.solver.augmented_lagrangian import tighten
 from gso.tno.solver.minimiser import says_no
-from gso.tno.solver.problem import Problem, energies, most
+from gso.tno.solver.problem import Problem, energies, largest_counts
 from gso.typing import Array
 from gso.unknowns import control_points
 
@@ -199,7 +199,7 @@ class Run:
         least = 0.0 if plan.cold_start is None else self.tolerance
         stages = plan.stages
         # Coarser grids use the kernels of the finest, which are compiled if that one is large.
-        many = most((stage.items, stage.layout) for stage in stages)
+        counts = largest_counts((stage.items, stage.layout) for stage in stages)
         for number, stage in enumerate(stages):
             clock = time.perf_counter()
             entered, coordinates = coordinates, stage.enter(coordinates)
@@ -213,7 +213,7 @@ class Run:
                 replace(stage, tolerance=max(stage.tolerance, least)),
                 place=(number, len(stages)),
                 reserved=reserved,
-                many=many,
+                counts=counts,
             )
             coordinates, minimum = solve(coordinates)
             if minimum.status is Status.CANCELLED:
@@ -248,7 +248,7 @@ class Run:
         items: Any = None,
         place: tuple[int, int] = (0, 1),
         reserved: int = 0,
-        many: Any = None,
+        counts: Any = None,
     ) -> tuple[Array, Minimum]:
         """Minimise the objective of one stage from coordinates.
 
@@ -266,7 +266,7 @@ class Run:
             Index and number of stages, for the callback.
         reserved : int
             Iterations of the budget to leave for later stages.
-        many : dict, optional
+        counts : dict, optional
             As for :class:`gso.tno.solver.problem.Problem`.
         """
         clock = time.perf_counter()
@@ -275,7 +275,7 @@ class Run:
         # The stage before may have the same sparsity pattern, as with other directions of offsets.
         before, self._problem = self._problem, None
         wanted = items if again else stage.items
-        problem = Problem(wanted, variables, stage.limits, like=before, many=many)
+        problem = Problem(wanted, variables, stage.limits, like=before, counts=counts)
         del before
         self._problem = problem
         x = variables.project(coordinates)

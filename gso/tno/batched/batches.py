@@ -36,10 +36,10 @@ from gso.tno.run import Run
 #: graphics processor.
 _BATCH, _GPU_BATCH, _GPU_VERTICES = 16, 256, 1 << 20
 #: Number of pieces from which worker processes save time.
-_WORTH = 4
+_ENOUGH = 4
 
 
-def solved(
+def solve_all(
     asked: Asked, designs: Sequence[Any], workers: int | None = 0
 ) -> Iterator[Result | GSOError]:
     """Solve grids of one size, arrays (H, W, 3) or meshes; yield results or errors in order."""
@@ -52,10 +52,10 @@ def solved(
         together = max(min(_GPU_VERTICES // max(vertices, 1), _GPU_BATCH), 1)
     pieces = [designs[k : k + together] for k in range(0, len(designs), together)]
     if workers is None:
-        workers = _paying(len(pieces))
+        workers = _useful_workers(len(pieces))
     if workers <= 0 or there:
         for piece in pieces:
-            yield from _together(asked, piece)
+            yield from _solve_batch(asked, piece)
         return
     # Smaller pieces where they leave no process without work.
     share = -(-len(designs) // (workers * -(-len(pieces) // workers)))
@@ -73,22 +73,22 @@ def solved(
 
 def _measured(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
     """Solve designs in a worker process, and compute their metrics there."""
-    found = _together(asked, designs)
+    found = _solve_batch(asked, designs)
     for result in found:
         if isinstance(result, Result):
             result.metrics  # noqa: B018
     return found
 
 
-def _paying(pieces: int) -> int:
+def _useful_workers(pieces: int) -> int:
     """Return the number of worker processes that saves time, 0 inside a worker process."""
-    if parent_process() is not None or pieces < _WORTH:
+    if parent_process() is not None or pieces < _ENOUGH:
         return 0
     return min(processors(), pieces)
 
 
 @dataclass
-class _Begun:
+class _Planned:
     """One surface that has been planned, and the seconds that this took."""
 
     design: Mesh
@@ -98,20 +98,20 @@ class _Begun:
     seconds: float
 
 
-def _together(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
+def _solve_batch(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
     """Solve designs in one batch for each structure that their stages have."""
     out: list[Any] = [None] * len(designs)
-    groups: dict[bytes, list[tuple[int, _Begun]]] = {}
+    groups: dict[bytes, list[tuple[int, _Planned]]] = {}
     with _one_thread(asked.device), blas_threads(asked.options.threads):
         for index, given in enumerate(designs):
             try:
-                begun = _begun(asked, given)
-                groups.setdefault(stages.structure(begun.plan), []).append((index, begun))
+                planned = _planned(asked, given)
+                groups.setdefault(stages.structure(planned.plan), []).append((index, planned))
             except (Unbatchable, GSOError):
                 pass
         for group in groups.values():
             try:
-                found = _solved([begun for _, begun in group], asked)
+                found = _solve_group([planned for _, planned in group], asked)
             except (Unbatchable, GSOError):
                 continue
             for (index, _), result in zip(group, found, strict=True):
@@ -119,7 +119,7 @@ def _together(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
         for index, given in enumerate(designs):
             if out[index] is None:
                 # This also finds out which surface an error is about.
-                out[index] = _alone(asked, given)
+                out[index] = _solve_alone(asked, given)
     return out
 
 
@@ -135,7 +135,7 @@ def _one_thread(device: str) -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def _begun(asked: Asked, given: Any) -> _Begun:
+def _planned(asked: Asked, given: Any) -> _Planned:
     """Plan the solve of a surface."""
     from gso.io import as_mesh
 
@@ -149,10 +149,10 @@ def _begun(asked: Asked, given: Any) -> _Begun:
     run = Run(module, analysis)
     request = Request(asked.options.in_unit(frame.frame.scale), asked.formulation)
     plan = module.plan(analysis, request)
-    return _Begun(design, frame, run, plan, time.perf_counter() - clock)
+    return _Planned(design, frame, run, plan, time.perf_counter() - clock)
 
 
-def _alone(asked: Asked, given: Any) -> Result | GSOError:
+def _solve_alone(asked: Asked, given: Any) -> Result | GSOError:
     """Solve a surface by itself."""
     try:
         with warnings.catch_warnings():
@@ -169,10 +169,10 @@ def _alone(asked: Asked, given: Any) -> Result | GSOError:
         return error
 
 
-def _solved(group: list[_Begun], asked: Asked) -> list[Result]:
+def _solve_group(group: list[_Planned], asked: Asked) -> list[Result]:
     """Solve surfaces whose stages have one structure, in halves where memory is short."""
     clock = time.perf_counter()
-    plans, half = [begun.plan for begun in group], len(group) // 2
+    plans, half = [planned.plan for planned in group], len(group) // 2
     try:
         reached, iterations, timings = stages.solve(
             plans, asked.options.method, torch.device(asked.device)
@@ -186,21 +186,21 @@ def _solved(group: list[_Begun], asked: Asked) -> list[Result]:
         # Outside the handler, which would keep the tensors alive.
         forget()
         torch.cuda.empty_cache()
-        return _solved(group[:half], asked) + _solved(group[half:], asked)
+        return _solve_group(group[:half], asked) + _solve_group(group[half:], asked)
     each = (time.perf_counter() - clock) / len(group)
     out = []
-    for begun, state, count in zip(group, reached, iterations, strict=True):
+    for planned, state, count in zip(group, reached, iterations, strict=True):
         clock = time.perf_counter()
-        run = begun.run
+        run = planned.run
         run.iterations, run.history = count, state.minimum.history
         for phase, seconds in timings.as_dict().items():
             setattr(run.timings, phase, seconds / len(group))
-        run.timings.setup += begun.seconds
-        solution = run.concluded(begun.plan, state)
-        result = packed(asked.task, asked.formulation, begun.design, begun.frame, solution, run)
+        run.timings.setup += planned.seconds
+        solution = run.concluded(planned.plan, state)
+        result = packed(asked.task, asked.formulation, planned.design, planned.frame, solution, run)
         if asked.verdict:
-            scale = begun.frame.frame.scale
-            result = judged(result, requirements(begun.frame.mesh, Compiled(), scale))
-        result.seconds["total"] = begun.seconds + each + time.perf_counter() - clock
+            scale = planned.frame.frame.scale
+            result = judged(result, requirements(planned.frame.mesh, Compiled(), scale))
+        result.seconds["total"] = planned.seconds + each + time.perf_counter() - clock
         out.append(result)
     return out

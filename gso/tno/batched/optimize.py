@@ -12,7 +12,7 @@ from gso.errors import GSOError, MeshError, OptionError
 from gso.result import Result
 from gso.spelling import known_keywords
 from gso.tno.batched.asked import checked
-from gso.tno.batched.batches import solved
+from gso.tno.batched.batches import solve_all
 from gso.typing import Array
 
 
@@ -82,7 +82,7 @@ def optimize_batch(
     designs = _designs(points)
     asked = checked(task, formulation, options, device, verdict)
     out: list[Result] = []
-    for index, found in enumerate(solved(asked, list(designs), workers)):
+    for index, found in enumerate(solve_all(asked, list(designs), workers)):
         if isinstance(found, GSOError):
             raise type(found)(f"surface {index}: {found}")
         out.append(found)

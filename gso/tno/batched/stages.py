@@ -111,7 +111,7 @@ def solve(
         stages = [plan.stages[number] for plan in plans]
         entered = coordinates
         coordinates = [s.enter(c) for s, c in zip(stages, coordinates, strict=True)]
-        problem, start, losses = begun(stages, coordinates, device)
+        problem, start, losses = stacked_problem(stages, coordinates, device)
         timings.setup += time.perf_counter() - clock
         first = stages[0]
         minima = minimise(
@@ -136,7 +136,7 @@ def solve(
     return reached, iterations.tolist(), timings
 
 
-def begun(
+def stacked_problem(
     stages: Sequence[Stage], coordinates: Sequence[Array], device: torch.device
 ) -> tuple[Problem, Tensor, list[Any]]:
     """Return the problem of one stage of each surface, its start (n, B), and its continuation.

@@ -41,14 +41,14 @@ class Values:
     ----------
     item : Weighted
     layout : Layout
-    many : int
+    among : int
         Number of elements for which kernels are chosen, if that is more than the term's own.
     """
 
-    def __init__(self, item: Weighted, layout: Layout, many: int = 0):
+    def __init__(self, item: Weighted, layout: Layout, among: int = 0):
         term = item.term
         self.item, self.layout = item, layout
-        self.many = max(many, term.count)
+        self.among = max(among, term.count)
         self.gather = np.concatenate([layout.rows(block, index) for block, index in term.stencil])
         self.constants = term.constants if term.constants.size else np.empty((0, term.count))
         self.shape = kind(term, layout)[1]
@@ -71,7 +71,7 @@ class Values:
     def residual(self, coordinates: Array) -> Array:
         """Residuals (r, e)."""
         key = self.item.term.residual, self.shape, len(self.constants)
-        loop = loops.residual(*key, self.many)
+        loop = loops.residual(*key, self.among)
         if loop is None:
             return kernel(*key, False)(coordinates[self.gather], self.constants)[0]
         out = np.empty((loop.rows, self.item.term.count))
@@ -92,8 +92,8 @@ class Values:
 class Elements(Values):
     """One weighted term on given unknowns, with the Jacobian by the unknowns (chain rule)."""
 
-    def __init__(self, item: Weighted, variables: Variables, many: int = 0):
-        super().__init__(item, variables.layout, many)
+    def __init__(self, item: Weighted, variables: Variables, among: int = 0):
+        super().__init__(item, variables.layout, among)
         self._chain, self.columns = chained(self.gather, self.shape, variables)
 
     def linearise(self, coordinates: Array, at: slice = _ALL) -> tuple[Array, Array]:
@@ -116,8 +116,8 @@ class Elements(Values):
         term, loss = self.item.term, self.item.loss
         factor = self.item.weight * self.weights
         key = self.shape, len(self.constants)
-        loop = loops.jacobian(term.residual, *key, self.many)
-        bend = None if term.vectors is None else loops.stiffness(term.vectors, *key, self.many)
+        loop = loops.jacobian(term.residual, *key, self.among)
+        bend = None if term.vectors is None else loops.stiffness(term.vectors, *key, self.among)
         if loop is None or (bend is None and term.vectors is not None):
             return self._add(coordinates, places, gradient, values, factor)
         count, q = term.count, len(self.columns)

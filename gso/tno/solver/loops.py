@@ -30,7 +30,7 @@ VARIABLE = "GSO_KERNELS"
 _LEAST = 3000
 
 _log = logging.getLogger("gso")
-_without: ContextVar[bool] = ContextVar("without", default=False)
+_numpy_only: ContextVar[bool] = ContextVar("numpy_only", default=False)
 
 
 @dataclass(frozen=True)
@@ -51,11 +51,11 @@ class Loop:
 @contextmanager
 def without(active: bool = True) -> Iterator[None]:
     """Evaluate all terms by NumPy if `active`, unless the environment variable says otherwise."""
-    before = _without.set(active)
+    token = _numpy_only.set(active)
     try:
         yield
     finally:
-        _without.reset(before)
+        _numpy_only.reset(token)
 
 
 def residual(function: Residual, shape: tuple[int, ...], constants: int, count: int) -> Loop | None:
@@ -87,7 +87,7 @@ def adder(rows: int, wide: int, size: int, kind: int) -> Any:
 
 
 def _pays(count: int) -> bool:
-    choice = os.environ.get(VARIABLE, "") or ("numpy" if _without.get() else "")
+    choice = os.environ.get(VARIABLE, "") or ("numpy" if _numpy_only.get() else "")
     if choice == "numpy" or not _installed():
         return False
     return choice == "numba" or count >= _LEAST

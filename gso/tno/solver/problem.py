@@ -34,9 +34,9 @@ class Problem:
         Bounds on a step, see :data:`Limit`.
     like : Problem, optional
         A problem whose sparsity pattern is reused if it is the same.
-    many : dict, optional
+    counts : dict, optional
         Numbers of elements by :func:`kind` for which kernels are chosen, if they are more than
-        the problem's own; see :func:`most`.
+        the problem's own; see :func:`largest_counts`.
     """
 
     def __init__(
@@ -45,12 +45,12 @@ class Problem:
         variables: Variables,
         limits: Sequence[Limit] = (),
         like: Problem | None = None,
-        many: Mapping[Kind, int] | None = None,
+        counts: Mapping[Kind, int] | None = None,
     ):
         self.variables = variables
         self.limits = tuple(limits)
         used = _counted(items)
-        more = {} if many is None else many
+        more = {} if counts is None else counts
         self._elements = [
             Elements(i, variables, more.get(kind(i.term, variables.layout), 0))
             for i in used
@@ -145,7 +145,7 @@ class Problem:
         return min(1.0, *(limit(coordinates, direction) for limit in self.limits))
 
 
-def most(problems: Iterable[tuple[Sequence[Weighted], Layout]]) -> dict[Kind, int]:
+def largest_counts(problems: Iterable[tuple[Sequence[Weighted], Layout]]) -> dict[Kind, int]:
     """Return the largest number of elements of each kind in problems of given terms and layouts."""
     out: dict[Kind, int] = {}
     for items, layout in problems:
