@@ -57,17 +57,11 @@ class Prolongation:
 
     @cached_property
     def _solver(self) -> Any:
-        from scipy.sparse import csr_matrix, diags, tril
+        from scipy.sparse import diags, tril
 
         mesh, ids = self.mesh, self.ids
         n = len(mesh.vertices)
-        # Across the edges of the triangulation: polylines do not reach every vertex.
-        stencil, coefficients = fairness.hinge_differences(mesh)
-        count, width = stencil.shape
-        bend = csr_matrix(
-            (coefficients.T.ravel(), stencil.ravel(), width * np.arange(count + 1)),
-            shape=(count, n),
-        )
+        bend = _bending(mesh)
         ends = mesh.vertices[mesh.edges]
         edge2 = float(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1).mean())
         # The squared spacing of the m given vertices among n: edge^2 n / m.
@@ -76,7 +70,7 @@ class Prolongation:
         given[ids] = 1.0
         given[~mesh.used] = 1.0
         given[self.held] += _HELD
-        matrix = diags(given) + reach4 * len(ids) / max(count, 1) * (bend.T @ bend)
+        matrix = diags(given) + reach4 * len(ids) / max(bend.shape[0], 1) * (bend.T @ bend)
         lower = tril(matrix.tocsc(), format="csc")
         lower.sort_indices()
         pattern = Pattern(n, lower.indptr.astype(np.int64), lower.indices.astype(np.int64))
@@ -102,6 +96,33 @@ class Prolongation:
             np.linalg.norm(base, axis=1, keepdims=True),
         )
         return field * np.minimum(1.0, most / np.maximum(length, 1e-300))
+
+
+def _bending(mesh: Mesh) -> Any:
+    """Return the matrix (m, n) of second differences that reach every vertex of a face.
+
+    Where no polyline goes through a vertex, they are those across the edges around it.
+    """
+    from scipy.sparse import csr_matrix, vstack
+
+    n = len(mesh.vertices)
+    parts = [fairness.differences(mesh)]
+    missed = mesh.used.copy()
+    missed[parts[0][0]] = False
+    if missed.any():
+        stencil, coefficients = fairness.hinge_differences(mesh)
+        around = missed[stencil].any(axis=1)
+        parts.append((stencil[around], coefficients[:, around]))
+    return vstack(
+        [
+            csr_matrix(
+                (c.T.ravel(), ids.ravel(), ids.shape[1] * np.arange(len(ids) + 1)),
+                shape=(len(ids), n),
+            )
+            for ids, c in parts
+        ],
+        format="csr",
+    )
 
 
 def _affine(points: Array, values: Array) -> Any:
