@@ -617,13 +617,18 @@ class TestDevice:
         dataset.build(place, TINY, device="cpu", workers=0)
         assert digests(place) == before
 
-    def test_devices_do_not_mix(self, batched, quick, tmp_path):
-        for made, recipe, device in ((batched, TINY, None), (quick, QUICK, "cpu")):
-            place = tmp_path / str(device)
-            shutil.copytree(made.path, place)
-            (place / "test" / "00000.h5").unlink()
-            with pytest.raises(DatasetError, match="a set with device"):
-                dataset.build(place, recipe, device=device, workers=0)
+    def test_a_set_goes_on_with_its_device(self, batched, quick, tmp_path):
+        place = tmp_path / "batched"
+        shutil.copytree(batched.path, place)
+        lost = place / "test" / "00000.h5"
+        content = lost.read_bytes()
+        lost.unlink()
+        dataset.build(place, TINY, workers=0)
+        assert lost.read_bytes() == content
+        place = tmp_path / "quick"
+        shutil.copytree(quick.path, place)
+        with pytest.raises(DatasetError, match="begun without --device, not with --device cpu"):
+            dataset.build(place, QUICK, device="cpu", workers=0)
 
     def test_a_surface_that_fails_leaves_the_others(self):
         pytest.importorskip("torch")

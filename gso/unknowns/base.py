@@ -62,8 +62,10 @@ class Layout:
                [9]])
         """
         start, _, dim = self.where(name)
-        first = np.asarray(index, np.int64).T * dim + start
-        return (first[:, None] + np.arange(dim)[:, None]).reshape(-1, first.shape[1])
+        # Half as wide where that is enough: on large meshes these are the largest arrays.
+        kind = np.int32 if self.size < 2**31 else np.int64
+        first = index.T.astype(kind) * kind(dim) + kind(start)
+        return (first[:, None] + np.arange(dim, dtype=kind)[:, None]).reshape(-1, first.shape[1])
 
     def pack(self, blocks: dict[str, Array]) -> Array:
         """Concatenate arrays (count, dim) by block into the coordinate vector."""
@@ -108,7 +110,8 @@ class Variables:
         count = np.diff(basis.indptr)
         if count.max(initial=0) > 1:
             return None
-        unknown, share = np.full(len(count), basis.shape[1]), np.zeros(len(count))
+        unknown = np.full(len(count), basis.shape[1], basis.indices.dtype)
+        share = np.zeros(len(count))
         unknown[count > 0], share[count > 0] = basis.indices, basis.data
         return unknown, share
 

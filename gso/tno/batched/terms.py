@@ -73,7 +73,8 @@ class Term:
         self, items: Sequence[Weighted], layout: Layout, unknowns: Unknowns, device: torch.device
     ):
         term = items[0].term
-        gather = np.concatenate([layout.rows(block, index) for block, index in term.stencil])
+        parts = [layout.rows(block, index) for block, index in term.stencil]
+        gather = np.concatenate(parts).astype(np.int64)
         self.term, self.name, self.shape = term, term.name, kind(term, layout)[1]
         self.quadratic = items[0].quadratic
         self._gather = torch.as_tensor(gather, device=device)
