@@ -52,7 +52,7 @@ for _ in range(runs):
     r = gso.tno.optimize(grid, task=task, verdict=False)
     seconds.append(time.perf_counter() - clock)
 status = open("/proc/self/status").read() if sys.platform == "linux" else ""
-peak = [int(line.split()[1]) / 1e6 for line in status.splitlines() if "VmHWM" in line]
+peak = [int(line.split()[1]) * 1.024e-6 for line in status.splitlines() if "VmHWM" in line]
 print(json.dumps([min(seconds), r.seconds["factor"], sum(r.energy.values()), *peak]))
 """
 
