@@ -55,11 +55,8 @@ class Layout:
     def rows(self, name: str, index: Ints) -> Ints:
         """Return the positions (k * dim, e) in the coordinate vector of k rows (e, k) of a block.
 
-        >>> Layout.of(9, "flat").rows("flat", np.array([[0, 4]]))
-        array([[0],
-               [1],
-               [8],
-               [9]])
+        >>> Layout.of(9, "flat").rows("flat", np.array([[0, 4]])).ravel().tolist()
+        [0, 1, 8, 9]
         """
         start, _, dim = self.where(name)
         # Half as wide where that is enough: on large meshes these are the largest arrays.
