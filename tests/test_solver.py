@@ -174,7 +174,7 @@ def test_the_sorting_and_the_table_analysis_agree(monkeypatch):
 
     rng = np.random.default_rng(3)
     columns = rng.integers(0, 40, 500) + rng.integers(0, 6, (4, 500))
-    groups = [ranking.Pairs.of(np.minimum(columns, 40), 40)]
+    groups = [ranking.Pairs(np.minimum(columns, 40), 40)]
     table = ranking.ranked(groups, 40)
     monkeypatch.setattr(ranking, "_LARGEST_TABLE", 0)
     for a, b in zip(table, ranking.ranked(groups, 40), strict=True):

@@ -256,7 +256,7 @@ def _jiang(result: Result) -> dict[str, Array]:
 #: Labels that a recipe may give to every surface.
 LABELS = ("developable", "strain", "lengths")
 #: Kinds of labels that can be made in batches.
-BATCHED = ("developable", "strain", "lengths")
+BATCHED = LABELS
 #: Reference labels, made only for requested splits.
 REFERENCES = ("jiang2020",)
 

@@ -81,6 +81,11 @@ class Term:
         """Number of elements."""
         return len(self.weights)
 
+    @property
+    def by_element(self) -> Array:
+        """The constants (c, e); (0, e) where there are none."""
+        return self.constants if self.constants.size else np.empty((0, self.count))
+
     def renumbered(self, block: str, row: Ints) -> Term:
         """Copy the term with row k of a block renumbered to ``row[k]``."""
         stencil = tuple((b, row[ids] if b == block else ids) for b, ids in self.stencil)
@@ -99,6 +104,11 @@ class Weighted:
     term: Term
     weight: float
     loss: Loss = field(default_factory=Squared)
+
+    @property
+    def active(self) -> bool:
+        """Whether it counts: its weight is positive, and it has elements."""
+        return self.weight > 0 and self.term.count > 0
 
     @property
     def quadratic(self) -> bool:

@@ -47,7 +47,7 @@ def placed(term: Term, frame: Frame, vertices: Ints, faces: Ints, *, share: floa
                 mine["flat"] = mine["flat"] / frame.scale
             return np.concatenate([own, renew(mine)])
 
-    constants = term.constants if term.constants.size else np.empty((0, term.count))
+    constants = term.by_element
     return replace(
         term,
         residual=_within(term.residual, kinds),

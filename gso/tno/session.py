@@ -46,8 +46,7 @@ class Session:
     first iteration after a move changes offsets along the normals only, for a faster answer; all
     others move the vertices freely. Take two iterations a frame, or iterate while the handles rest,
     for a lower energy; so that hard lengths and planes hold, all iterations are free there. The
-    components of a mesh are solved together, each
-    with weights by its own size.
+    components of a mesh are solved together, each with weights by its own size.
 
     Parameters
     ----------

@@ -63,8 +63,7 @@ def _described(stage: Stage) -> list[Any]:
         term = item.term
         if term.refresh is not None or term.multipliers is not None:
             raise Unbatchable
-        used = item.weight > 0 and term.count > 0
-        out += [term.name, used, item.quadratic, type(item.loss), len(term.constants)]
+        out += [term.name, item.active, item.quadratic, type(item.loss), len(term.constants)]
         out += [_name(term.residual), _name(term.vectors)]
         for block, index in term.stencil:
             out += [block, index.shape, index.tobytes()]
@@ -147,7 +146,7 @@ def stacked_problem(
         The surfaces cannot be solved together.
     """
     variables = [s.unknowns(c) for s, c in zip(stages, coordinates, strict=True)]
-    items = [[i for i in s.own_items if i.weight > 0 and i.term.count] for s in stages]
+    items = [[item for item in s.own_items if item.active] for s in stages]
     first = stages[0]
     unknowns = Unknowns.stacked(variables, device)
     problem = Problem(items, first.layout, unknowns, first.limits, device)

@@ -19,8 +19,8 @@ from gso.energy.base import Weighted
 from gso.energy.losses import Loss
 from gso.tno.batched.kernels import geometric_stiffness, kernel
 from gso.tno.batched.unknowns import Unbatchable, Unknowns, columns, picked
+from gso.tno.solver.chain import by_point
 from gso.tno.solver.elements import kind
-from gso.typing import Array, Ints
 from gso.unknowns import Layout
 
 #: Numbers per row of a block of elements: on a processor its work arrays then stay in the cache,
@@ -78,14 +78,17 @@ class Term:
         self.term, self.name, self.shape = term, term.name, kind(term, layout)[1]
         self.quadratic = items[0].quadratic
         self._gather = torch.as_tensor(gather, device=device)
-        self.constants = columns([_constants(i) for i in items], device)
+        self.constants = columns([i.term.by_element for i in items], device)
         self.factor = columns([i.weight * i.term.weights for i in items], device)
         self.loss = stacked_loss([i.loss for i in items], device)
         self._slope: Tensor | None = None
         self._by_point = unknowns.of is not None
         self.columns = gather
         if unknowns.of is not None:
-            self.columns = _by_point(gather, self.shape, unknowns.of.cpu().numpy())
+            own = by_point(gather, self.shape, unknowns.of.cpu().numpy(), unknowns.size)
+            if own is None:
+                raise Unbatchable
+            self.columns = own
 
     @cached_property
     def count(self) -> int:
@@ -186,22 +189,6 @@ class Term:
         r, k, *rest = slope.shape
         parts = (slope * moved).view(r, k // dim, dim, *rest)
         return parts.sum(dim=2)
-
-
-def _constants(item: Weighted) -> Array:
-    given = item.term.constants
-    return given if given.size else np.empty((0, item.term.count))
-
-
-def _by_point(gather: Ints, shape: tuple[int, ...], of: Ints) -> Ints:
-    """Return the unknowns (q, e) of elements whose points have one unknown each."""
-    dim = shape[0]
-    if any(d != dim for d in shape):
-        raise Unbatchable
-    by_point = of[gather].reshape(-1, dim, gather.shape[1])
-    if (by_point != by_point[:, :1]).any():
-        raise Unbatchable
-    return by_point[:, 0]
 
 
 def _products(slope: Tensor, weight: Tensor, out: Tensor, *, fresh: bool) -> None:

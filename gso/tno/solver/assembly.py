@@ -97,8 +97,9 @@ def assemble(n: int, columns: list[Ints], quadratic) -> Assembly:
 def _analysed(n: int, columns: list[Ints], quadratic: Any) -> Assembly:
     """Compute the position in the matrix of every product of two unknowns of an element."""
     every = np.arange(n)
-    constant = Pairs(np.repeat(every, np.diff(quadratic.indptr))[None], quadratic.indices[None], n)
-    groups = [*(Pairs.of(own, n) for own in columns), constant, Pairs(every[None], every[None], n)]
+    entries = np.stack([np.repeat(every, np.diff(quadratic.indptr)), quadratic.indices])
+    constant = Pairs(entries, n, (np.array([0]), np.array([1])))
+    groups = [*(Pairs(own, n) for own in columns), constant, Pairs(every[None], n)]
     (*own, fixed, diagonal), column, row = ranked(groups, n)
     pattern = Pattern(n, np.searchsorted(column, np.arange(n + 1)), row)
     places = [Places(at, _repeated(c)) for at, c in zip(own, columns, strict=True)]

@@ -117,30 +117,37 @@ def chained(gather: Ints, shape: tuple[int, ...], variables: Variables) -> tuple
         unknown, share = variables.single
         if (variables.basis.data == 1.0).all():
             return Same(), unknown[gather]
-        direct = _by_point(gather, shape, variables.size, unknown, share)
-        if direct is not None:
-            return direct
+        columns = by_point(gather, shape, unknown, variables.size)
+        if columns is not None:
+            return ByPoint(share, gather, shape[0]), columns
     return _sums(gather, variables)
 
 
-def _by_point(
-    gather: Ints, shape: tuple[int, ...], size: int, unknown: Ints, share: Array
-) -> tuple[Same, Ints] | None:
-    """Return chain rule and unknowns where points move with one unknown each; None otherwise.
+def by_point(gather: Ints, shape: tuple[int, ...], unknown: Ints, size: int) -> Ints | None:
+    """Return the unknowns (q, e) of elements whose points move with one unknown each.
 
-    Nor may two points of an element share their unknown. `size` is the number of unknowns.
+    None where points move otherwise, or where two points of an element share their unknown.
+
+    Parameters
+    ----------
+    gather, shape
+        As for :func:`chained`.
+    unknown : ndarray of int, (n,)
+        Unknown of each coordinate, `size` if it is fixed.
+    size : int
+        Number of unknowns.
     """
     (k, count), dim = gather.shape, shape[0]
     if any(d != dim for d in shape):
         return None
-    by_point = unknown[gather].reshape(k // dim, dim, count)
-    columns = by_point.min(axis=1)
-    if not ((by_point == columns[:, None]) | (by_point == size)).all():
+    own = unknown[gather].reshape(k // dim, dim, count)
+    columns = own.min(axis=1)
+    if not ((own == columns[:, None]) | (own == size)).all():
         return None
     ordered = np.sort(columns, axis=0)
     if ((ordered[1:] == ordered[:-1]) & (ordered[1:] < size)).any():
         return None
-    return ByPoint(share, gather, dim), columns
+    return columns
 
 
 def _sums(gather: Ints, variables: Variables) -> tuple[Same, Ints]:

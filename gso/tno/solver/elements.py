@@ -50,7 +50,7 @@ class Values:
         self.item, self.layout = item, layout
         self.among = max(among, term.count)
         self.gather = np.concatenate([layout.rows(block, index) for block, index in term.stencil])
-        self.constants = term.constants if term.constants.size else np.empty((0, term.count))
+        self.constants = term.by_element
         self.shape = kind(term, layout)[1]
         self.weights = term.weights
 

@@ -49,7 +49,7 @@ class Problem:
     ):
         self.variables = variables
         self.limits = tuple(limits)
-        used = _counted(items)
+        used = [item for item in items if item.active]
         more = {} if counts is None else counts
         self._elements = [
             Elements(i, variables, more.get(kind(i.term, variables.layout), 0))
@@ -157,7 +157,7 @@ def largest_counts(problems: Iterable[tuple[Sequence[Weighted], Layout]]) -> dic
 
 def energies(items: Sequence[Weighted], layout: Layout, coordinates: Array) -> dict[str, float]:
     """Return the energy by term name at given coordinates, with updated constants."""
-    return _by_term([Values(item, layout) for item in _counted(items)], coordinates)
+    return _by_term([Values(item, layout) for item in items if item.active], coordinates)
 
 
 def _by_term(terms: Sequence[Values], coordinates: Array) -> dict[str, float]:
@@ -167,8 +167,3 @@ def _by_term(terms: Sequence[Values], coordinates: Array) -> dict[str, float]:
         name = term.item.term.name
         out[name] = out.get(name, 0.0) + term.energy(term.residual(coordinates))
     return out
-
-
-def _counted(items: Sequence[Weighted]) -> list[Weighted]:
-    """Return the active terms: those with a positive weight and at least one element."""
-    return [i for i in items if i.weight > 0 and i.term.count]

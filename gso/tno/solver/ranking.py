@@ -24,47 +24,30 @@ class Pairs:
 
     Parameters
     ----------
-    first, second : ndarray of int, (m, e)
-        The two unknowns; `size` where there is none.
+    columns : ndarray of int, (q, e)
+        The unknowns of the elements; `size` where there is none.
     size : int
         Number of unknowns n. Entries with a missing unknown are (n, n).
+    pairs : (ndarray, ndarray) of int, (m,), optional
+        Which unknowns of an element each entry is of; all pairs a <= b when not given.
     """
 
-    def __init__(self, first: Ints, second: Ints, size: int):
-        self._first, self._second, self._size = first, second, size
-        self.shape = first.shape[1], first.shape[0]
-
-    @classmethod
-    def of(cls, columns: Ints, size: int) -> Pairs:
-        """Make the pairs a <= b of the unknowns (q, e) of elements."""
-        a, b = np.triu_indices(columns.shape[0])
-        return _Products(columns, a, b, size)
-
-    def _block(self, at: slice) -> tuple[Ints, Ints]:
-        return self._first[:, at], self._second[:, at]
+    def __init__(self, columns: Ints, size: int, pairs: tuple[Ints, Ints] | None = None):
+        self._columns, self._size = columns, size
+        self._pairs = np.triu_indices(len(columns)) if pairs is None else pairs
+        self.shape = columns.shape[1], len(self._pairs[0])
 
     def blocks(self) -> Iterator[tuple[slice, Int32, Int32]]:
         """Yield some elements, and the lower and higher unknowns (m, b) of their entries."""
         n = self._size
         for start in range(0, self.shape[0], _BLOCK):
             at = slice(start, start + _BLOCK)
-            one, two = self._block(at)
+            own = self._columns[:, at]
+            one, two = (own[k] for k in self._pairs)
             high = np.maximum(one, two).astype(np.int32)
             low = np.minimum(one, two).astype(np.int32)
             low[high == n] = n
             yield at, low, high
-
-
-class _Products(Pairs):
-    """Pairs of the unknowns of elements, made when they are asked for."""
-
-    def __init__(self, columns: Ints, a: Ints, b: Ints, size: int):
-        self._columns, self._a, self._b, self._size = columns, a, b, size
-        self.shape = columns.shape[1], len(a)
-
-    def _block(self, at: slice) -> tuple[Ints, Ints]:
-        own = self._columns[:, at]
-        return own[self._a], own[self._b]
 
 
 def ranked(groups: list[Pairs], size: int) -> tuple[list[Int32], Ints, Ints]:
