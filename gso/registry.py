@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Iterable
+from functools import cached_property
 from types import ModuleType
 
 from gso.errors import OptionError
@@ -29,8 +30,11 @@ class Registry:
 
     def names(self) -> list[str]:
         """List the names, sorted."""
-        files = {info.name for info in pkgutil.iter_modules(self._path)} - self._support
-        return sorted(files | self._added.keys())
+        return sorted(self._files | self._added.keys())
+
+    @cached_property
+    def _files(self) -> set[str]:
+        return {info.name for info in pkgutil.iter_modules(self._path)} - self._support
 
     def get(self, name: str) -> ModuleType:
         """Import the module of a name."""

@@ -50,7 +50,8 @@ USERS = {
     ],
     "unit_rectangle": [lambda: rectangle(MESH.grid)],
     "corner_angles": [lambda: patch._angles(MESH)],
-    "quad_area_vectors": [lambda: vertex_normals(MESH)],
+    "quad_area_vectors": [lambda: stretch.corner_shares(MESH.vertices, MESH.faces)],
+    "quad_corner_vectors": [lambda: vertex_normals(MESH)],
 }
 
 

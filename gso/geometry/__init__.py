@@ -40,6 +40,7 @@ from gso.geometry.triangle import (
     corner_angles,
     doubled_areas,
     quad_area_vectors,
+    quad_corner_vectors,
     signed_areas,
 )
 from gso.geometry.vector import angle, cross, dot, norm, norm2, sub
@@ -72,6 +73,7 @@ __all__ = [
     "norm2",
     "principal_stretches",
     "quad_area_vectors",
+    "quad_corner_vectors",
     "rest_frame",
     "second_difference",
     "shape_matrix",

@@ -36,6 +36,20 @@ def quad_area_vectors(points: Array, quads: Ints) -> Array:
     return np.stack(cross(sub(v2, v0), sub(v3, v1)), axis=1)
 
 
+def quad_corner_vectors(points: Array, quads: Ints) -> Array:
+    """Return the doubled area vectors (4, 3, q) of the triangles at the corners of quads.
+
+    The triangle at a corner has it and both its neighbours as vertices.
+
+    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> quad_corner_vectors(square, np.array([[0, 1, 2, 3]]))[:, 2, 0]
+    array([1., 1., 1., 1.])
+    """
+    v = _corners(points, quads)
+    sides = [sub(v[(k + 1) % 4], v[k]) for k in range(4)]
+    return np.stack([np.stack(cross(sides[k - 1], sides[k])) for k in range(4)])
+
+
 def _corners(points: Array, faces: Ints) -> list[Vec]:
     """Return the component arrays of the corners of faces; contiguous ones are the fastest."""
     x, y, z = np.ascontiguousarray(points.T)

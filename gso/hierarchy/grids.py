@@ -50,7 +50,8 @@ def resample(values: Array, height: int, width: int) -> Array:
     (7, 4, 1)
     """
     h, w = values.shape[:2]
-    return np.einsum("ia,jb,abk->ijk", _matrix(h, height), _matrix(w, width), values, optimize=True)
+    along = (_matrix(h, height) @ values.reshape(h, -1)).reshape(height, w, -1)
+    return np.matmul(_matrix(w, width), along)
 
 
 def prolong_displacement(coarse: Mesh, fine: Mesh, points: Array) -> Array:

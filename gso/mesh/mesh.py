@@ -291,7 +291,7 @@ class Mesh:
     @property
     def grid(self) -> Array | None:
         """The vertices as (H, W, 3) when the mesh is a grid, otherwise None."""
-        return None if self.grid_index is None else self.vertices[self.grid_index]
+        return None if self.grid_index is None else self.vertices.take(self.grid_index, axis=0)
 
     @property
     def diagonal(self) -> float:

@@ -18,16 +18,16 @@ def vertex_normals(mesh: Mesh) -> Array:
     symmetric surface has symmetric normals, independently of its numbering. Vertices without
     an area around them get the z direction.
     """
-    v, he = mesh.vertices, mesh.half_edges
-    four = topology.four_corners(mesh.faces)
-    whole = geometry.quad_area_vectors(v, four)
+    v, n = mesh.vertices, len(mesh.vertices)
+    quads, triangles = topology.by_size(mesh.faces)
+    around = geometry.quad_corner_vectors(v, quads)
+    # Two opposite corners make up a quad.
+    around += around[0] + around[2]
     # A triangle belongs to both triangulations, so it counts twice.
-    whole[~topology.are_quads(mesh.faces)] *= 2.0
-    tri = topology.corner_triangles(topology.by_size(mesh.faces)[0])
-    corner, first = geometry.area_vectors(v, tri), np.ascontiguousarray(tri[:, 0])
-    n = len(v)
+    whole = 2.0 * geometry.area_vectors(v, triangles).T
+    at = np.concatenate([quads.T.ravel(), triangles.T.ravel()])
     x, y, z = total = [
-        np.bincount(he.origin, whole[:, d][he.face], n) + np.bincount(first, corner[:, d], n)
+        np.bincount(at, np.concatenate([around[:, d].ravel(), np.tile(whole[d], 3)]), n)
         for d in range(3)
     ]
     length = np.sqrt(x * x + y * y + z * z)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gso import geometry
 from gso.errors import MeshError
 from gso.mesh import topology
 from gso.mesh.attributes import Attributes
@@ -149,15 +150,8 @@ def have_area(table: Ints, points: Array, size: float | None = None) -> NDArray[
     if p.shape[1] == 2:
         p = np.pad(p, ((0, 0), (0, 1)))
     size = float(np.ptp(p, axis=0).max()) if size is None else size
-    if table.shape[1] == 3:
-        last = table[:, 2]
-    else:
-        last = np.where(table[:, 3] < 0, table[:, 0], table[:, 3])
-    # Diagonals of a quad, two edges of a triangle.
-    a = p[table[:, 2]] - p[table[:, 0]]
-    b = p[last] - p[table[:, 1]] if table.shape[1] == 4 else p[table[:, 1]] - p[table[:, 0]]
-    scaled = np.linalg.norm(np.cross(a / size, b / size), axis=1)
-    return np.asarray(scaled > 1e-14)
+    x, y, z = geometry.quad_area_vectors(p / size, topology.four_corners(table)).T
+    return np.asarray(np.sqrt(x * x + y * y + z * z) > 1e-14)
 
 
 def weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]] | None:

@@ -23,10 +23,13 @@ from gso.typing import Array
 from gso.unknowns import control_points
 
 
-def objective(stage: Stage, coordinates: Array) -> dict[str, float]:
-    """Return the objective of a stage by term, without terms that enforce hard constraints."""
+def objective(stage: Stage, *coordinates: Array) -> list[dict[str, float]]:
+    """Return the objective of a stage by term at each of given coordinates.
+
+    Terms that enforce hard constraints do not belong to it.
+    """
     items = [item for item in stage.items if item.term.multipliers is None]
-    return energies(items, stage.layout, coordinates)
+    return energies(items, stage.layout, *coordinates)
 
 
 @dataclass(frozen=True)
@@ -190,7 +193,7 @@ class Run:
             solution,
             blocks=blocks,
             coordinates=coordinates,
-            energy=objective(stage, coordinates),
+            energy=objective(stage, coordinates)[0],
         )
 
     def through(self, plan: Plan, options: Options) -> Reached:
@@ -330,11 +333,11 @@ def _finished(
 
 def _guard(plan: Plan, stage: Stage, coordinates: Array) -> tuple[Array, dict[str, float]]:
     """Return the coordinates and their energy, or the fallback's if that has less."""
-    energy = objective(stage, coordinates)
-    if plan.fallback is not None:
-        other = objective(stage, plan.fallback)
-        if not sum(energy.values()) <= sum(other.values()):
-            return plan.fallback, other
+    if plan.fallback is None:
+        return coordinates, objective(stage, coordinates)[0]
+    energy, other = objective(stage, coordinates, plan.fallback)
+    if not sum(energy.values()) <= sum(other.values()):
+        return plan.fallback, other
     return coordinates, energy
 
 
@@ -357,9 +360,8 @@ def _worse(plan: Plan) -> str:
     coordinates = plan.start
     for stage in stages:
         coordinates = stage.enter(coordinates)
-    warm, cold = (
-        sum(objective(stages[-1], at).values()) for at in (coordinates, plan.cold_start())
-    )
+    found = objective(stages[-1], coordinates, plan.cold_start())
+    warm, cold = (sum(energy.values()) for energy in found)
     if warm <= cold:
         return ""
     return f"its energy, {warm:.3g}, is above that of the start without it, {cold:.3g}"

@@ -266,7 +266,7 @@ class Session:
         solution = Solution(
             plan.layout.split(plan.finish(at)),
             self._status,
-            {"objective": 0.0} if stage is None else objective(stage, at),
+            {"objective": 0.0} if stage is None else objective(stage, at)[0],
             at,
             backend="" if stage is None else self._kept[False][1].name,
             notes=tuple(plan.notes),

@@ -63,7 +63,8 @@ def plan(analysis: Analysis, request: Request) -> Plan:
     good = curved <= options.developable_below and spline is None
     if good and request.start is None and constraints.empty:
         return Plan(_layout(mesh), mesh.vertices.ravel(), status=Status.ALREADY_GOOD)
-    left = measure.loss_gc_mean(analysis.shape.smooth, scale=1.0)
+    smooth = analysis.shape.smooth
+    left = curved if smooth is mesh else measure.loss_gc_mean(smooth, scale=1.0)
     if constraints.empty and left <= min(NOISE_ONLY * curved, FLAT_CURVATURE):
         bound = min(NOISE_REACH * analysis.shape.noise, request.max_displacement or np.inf)
         request = replace(request, max_displacement=bound)

@@ -140,13 +140,17 @@ def by_point(gather: Ints, shape: tuple[int, ...], unknown: Ints, size: int) -> 
     (k, count), dim = gather.shape, shape[0]
     if any(d != dim for d in shape):
         return None
-    own = unknown[gather].reshape(k // dim, dim, count)
-    columns = own.min(axis=1)
-    if not ((own == columns[:, None]) | (own == size)).all():
+    own = unknown.take(gather).reshape(k // dim, dim, count)
+    columns = own[:, 0]
+    for d in range(1, dim):
+        columns = np.minimum(columns, own[:, d])
+    fixed = own == size
+    if not ((own == columns[:, None]) | fixed).all():
         return None
-    ordered = np.sort(columns, axis=0)
-    if ((ordered[1:] == ordered[:-1]) & (ordered[1:] < size)).any():
-        return None
+    for a in range(1, len(columns)):
+        same = columns[:a] == columns[a]
+        if same.any() and (same & ~fixed[:a].all(axis=1)).any():
+            return None
     return columns
 
 

@@ -155,9 +155,12 @@ def largest_counts(problems: Iterable[tuple[Sequence[Weighted], Layout]]) -> dic
     return out
 
 
-def energies(items: Sequence[Weighted], layout: Layout, coordinates: Array) -> dict[str, float]:
-    """Return the energy by term name at given coordinates, with updated constants."""
-    return _by_term([Values(item, layout) for item in items if item.active], coordinates)
+def energies(
+    items: Sequence[Weighted], layout: Layout, *coordinates: Array
+) -> list[dict[str, float]]:
+    """Return the energy by term name at each of given coordinates, with updated constants."""
+    terms = [Values(item, layout) for item in items if item.active]
+    return [_by_term(terms, at) for at in coordinates]
 
 
 def _by_term(terms: Sequence[Values], coordinates: Array) -> dict[str, float]:

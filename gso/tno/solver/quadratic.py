@@ -53,11 +53,16 @@ class Quadratic:
     @cached_property
     def matrix(self) -> Any:
         """Lower triangle of ``A^T A``, CSC with sorted rows."""
-        from scipy.sparse import tril
+        from scipy.sparse import csc_matrix
 
-        lower = tril((self._at @ self.a).tocsc(), format="csc")
-        lower.sort_indices()
-        return lower
+        # The product is symmetric: its rows are its columns.
+        whole = self._at.tocsr() @ self.a
+        whole.sort_indices()
+        column = np.repeat(np.arange(whole.shape[0], dtype=np.int32), np.diff(whole.indptr))
+        lower = whole.indices >= column
+        start = np.r_[0, np.cumsum(np.bincount(column[lower], minlength=whole.shape[0]))]
+        data, rows = whole.data[lower], whole.indices[lower]
+        return csc_matrix((data, rows, start), shape=whole.shape)
 
     def _residual(self, x: Array) -> Array:
         return self.a @ x - self.b
