@@ -114,23 +114,31 @@ def measured(results: dict[str, Any]) -> dict[str, str]:
         for line in wrapped(f"{loss['section']}, {loss['text']}", "- ", "  ")
     )
     about, surfaces = results["machine"], results["surfaces"]
+    # Older runs do not say which kernels they used.
+    build = f" {results['kernels']}" if "kernels" in results else ""
     found["measured-machine"] = "\n".join(
         wrapped(
             f"{surfaces['name']}; mean loss_gc {surfaces['loss_gc']:.3f}. {about['processor']}, "
-            f"Python {about['python']}, one thread. Printed by ``{results['command']}``."
+            f"Python {about['python']}, one thread.{build} Printed by "
+            f"``{results['command']}``."
         )
     )
     return found
 
 
 def quality_table(section: dict[str, Any]) -> str:
-    """Quality and time of the methods of a section; those without figures are left out."""
-    head = ("Method", *section["headings"], "Time", "Surfaces")
+    """Quality and time of the methods of a section; those without figures are left out.
+
+    The time with NumPy kernels has a column where it was measured.
+    """
+    both = any(row.get("seconds_numpy") for row in section["rows"])
+    times = ("seconds", "seconds_numpy") if both else ("seconds",)
+    head = ("Method", *section["headings"], *("Time", "Time, NumPy")[: len(times)], "Surfaces")
     rows = [
         (
             row_name(row),
             *(number(row["figures"].get(column)) for column in section["columns"]),
-            duration(row["seconds"].get("median")),
+            *(duration(row.get(key, {}).get("median")) for key in times),
             f"{row['count']:,}" if row["count"] else "",
         )
         for row in section["rows"]

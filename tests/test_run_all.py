@@ -6,6 +6,7 @@ import doctest
 import importlib
 import json
 import math
+import os
 import re
 import subprocess
 import sys
@@ -23,7 +24,9 @@ pytest.importorskip("matplotlib")
 from report import (  # noqa: E402
     build,
     energy,
+    kernels,
     measure,
+    pages,
     quality,
     store,
     surfaces,
@@ -34,7 +37,7 @@ from report import (  # noqa: E402
 from report.method import TASKS, Method, Solved, tuned  # noqa: E402
 from report.methods import methods, of  # noqa: E402
 from report.published import NETS, TABLE_1, TABLE_2, TABLE_3  # noqa: E402
-from report.sections import SECTIONS, Section, rows  # noqa: E402
+from report.sections import SECTIONS, Row, Section, rows  # noqa: E402
 from report.settings import Settings  # noqa: E402
 from report.store import Store  # noqa: E402
 
@@ -43,6 +46,7 @@ TINY = Settings(
     "tiny",
     {"fast": 2, "slow": 1, "peer": 1},
     timed=1,
+    numpy={"fast": 1, "slow": 1, "peer": 1},
     sizes=(16,),
     repeats=2,
     examples=(0.3,),
@@ -132,6 +136,93 @@ def test_json_says_on_what_it_was_measured(tiny):
         if t["limit"]:
             assert t["limit"] < np.median(t["seconds"])
             assert sum(t["shares"].values()) == pytest.approx(1.0)
+
+
+# ---------------------------------------------------------------- both builds of the solver
+
+
+@pytest.fixture
+def both(monkeypatch):
+    """Two builds, whether or not Numba is installed."""
+    monkeypatch.delenv(kernels.VARIABLE, raising=False)
+    monkeypatch.setattr(kernels, "numba", lambda: "0.1")
+
+
+def test_methods_with_kernels_have_a_time_of_either_build(tiny):
+    sections = tiny[2]["sections"]
+    for name, section in sections.items():
+        for row in section["rows"]:
+            own = methods().get((name.split("-")[0].replace("energy", "developable"), row["name"]))
+            if own is None or row["source"] == "paper" or row["absent"]:
+                continue
+            wanted = kernels.compiled() and own.kernels
+            assert bool(row["seconds_numpy"]) == wanted, (name, row["name"])
+            if wanted:
+                assert row["seconds_numpy"].keys() == row["seconds"].keys()
+                assert row["seconds_numpy"]["median"] > 0 and row["seconds_numpy"]["count"] == 1
+    text = (tiny[0] / "report.md").read_text()
+    assert text.count("time, NumPy |") == (3 if kernels.compiled() else 0)
+    assert "TNO, NumPy" in text and kernels.described() in text
+
+
+def test_size_is_timed_with_numpy_too(tiny):
+    found = {t["task"]: t for t in tiny[2]["timing"] if t["method"] == "TNO, NumPy"}
+    assert set(found) == set(TASKS) and "closed form" in found["denoise"]["absent"]
+    for task in ("developable", "flatten"):
+        assert bool(found[task]["seconds"]) == kernels.compiled()
+
+
+def test_a_surface_is_solved_with_the_kernels_of_its_block(both, monkeypatch, tmp_path):
+    used = []
+
+    def run(case):
+        used.append(os.environ.get(kernels.VARIABLE, ""))
+        return Solved(case.surface[..., :2])
+
+    slow = Method("slow", "flatten", run, pace="slow", kernels=True)
+    net = Method("net", "flatten", run, pace="slow")
+    known = {(m.task, m.name): m for m in (slow, net)}
+    monkeypatch.setattr(quality, "methods", lambda: known)
+    monkeypatch.setattr(quality, "of", lambda *name: known[name])
+    monkeypatch.setattr(quality, "_warm", set())
+    settings = Settings("both", {"slow": 3}, timed=3, numpy={"slow": 2}, workers=0)
+    some = surfaces.reference(tmp_path, 3, 12)
+    given = list(quality.blocks(settings, some))
+    assert [(b.name, b.stop, b.numpy) for b in given] == [
+        ("slow", 3, False),
+        ("slow", 2, True),
+        ("net", 3, False),
+    ]
+    assert given[0].key != given[1].key and given[0].place != given[1].place
+    records = quality.measured(settings, some, Store(tmp_path), lambda *_: None)
+    # The first solves, of a small case, are not timed.
+    assert used == ["", "numba", "", "", "", *["numpy"] * 3, *[""] * 4]
+    slowly, others = (records["flatten", 0.0, name] for name in ("slow", "net"))
+    assert ["seconds_numpy" in r for r in slowly] == [True, True, False]
+    assert not any("seconds_numpy" in r for r in others)
+
+
+def test_one_build_is_not_timed_twice(both, monkeypatch, tmp_path):
+    some = surfaces.reference(tmp_path, 1, 12)
+    assert "Numba 0.1" in kernels.described()
+    assert any(b.numpy for b in quality.blocks(TINY, some))
+    monkeypatch.setenv(kernels.VARIABLE, kernels.NUMPY)
+    assert not kernels.compiled() and kernels.VARIABLE in kernels.described()
+    assert not any(b.numpy for b in quality.blocks(TINY, some))
+    monkeypatch.delenv(kernels.VARIABLE)
+    monkeypatch.setattr(kernels, "numba", lambda: "")
+    assert "not installed" in kernels.described() and kernels.key() == kernels.key(kernels.NUMPY)
+    assert not any(b.numpy for b in quality.blocks(TINY, some))
+    assert "the same as TNO" in timing._absent("TNO, NumPy", of("flatten", "TNO strain"))
+
+
+def test_times_with_numpy_have_a_column_where_there_are_any():
+    spent = {"median": 0.25, "p10": 0.2, "p90": 0.3, "count": 4}
+    row = Row("TNO", "package", 4, seconds=spent, seconds_numpy=spent | {"median": 0.5, "count": 2})
+    other = Row("Net", "package", 4, seconds=spent)
+    table = pages.quality_table((), [row, other])
+    assert [r[table.head.index("time, NumPy")] for r in table.rows] == ["500 ms of 2", ""]
+    assert "time, NumPy" not in pages.quality_table((), [other]).head
 
 
 # ---------------------------------------------------------------- resuming
@@ -396,6 +487,10 @@ def test_tables_of_docs_come_from_the_figures(tiny, monkeypatch, tmp_path):
     assert tables.number(balanced["figures"]["loss_gc"]) in found["measured-developable"]
     assert "*Net-CF, published*" in found["measured-developable"]
     assert not math.isnan(float(tables.number(0.02)))
+    columns = 'Time,"Time, NumPy",Surfaces'
+    assert (columns in found["measured-developable"]) == kernels.compiled()
+    assert ("TNO, NumPy" in found["measured-size"]) == kernels.compiled()
+    assert "kernels" in found["measured-machine"]
     path = tmp_path / "results.json"
     path.write_text(json.dumps(result))
     monkeypatch.setattr(tables, "RESULTS", path)
@@ -406,6 +501,18 @@ def test_tables_of_docs_come_from_the_figures(tiny, monkeypatch, tmp_path):
     text = pages[page].replace(".. begin measured-", ".. ")
     with pytest.raises(SystemExit, match="measured-"):
         tables.replaced({**pages, page: text})
+
+
+def test_tables_of_docs_come_from_older_figures_too(tiny, monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    tables = importlib.import_module("tables")
+    result = json.loads(json.dumps({k: v for k, v in tiny[2].items() if k != "kernels"}))
+    for section in result["sections"].values():
+        for row in section["rows"]:
+            del row["seconds_numpy"]
+    found = tables.measured(result)
+    assert "Time, NumPy" not in found["measured-developable"]
+    assert "kernels" not in found["measured-machine"]
 
 
 def test_sections_are_listed_and_take_settings(tmp_path):

@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 from gso.io import replacing
 from gso.metrics import loss_gc
-from report import examples, figures, pages, store
+from report import examples, figures, kernels, pages, store
 from report.chapters import chapters
 from report.quality import Records, blocks, measured
 from report.sections import HEADINGS, SECTIONS, rows
@@ -27,7 +27,7 @@ from report.verdict import Loss, losses, unmeasured
 
 TITLE = "gso: quality and time, beside the paper and its peers"
 #: Packages whose versions are reported, in addition to those of ``bench/harness.py``.
-_PACKAGES = ("gso", "cvxopt", "pypardiso", "torch", "matplotlib", "pymeshlab", "vtk")
+_PACKAGES = ("gso", "numba", "cvxopt", "pypardiso", "torch", "matplotlib", "pymeshlab", "vtk")
 
 
 @contextmanager
@@ -89,6 +89,7 @@ def _results(
         "command": command,
         "run": settings.name,
         "machine": known,
+        "kernels": kernels.described(),
         "surfaces": {
             "name": surfaces.name,
             "count": count,

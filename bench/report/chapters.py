@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from report import pages
+from report import kernels, pages
 from report.figures import Figure
 from report.published import INPUT
 from report.quality import Records
@@ -31,6 +31,7 @@ def chapters(
         "array to array, with everything that a user waits for except what is made at first use. "
         "Published figures are those of other surfaces drawn by the same recipe; published times "
         "are those of other machines, the nets' on a GPU.",
+        _builds(),
         "Peers with parameters have those that were best on surfaces of the validation split; "
         "denoisers among them for each level of the noise, which the package's method is not "
         "told.",
@@ -64,10 +65,35 @@ def chapters(
         "Each row is a process of its own; its memory is that of Python with all packages. "
         "The shares are those of one more solve: the net; setup, with starts, coarser grids, "
         "symbolic analysis and whatever is not named; evaluation of residuals and derivatives; "
-        "assembly of the matrix; its factorisation; its solution. Denoising is in closed form, "
-        "all of it setup. The limit is one numeric factorisation of each iteration's matrix by "
-        "the fastest backend that is installed, and nothing else."
+        "assembly of the matrix; its factorisation; its solution. Compiled kernels evaluate "
+        "derivatives and assemble in one loop, which counts as assembly. Denoising is in closed "
+        "form, all of it setup. The limit is one numeric factorisation of each iteration's matrix "
+        "by the fastest backend that is installed, and nothing else.",
+        _sizes(),
     ]
     items = [*pages.exponents(times), *against_limit(times)]
     table = pages.timing_table(times)
     return [*parts, pages.Chapter("Time against size", text, items, table, drawn["time"])]
+
+
+def _builds() -> str:
+    """Say which build the times of the tables of quality are of."""
+    if not kernels.compiled():
+        return kernels.described()
+    return (
+        f'{kernels.described()} The column "time, NumPy" has the median with NumPy kernels '
+        f"({kernels.VARIABLE}={kernels.NUMPY}). It says of how many surfaces, which are the first "
+        "of those that are timed. It is empty for methods without the solver's kernels. Results "
+        "of both builds are the same up to rounding."
+    )
+
+
+def _sizes() -> str:
+    """Say which build the times against size are of."""
+    if not kernels.compiled():
+        return kernels.described()
+    return (
+        f"{kernels.described()} TNO, NumPy is the optimiser with NumPy kernels "
+        f"({kernels.VARIABLE}={kernels.NUMPY}). On grids of up to about 40 by 40 vertices TNO uses "
+        "NumPy kernels, too."
+    )

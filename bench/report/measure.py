@@ -27,8 +27,9 @@ from gso.tno.solver import kernels, problem
 
 #: Noise of the denoising task.
 SIGMA = 0.005
-#: Side of the largest grid of the first, untimed solve, which generates the kernels.
-_WARM = 32
+#: Side of the largest grid of the first, untimed solve, which generates the kernels; on smaller
+#: ones they would not be compiled.
+_WARM = 64
 #: Backends are timed if their estimated cost is at most this many times the smallest.
 _HOPEFUL = 4.0
 

@@ -69,6 +69,8 @@ class Method:
         Source files of the method.
     solver : bool
         Whether the results of a peer depend on the package's solver.
+    kernels : bool
+        Whether the solver's kernels do much of the work, so that compiled ones change the time.
     refused : str
         Why the method does not exist for its task, or "".
     """
@@ -84,6 +86,7 @@ class Method:
     candidates: tuple[dict[str, Any], ...] = ()
     files: tuple[Path, ...] = ()
     solver: bool = False
+    kernels: bool = False
     refused: str = ""
 
     def __call__(self, case: Case) -> Solved:

@@ -17,6 +17,8 @@ from report.surfaces import Case
 
 _HERE = (Path(__file__),)
 _PEERS = ("peers_flatten", "peers_developable", "peers_denoise")
+#: Tasks that the optimiser solves with kernels; denoising is in closed form.
+KERNELS = ("developable", "flatten")
 #: The method of each task that the others are compared with.
 DEFAULT = {"developable": "TNO balanced", "flatten": "TNO strain", "denoise": "TNO"}
 
@@ -48,7 +50,8 @@ def _init(case: Case) -> Solved:
 def _own() -> list[Method]:
     def tno(name: str, task: str, pace: str = "fast", note: str = "", **options: Any) -> Method:
         run = partial(_tno, task, **options)
-        return Method(name, task, run, pace=pace, note=note, files=_HERE)
+        used = task in KERNELS
+        return Method(name, task, run, pace=pace, note=note, files=_HERE, kernels=used)
 
     def net(name: str, task: str, model: str, note: str = "") -> Method:
         return Method(name, task, partial(_net, task), net=model, note=note, files=_HERE)
@@ -81,6 +84,7 @@ def _own() -> list[Method]:
                 partial(_hybrid, task),
                 net=kind.default,
                 note="the default net, then the optimiser",
+                kernels=task in KERNELS,
                 refused="" if kind.warm_start else "a closed form has no start to improve",
                 files=_HERE,
             )

@@ -54,25 +54,28 @@ def duration(seconds: float | None) -> str:
 
 
 def quality_table(columns: Sequence[str], rows: Sequence[Row]) -> Table:
-    """Return a table of quality and time."""
-    head = ["", "method", *(HEADINGS[c] for c in columns), "time", "10 to 90 %", "iterations"]
+    """Return a table of quality and time; times with NumPy kernels only if there are any."""
+    both = any(row.seconds_numpy for row in rows)
+    times = ["time", "10 to 90 %", *(["time, NumPy"] if both else [])]
+    head = ["", "method", *(HEADINGS[c] for c in columns), *times, "iterations"]
     cells = []
     for row in rows:
         # The paper does not publish all figures.
         blank = "not given" if row.source == "paper" else ""
         figures = [number(row.figures.get(c)) or blank for c in columns]
         time = duration(row.seconds.get("median")) or blank
-        spread = ""
+        spread, again = "", ""
         if "p10" in row.seconds:
             low, high, count = (row.seconds[k] for k in ("p10", "p90", "count"))
             spread = f"{duration(low)} to {duration(high)} of {count:.0f}"
+        if row.seconds_numpy:
+            again = f"{duration(row.seconds_numpy['median'])} of {row.seconds_numpy['count']:.0f}"
         if row.absent:
             figures, time = ["–"] * len(columns), row.absent
         count_text = f"{row.count:,}" if row.count else blank
-        steps = number(row.iterations)
-        cells.append(
-            [_SOURCES[row.source], row.name, *figures, time, spread, steps, count_text, row.note]
-        )
+        last = [number(row.iterations), count_text, row.note]
+        spent = [time, spread, *([again] if both else [])]
+        cells.append([_SOURCES[row.source], row.name, *figures, *spent, *last])
     return Table([*head, "surfaces", "note"], cells, [row.source for row in rows])
 
 

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from gso.dataset.noise import LEVELS
 from gso.errors import ConvergenceWarning
 from gso.linalg import blas_threads
 from gso.mesh import Mesh
-from report import store
+from report import kernels, store
 from report.method import TASKS, Method, level_name
 from report.methods import methods, of
 from report.settings import Settings
@@ -25,7 +26,8 @@ from report.store import Store
 from report.surfaces import Case, Surfaces
 
 Array = NDArray[np.float64]
-#: The record of a method on a surface: figures, seconds, iterations, or an error.
+#: The record of a method on a surface: figures, seconds, iterations, or an error; seconds with
+#: NumPy kernels, too, where they were measured.
 Record = dict[str, Any]
 #: Records in the order of the surfaces, by task, level of the noise, and method.
 Records = dict[tuple[str, float, str], list[Record]]
@@ -38,7 +40,7 @@ _BLOCKS, _UNTIMED = {"fast": 16, "slow": 4, "peer": 2}, 64
 
 @dataclass(frozen=True)
 class Block:
-    """Some surfaces for one method."""
+    """Some surfaces for one method; `numpy` says that they are solved with NumPy kernels."""
 
     task: str
     name: str
@@ -47,6 +49,7 @@ class Block:
     start: int
     stop: int
     timed: bool
+    numpy: bool = False
 
     @property
     def method(self) -> Method:
@@ -54,15 +57,23 @@ class Block:
         return of(self.task, self.name)
 
     @property
+    def choice(self) -> str:
+        """Choice of the kernels; "" for the build that the run uses."""
+        return kernels.NUMPY if self.numpy else ""
+
+    @property
     def place(self) -> str:
         """Name of its file in the store."""
-        name = f"{self.name} {level_name(self.sigma)}".strip().replace(" ", "-").replace(",", "")
+        words = f"{self.name} {level_name(self.sigma)} {self.choice}".split()
+        name = "-".join(words).replace(",", "")
         return f"quality/{self.task}/{name}/{self.start:04d}-{self.stop:04d}"
 
     @property
     def key(self) -> dict[str, Any]:
         """Everything that its records depend on."""
         known = self.method.key(self.sigma) | {"surfaces": self.surfaces.key}
+        if self.method.kernels:
+            known["kernels"] = kernels.key(self.choice)
         return known | {"processor": store.processor() if self.timed else ""}
 
 
@@ -80,12 +91,20 @@ def blocks(settings: Settings, surfaces: Surfaces) -> Iterator[Block]:
                     continue
                 count = min(settings.counts[method.pace], len(surfaces))
                 timed = min(settings.timed, count)
-                for start in range(0, timed, _BLOCKS[method.pace]):
-                    stop = min(start + _BLOCKS[method.pace], timed)
-                    yield Block(task, method.name, sigma, surfaces, start, stop, True)
-                for start in range(timed, count, _UNTIMED):
-                    stop = min(start + _UNTIMED, count)
-                    yield Block(task, method.name, sigma, surfaces, start, stop, False)
+                whole = partial(Block, task, method.name, sigma, surfaces)
+                for start, stop in _parts(0, timed, _BLOCKS[method.pace]):
+                    yield whole(start, stop, True)
+                if method.kernels and kernels.compiled():
+                    again = min(settings.numpy.get(method.pace, 0), timed)
+                    for start, stop in _parts(0, again, _BLOCKS[method.pace]):
+                        yield whole(start, stop, True, numpy=True)
+                for start, stop in _parts(timed, count, _UNTIMED):
+                    yield whole(start, stop, False)
+
+
+def _parts(start: int, stop: int, size: int) -> list[tuple[int, int]]:
+    """Cut a range into parts of a size; the last may be smaller."""
+    return [(k, min(k + size, stop)) for k in range(start, stop, size)]
 
 
 def measured(settings: Settings, surfaces: Surfaces, kept: Store, tick: Tick) -> Records:
@@ -112,30 +131,51 @@ def measured(settings: Settings, surfaces: Surfaces, kept: Store, tick: Tick) ->
                 else:
                     found[block] = [{"error": done.error}] * (block.stop - block.start)
                 tick(block.name, block.stop - block.start)
+    return _joined(found, every)
+
+
+def _joined(found: dict[Block, list[Record]], every: list[Block]) -> Records:
+    """Return the records by method; "seconds_numpy" is the time of a surface with NumPy kernels."""
     records: Records = {}
     for block in every:
-        records.setdefault((block.task, block.sigma, block.name), []).extend(found[block])
+        if not block.numpy:
+            records.setdefault((block.task, block.sigma, block.name), []).extend(found[block])
+    for block in (b for b in every if b.numpy):
+        given = records[block.task, block.sigma, block.name]
+        for k, again in enumerate(found[block], block.start):
+            given[k] = given[k] | {"seconds_numpy": again.get("seconds")}
     return records
 
 
-_warm: set[tuple[str, str]] = set()
+_warm: set[tuple[str, str, bool]] = set()
 
 
 def measure(block: Block) -> list[Record]:
     """Measure the surfaces of a block."""
     method = block.method
-    with warnings.catch_warnings(), blas_threads(1):
+    with warnings.catch_warnings(), blas_threads(1), kernels.chosen(block.choice):
         warnings.simplefilter("ignore", ConvergenceWarning)
-        if block.timed and (block.task, block.name) not in _warm:
-            # An untimed solve for the work of the first use: imports, kernels, a net's weights.
-            case = block.surfaces.case(block.start, block.sigma)
-            _record(method, case if method.pace == "fast" else case.small)
-            _warm.add((block.task, block.name))
+        if block.timed and (block.task, block.name, block.numpy) not in _warm:
+            _prepare(block)
+            _warm.add((block.task, block.name, block.numpy))
         found = [
             _record(method, block.surfaces.case(k, block.sigma))
             for k in range(block.start, block.stop)
         ]
     return found if block.timed else [record | {"seconds": None} for record in found]
+
+
+def _prepare(block: Block) -> None:
+    """Solve untimed for the work of the first use: imports, kernels, a net's weights."""
+    method, case = block.method, block.surfaces.case(block.start, block.sigma)
+    if method.pace == "fast":
+        _record(method, case)
+        return
+    _record(method, case.small)
+    if method.kernels and not block.numpy:
+        # Of the small case the kernels are not compiled, unless that is chosen.
+        with kernels.chosen(kernels.NUMBA if kernels.compiled() else ""):
+            _record(method, case.small)
 
 
 def _record(method: Method, case: Case) -> Record:

@@ -59,6 +59,8 @@ class Row:
         Means by metric.
     seconds : dict of str to float
         Median, 10th and 90th percentile, and the number of timed surfaces.
+    seconds_numpy : dict of str to float
+        The same of the solves with NumPy kernels; empty where these change nothing.
     iterations : float or None
         Mean number of iterations.
     note : str
@@ -72,6 +74,7 @@ class Row:
     count: int = 0
     figures: dict[str, float] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
+    seconds_numpy: dict[str, float] = field(default_factory=dict)
     iterations: float | None = None
     note: str = ""
     absent: str = ""
@@ -229,6 +232,8 @@ def _row(section: Section, method: Method, given: list[Record]) -> Row:
     names = good[0]["figures"]
     row.figures = {k: float(np.mean([r["figures"][k] for r in good])) for k in names}
     row.seconds = spread([r["seconds"] for r in good if r["seconds"] is not None])
+    again = [r.get("seconds_numpy") for r in good]
+    row.seconds_numpy = spread([s for s in again if s is not None])
     if good[0]["iterations"] is not None:
         row.iterations = float(np.mean([r["iterations"] for r in good]))
     if "warm" in names:

@@ -17,6 +17,8 @@ class Settings:
         Largest number of surfaces of a method, by its pace.
     timed : int
         Number of surfaces that are timed, one after the other with no other work.
+    numpy : dict of str to int
+        Largest number of those that are timed with NumPy kernels, too, by the method's pace.
     sizes : tuple of int
         Sides of the grids in the comparison of times.
     repeats : int
@@ -30,17 +32,23 @@ class Settings:
     name: str
     counts: dict[str, int] = field(default_factory=dict)
     timed: int = 64
+    numpy: dict[str, int] = field(default_factory=dict)
     sizes: tuple[int, ...] = (16, 32, 64, 128, 256, 512)
     repeats: int = 5
     examples: tuple[float, ...] = (0.1, 0.3, 0.7)
     workers: int = 2
 
 
-FULL = Settings("full", {"fast": 1_000_000, "slow": 64, "peer": 16})
+FULL = Settings(
+    "full",
+    {"fast": 1_000_000, "slow": 64, "peer": 16},
+    numpy={"fast": 64, "slow": 16, "peer": 8},
+)
 QUICK = Settings(
     "quick",
     {"fast": 24, "slow": 3, "peer": 1},
     timed=8,
+    numpy={"fast": 8, "slow": 2, "peer": 1},
     sizes=(32, 64),
     repeats=3,
     examples=(0.3,),

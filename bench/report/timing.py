@@ -1,4 +1,4 @@
-"""Time against size: optimiser, net and hybrid, each in a process of its own."""
+"""Time against size: optimiser with either kernels, net, hybrid, each in its own process."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from gso.net import tasks as net_tasks
-from report import store
-from report.method import TASKS
+from report import kernels, store
+from report.method import TASKS, Method
 from report.methods import DEFAULT, methods, of
 from report.settings import Settings
 from report.store import Store
@@ -28,7 +28,7 @@ _LEAST = 32
 #: Phases, in the order in which they are shown.
 PHASES = ("net", "setup", "evaluation", "assembly", "factor", "solve")
 #: Methods that are compared; :func:`_named` maps them to the methods of each task.
-METHODS = ("TNO", "Net", "hybrid")
+METHODS = ("TNO", "TNO, NumPy", "Net", "hybrid")
 
 
 @dataclass
@@ -84,10 +84,11 @@ def timings(settings: Settings, kept: Store, tick: Callable[..., None]) -> list[
     found = []
     for task, name, size in pieces(settings):
         method = of(task, _named(task, name))
-        timing = Timing(task, name, size, absent=method.absent())
+        timing = Timing(task, name, size, absent=_absent(name, method))
         if not timing.absent:
-            place = f"timing/{task}-{name}-{size}"
+            place = f"timing/{task}-{name}-{size}".replace(", ", "-")
             key = method.key(0.0) | {
+                "kernels": kernels.key(_choice(name)) if method.kernels else "",
                 "processor": store.processor(),
                 "repeats": settings.repeats,
                 "script": store.source(_SCRIPT),
@@ -112,14 +113,29 @@ def _named(task: str, name: str) -> str:
             if (m.task, m.net) == (task, net_tasks.get(task).default)
         ]
         return next(n for n in nets if n != "hybrid")
-    return DEFAULT[task] if name == "TNO" else name
+    return DEFAULT[task] if name.startswith("TNO") else name
+
+
+def _choice(name: str) -> str:
+    """Return the choice of the kernels; "" for the build that the run uses."""
+    return kernels.NUMPY if name == "TNO, NumPy" else ""
+
+
+def _absent(name: str, method: Method) -> str:
+    """Return why a method is not timed, or ""."""
+    if _choice(name) and not method.kernels:
+        return "a closed form, which has no kernels"
+    if _choice(name) and not kernels.compiled():
+        return "the same as TNO, as there are no compiled kernels"
+    return method.absent()
 
 
 def _measured(task: str, method: str, model: str, size: int, repeats: int) -> dict[str, Any]:
     asked = {"task": task, "method": method, "model": model, "size": size}
     command = [sys.executable, str(_SCRIPT), json.dumps(asked | _limits(repeats))]
     one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **one})
+    with kernels.chosen(_choice(method)):
+        done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **one})
     if done.returncode:
         return {"absent": f"failed: {(done.stderr.strip().splitlines() or ['no message'])[-1]}"}
     return json.loads(done.stdout.splitlines()[-1])
