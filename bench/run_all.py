@@ -30,8 +30,9 @@ from pathlib import Path
 # before NumPy is imported.
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = os.environ.get(name, "1") if "--only" in sys.argv else "1"
-# Nets run on the CPU, as the optimiser does.
-os.environ["CUDA_VISIBLE_DEVICES"] = ""
+# Nets run on the CPU, as the optimiser does, unless a section is asked for a device.
+if not any(word.startswith("device=") for word in sys.argv):
+    os.environ["CUDA_VISIBLE_DEVICES"] = ""
 
 BENCH = Path(__file__).resolve().parent
 sys.path.insert(0, str(BENCH))

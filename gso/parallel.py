@@ -14,6 +14,9 @@ from typing import Any
 
 from gso.errors import ConvergenceWarning, GSOError
 
+#: The error of a piece of work that ends its process.
+DIED = "the worker process died; is there enough memory?"
+
 
 @dataclass(frozen=True)
 class Done:
@@ -60,7 +63,7 @@ def spread(
     numbered = enumerate(pieces)
     if workers <= 0:
         for index, piece in numbered:
-            yield _attempt(function, index, piece)
+            yield attempt(function, index, piece)
         return
     pool = _Pool(workers, function, caller)
     try:
@@ -115,13 +118,13 @@ def helpers(workers: int | None) -> Iterator[Each]:
         yield here
         return
     executor = ProcessPoolExecutor(
-        count - 1, mp_context=get_context("spawn"), initializer=_prepare_worker
+        count - 1, mp_context=get_context("spawn"), initializer=prepare_worker
     )
 
     def each(function: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
         futures = []
         try:
-            with _nameless():
+            with nameless():
                 futures += [executor.submit(function, item) for item in items[1:]]
         except BrokenProcessPool:
             return here(function, items)
@@ -150,7 +153,7 @@ def processors() -> int:
 
 
 @contextmanager
-def _nameless() -> Iterator[None]:
+def nameless() -> Iterator[None]:
     """Hide the main script, so that processes started meanwhile do not import it."""
     main = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
@@ -160,7 +163,8 @@ def _nameless() -> Iterator[None]:
         sys.modules["__main__"] = main
 
 
-def _attempt(function: Callable[[Any], Any], index: int, piece: Any) -> Done:
+def attempt(function: Callable[[Any], Any], index: int, piece: Any) -> Done:
+    """Apply a function to a piece of work; an exception becomes the error of the result."""
     try:
         return Done(index, function(piece))
     except GSOError as error:
@@ -169,7 +173,7 @@ def _attempt(function: Callable[[Any], Any], index: int, piece: Any) -> Done:
         return Done(index, error=f"{type(error).__name__}: {error}")
 
 
-def _prepare_worker() -> None:
+def prepare_worker() -> None:
     """Leave Ctrl-C to the parent and warnings to the results' status; end when the parent does."""
     import signal
     import threading
@@ -208,7 +212,7 @@ class _Pool:
 
         # Forking would copy the threads' locks of BLAS and PARDISO in an unknown state.
         self.executor = ProcessPoolExecutor(
-            self.workers, mp_context=get_context("spawn"), initializer=_prepare_worker
+            self.workers, mp_context=get_context("spawn"), initializer=prepare_worker
         )
 
     @property
@@ -222,8 +226,8 @@ class _Pool:
     def add(self, index: int, piece: Any, *, alone: bool = False) -> None:
         try:
             # The executor starts workers on submission.
-            with nullcontext() if self.caller else _nameless():
-                future = self.executor.submit(_attempt, self.function, index, piece)
+            with nullcontext() if self.caller else nameless():
+                future = self.executor.submit(attempt, self.function, index, piece)
         except BrokenProcessPool:
             self._replace()
             self.suspects.append((index, piece))
@@ -243,7 +247,7 @@ class _Pool:
                 yield future.result()
             except BrokenProcessPool:
                 if alone:
-                    yield Done(index, error="the worker process died; is there enough memory?")
+                    yield Done(index, error=DIED)
                 else:
                     self.suspects.append((index, piece))
                 self._replace()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -24,12 +25,14 @@ from tests.conftest import cylinder, meshes, saddle
 torch = pytest.importorskip("torch")
 
 from gso.linalg import banded as lapack  # noqa: E402
-from gso.tno.batched import cholesky, search, stages  # noqa: E402
+from gso.tno.batched import cholesky, device, exchange, search, stages  # noqa: E402
 from gso.tno.batched import kernels as on_tensors  # noqa: E402
-from gso.tno.batched.asked import checked  # noqa: E402
-from gso.tno.batched.batches import solve_all  # noqa: E402
+from gso.tno.batched.batches import asked, solve_batch  # noqa: E402
+from gso.tno.batched.gathered import TooLarge, Unbatchable, gather  # noqa: E402
+from gso.tno.batched.many import solve_all  # noqa: E402
+from gso.tno.batched.problem import Problem as Batch  # noqa: E402
 from gso.tno.batched.sums import Sums  # noqa: E402
-from gso.tno.batched.unknowns import Unbatchable  # noqa: E402
+from gso.tno.batched.terms import stacked_loss  # noqa: E402
 from gso.tno.solver.directions import GaussNewton  # noqa: E402
 
 CPU = torch.device("cpu")
@@ -107,12 +110,14 @@ def test_energy_gradient_and_matrix_are_those_of_the_solver(name, designs):
     task, request, heights = CASES[name]
     points = designs[:2] if heights is None else np.stack([bump(21, h) for h in heights])
     plans = [planned(task, p, **request) for p in points]
-    assert len({stages.structure(plan) for plan in plans}) == 1
+    assert stages.same(*(stages.structure(plan) for plan in plans))
     rng = np.random.default_rng(0)
     coordinates = [plan.start for plan in plans]
     for own in zip(*(plan.stages for plan in plans), strict=True):
         coordinates = [s.enter(c) for s, c in zip(own, coordinates, strict=True)]
-        problem, x, losses = stages.stacked_problem(own, coordinates, CPU)
+        gathered = gather(own, coordinates, "gauss-newton")
+        problem, x = Batch([gathered], CPU), torch.as_tensor(gathered.start.T)
+        losses = [stacked_loss(each, CPU) for each in gathered.continuation]
         x = x + 1e-4 * torch.as_tensor(rng.standard_normal(x.shape))
         for number, loss in enumerate(losses or [None]):
             here = problem if loss is None else problem.with_loss(own[0].continued, loss)
@@ -447,23 +452,135 @@ def test_unknowns_that_cannot_be_stacked(designs):
     ]
     own = [plan.stages[-1] for plan in plans]
     with pytest.raises(Unbatchable):
-        stages.stacked_problem(own, [p.reshape(-1) for p in designs[:2]], CPU)
+        gather(own, [p.reshape(-1) for p in designs[:2]], "gauss-newton")
 
 
 def test_a_batch_is_halved_where_memory_is_short(designs, monkeypatch):
-    real, sizes = stages.solve, []
+    real, sizes = device._solve, []
 
-    def small(plans, *given):
-        sizes.append(len(plans))
-        if len(plans) > 1:
+    def small(parts, *given):
+        sizes.append(sum(map(len, parts)))
+        if sizes[-1] > 1:
             raise torch.cuda.OutOfMemoryError
-        return real(plans, *given)
+        return real(parts, *given)
 
     wanted = gso.tno.optimize_batch(designs[:3], task="flatten", workers=0)
-    monkeypatch.setattr(stages, "solve", small)
+    monkeypatch.setattr(device, "_solve", small)
     found = gso.tno.optimize_batch(designs[:3], task="flatten", workers=0)
-    assert sizes == [3, 1, 2, 1, 1]
+    # Flattening has two stages.
+    assert sizes == [3, 1, 1, 2, 1, 1, 1, 1]
     np.testing.assert_allclose(energies(found), energies(wanted), rtol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def two_workers():
+    with gso.tno.BatchWorkers(2) as ready:
+        yield ready
+
+
+def piece(task, designs, *, minimise):
+    return solve_batch(asked(task), designs, minimise)
+
+
+def on_cpu(parts):
+    return device.solve(parts, "cpu")
+
+
+def by_workers(ready, some, task, together=on_cpu, most=100):
+    found = {}
+    for done in ready.spread(partial(piece, task), list(some[:, None]), together, most):
+        assert done.error is None
+        found[done.index] = done.value[0]
+    return [found[k] for k in range(len(some))]
+
+
+def counting(sizes, most=100):
+    """A device that has memory for so many surfaces, and tells how many it was given."""
+
+    def together(parts):
+        sizes.append(sum(map(len, parts)))
+        if sizes[-1] > most:
+            raise TooLarge
+        return on_cpu(parts)
+
+    return together
+
+
+@pytest.mark.parametrize("task", ["developable", "flatten"])
+def test_workers_plan_and_this_process_minimises(task, designs, two_workers):
+    some = np.concatenate([designs, 1.5 * designs[:1], [odd_ones()["flat"]]])
+    sizes = []
+    wanted = gso.tno.optimize_batch(some, task=task, workers=0)
+    for _ in range(2):
+        found = by_workers(two_workers, some, task, counting(sizes))
+        np.testing.assert_allclose(energies(found), energies(wanted), rtol=1e-6, atol=1e-18)
+        assert [f.status for f in found] == [w.status for w in wanted]
+    assert max(sizes) == 2
+    assert len(two_workers) == 2
+
+
+def test_workers_share_a_device_with_little_memory(designs, two_workers):
+    sizes = []
+    found = by_workers(two_workers, designs, "flatten", counting(sizes, 1))
+    assert max(sizes) > 1
+    wanted = gso.tno.optimize_batch(designs, task="flatten", workers=0)
+    np.testing.assert_allclose(energies(found), energies(wanted), rtol=1e-6)
+
+
+def test_most_surfaces_of_a_device(designs, two_workers):
+    sizes = []
+    by_workers(two_workers, designs, "flatten", counting(sizes), most=1)
+    assert max(sizes) == 1
+
+
+def test_a_worker_that_dies_loses_nothing(designs, two_workers):
+    killed = []
+
+    def together(parts):
+        if not killed:
+            killed.append(next(iter(two_workers._processes.values())))
+            killed[0].kill()
+            killed[0].join()
+        return on_cpu(parts)
+
+    found = by_workers(two_workers, designs, "flatten", together)
+    wanted = gso.tno.optimize_batch(designs, task="flatten", workers=0)
+    np.testing.assert_allclose(energies(found), energies(wanted), rtol=1e-6)
+    assert len(two_workers) == 2
+
+
+def test_workers_are_ready_after_an_error(designs, two_workers):
+    def broken(parts):
+        raise RuntimeError("the device is gone")
+
+    with pytest.raises(RuntimeError, match="the device is gone"):
+        by_workers(two_workers, designs, "flatten", broken)
+    assert len(by_workers(two_workers, designs[:1], "flatten")) == 1
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.5, "two"])
+def test_a_number_of_workers_that_cannot_be(count):
+    with pytest.raises(gso.OptionError, match="whole number of 1 or more"):
+        gso.tno.BatchWorkers(count)
+
+
+@pytest.mark.parametrize("size", [0, 3, 200_000])
+def test_exchange_of_arrays(size):
+    from multiprocessing import Pipe
+    from threading import Thread
+
+    here, there = Pipe()
+    value = {"a": np.arange(float(size)), "b": np.arange(2 * size)[::2], "c": "text"}
+    sender = Thread(target=exchange.send, args=(here, value))
+    sender.start()
+    found = exchange.receive(there)
+    sender.join()
+    assert found["c"] == "text"
+    for name in "ab":
+        np.testing.assert_array_equal(found[name], value[name])
+    here.close()
+    with pytest.raises(EOFError):
+        exchange.receive(there)
 
 
 def test_what_fails_in_a_batch_is_solved_alone(designs, monkeypatch):
@@ -480,5 +597,5 @@ def test_what_fails_in_a_batch_is_solved_alone(designs, monkeypatch):
 def test_solved_yields_errors_in_place(designs):
     bad = designs.copy()
     bad[1] = 0.5
-    found = list(solve_all(checked("flatten"), bad))
+    found = list(solve_all(asked("flatten"), bad))
     assert [isinstance(one, gso.MeshError) for one in found] == [False, True, False, False]

@@ -33,8 +33,7 @@ def batches(n: int = 256, device: str = "cpu", seed: int = 31) -> dict[str, Any]
         return _energies([found[k] for k in range(len(points))])
 
     def batch(task: str, points: np.ndarray) -> np.ndarray:
-        own = None if device == "cpu" else 0
-        return _energies(gso.tno.optimize_batch(points, task=task, device=device, workers=own))
+        return _energies(gso.tno.optimize_batch(points, task=task, device=device))
 
     out, rows = {}, []
     for task in ("developable", "flatten"):
@@ -64,6 +63,54 @@ def batches(n: int = 256, device: str = "cpu", seed: int = 31) -> dict[str, Any]
     return out
 
 
+def device(
+    n: int = 1024, device: str = "cuda", workers: int = 0, compared: int = 32, seed: int = 31
+) -> dict[str, Any]:
+    """Time n surfaces of the dataset, 64 x 64, on a graphics processor, with workers that plan.
+
+    The energies of some of them are compared with those of single solves on the processor.
+    """
+    designs = np.stack([s.sample(64) for s in bezier.generate(n, seed=seed)])
+    out, rows = {}, []
+    (ready, _), begun = timed(lambda: (gso.tno.BatchWorkers(workers or None), 0))
+    with ready:
+        for task in ("developable", "flatten"):
+
+            def batch(points: np.ndarray, task: str = task) -> list[Any]:
+                return gso.tno.optimize_batch(points, task=task, device=device, workers=ready)
+
+            # The workers import the package and print kernels at first use.
+            _, first = timed(batch, designs[: 4 * len(ready)])
+            found, seconds = timed(batch, designs)
+            again, second = timed(batch, designs)
+            single = [gso.tno.optimize(p, task=task, verdict=False) for p in designs[:compared]]
+            off = _off(_energies(found[:compared]), _energies(single))
+            out[task] = {
+                "first call, s": begun + first,
+                "ms a surface": 1e3 * min(seconds, second) / n,
+                "of them set-up": _mean(again, "setup"),
+                "evaluation": _mean(again, "evaluate"),
+                "factorisation": _mean(again, "factor"),
+                "line search": _mean(again, "search"),
+                "median difference %": 100.0 * float(np.median(off)),
+                "largest %": 100.0 * float(off.max()),
+            }
+            rows.append([task, *out[task].values()])
+            begun = 0.0
+    table(
+        f"{n} surfaces 64 x 64 on {device!r}, planned by {workers or 'all'} processes; set-up is "
+        "that of the processes, which work at the same time",
+        ["task", *out["flatten"]],
+        rows,
+    )
+    return out
+
+
+def _mean(results: list[Any], phase: str) -> float:
+    """Return the mean of a phase, ms."""
+    return 1e3 * float(np.mean([r.seconds.get(phase, 0.0) for r in results]))
+
+
 def _measured(function: Callable[..., Any], *given: Any) -> tuple[tuple[Any, float], float]:
     """Call a function; return its result with the seconds, and those of all processors.
 
@@ -87,4 +134,4 @@ def _off(energies: np.ndarray, reference: np.ndarray) -> np.ndarray:
     return np.abs(energies - reference) / np.where(reference > 0, reference, 1.0)
 
 
-SECTIONS = (batches,)
+SECTIONS = (batches, device)

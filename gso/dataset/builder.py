@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
 from importlib.util import find_spec
@@ -29,6 +29,7 @@ from gso.dataset.summary import summarise
 from gso.errors import DatasetError, MeshError, OptionError
 from gso.io import replacing
 from gso.linalg import blas_threads
+from gso.parallel import Done, processors
 from gso.spelling import choices, known_keywords
 
 _OTHER_RECIPE = "give its own options, or another folder"
@@ -36,6 +37,8 @@ _OTHER_VERSIONS = "install what it was begun with, or build in another folder"
 
 #: Progress callback: (name of the counted items, number done, total number).
 Tick = Callable[[str, int, int], None]
+#: Makes files, and yields them as they are finished.
+Spread = Callable[[Callable[..., bytes], Sequence[shard.Task]], Generator[Done, None, None]]
 
 
 @known_keywords()
@@ -107,9 +110,9 @@ def build(
         )
     if device is not None and scheduler is None:
         # The import needs PyTorch.
-        from gso.tno.batched.asked import checked
+        from gso.tno.batched.device import checked
 
-        checked(device=device)
+        checked(device)
     place = Path(folder)
     with claimed(place):
         with _kept():
@@ -132,7 +135,7 @@ def build(
         for part in (shard.LABELS, *REFERENCES):
             todo = [task for task in everything if task.part == part]
             work = partial(shard.make, recipe, versions(device), device=device)
-            _make(place, work, todo, set(bad), workers, scheduler, tick)
+            _make(place, work, todo, set(bad), _spreading(workers, scheduler, device), tick)
         with _kept():
             record = _listed(place, record, recipe, everything, wanted, selection.drawn)
             record["summary"] = summarise(Dataset(place, record))
@@ -226,8 +229,7 @@ def _make(
     work: Callable[[shard.Task], bytes],
     todo: list[shard.Task],
     bad: set[str],
-    workers: int | None,
-    scheduler: str | None,
+    spread: Spread,
     tick: Tick | None,
 ) -> None:
     """Make the files that are missing or damaged."""
@@ -240,7 +242,7 @@ def _make(
     what = f"surfaces with {missing[0].part}" if reference else "surfaces labelled"
     if tick is not None:
         tick(what, done, total)
-    with closing(cluster.either(work, missing, workers=workers, scheduler=scheduler)) as results:
+    with closing(spread(work, missing)) as results:
         for result in results:
             task = missing[result.index]
             if result.error is not None:
@@ -255,6 +257,24 @@ def _make(
             done += len(task.ids)
             if tick is not None:
                 tick(what, done, total)
+
+
+def _spreading(workers: int | None, scheduler: str | None, device: str | None) -> Spread:
+    """Return how work is spread over processes."""
+    if scheduler is not None or workers == 0 or device is None or device.startswith("cpu"):
+        return partial(cluster.either, workers=workers, scheduler=scheduler)
+    return partial(_on_device, device, 2 * processors() if workers is None else workers)
+
+
+def _on_device(
+    device: str, workers: int, work: Callable[..., bytes], missing: Sequence[shard.Task]
+) -> Generator[Done, None, None]:
+    """Make files in worker processes, for which this one minimises on a graphics processor."""
+    from gso.tno.batched.many import in_batches
+    from gso.tno.batched.workers import BatchWorkers
+
+    with BatchWorkers(min(workers, len(missing))) as ready:
+        yield from in_batches(ready, work, missing, device)
 
 
 def _intact(place: Path, task: shard.Task) -> bool:

@@ -108,7 +108,9 @@ def solve(kind: str, points: Array) -> Label:
         return _failed(kind, len(points))
 
 
-def solve_many(kind: str, points: Array, device: str | None = None) -> list[Label]:
+def solve_many(
+    kind: str, points: Array, device: str | None = None, minimise: Any = None
+) -> list[Label]:
     """Label surfaces (B, H, W, 3) of the unit ball.
 
     Parameters
@@ -119,6 +121,8 @@ def solve_many(kind: str, points: Array, device: str | None = None) -> list[Labe
     device : str, optional
         Where to solve them in batches, for the kinds in :data:`BATCHED`; one by one when not
         given.
+    minimise : callable, optional
+        Minimises stages there for this process, see :class:`gso.tno.BatchWorkers`.
 
     Raises
     ------
@@ -129,12 +133,18 @@ def solve_many(kind: str, points: Array, device: str | None = None) -> list[Labe
     """
     if device is None or kind not in BATCHED:
         return [solve(kind, p) for p in points]
-    from gso.tno.batched.asked import checked
-    from gso.tno.batched.batches import solve_all
+    from gso.tno.batched.batches import asked, solve_batch
 
-    asked = checked(device=device, **KINDS[kind].arguments)
+    what = asked(device=device, **KINDS[kind].arguments)
     designs: list[Mesh | GSOError] = [_or_error(Mesh.from_grid, p, weld=False) for p in points]
-    results = solve_all(asked, [d for d in designs if isinstance(d, Mesh)])
+    good = [d for d in designs if isinstance(d, Mesh)]
+    if minimise is None:
+        # PyTorch is not loaded where another process minimises.
+        from gso.tno.batched.many import solve_all
+
+        results = solve_all(what, good)
+    else:
+        results = iter(solve_batch(what, good, minimise))
     found = [next(results) if isinstance(d, Mesh) else d for d in designs]
     labels = [_or_error(_labelled, kind, f) if isinstance(f, Result) else f for f in found]
     return [x if isinstance(x, Label) else _failed(kind, points.shape[1]) for x in labels]

@@ -7,20 +7,22 @@ from gso.tno.optimize import check, optimize
 from gso.tno.session import Session
 from gso.tno.start import Start
 
-#: ``optimize_batch`` is not among them, as it needs PyTorch.
+#: The names in :data:`_BATCHED` are not among them, as they need PyTorch.
 __all__ = ["Session", "Start", "check", "optimize", "optimize_many"]
+
+#: Names that are imported on first use, and their modules.
+_BATCHED = {"optimize_batch": "optimize", "BatchWorkers": "workers"}
 
 
 def __getattr__(name: str) -> Any:
-    if name != "optimize_batch":
+    if name not in _BATCHED:
         raise AttributeError(f"module 'gso.tno' has no attribute {name!r}")
     from importlib import import_module
 
-    # Imported on first use, as it loads PyTorch.
-    value = import_module("gso.tno.batched.optimize").optimize_batch
+    value = getattr(import_module(f"gso.tno.batched.{_BATCHED[name]}"), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted([*__all__, "optimize_batch"])
+    return sorted([*__all__, *_BATCHED])

@@ -4,87 +4,65 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
-from multiprocessing import parent_process
 from typing import Any
-
-import numpy as np
-import torch
 
 from gso import tasks
 from gso.constraints import Compiled
-from gso.errors import ConvergenceWarning, GSOError
+from gso.errors import ConvergenceWarning, GSOError, OptionError
 from gso.linalg import blas_threads
 from gso.mesh import Mesh
-from gso.parallel import processors, spread
 from gso.result import Result
-from gso.tasks.base import Plan, Request
+from gso.tasks.base import Options, Plan, Request
 from gso.tno.batched import stages
-from gso.tno.batched.asked import Asked
-from gso.tno.batched.problem import forget
-from gso.tno.batched.unknowns import Unbatchable
+from gso.tno.batched.gathered import TooLarge, Unbatchable
+from gso.tno.batched.stages import Minimise
 from gso.tno.judged import judged, requirements
 from gso.tno.normalise import Canonical
-from gso.tno.optimize import optimize
+from gso.tno.optimize import check, optimize
 from gso.tno.packed import packed
 from gso.tno.run import Run
 
-#: Surfaces solved together on a processor, and most surfaces and vertices of them together on a
-#: graphics processor.
-_BATCH, _GPU_BATCH, _GPU_VERTICES = 16, 256, 1 << 20
-#: Number of pieces from which worker processes save time.
-_ENOUGH = 4
+
+@dataclass(frozen=True)
+class Asked:
+    """What every surface of a batch is solved for, with checked options."""
+
+    task: str
+    formulation: str
+    options: Options
+    device: str
+    verdict: bool
 
 
-def solve_all(
-    asked: Asked, designs: Sequence[Any], workers: int | None = 0
-) -> Iterator[Result | GSOError]:
-    """Solve grids of one size, arrays (H, W, 3) or meshes; yield results or errors in order."""
-    if not len(designs):
-        return
-    there = asked.device.partition(":")[0] != "cpu"
-    together = _BATCH
-    if there:
-        vertices = np.size(getattr(designs[0], "vertices", designs[0])) // 3
-        together = max(min(_GPU_VERTICES // max(vertices, 1), _GPU_BATCH), 1)
-    pieces = [designs[k : k + together] for k in range(0, len(designs), together)]
-    if workers is None:
-        workers = _useful_workers(len(pieces))
-    if workers <= 0 or there:
-        for piece in pieces:
-            yield from _solve_batch(asked, piece)
-        return
-    # Smaller pieces where they leave no process without work.
-    share = -(-len(designs) // (workers * -(-len(pieces) // workers)))
-    pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
-    done: dict[int, Any] = {}
-    work = partial(_measured, asked)
-    with closing(spread(work, pieces, workers=min(workers, len(pieces)), caller=False)) as results:
-        for one in results:
-            if one.error is not None:
-                raise GSOError(f"surfaces from {one.index * share} on: {one.error}")
-            done[one.index] = one.value
-    for k in range(len(pieces)):
-        yield from done.pop(k)
+#: Formulations whose stages can be solved in batches, by task.
+FORMULATIONS = {"developable": ("curvature",), "flatten": ("strain", "lengths")}
 
 
-def _measured(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
-    """Solve designs in a worker process, and compute their metrics there."""
-    found = _solve_batch(asked, designs)
-    for result in found:
-        if isinstance(result, Result):
-            result.metrics  # noqa: B018
-    return found
+def asked(
+    task: str = "developable",
+    formulation: str | None = None,
+    options: Any = None,
+    device: str = "cpu",
+    verdict: bool = False,
+) -> Asked:
+    """Check what a batch is asked for, but for its device.
 
-
-def _useful_workers(pieces: int) -> int:
-    """Return the number of worker processes that saves time, 0 inside a worker process."""
-    if parent_process() is not None or pieces < _ENOUGH:
-        return 0
-    return min(processors(), pieces)
+    Raises
+    ------
+    OptionError
+        Something is unknown, or has no batched solve.
+    """
+    _, chosen, settings = check(task, formulation, options)
+    if chosen not in FORMULATIONS.get(task, ()):
+        there = "; ".join(f"{name}: {', '.join(some)}" for name, some in FORMULATIONS.items())
+        raise OptionError(
+            f"task {task!r} with formulation {chosen!r} is not solved in batches ({there} are); "
+            "use gso.tno.optimize_many"
+        )
+    return Asked(task, chosen, settings, str(device), verdict)
 
 
 @dataclass
@@ -98,23 +76,31 @@ class _Planned:
     seconds: float
 
 
-def _solve_batch(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
+@dataclass
+class _Group:
+    """Surfaces whose stages have one structure, with their places among the designs."""
+
+    structure: list[Any]
+    indices: list[int]
+    planned: list[_Planned]
+
+
+def solve_batch(
+    asked: Asked, designs: Sequence[Any], minimise: Minimise
+) -> list[Result | GSOError]:
     """Solve designs in one batch for each structure that their stages have."""
     out: list[Any] = [None] * len(designs)
-    groups: dict[bytes, list[tuple[int, _Planned]]] = {}
-    with _one_thread(asked.device), blas_threads(asked.options.threads):
+    groups: list[_Group] = []
+    with blas_threads(asked.options.threads):
         for index, given in enumerate(designs):
+            with suppress(Unbatchable, GSOError):
+                _grouped(groups, index, _planned(asked, given))
+        for group in groups:
             try:
-                planned = _planned(asked, given)
-                groups.setdefault(stages.structure(planned.plan), []).append((index, planned))
-            except (Unbatchable, GSOError):
-                pass
-        for group in groups.values():
-            try:
-                found = _solve_group([planned for _, planned in group], asked)
+                found = _solve_group(group.planned, asked, minimise)
             except (Unbatchable, GSOError):
                 continue
-            for (index, _), result in zip(group, found, strict=True):
+            for index, result in zip(group.indices, found, strict=True):
                 out[index] = result
         for index, given in enumerate(designs):
             if out[index] is None:
@@ -123,16 +109,15 @@ def _solve_batch(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError
     return out
 
 
-@contextmanager
-def _one_thread(device: str) -> Iterator[None]:
-    """Use one thread on a processor: worker processes use the others."""
-    before = torch.get_num_threads()
-    if device.partition(":")[0] == "cpu":
-        torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
+def _grouped(groups: list[_Group], index: int, planned: _Planned) -> None:
+    """Add a surface to the group of its structure."""
+    structure = stages.structure(planned.plan)
+    for group in groups:
+        if stages.same(group.structure, structure):
+            group.indices.append(index)
+            group.planned.append(planned)
+            return
+    groups.append(_Group(structure, [index], [planned]))
 
 
 def _planned(asked: Asked, given: Any) -> _Planned:
@@ -169,24 +154,25 @@ def _solve_alone(asked: Asked, given: Any) -> Result | GSOError:
         return error
 
 
-def _solve_group(group: list[_Planned], asked: Asked) -> list[Result]:
+def _solve_group(group: list[_Planned], asked: Asked, minimise: Minimise) -> list[Result]:
     """Solve surfaces whose stages have one structure, in halves where memory is short."""
     clock = time.perf_counter()
     plans, half = [planned.plan for planned in group], len(group) // 2
     try:
         reached, iterations, timings = stages.solve(
-            plans, asked.options.method, torch.device(asked.device)
+            plans, asked.options.method, f"blocks ({asked.device})", minimise
         )
-    except torch.cuda.OutOfMemoryError:
+    except TooLarge:
         if not half:
             # It is then solved by itself, on the processor.
             raise Unbatchable from None
         reached = []
     if not reached:
-        # Outside the handler, which would keep the tensors alive.
-        forget()
-        torch.cuda.empty_cache()
-        return _solve_group(group[:half], asked) + _solve_group(group[half:], asked)
+        return [
+            result
+            for part in (group[:half], group[half:])
+            for result in _solve_group(part, asked, minimise)
+        ]
     each = (time.perf_counter() - clock) / len(group)
     out = []
     for planned, state, count in zip(group, reached, iterations, strict=True):

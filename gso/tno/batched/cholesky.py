@@ -41,8 +41,8 @@ class Blocks:
     def cost(self) -> float:
         """Approximate time of a factorisation, in operations of a product."""
         p, cube = self.band, float(self.size) ** 3
-        calls = 2 + p + p * (p + 1) / 2
-        each = (_FACTOR / 3 + _SOLVE * p + p * (p + 1)) * cube + _CALL * calls
+        calls = 3 + p + p * (p + 1) / 2
+        each = (_FACTOR / 3 + _SOLVE + 2 * p + p * (p + 1)) * cube + _CALL * calls
         return self.count * each
 
     @property
@@ -101,7 +101,7 @@ class BlockBanded:
         self._panel = torch.as_tensor(panel, device=device)
         self._place = torch.as_tensor(place, device=device)
         self._storage: Tensor | None = None
-        self._diagonal: list[Tensor] = []
+        self._inverse: list[Tensor] = []
 
     def factor(self, values: Tensor) -> Tensor:
         """Factor matrices, and return the mask (B,) of those that are not positive definite.
@@ -125,16 +125,17 @@ class BlockBanded:
         # Rows past the matrix are those of the identity.
         a[-1, 0].diagonal(dim1=-2, dim2=-1)[:, self.unknowns - (count - 1) * m :] = 1.0
         failed = torch.zeros(surfaces, dtype=torch.int32, device=values.device)
-        self._diagonal = []
+        self._inverse = []
+        unit = torch.eye(m, dtype=values.dtype, device=values.device).expand(surfaces, m, m)
         for k in range(count):
             lower, info = torch.linalg.cholesky_ex(a[k, 0])
-            self._diagonal.append(lower)
             failed += info.abs()
+            # Products are faster than triangular solves, of which this is the only one.
+            inverse = torch.linalg.solve_triangular(lower, unit, upper=False)
+            self._inverse.append(inverse)
             beyond = min(band, count - 1 - k)
             for d in range(1, beyond + 1):
-                # X L^T = A, in place.
-                turned = a[k, d].mT
-                torch.linalg.solve_triangular(lower, turned, upper=False, out=turned)
+                a[k, d] = a[k, d] @ inverse.mT
             for d in range(1, beyond + 1):
                 for e in range(1, d + 1):
                     a[k + e, d - e].baddbmm_(a[k, d], a[k, e].mT, alpha=-1.0)
@@ -151,13 +152,12 @@ class BlockBanded:
         x = x.view(-1, count, m, 1)
         parts = list(x.unbind(1))
         for k in range(count):
-            here = torch.linalg.solve_triangular(self._diagonal[k], parts[k], upper=False)
-            parts[k] = here
+            here = parts[k] = self._inverse[k] @ parts[k]
             for d in range(1, min(band, count - 1 - k) + 1):
                 parts[k + d] = torch.baddbmm(parts[k + d], a[k, d], here, alpha=-1.0)
         for k in range(count - 1, -1, -1):
             here = parts[k]
             for d in range(1, min(band, count - 1 - k) + 1):
                 here = torch.baddbmm(here, a[k, d].mT, parts[k + d], alpha=-1.0)
-            parts[k] = torch.linalg.solve_triangular(self._diagonal[k].mT, here, upper=True)
+            parts[k] = self._inverse[k].mT @ here
         return torch.cat(parts, dim=1)[:, : self.unknowns, 0].T.contiguous()

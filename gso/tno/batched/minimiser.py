@@ -10,14 +10,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from gso.tno.batched.gathered import CONVERGED, MAX_ITERATIONS, STALLED
 from gso.tno.batched.problem import Problem
 from gso.tno.batched.search import armijo, direction
 from gso.tno.solver import Timings
 from gso.tno.solver.directions import GaussNewton, LevenbergMarquardt, adapted
 from gso.tno.solver.method import falls
-
-#: Codes of the reasons to stop.
-MAX_ITERATIONS, CONVERGED, STALLED = 0, 1, 2
 
 
 @dataclass

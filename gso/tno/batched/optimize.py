@@ -11,8 +11,10 @@ import torch
 from gso.errors import GSOError, MeshError, OptionError
 from gso.result import Result
 from gso.spelling import known_keywords
-from gso.tno.batched.asked import checked
-from gso.tno.batched.batches import solve_all
+from gso.tno.batched import batches
+from gso.tno.batched import device as devices
+from gso.tno.batched.many import solve_all
+from gso.tno.batched.workers import BatchWorkers
 from gso.typing import Array
 
 
@@ -24,7 +26,7 @@ def optimize_batch(
     formulation: str | None = None,
     options: Any = None,
     device: str = "cpu",
-    workers: int | None = None,
+    workers: int | BatchWorkers | None = None,
     verdict: bool = False,
 ) -> list[Result]:
     """Make many grids of one size developable, or flatten them, in batches on PyTorch tensors.
@@ -49,8 +51,10 @@ def optimize_batch(
         backend and the number of threads in it are not used.
     device : str
         PyTorch's name of the device: "cpu", "cuda", "cuda:1" ...
-    workers : int, optional
-        "cpu": number of worker processes; as many as save time when not given, 0 for none.
+    workers : int or BatchWorkers, optional
+        Number of worker processes; as many as save time when not given, 0 for none. Those of a
+        :class:`gso.tno.BatchWorkers` are started once for many calls. On a processor workers
+        solve whole batches. With a graphics processor they plan, and this process solves.
     verdict : bool
         Judge the results, and flatten developable ones to measure their strain. This is done
         surface by surface on the processor.
@@ -77,10 +81,15 @@ def optimize_batch(
     >>> [r.metrics["loss_gc"] < r.metrics["loss_gc_before"] for r in results]
     [True, True]
     """
-    if workers is not None and (not isinstance(workers, int) or workers < 0):
-        raise OptionError(f"workers is {workers!r}; it must be a whole number of 0 or more")
+    if not isinstance(workers, int | BatchWorkers | None) or (
+        isinstance(workers, int) and workers < 0
+    ):
+        raise OptionError(
+            f"workers is {workers!r}; it must be a whole number of 0 or more, or BatchWorkers"
+        )
     designs = _designs(points)
-    asked = checked(task, formulation, options, device, verdict)
+    devices.checked(device)
+    asked = batches.asked(task, formulation, options, device, verdict)
     out: list[Result] = []
     for index, found in enumerate(solve_all(asked, list(designs), workers)):
         if isinstance(found, GSOError):

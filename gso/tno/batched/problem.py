@@ -13,16 +13,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from gso.energy.base import Weighted
 from gso.linalg.base import Pattern
-from gso.parametrization.orientation import SAFETY, Orientation, degenerate
+from gso.parametrization.orientation import SAFETY, degenerate
 from gso.tno.batched.cholesky import BlockBanded, divide
+from gso.tno.batched.gathered import Gathered, Unbatchable
 from gso.tno.batched.sums import Sums
 from gso.tno.batched.terms import Term
-from gso.tno.batched.unknowns import Unbatchable, Unknowns
+from gso.tno.batched.unknowns import Unknowns
 from gso.tno.solver.assembly import assemble
 from gso.typing import Ints
-from gso.unknowns import Layout
 
 #: Structures that are kept for the next batch.
 _KEPT = 24
@@ -124,13 +123,8 @@ class Problem:
 
     Parameters
     ----------
-    items : sequence of sequences of Weighted
-        For each surface its terms, with their weights and losses.
-    layout : Layout
-        Layout of the coordinates.
-    unknowns : Unknowns
-    limits : sequence of Limit
-        Bounds on a step, equal for all surfaces.
+    parts : sequence of Gathered
+        Surfaces whose stages have one key.
     device : torch.device
 
     Raises
@@ -139,27 +133,18 @@ class Problem:
         The surfaces cannot be solved together.
     """
 
-    def __init__(
-        self,
-        items: Sequence[Sequence[Weighted]],
-        layout: Layout,
-        unknowns: Unknowns,
-        limits: Sequence[Any],
-        device: torch.device,
-    ):
-        terms = [Term(each, layout, unknowns, device) for each in zip(*items, strict=True)]
+    def __init__(self, parts: Sequence[Gathered], device: torch.device):
+        first = parts[0]
+        self.unknowns = Unknowns.stacked(parts, device)
+        each = zip(*(part.terms for part in parts), strict=True)
+        terms = [Term(same, self.unknowns, device) for same in each]
         # Terms with a constant matrix come last.
         self.terms = sorted(terms, key=lambda term: term.quadratic)
-        self.unknowns, self.surfaces = unknowns, len(items)
-        self.structure = _structure(unknowns.size, self.terms, device)
-        self._limits = []
-        for limit in limits:
-            if not isinstance(limit, Orientation):
-                raise Unbatchable
-            corners = torch.as_tensor(limit.corners, device=device)
-            self._limits.append(limit.start + 2 * corners)
+        self.surfaces = sum(map(len, parts))
+        self.structure = _structure(self.unknowns.size, self.terms, device)
+        self._limits = [torch.tensor(c, device=device) for c in first.corners]
         self._device = device
-        self._constant = self._fixed_matrix(layout.size)
+        self._constant = self._fixed_matrix(first.coordinates)
 
     def _fixed_matrix(self, size: int) -> Tensor | None:
         """Return the sum of the constant matrices."""

@@ -4,34 +4,39 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from gso.parametrization.orientation import Orientation
 from gso.status import Progress, Status
 from gso.tasks.base import Plan, Stage
-from gso.tno.batched import minimiser
-from gso.tno.batched.minimiser import Minima, minimise
-from gso.tno.batched.problem import Problem
-from gso.tno.batched.terms import stacked_loss
-from gso.tno.batched.unknowns import Unbatchable, Unknowns, columns
+from gso.tno.batched.gathered import (
+    CONVERGED,
+    MAX_ITERATIONS,
+    STALLED,
+    Gathered,
+    Solved,
+    Unbatchable,
+    gather,
+)
 from gso.tno.run import Reached
 from gso.tno.solver import Minimum, Timings
 from gso.typing import Array
 
 _STATUSES = {
-    minimiser.MAX_ITERATIONS: Status.MAX_ITERATIONS,
-    minimiser.CONVERGED: Status.CONVERGED,
-    minimiser.STALLED: Status.STALLED,
+    MAX_ITERATIONS: Status.MAX_ITERATIONS,
+    CONVERGED: Status.CONVERGED,
+    STALLED: Status.STALLED,
 }
 
+#: Minimises a stage of many surfaces.
+Minimise = Callable[[Gathered], Solved]
 
-def structure(plan: Plan) -> bytes:
-    """Return a key that is the same for plans that can be solved together.
+
+def structure(plan: Plan) -> list[Any]:
+    """Return all of a plan that must be the same in a batch, to compare by :func:`same`.
 
     Raises
     ------
@@ -40,11 +45,23 @@ def structure(plan: Plan) -> bytes:
     """
     if not plan.stages or plan.spline is not None or plan.convert is not None:
         raise Unbatchable
+    return [part for stage in plan.stages for part in _described(stage)]
+
+
+def same(one: Sequence[Any], other: Sequence[Any]) -> bool:
+    """Return whether two plans can be solved together."""
+    return len(one) == len(other) and all(
+        np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b
+        for a, b in zip(one, other, strict=True)
+    )
+
+
+def _digest(described: Sequence[Any]) -> bytes:
     digest = hashlib.blake2b()
-    for stage in plan.stages:
-        for part in _described(stage):
-            digest.update(part if isinstance(part, bytes) else repr(part).encode())
-            digest.update(b";")
+    for part in described:
+        array = isinstance(part, np.ndarray)
+        digest.update(np.ascontiguousarray(part).data if array else repr(part).encode())
+        digest.update(b";")
     return digest.digest()
 
 
@@ -58,7 +75,7 @@ def _described(stage: Stage) -> list[Any]:
     for limit in stage.limits:
         if not isinstance(limit, Orientation):
             raise Unbatchable
-        out += [limit.start, limit.corners.tobytes()]
+        out += [limit.start, limit.corners.shape, limit.corners]
     for item in stage.own_items:
         term = item.term
         if term.refresh is not None or term.multipliers is not None:
@@ -66,7 +83,7 @@ def _described(stage: Stage) -> list[Any]:
         out += [term.name, item.active, item.quadratic, type(item.loss), len(term.constants)]
         out += [_name(term.residual), _name(term.vectors)]
         for block, index in term.stencil:
-            out += [block, index.shape, index.tobytes()]
+            out += [block, index.shape, index]
     return out
 
 
@@ -75,7 +92,7 @@ def _name(function: Any) -> str:
 
 
 def solve(
-    plans: Sequence[Plan], method: str, device: torch.device
+    plans: Sequence[Plan], method: str, backend: str, minimise: Minimise
 ) -> tuple[list[Reached], list[int], Timings]:
     """Solve the stages of plans with one structure.
 
@@ -84,7 +101,10 @@ def solve(
     plans : sequence of Plan
     method : str
         Of the options.
-    device : torch.device
+    backend : str
+        Name of the linear backend in the results.
+    minimise : callable
+        Minimises a stage.
 
     Returns
     -------
@@ -99,35 +119,29 @@ def solve(
     ------
     Unbatchable
         The plans cannot be solved together.
+    TooLarge
+        They are too many for the memory of the device.
     """
     timings = Timings()
     coordinates: list[Array] = [plan.start for plan in plans]
     histories: list[list[Progress]] = [[] for _ in plans]
     iterations = np.zeros(len(plans), np.int64)
-    count = len(plans[0].stages)
+    count, key = len(plans[0].stages), _digest(structure(plans[0]))
     for number in range(count):
         clock = time.perf_counter()
         stages = [plan.stages[number] for plan in plans]
         entered = coordinates
         coordinates = [s.enter(c) for s, c in zip(stages, coordinates, strict=True)]
-        problem, start, losses = stacked_problem(stages, coordinates, device)
+        gathered = gather(stages, coordinates, method, key + bytes([number]))
         timings.setup += time.perf_counter() - clock
-        first = stages[0]
-        minima = minimise(
-            problem,
-            start,
-            iterations=first.iterations,
-            tolerance=first.tolerance,
-            continuation=losses,
-            continued=first.continued,
-            method=method,
-            timings=timings,
-        )
-        coordinates = list(problem.unknowns.points(minima.x).cpu().numpy().T.copy())
-        found = _minima(minima, first, (number, count), f"blocks ({device})")
+        solved = minimise(gathered)
+        for phase, seconds in solved.timings.as_dict().items():
+            setattr(timings, phase, getattr(timings, phase) + seconds)
+        coordinates = list(solved.points)
+        found = _minima(solved, stages[0], (number, count), backend)
         for history, one in zip(histories, found, strict=True):
             history += one.history
-        iterations += [one.iterations for one in found]
+        iterations += solved.iterations
     reached = []
     for k, one in enumerate(found):
         one.history = histories[k]
@@ -135,44 +149,14 @@ def solve(
     return reached, iterations.tolist(), timings
 
 
-def stacked_problem(
-    stages: Sequence[Stage], coordinates: Sequence[Array], device: torch.device
-) -> tuple[Problem, Tensor, list[Any]]:
-    """Return the problem of one stage of each surface, its start (n, B), and its continuation.
-
-    Raises
-    ------
-    Unbatchable
-        The surfaces cannot be solved together.
-    """
-    variables = [s.unknowns(c) for s, c in zip(stages, coordinates, strict=True)]
-    items = [[item for item in s.own_items if item.active] for s in stages]
-    first = stages[0]
-    unknowns = Unknowns.stacked(variables, device)
-    problem = Problem(items, first.layout, unknowns, first.limits, device)
-    start = [v.project(c) for v, c in zip(variables, coordinates, strict=True)]
-    by_iteration = zip(*(s.continuation for s in stages), strict=True)
-    return problem, columns(start, device), [stacked_loss(each, device) for each in by_iteration]
-
-
-def _minima(minima: Minima, stage: Stage, place: tuple[int, int], backend: str) -> list[Minimum]:
+def _minima(solved: Solved, stage: Stage, place: tuple[int, int], backend: str) -> list[Minimum]:
     """Convert the results of a stage to those of each surface."""
-    energies, steps = (torch.stack(h).cpu().numpy() for h in (minima.energies, minima.steps))
-    x, energy = minima.x.cpu().numpy().T.copy(), minima.energy.tolist()
-    codes, done = minima.code.tolist(), minima.iterations.tolist()
-    out = []
-    for k, last in enumerate(done):
+    out, energies, steps = [], solved.energies.tolist(), solved.steps.tolist()
+    for k, last in enumerate(solved.iterations.tolist()):
         history = [
-            Progress(
-                *place,
-                i,
-                stage.iterations,
-                float(energies[i, k]),
-                {},
-                float(steps[i, k]),
-                stage.name,
-            )
+            Progress(*place, i, stage.iterations, energies[k][i], {}, steps[k][i], stage.name)
             for i in range(last + 1)
         ]
-        out.append(Minimum(x[k], energy[k], _STATUSES[codes[k]], last, backend, history))
+        status = _STATUSES[int(solved.code[k])]
+        out.append(Minimum(solved.x[k], float(solved.energy[k]), status, last, backend, history))
     return out

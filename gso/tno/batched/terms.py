@@ -15,13 +15,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from gso.energy.base import Weighted
 from gso.energy.losses import Loss
+from gso.tno.batched.gathered import GatheredTerm, Unbatchable
 from gso.tno.batched.kernels import geometric_stiffness, kernel
-from gso.tno.batched.unknowns import Unbatchable, Unknowns, columns, picked
+from gso.tno.batched.unknowns import Unknowns, columns, picked
 from gso.tno.solver.chain import by_point
-from gso.tno.solver.elements import kind
-from gso.unknowns import Layout
 
 #: Numbers per row of a block of elements: on a processor its work arrays then stay in the cache,
 #: on a graphics processor they fit into memory.
@@ -56,10 +54,8 @@ class Term:
 
     Parameters
     ----------
-    items : sequence of Weighted
-        The term of each surface.
-    layout : Layout
-        Layout of the coordinates.
+    parts : sequence of GatheredTerm
+        The term of some surfaces each.
     unknowns : Unknowns
     device : torch.device
 
@@ -67,20 +63,22 @@ class Term:
     ----------
     columns : ndarray of int, (q, e)
         Unknowns of each element.
+
+    Raises
+    ------
+    Unbatchable
+        Points of an element do not move with one unknown each.
     """
 
-    def __init__(
-        self, items: Sequence[Weighted], layout: Layout, unknowns: Unknowns, device: torch.device
-    ):
-        term = items[0].term
-        parts = [layout.rows(block, index) for block, index in term.stencil]
-        gather = np.concatenate(parts).astype(np.int64)
-        self.term, self.name, self.shape = term, term.name, kind(term, layout)[1]
-        self.quadratic = items[0].quadratic
+    def __init__(self, parts: Sequence[GatheredTerm], unknowns: Unknowns, device: torch.device):
+        first = parts[0]
+        self.name, self.shape, self.quadratic = first.name, first.shape, first.quadratic
+        self._residual, self._vectors = first.residual, first.vectors
+        gather = first.gather.astype(np.int64)
         self._gather = torch.as_tensor(gather, device=device)
-        self.constants = columns([i.term.by_element for i in items], device)
-        self.factor = columns([i.weight * i.term.weights for i in items], device)
-        self.loss = stacked_loss([i.loss for i in items], device)
+        self.constants = columns([part.constants for part in parts], device)
+        self.factor = columns([part.factor for part in parts], device)
+        self.loss = stacked_loss([loss for part in parts for loss in part.losses], device)
         self._slope: Tensor | None = None
         self._by_point = unknowns.of is not None
         self.columns = gather
@@ -128,7 +126,7 @@ class Term:
 
     def energy(self, points: Tensor) -> Tensor:
         """Return the weighted energy (B,) at coordinates (N, B); not finite where it overflows."""
-        run = kernel(self.term.residual, self.shape, len(self.constants), False)
+        run = kernel(self._residual, self.shape, len(self.constants), False)
         total = points.new_zeros(points.shape[1])
         for at, x, c in self._blocks(points):
             total += self._cost(run(x, c)[0], at)
@@ -152,8 +150,8 @@ class Term:
         """
         key = self.shape, len(self.constants)
         known = self._slope
-        run = kernel(self.term.residual, *key, known is None)
-        vectors = self.term.vectors
+        run = kernel(self._residual, *key, known is None)
+        vectors = self._vectors
         bend = None if vectors is None else geometric_stiffness(vectors, *key)
         total = points.new_zeros(points.shape[1])
         for at, x, c in self._blocks(points):
@@ -176,7 +174,7 @@ class Term:
 
     def keep_slope(self, points: Tensor, share: Tensor | None) -> None:
         """Compute the Jacobian of a quadratic term once."""
-        run = kernel(self.term.residual, self.shape, len(self.constants), True)
+        run = kernel(self._residual, self.shape, len(self.constants), True)
         blocks = [self._pulled(run(x, c)[1], share, at) for at, x, c in self._blocks(points)]
         self._slope = torch.cat(blocks, dim=2)
 

@@ -10,12 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from gso.typing import Array
-from gso.unknowns import Variables
-
-
-class Unbatchable(Exception):
-    """Surfaces cannot be solved together: their problems differ in structure."""
+from gso.tno.batched.gathered import Gathered
 
 
 @dataclass(frozen=True)
@@ -38,32 +33,16 @@ class Unknowns:
     offset: Any = None
 
     @classmethod
-    def stacked(cls, each: Sequence[Variables], device: torch.device) -> Unknowns:
-        """Stack the unknowns of surfaces.
-
-        Raises
-        ------
-        Unbatchable
-            A coordinate depends on several unknowns, or on none.
-        """
-        first = each[0]
-        if first.basis is None:
+    def stacked(cls, parts: Sequence[Gathered], device: torch.device) -> Unknowns:
+        """Stack the unknowns of surfaces."""
+        first = parts[0]
+        if first.of is None:
             return cls(first.size)
-        shares = []
-        for variables in each:
-            if first.single is None or variables.single is None or variables.size != first.size:
-                raise Unbatchable
-            of, share = variables.single
-            if not np.array_equal(of, first.single[0]):
-                raise Unbatchable
-            shares.append(share)
-        if (of >= first.size).any():
-            raise Unbatchable
         return cls(
             first.size,
-            torch.as_tensor(of.astype(np.int64), device=device),
-            columns(shares, device),
-            columns([v.offset for v in each], device),
+            torch.as_tensor(first.of.astype(np.int64), device=device),
+            columns([part.share for part in parts], device),
+            columns([part.offset for part in parts], device),
         )
 
     def points(self, x: Tensor) -> Tensor:
@@ -81,9 +60,11 @@ class Unknowns:
         return replace(self, share=picked(self.share, which), offset=picked(self.offset, which))
 
 
-def columns(arrays: Sequence[Array], device: torch.device) -> Tensor:
-    """Stack arrays, one for each surface, along a new last axis."""
-    return torch.as_tensor(np.stack(arrays, axis=-1), device=device)
+def columns(parts: Sequence[Any], device: torch.device) -> Tensor:
+    """Join arrays whose first axis is that of the surfaces, and make it the last axis."""
+    there = [torch.from_numpy(np.require(part, requirements="W")).to(device) for part in parts]
+    whole = there[0] if len(there) == 1 else torch.cat(there)
+    return whole.movedim(0, -1).contiguous()
 
 
 def picked(values: Any, which: Tensor) -> Any:

@@ -1,0 +1,87 @@
+"""Minimisation of gathered stages on one of PyTorch's devices."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import torch
+
+from gso.errors import OptionError
+from gso.tno.batched.gathered import Gathered, Solved, TooLarge
+from gso.tno.batched.minimiser import minimise
+from gso.tno.batched.problem import Problem, forget
+from gso.tno.batched.terms import stacked_loss
+from gso.tno.batched.unknowns import columns
+from gso.tno.solver import Timings
+from gso.typing import Array
+
+
+def checked(device: str) -> None:
+    """Raise an OptionError if there is no such device."""
+    try:
+        torch.zeros(1, dtype=torch.float64, device=device).item()
+    except (RuntimeError, AssertionError, TypeError) as error:
+        reason = str(error).splitlines()[0]
+        raise OptionError(f"device {device!r} cannot be used ({reason}); take 'cpu'") from None
+
+
+def solve(parts: Sequence[Gathered], device: str) -> list[Solved]:
+    """Minimise parts with one key together, and return the minima of each.
+
+    Raises
+    ------
+    Unbatchable
+        They cannot be solved together.
+    TooLarge
+        The device has too little memory for them.
+    """
+    try:
+        return _solve(parts, torch.device(device))
+    except torch.cuda.OutOfMemoryError:
+        pass
+    # Outside the handler, which would keep the tensors alive.
+    forget()
+    torch.cuda.empty_cache()
+    raise TooLarge
+
+
+def _solve(parts: Sequence[Gathered], device: torch.device) -> list[Solved]:
+    first, timings, clock = parts[0], Timings(), time.perf_counter()
+    problem = Problem(parts, device)
+    start = columns([part.start for part in parts], device)
+    by_iteration = zip(*(part.continuation for part in parts), strict=True)
+    losses = [
+        stacked_loss([loss for part in each for loss in part], device) for each in by_iteration
+    ]
+    timings.setup += time.perf_counter() - clock
+    minima = minimise(
+        problem,
+        start,
+        iterations=first.iterations,
+        tolerance=first.tolerance,
+        continuation=losses,
+        continued=first.continued,
+        method=first.method,
+        timings=timings,
+    )
+    clock = time.perf_counter()
+    points = problem.unknowns.points(minima.x)
+    energies, steps = torch.stack(minima.energies), torch.stack(minima.steps)
+    whole = [_rows(t) for t in (minima.x, points, energies, steps)]
+    flat = [t.cpu().numpy() for t in (minima.energy, minima.code, minima.iterations)]
+    timings.setup += time.perf_counter() - clock
+    out, begin, total = [], 0, sum(map(len, parts))
+    for part in parts:
+        own = slice(begin, begin + len(part))
+        begin = own.stop
+        share = Timings(**{k: v * len(part) / total for k, v in timings.as_dict().items()})
+        x, at, energy, step = (a[own] for a in whole)
+        value, code, iterations = (a[own] for a in flat)
+        out.append(Solved(x, at, value, code, iterations, energy, step, share))
+    return out
+
+
+def _rows(values: torch.Tensor) -> Array:
+    """Return values (k, B) as an array (B, k)."""
+    return values.T.contiguous().cpu().numpy()

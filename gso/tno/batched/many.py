@@ -1,0 +1,143 @@
+"""Many surfaces in batches, in this process or in several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager, nullcontext
+from functools import partial
+from multiprocessing import parent_process
+from typing import Any
+
+import numpy as np
+import torch
+
+from gso.errors import GSOError
+from gso.parallel import Done, processors, spread
+from gso.result import Result
+from gso.tno.batched import device
+from gso.tno.batched.batches import Asked, solve_batch
+from gso.tno.batched.gathered import Gathered, Solved
+from gso.tno.batched.stages import Minimise
+from gso.tno.batched.workers import BatchWorkers
+
+#: Surfaces solved together on a processor.
+_BATCH = 16
+#: Most surfaces and vertices solved together on a graphics processor by the process that plans
+#: them.
+_GPU_BATCH, _GPU_VERTICES = 256, 1 << 20
+#: Most surfaces that a worker plans at a time, and most that are then minimised together.
+_SHARE, _MOST = 64, 1024
+#: Number of pieces from which worker processes save time, and number of surfaces from which they
+#: do where there is a graphics processor.
+_ENOUGH, _GPU_ENOUGH = 4, 256
+
+
+def solve_all(
+    asked: Asked, designs: Sequence[Any], workers: int | BatchWorkers | None = 0
+) -> Iterator[Result | GSOError]:
+    """Solve grids of one size, arrays (H, W, 3) or meshes; yield results or errors in order."""
+    if not len(designs):
+        return
+    vertices = max(np.size(getattr(designs[0], "vertices", designs[0])) // 3, 1)
+    there = asked.device.partition(":")[0] != "cpu"
+    if there:
+        yield from _on_device(asked, designs, vertices, workers)
+        return
+    if isinstance(workers, BatchWorkers):
+        workers = len(workers)
+    elif workers is None:
+        workers = _useful_workers(-(-len(designs) // _BATCH), _ENOUGH)
+    if workers == 0:
+        for k in range(0, len(designs), _BATCH):
+            yield from _batch(asked, designs[k : k + _BATCH])
+        return
+    # Smaller pieces where they leave no process without work.
+    share = -(-len(designs) // (workers * -(-len(designs) // (_BATCH * workers))))
+    pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
+    work = partial(_measured, asked)
+    with closing(spread(work, pieces, workers=min(workers, len(pieces)), caller=False)) as results:
+        yield from _in_order(results, share)
+
+
+def _on_device(
+    asked: Asked, designs: Sequence[Any], vertices: int, workers: int | BatchWorkers | None
+) -> Iterator[Result | GSOError]:
+    """Solve designs on a graphics processor, planned by this process or by workers."""
+    if workers is None:
+        workers = _useful_workers(len(designs), _GPU_ENOUGH)
+    if workers == 0:
+        together = max(min(_GPU_VERTICES // vertices, _GPU_BATCH), 1)
+        for k in range(0, len(designs), together):
+            yield from _batch(asked, designs[k : k + together])
+        return
+    own = BatchWorkers(workers) if isinstance(workers, int) else nullcontext(workers)
+    with own as ready:
+        # Two for each process: while some are minimised, others are planned.
+        share = min(-(-len(designs) // (2 * len(ready))), _SHARE)
+        pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
+        with closing(in_batches(ready, partial(_planned, asked), pieces, asked.device)) as results:
+            yield from _in_order(results, share)
+
+
+def in_batches(
+    workers: BatchWorkers, function: Callable[..., Any], pieces: Sequence[Any], where: str
+) -> Generator[Done, None, None]:
+    """Apply a function to pieces in processes, while this one minimises for them on a device."""
+    yield from workers.spread(function, pieces, partial(device.solve, device=where), _MOST)
+
+
+def _in_order(results: Iterable[Done], share: int) -> Iterator[Result | GSOError]:
+    """Yield the results of pieces of `share` surfaces, which finish in any order."""
+    done: dict[int, Any] = {}
+    shown = 0
+    for one in results:
+        if one.error is not None:
+            raise GSOError(f"surfaces from {one.index * share} on: {one.error}")
+        done[one.index] = one.value
+        while shown in done:
+            yield from done.pop(shown)
+            shown += 1
+
+
+def _planned(
+    asked: Asked, designs: Sequence[Any], *, minimise: Minimise
+) -> list[Result | GSOError]:
+    return solve_batch(asked, designs, minimise)
+
+
+def _batch(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
+    """Solve designs in one batch in this process."""
+    with _one_thread(asked.device):
+        return solve_batch(asked, designs, partial(_minimised, asked.device))
+
+
+def _minimised(where: str, gathered: Gathered) -> Solved:
+    return device.solve([gathered], where)[0]
+
+
+def _measured(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
+    """Solve designs in a worker process, and compute their metrics there."""
+    found = _batch(asked, designs)
+    for result in found:
+        if isinstance(result, Result):
+            result.metrics  # noqa: B018
+    return found
+
+
+def _useful_workers(pieces: int, enough: int) -> int:
+    """Return the number of worker processes that saves time, 0 inside a worker process."""
+    if parent_process() is not None or pieces < enough:
+        return 0
+    return min(processors(), pieces)
+
+
+@contextmanager
+def _one_thread(where: str) -> Iterator[None]:
+    """Use one thread on a processor: worker processes use the others."""
+    before = torch.get_num_threads()
+    if where.partition(":")[0] == "cpu":
+        torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
