@@ -488,7 +488,8 @@ def on_cpu(parts):
 
 def by_workers(ready, some, task, together=on_cpu, most=100):
     found = {}
-    for done in ready.spread(partial(piece, task), list(some[:, None]), together, most):
+    pieces = list(some[:, None])
+    for done in ready.spread(partial(piece, task), pieces, together, most=most, enough=1.0):
         assert done.error is None
         found[done.index] = done.value[0]
     return [found[k] for k in range(len(some))]

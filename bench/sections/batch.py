@@ -80,7 +80,7 @@ def device(
                 return gso.tno.optimize_batch(points, task=task, device=device, workers=ready)
 
             # The workers import the package and print kernels at first use.
-            _, first = timed(batch, designs[: 4 * len(ready)])
+            _, first = timed(batch, designs[: 2 * len(ready)])
             found, seconds = timed(batch, designs)
             again, second = timed(batch, designs)
             single = [gso.tno.optimize(p, task=task, verdict=False) for p in designs[:compared]]

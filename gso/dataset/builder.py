@@ -263,18 +263,20 @@ def _spreading(workers: int | None, scheduler: str | None, device: str | None) -
     """Return how work is spread over processes."""
     if scheduler is not None or workers == 0 or device is None or device.startswith("cpu"):
         return partial(cluster.either, workers=workers, scheduler=scheduler)
-    return partial(_on_device, device, 2 * processors() if workers is None else workers)
+    return partial(_on_device, device, workers)
 
 
 def _on_device(
-    device: str, workers: int, work: Callable[..., bytes], missing: Sequence[shard.Task]
+    device: str, workers: int | None, work: Callable[..., bytes], missing: Sequence[shard.Task]
 ) -> Generator[Done, None, None]:
     """Make files in worker processes, for which this one minimises on a graphics processor."""
     from gso.tno.batched.many import in_batches
     from gso.tno.batched.workers import BatchWorkers
 
-    with BatchWorkers(min(workers, len(missing))) as ready:
-        yield from in_batches(ready, work, missing, device)
+    count = 2 * processors() if workers is None else workers
+    with BatchWorkers(min(count, len(missing))) as ready:
+        # They are at different labels.
+        yield from in_batches(ready, work, missing, device, enough=0.25)
 
 
 def _intact(place: Path, task: shard.Task) -> bool:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from gso import geometry
+from gso.mesh import Mesh
 from gso.metrics.surfaces import components, grid_of, mesh_of, unit
 from gso.typing import Array
 
@@ -63,8 +65,15 @@ def _interior_curvature(surface: Any, split: int = 0) -> Array:
     return values if values.size else np.zeros(1)
 
 
+#: Mean |K| of meshes by triangulation: several metrics need it.
+_known: WeakKeyDictionary[Any, dict[int, float]] = WeakKeyDictionary()
+
+
 def _mean_abs(surface: Any, split: int) -> float:
-    return float(np.abs(_interior_curvature(surface, split)).mean())
+    known = _known.setdefault(surface, {}) if isinstance(surface, Mesh) else {}
+    if split not in known:
+        known[split] = float(np.abs(_interior_curvature(surface, split)).mean())
+    return known[split]
 
 
 def loss_gc(surface: Any, *, scale: float | None = None, split: int = 0) -> float:

@@ -36,13 +36,20 @@ class Orientation:
     def __call__(self, coordinates: Array, direction: Array) -> float:
         """Return the largest step, at most 1."""
         part = slice(self.start, self.start + 2 * self.count)
-        flat, moved = (
-            np.ascontiguousarray(c[part].reshape(-1, 2).T) for c in (coordinates, direction)
+        at, along = (
+            list(
+                np.ascontiguousarray(c[part].reshape(-1, 2).T).take(self.corners, 1).swapaxes(0, 1)
+            )
+            for c in (coordinates, direction)
         )
-        at, along = ([tuple(p[:, k]) for k in self.corners] for p in (flat, moved))
+        c, b, a = _areas(at, along)
+        # Most triangles change too little to degenerate within a step of one.
+        some = (c > 0) & (c <= (np.abs(b) + np.abs(a) / SAFETY) / SAFETY)
+        if not some.any():
+            return 1.0
         with np.errstate(invalid="ignore"):
-            steps = degenerate(at, along)
-        return float(min(1.0, SAFETY * steps.min(initial=np.inf)))
+            steps = _first_root(c[some], b[some], a[some])
+        return float(min(1.0, SAFETY * steps.min()))
 
 
 def orientation(triangles: Ints, layout: Layout) -> Orientation:
@@ -74,10 +81,17 @@ def degenerate(points: Sequence[Vec], directions: Sequence[Vec]) -> Any:
     points, directions : three tuples (x, y) of arrays or tensors
         Corners, and their displacements by a full step.
     """
+    return _first_root(*_areas(points, directions))
+
+
+def _areas(points: Sequence[Vec], directions: Sequence[Vec]) -> tuple[Any, Any, Any]:
+    """Return c, b and a of the doubled signed areas ``c + b t + a t^2`` at steps t."""
     e, f, de, df = (sub(corners[k], corners[0]) for corners in (points, directions) for k in (1, 2))
-    c = _cross(e, f)
-    b = _cross(e, df) + _cross(de, f)
-    a = _cross(de, df)
+    return _cross(e, f), _cross(e, df) + _cross(de, f), _cross(de, df)
+
+
+def _first_root(c: Any, b: Any, a: Any) -> Any:
+    """Return the smallest positive root of ``c + b t + a t^2``, or infinity; so where c <= 0."""
     # 2c / (sqrt(b^2 - 4ac) - b) is the smallest positive root, if there is one.
     steepness = (b * b - 4.0 * a * c) ** 0.5 - b
     falling = (steepness > 0) & (c > 0)

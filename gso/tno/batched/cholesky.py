@@ -41,8 +41,7 @@ class Blocks:
     def cost(self) -> float:
         """Approximate time of a factorisation, in operations of a product."""
         p, cube = self.band, float(self.size) ** 3
-        calls = 3 + p + p * (p + 1) / 2
-        each = (_FACTOR / 3 + _SOLVE + 2 * p + p * (p + 1)) * cube + _CALL * calls
+        each = (_FACTOR / 3 + _SOLVE + 2 * p + p * (p + 1)) * cube + _CALL * (6 + 2 * p)
         return self.count * each
 
     @property
@@ -77,6 +76,8 @@ def divide(pattern: Pattern) -> Blocks | None:
 class BlockBanded:
     """Symmetric positive definite matrices with one block-banded pattern.
 
+    A panel holds a column of blocks, from the diagonal one downwards.
+
     Parameters
     ----------
     pattern : Pattern
@@ -90,17 +91,16 @@ class BlockBanded:
 
     def __init__(self, pattern: Pattern, order: Ints, blocks: Blocks, device: torch.device):
         self.blocks, self.unknowns = blocks, pattern.size
-        m, band = blocks.size, blocks.band + 1
+        m = blocks.size
         row, column = pattern.indices[order], pattern.columns[order]
-        block, below = column // m, row // m - column // m
+        panel, below = column // m, row - column // m * m
         # Diagonal blocks have both triangles.
-        twin = np.flatnonzero((below == 0) & (row != column))
+        twin = np.flatnonzero((below < m) & (row != column))
         self._twin = torch.as_tensor(twin, device=device)
-        panel = np.r_[block * band + below, (block * band)[twin]]
-        place = np.r_[(row % m) * m + column % m, ((column % m) * m + row % m)[twin]]
-        self._panel = torch.as_tensor(panel, device=device)
+        place = np.r_[below * m + column % m, ((column % m) * m + below)[twin]]
+        self._panel = torch.as_tensor(np.r_[panel, panel[twin]], device=device)
         self._place = torch.as_tensor(place, device=device)
-        self._storage: Tensor | None = None
+        self._panels: Tensor | None = None
         self._inverse: list[Tensor] = []
 
     def factor(self, values: Tensor) -> Tensor:
@@ -113,51 +113,54 @@ class BlockBanded:
         """
         m, count, band = self.blocks.size, self.blocks.count, self.blocks.band
         surfaces = values.shape[1]
-        shape = (count, band + 1, surfaces, m, m)
-        if self._storage is None or self._storage.shape != shape:
-            self._storage = None
-            self._storage = values.new_zeros(shape)
+        shape = (count, surfaces, (band + 1) * m, m)
+        if self._panels is None or self._panels.shape != shape:
+            self._panels = None
+            self._panels = values.new_zeros(shape)
         else:
-            self._storage.zero_()
-        a = self._storage
-        flat = a.view(count * (band + 1), surfaces, m * m)
+            self._panels.zero_()
+        panels = self._panels
+        flat = panels.view(count, surfaces, -1)
         flat[self._panel, :, self._place] = torch.cat([values, values.index_select(0, self._twin)])
         # Rows past the matrix are those of the identity.
-        a[-1, 0].diagonal(dim1=-2, dim2=-1)[:, self.unknowns - (count - 1) * m :] = 1.0
+        own = panels[:, :, :m]
+        own[-1].diagonal(dim1=-2, dim2=-1)[:, self.unknowns - (count - 1) * m :] = 1.0
         failed = torch.zeros(surfaces, dtype=torch.int32, device=values.device)
-        self._inverse = []
         unit = torch.eye(m, dtype=values.dtype, device=values.device).expand(surfaces, m, m)
-        for k in range(count):
-            lower, info = torch.linalg.cholesky_ex(a[k, 0])
-            failed += info.abs()
+        self._inverse = []
+        for k, panel in enumerate(panels):
+            lower, info = torch.linalg.cholesky_ex(panel[:, :m])
+            failed += info
             # Products are faster than triangular solves, of which this is the only one.
             inverse = torch.linalg.solve_triangular(lower, unit, upper=False)
             self._inverse.append(inverse)
-            beyond = min(band, count - 1 - k)
-            for d in range(1, beyond + 1):
-                a[k, d] = a[k, d] @ inverse.mT
-            for d in range(1, beyond + 1):
-                for e in range(1, d + 1):
-                    a[k + e, d - e].baddbmm_(a[k, d], a[k, e].mT, alpha=-1.0)
+            below = panel[:, m : (min(band, count - 1 - k) + 1) * m]
+            if below.shape[1]:
+                below.copy_(torch.bmm(below, inverse.mT))
+            for e in range(below.shape[1] // m):
+                rest = below[:, e * m :]
+                panels[k + e + 1][:, : rest.shape[1]].baddbmm_(rest, rest[:, :m].mT, alpha=-1.0)
         return failed > 0
 
     def solve(self, rhs: Tensor) -> Tensor:
         """Solve for the right-hand sides (n, B), one for each matrix."""
-        if self._storage is None:
+        if self._panels is None:
             raise BackendError("there is no factorisation to solve with")
-        a = self._storage
         m, count, band = self.blocks.size, self.blocks.count, self.blocks.band
-        x = rhs.new_zeros((rhs.shape[1], count * m, 1))
+        # The rows past the matrix make room for those that the last panels have.
+        x = rhs.new_zeros((rhs.shape[1], (count + band) * m, 1))
         x[:, : self.unknowns, 0] = rhs.T
-        x = x.view(-1, count, m, 1)
-        parts = list(x.unbind(1))
         for k in range(count):
-            here = parts[k] = self._inverse[k] @ parts[k]
-            for d in range(1, min(band, count - 1 - k) + 1):
-                parts[k + d] = torch.baddbmm(parts[k + d], a[k, d], here, alpha=-1.0)
+            here = x[:, k * m : (k + 1) * m]
+            here.copy_(torch.bmm(self._inverse[k], here))
+            if k < count - 1:
+                x[:, (k + 1) * m : (k + band + 1) * m].baddbmm_(
+                    self._panels[k][:, m:], here, alpha=-1.0
+                )
         for k in range(count - 1, -1, -1):
-            here = parts[k]
-            for d in range(1, min(band, count - 1 - k) + 1):
-                here = torch.baddbmm(here, a[k, d].mT, parts[k + d], alpha=-1.0)
-            parts[k] = self._inverse[k].mT @ here
-        return torch.cat(parts, dim=1)[:, : self.unknowns, 0].T.contiguous()
+            here = x[:, k * m : (k + 1) * m]
+            if k < count - 1:
+                after = x[:, (k + 1) * m : (k + band + 1) * m]
+                here.baddbmm_(self._panels[k][:, m:].mT, after, alpha=-1.0)
+            here.copy_(torch.bmm(self._inverse[k].mT, here))
+        return x[:, : self.unknowns, 0].T.contiguous()

@@ -72,18 +72,25 @@ def _on_device(
         return
     own = BatchWorkers(workers) if isinstance(workers, int) else nullcontext(workers)
     with own as ready:
-        # Two for each process: while some are minimised, others are planned.
-        share = min(-(-len(designs) // (2 * len(ready))), _SHARE)
+        share = min(-(-len(designs) // len(ready)), _SHARE)
         pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
         with closing(in_batches(ready, partial(_planned, asked), pieces, asked.device)) as results:
             yield from _in_order(results, share)
 
 
 def in_batches(
-    workers: BatchWorkers, function: Callable[..., Any], pieces: Sequence[Any], where: str
+    workers: BatchWorkers,
+    function: Callable[..., Any],
+    pieces: Sequence[Any],
+    where: str,
+    enough: float = 0.5,
 ) -> Generator[Done, None, None]:
-    """Apply a function to pieces in processes, while this one minimises for them on a device."""
-    yield from workers.spread(function, pieces, partial(device.solve, device=where), _MOST)
+    """Apply a function to pieces in processes, while this one minimises for them on a device.
+
+    See :meth:`BatchWorkers.spread`.
+    """
+    together = partial(device.solve, device=where)
+    yield from workers.spread(function, pieces, together, most=_MOST, enough=enough)
 
 
 def _in_order(results: Iterable[Done], share: int) -> Iterator[Result | GSOError]:

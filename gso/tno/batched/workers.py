@@ -29,7 +29,8 @@ class BatchWorkers:
     Parameters
     ----------
     count : int, optional
-        Number of processes; one for each processor when not given.
+        Number of processes; two for each processor when not given. At most half of them plan at a
+        time, while others wait for the device.
 
     Examples
     --------
@@ -46,7 +47,7 @@ class BatchWorkers:
         if count is not None and (not isinstance(count, int) or count < 1):
             raise OptionError(f"count is {count!r}; it must be a whole number of 1 or more")
         self._processes: dict[Connection, Any] = {}
-        for _ in range(count or processors()):
+        for _ in range(count or 2 * processors()):
             self._start()
 
     def __enter__(self) -> BatchWorkers:
@@ -87,7 +88,13 @@ class BatchWorkers:
         process.join()
 
     def spread(
-        self, function: Callable[..., Any], pieces: Sequence[Any], together: Together, most: int
+        self,
+        function: Callable[..., Any],
+        pieces: Sequence[Any],
+        together: Together,
+        *,
+        most: int,
+        enough: float = 0.5,
     ) -> Iterator[Done]:
         """Apply a function to pieces in the processes, and yield results as they finish.
 
@@ -98,10 +105,11 @@ class BatchWorkers:
             importable by name, or a partial of one that is.
         pieces : sequence
         together : callable
-            Minimises stages of one key here. It is called when more than half of the processes that
-            have work wait for it, or all that do anything.
+            Minimises stages of one key here.
         most : int
             Largest number of surfaces to minimise together.
+        enough : float
+            Share of the processes for which it is called while others plan.
 
         Yields
         ------
@@ -109,17 +117,18 @@ class BatchWorkers:
             As by :func:`gso.parallel.spread`.
         """
         todo, lost = deque(range(len(pieces))), set[int]()
+        busy = -(-len(self) // 2)
         given: dict[Connection, int] = {}
         waiting: dict[Connection, Gathered] = {}
         try:
             while todo or given:
                 for connection in self._processes:
-                    if connection not in given and todo:
+                    if connection not in given and todo and len(given) - len(waiting) < busy:
                         given[connection] = todo.popleft()
                         _told(connection, (function, given[connection], pieces[given[connection]]))
                 planning = [c for c in given if c not in waiting]
                 group = _group(waiting, most)
-                if group and (not planning or 2 * len(waiting) > len(given)):
+                if group and (not planning or len(group) >= max(enough * len(self), 1)):
                     parts = [waiting.pop(connection) for connection in group]
                     for connection, answer in zip(group, _minimised(parts, together), strict=True):
                         _told(connection, answer)
