@@ -67,7 +67,8 @@ def build(
     reference_splits : iterable of str
         Splits that get the reference labels.
     workers : int, optional
-        Number of worker processes; the number of cores by default, 0 for this process only.
+        Number of worker processes; by default the number of cores, or twice as many with a
+        graphics processor; 0 for this process only.
     scheduler : str, optional
         Address of a Dask cluster that does the work instead.
     device : str, optional

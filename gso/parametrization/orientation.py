@@ -36,12 +36,8 @@ class Orientation:
     def __call__(self, coordinates: Array, direction: Array) -> float:
         """Return the largest step, at most 1."""
         part = slice(self.start, self.start + 2 * self.count)
-        at, along = (
-            list(
-                np.ascontiguousarray(c[part].reshape(-1, 2).T).take(self.corners, 1).swapaxes(0, 1)
-            )
-            for c in (coordinates, direction)
-        )
+        both = (np.ascontiguousarray(c[part].reshape(-1, 2).T) for c in (coordinates, direction))
+        at, along = (list(p.take(self.corners, axis=1).swapaxes(0, 1)) for p in both)
         c, b, a = _areas(at, along)
         # Most triangles change too little to degenerate within a step of one.
         some = (c > 0) & (c <= (np.abs(b) + np.abs(a) / SAFETY) / SAFETY)
