@@ -630,6 +630,43 @@ class TestDevice:
         with pytest.raises(DatasetError, match="begun without --device, not with --device cpu"):
             dataset.build(place, QUICK, device="cpu", workers=0)
 
+    def test_labels_from_a_graphics_processor(self, quick, tmp_path, monkeypatch):
+        pytest.importorskip("torch")
+        from gso.tno.batched import device
+
+        real, sizes = device.solve, []
+
+        def solve(parts, device):
+            sizes.append(len(parts))
+            return real(parts, "cpu")
+
+        monkeypatch.setattr(device, "checked", lambda name: None)
+        monkeypatch.setattr(device, "solve", solve)
+        made = dataset.build(tmp_path / "set", QUICK, device="cuda", workers=1)
+        assert sizes
+        assert made.manifest["device"] == "cuda"
+        for split, there in quick.items():
+            np.testing.assert_array_equal(made[split]["surface"][:], there["surface"][:])
+            for name in ("developable", "strain", "lengths"):
+                if name in there.arrays:
+                    off = np.abs(made[split][name][:] - there[name][:]).max(axis=(1, 2, 3))
+                    assert np.median(off) < 1e-5
+
+    def test_a_device_that_is_gone(self, batched, tmp_path, monkeypatch):
+        from gso.tno.batched import device
+
+        def refused(name):
+            raise OptionError(f"device {name!r} cannot be used")
+
+        place = tmp_path / "batched"
+        shutil.copytree(batched.path, place)
+        (place / "test" / "00000.h5").unlink()
+        monkeypatch.setattr(device, "checked", refused)
+        with pytest.raises(OptionError, match="cannot be used"):
+            dataset.build(place, TINY, workers=0)
+        with pytest.raises(OptionError, match="cannot be used"):
+            labels.solve_many("strain", np.zeros((1, 9, 9, 3)), "cuda")
+
     def test_a_surface_that_fails_leaves_the_others(self):
         pytest.importorskip("torch")
         points = shapes.sample("torus", seed=0, size=16)[:3].copy()

@@ -50,7 +50,10 @@ USERS = {
     ],
     "unit_rectangle": [lambda: rectangle(MESH.grid)],
     "corner_angles": [lambda: patch._angles(MESH)],
-    "quad_area_vectors": [lambda: stretch.corner_shares(MESH.vertices, MESH.faces)],
+    "quad_area_vectors": [
+        lambda: vertex_normals(MESH),
+        lambda: stretch.corner_shares(MESH.vertices, MESH.faces),
+    ],
     "quad_corner_vectors": [lambda: vertex_normals(MESH)],
 }
 

@@ -82,9 +82,9 @@ def _builds() -> str:
         return kernels.described()
     return (
         f'{kernels.described()} The column "time, NumPy" has the median with NumPy kernels '
-        f"({kernels.VARIABLE}={kernels.NUMPY}). It says of how many surfaces, which are the first "
-        "of those that are timed. It is empty for methods without the solver's kernels. Results "
-        "of both builds are the same up to rounding."
+        f"({kernels.VARIABLE}={kernels.NUMPY}). The cell also has the number of surfaces, which "
+        "are the first of the timed ones. It is empty for methods without the solver's kernels. "
+        "Results of both builds are the same up to rounding."
     )
 
 

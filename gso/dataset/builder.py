@@ -29,7 +29,7 @@ from gso.dataset.summary import summarise
 from gso.errors import DatasetError, MeshError, OptionError
 from gso.io import replacing
 from gso.linalg import blas_threads
-from gso.parallel import Done, processors
+from gso.parallel import Done
 from gso.spelling import choices, known_keywords
 
 _OTHER_RECIPE = "give its own options, or another folder"
@@ -67,14 +67,15 @@ def build(
     reference_splits : iterable of str
         Splits that get the reference labels.
     workers : int, optional
-        Number of worker processes; by default the number of cores, or twice as many with a
-        graphics processor; 0 for this process only.
+        Number of processes that work at a time; the number of cores by default, 0 for this
+        process only. With a graphics processor as many more wait for it meanwhile.
     scheduler : str, optional
         Address of a Dask cluster that does the work instead.
     device : str, optional
         "cpu", "cuda" ...: label the surfaces of each file in a batch, by
         :func:`gso.tno.optimize_batch`. The labels are the same up to rounding errors and what
-        the iterations make of them. Reference labels are made one by one.
+        the iterations make of them; on a graphics processor the rounding errors may differ from
+        build to build. Reference labels are made one by one.
     tick : callable, optional
         Progress callback, called with the name of the counted items, the number done and the
         total number.
@@ -110,16 +111,16 @@ def build(
             'datasets need h5py and filelock: pip install ".[dataset]" in the folder of gso'
         )
     if device is not None and scheduler is None:
-        # The import needs PyTorch.
-        from gso.tno.batched.device import checked
-
-        checked(device)
+        _check_device(device)
     place = Path(folder)
     with claimed(place):
         with _kept():
             record = _begin(place, recipe, device)
         # A set goes on with the device that it was begun with.
-        device = record.get("device") if device is None else device
+        if device is None and record.get("device") is not None:
+            device = record["device"]
+            if scheduler is None:
+                _check_device(device)
         bad = manifest.damaged(place, record)
         if record["complete"] and wanted <= manifest.pairs(record) and not bad:
             return Dataset(place)
@@ -136,7 +137,8 @@ def build(
         for part in (shard.LABELS, *REFERENCES):
             todo = [task for task in everything if task.part == part]
             work = partial(shard.make, recipe, versions(device), device=device)
-            _make(place, work, todo, set(bad), _spreading(workers, scheduler, device), tick)
+            ways = _spreading(workers, scheduler, device, recipe, part)
+            _make(place, work, todo, set(bad), ways, tick)
         with _kept():
             record = _listed(place, record, recipe, everything, wanted, selection.drawn)
             record["summary"] = summarise(Dataset(place, record))
@@ -260,24 +262,38 @@ def _make(
                 tick(what, done, total)
 
 
-def _spreading(workers: int | None, scheduler: str | None, device: str | None) -> Spread:
+def _check_device(device: str) -> None:
+    """Raise an OptionError if there is no such device, or a BackendError without PyTorch."""
+    from gso.tno.batched.device import checked
+
+    checked(device)
+
+
+def _spreading(
+    workers: int | None, scheduler: str | None, device: str | None, recipe: Recipe, part: str
+) -> Spread:
     """Return how work is spread over processes."""
-    if scheduler is not None or workers == 0 or device is None or device.startswith("cpu"):
+    # References are made one by one, without a device.
+    here = part != shard.LABELS or device is None or device.startswith("cpu")
+    if scheduler is not None or workers == 0 or here:
         return partial(cluster.either, workers=workers, scheduler=scheduler)
-    return partial(_on_device, device, workers)
+    return partial(_on_device, str(device), workers, recipe.size**2)
 
 
 def _on_device(
-    device: str, workers: int | None, work: Callable[..., bytes], missing: Sequence[shard.Task]
+    device: str,
+    workers: int | None,
+    vertices: int,
+    work: Callable[..., bytes],
+    missing: Sequence[shard.Task],
 ) -> Generator[Done, None, None]:
     """Make files in worker processes, for which this one minimises on a graphics processor."""
     from gso.tno.batched.many import in_batches
     from gso.tno.batched.workers import BatchWorkers
 
-    count = 2 * processors() if workers is None else workers
-    with BatchWorkers(min(count, len(missing))) as ready:
+    with BatchWorkers(workers) as ready:
         # They are at different labels.
-        yield from in_batches(ready, work, missing, device, enough=0.25)
+        yield from in_batches(ready, work, missing, device, vertices, enough=0.25)
 
 
 def _intact(place: Path, task: shard.Task) -> bool:

@@ -140,8 +140,10 @@ def solve_many(
     good = [d for d in designs if isinstance(d, Mesh)]
     if minimise is None:
         # PyTorch is not loaded where another process minimises.
+        from gso.tno.batched.device import checked
         from gso.tno.batched.many import solve_all
 
+        checked(device)
         results = solve_all(what, good)
     else:
         results = iter(solve_batch(what, good, minimise))

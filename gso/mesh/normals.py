@@ -20,9 +20,7 @@ def vertex_normals(mesh: Mesh) -> Array:
     """
     v, n = mesh.vertices, len(mesh.vertices)
     quads, triangles = topology.by_size(mesh.faces)
-    around = geometry.quad_corner_vectors(v, quads)
-    # Two opposite corners make up a quad.
-    around += around[0] + around[2]
+    around = geometry.quad_corner_vectors(v, quads) + geometry.quad_area_vectors(v, quads).T
     # A triangle belongs to both triangulations, so it counts twice.
     whole = 2.0 * geometry.area_vectors(v, triangles).T
     at = np.concatenate([quads.T.ravel(), triangles.T.ravel()])

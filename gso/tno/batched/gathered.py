@@ -66,7 +66,7 @@ class Gathered:
     Attributes
     ----------
     key : bytes
-        Stages of the same key can be solved together.
+        Stages of the same key can be solved together, with the unknowns that they have.
     terms : tuple of GatheredTerm
     coordinates, size : int
         Number of coordinates N and of unknowns n.

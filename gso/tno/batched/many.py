@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager, nullcontext
 from functools import partial
 from multiprocessing import parent_process
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -15,18 +15,17 @@ from gso.errors import GSOError
 from gso.parallel import Done, processors, spread
 from gso.result import Result
 from gso.tno.batched import device
-from gso.tno.batched.batches import Asked, solve_batch
+from gso.tno.batched.batches import Asked, solve_batch, solve_piece
 from gso.tno.batched.gathered import Gathered, Solved
-from gso.tno.batched.stages import Minimise
 from gso.tno.batched.workers import BatchWorkers
 
 #: Surfaces solved together on a processor.
 _BATCH = 16
-#: Most surfaces and vertices solved together on a graphics processor by the process that plans
-#: them.
-_GPU_BATCH, _GPU_VERTICES = 256, 1 << 20
-#: Most surfaces that a worker plans at a time, and most that are then minimised together.
-_SHARE, _MOST = 64, 1024
+#: Most surfaces and vertices that one process plans for a graphics processor at a time, and most
+#: vertices that are minimised there together.
+_SHARE, _VERTICES, _MOST = 64, 1 << 20, 1 << 22
+#: Most surfaces solved on a graphics processor by the process that plans them.
+_GPU_BATCH = 256
 #: Number of pieces from which worker processes save time, and number of surfaces from which they
 #: do where there is a graphics processor.
 _ENOUGH, _GPU_ENOUGH = 4, 256
@@ -38,44 +37,48 @@ def solve_all(
     """Solve grids of one size, arrays (H, W, 3) or meshes; yield results or errors in order."""
     if not len(designs):
         return
-    vertices = max(np.size(getattr(designs[0], "vertices", designs[0])) // 3, 1)
-    there = asked.device.partition(":")[0] != "cpu"
-    if there:
-        yield from _on_device(asked, designs, vertices, workers)
+    if asked.device.partition(":")[0] != "cpu":
+        yield from _on_device(asked, designs, workers)
         return
-    if isinstance(workers, BatchWorkers):
-        workers = len(workers)
-    elif workers is None:
+    if workers is None:
         workers = _useful_workers(-(-len(designs) // _BATCH), _ENOUGH)
     if workers == 0:
         for k in range(0, len(designs), _BATCH):
             yield from _batch(asked, designs[k : k + _BATCH])
         return
+    count = len(workers) if isinstance(workers, BatchWorkers) else workers
     # Smaller pieces where they leave no process without work.
-    share = -(-len(designs) // (workers * -(-len(designs) // (_BATCH * workers))))
+    share = -(-len(designs) // (count * -(-len(designs) // (_BATCH * count))))
     pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
-    work = partial(_measured, asked)
-    with closing(spread(work, pieces, workers=min(workers, len(pieces)), caller=False)) as results:
-        yield from _in_order(results, share)
+    if isinstance(workers, BatchWorkers):
+        results = workers.spread(partial(_measured, asked), pieces)
+    else:
+        # The workers of this are replaced when they die, and end with it.
+        work, many = partial(_measured, asked, minimise=None), min(count, len(pieces))
+        results = spread(work, pieces, workers=many, caller=False)
+    yield from _in_order(results, share)
 
 
 def _on_device(
-    asked: Asked, designs: Sequence[Any], vertices: int, workers: int | BatchWorkers | None
+    asked: Asked, designs: Sequence[Any], workers: int | BatchWorkers | None
 ) -> Iterator[Result | GSOError]:
     """Solve designs on a graphics processor, planned by this process or by workers."""
+    vertices = max(np.size(getattr(designs[0], "vertices", designs[0])) // 3, 1)
+    most = max(_VERTICES // vertices, 1)
     if workers is None:
         workers = _useful_workers(len(designs), _GPU_ENOUGH)
     if workers == 0:
-        together = max(min(_GPU_VERTICES // vertices, _GPU_BATCH), 1)
+        together = min(most, _GPU_BATCH)
         for k in range(0, len(designs), together):
             yield from _batch(asked, designs[k : k + together])
         return
     own = BatchWorkers(workers) if isinstance(workers, int) else nullcontext(workers)
     with own as ready:
-        share = min(-(-len(designs) // len(ready)), _SHARE)
+        # Two for each process: while some are minimised, others are planned.
+        share = min(-(-len(designs) // (2 * len(ready))), _SHARE, most)
         pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
-        with closing(in_batches(ready, partial(_planned, asked), pieces, asked.device)) as results:
-            yield from _in_order(results, share)
+        work = partial(solve_piece, asked)
+        yield from _in_order(in_batches(ready, work, pieces, asked.device, vertices), share)
 
 
 def in_batches(
@@ -83,33 +86,36 @@ def in_batches(
     function: Callable[..., Any],
     pieces: Sequence[Any],
     where: str,
+    vertices: int,
     enough: float = 0.5,
-) -> Generator[Done, None, None]:
+) -> Iterator[Done]:
     """Apply a function to pieces in processes, while this one minimises for them on a device.
 
-    See :meth:`BatchWorkers.spread`.
+    Parameters
+    ----------
+    workers, function, pieces, enough
+        As for :meth:`BatchWorkers.spread`.
+    where : str
+        The device.
+    vertices : int
+        Number of vertices of a surface.
     """
-    together = partial(device.solve, device=where)
-    yield from workers.spread(function, pieces, together, most=_MOST, enough=enough)
+    together, most = partial(device.solve, device=where), max(_MOST // vertices, 1)
+    return workers.spread(function, pieces, together, most=most, enough=enough)
 
 
-def _in_order(results: Iterable[Done], share: int) -> Iterator[Result | GSOError]:
+def _in_order(results: Iterator[Done], share: int) -> Iterator[Result | GSOError]:
     """Yield the results of pieces of `share` surfaces, which finish in any order."""
     done: dict[int, Any] = {}
     shown = 0
-    for one in results:
-        if one.error is not None:
-            raise GSOError(f"surfaces from {one.index * share} on: {one.error}")
-        done[one.index] = one.value
-        while shown in done:
-            yield from done.pop(shown)
-            shown += 1
-
-
-def _planned(
-    asked: Asked, designs: Sequence[Any], *, minimise: Minimise
-) -> list[Result | GSOError]:
-    return solve_batch(asked, designs, minimise)
+    with closing(cast(Generator[Done, None, None], results)):
+        for one in results:
+            if one.error is not None:
+                raise GSOError(f"surfaces from {one.index * share} on: {one.error}")
+            done[one.index] = one.value
+            while shown in done:
+                yield from done.pop(shown)
+                shown += 1
 
 
 def _batch(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
@@ -122,8 +128,8 @@ def _minimised(where: str, gathered: Gathered) -> Solved:
     return device.solve([gathered], where)[0]
 
 
-def _measured(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
-    """Solve designs in a worker process, and compute their metrics there."""
+def _measured(asked: Asked, designs: Sequence[Any], *, minimise: Any) -> list[Result | GSOError]:
+    """Solve designs in a worker process, by itself, and compute their metrics there."""
     found = _batch(asked, designs)
     for result in found:
         if isinstance(result, Result):

@@ -33,7 +33,7 @@ def optimize_batch(
 
     The objective and the stages are those of :func:`gso.tno.optimize`, and so are the results,
     up to rounding errors and what the iterations make of them. But for these, a result does not
-    depend on the other surfaces. On a graphics processor all surfaces are solved together.
+    depend on the other surfaces. On a graphics processor up to a thousand are solved together.
     On a processor PyTorch uses one thread of this process for as long as it runs.
     Surfaces whose stages differ from those of the others, such as noisy or closed ones, are
     solved in smaller batches, or one by one.
@@ -54,7 +54,7 @@ def optimize_batch(
     workers : int or BatchWorkers, optional
         Number of worker processes; as many as save time when not given, 0 for none. Those of a
         :class:`gso.tno.BatchWorkers` are started once for many calls. On a processor workers
-        solve whole batches. With a graphics processor they plan, and this process solves.
+        solve whole batches. With a graphics processor they plan, and this process minimises.
     verdict : bool
         Judge the results, and flatten developable ones to measure their strain. This is done
         surface by surface on the processor.
@@ -62,7 +62,8 @@ def optimize_batch(
     Returns
     -------
     list of Result
-        In the order of the designs. Their `seconds` are a share of those of their batch. There
+        In the order of the designs. Their `seconds` are a share of those of their batch, which
+        may include the time that it waits for others with a graphics processor. There
         are no warnings: the status of each says whether it has converged.
 
     Raises

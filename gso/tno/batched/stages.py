@@ -126,7 +126,7 @@ def solve(
     coordinates: list[Array] = [plan.start for plan in plans]
     histories: list[list[Progress]] = [[] for _ in plans]
     iterations = np.zeros(len(plans), np.int64)
-    count, key = len(plans[0].stages), _digest(structure(plans[0]))
+    count, key = len(plans[0].stages), _digest([method, *structure(plans[0])])
     for number in range(count):
         clock = time.perf_counter()
         stages = [plan.stages[number] for plan in plans]

@@ -7,12 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection, wait
+from threading import Lock
 from types import TracebackType
 from typing import Any, cast
 
 from gso.errors import OptionError
 from gso.parallel import DIED, Done, attempt, nameless, prepare_worker, processors
-from gso.tno.batched.exchange import receive, send
+from gso.tno.batched.exchange import Ended, receive, send
 from gso.tno.batched.gathered import Gathered, Solved, TooLarge, Unbatchable
 
 #: Minimises the stages of several workers, of one key, together.
@@ -20,17 +21,23 @@ Together = Callable[[Sequence[Gathered]], list[Solved]]
 
 
 class BatchWorkers:
-    """Processes that prepare surfaces for :func:`gso.tno.optimize_batch` on a graphics processor.
+    """Processes for many calls of :func:`gso.tno.optimize_batch`.
 
-    Planning a surface takes much longer than its share of a solve on a graphics processor.
-    So these processes plan, and this one minimises what several of them have planned together.
-    They start in some seconds, and stay for further batches until they are closed.
+    With a graphics processor they plan: that takes much longer than the share of a surface in a
+    solve there. This process minimises what several of them have planned. On a processor they
+    solve whole batches. They start when they are needed, in some seconds, and stay until they are
+    closed.
 
     Parameters
     ----------
     count : int, optional
-        Number of processes; two for each processor when not given. At most half of them plan at a
-        time, while others wait for the device.
+        Number of processes that work at a time; one for each processor when not given. With a
+        graphics processor as many more wait for it meanwhile.
+
+    Raises
+    ------
+    OptionError
+        The number is none, or the workers are used when they are closed or busy.
 
     Examples
     --------
@@ -38,17 +45,20 @@ class BatchWorkers:
     >>> bowl = np.dstack([*np.mgrid[-1:1:9j, -1:1:9j], np.zeros((9, 9))])
     >>> bowl[..., 2] = 0.1 * (bowl[..., 0] ** 2 + bowl[..., 1] ** 2)
     >>> with gso.tno.BatchWorkers(1) as workers:
-    ...     results = gso.tno.optimize_batch([bowl, 2 * bowl], workers=workers)
-    >>> len(results)
-    2
+    ...     once = gso.tno.optimize_batch([bowl, 2 * bowl], workers=workers)
+    ...     again = gso.tno.optimize_batch([3 * bowl], workers=workers)
+    >>> len(once), len(again)
+    (2, 1)
     """
 
     def __init__(self, count: int | None = None):
         if count is not None and (not isinstance(count, int) or count < 1):
             raise OptionError(f"count is {count!r}; it must be a whole number of 1 or more")
+        self._count = count or processors()
         self._processes: dict[Connection, Any] = {}
-        for _ in range(count or 2 * processors()):
-            self._start()
+        #: What each process that has work is given: the number of a piece.
+        self._given: dict[Connection, int] = {}
+        self._closed, self._used = False, Lock()
 
     def __enter__(self) -> BatchWorkers:
         return self
@@ -62,15 +72,15 @@ class BatchWorkers:
         self.close()
 
     def __len__(self) -> int:
-        """Return the number of processes."""
-        return len(self._processes)
+        """Return the number of processes that work at a time."""
+        return self._count
 
     def close(self) -> None:
         """End the processes."""
-        for connection in list(self._processes):
-            self._end(connection)
+        self._closed = True
+        self._end(list(self._processes))
 
-    def _start(self) -> None:
+    def _start(self) -> Connection:
         from multiprocessing import get_context
 
         context = get_context("spawn")
@@ -80,20 +90,34 @@ class BatchWorkers:
             process.start()
         there.close()
         self._processes[here] = process
+        return here
 
-    def _end(self, connection: Connection) -> None:
-        process = self._processes.pop(connection)
-        connection.close()
-        process.terminate()
-        process.join()
+    def _end(self, connections: Sequence[Connection]) -> None:
+        """End processes; others start in their place when they are needed."""
+        for connection in connections:
+            if connection in self._processes:
+                self._processes[connection].terminate()
+        for connection in connections:
+            process = self._processes.pop(connection, None)
+            self._given.pop(connection, None)
+            if process is not None:
+                connection.close()
+                process.join()
+
+    def _idle(self, most: int) -> Connection | None:
+        """Return a process without work; None if all of `most` have some."""
+        for connection in self._processes:
+            if connection not in self._given:
+                return connection
+        return self._start() if len(self._processes) < most else None
 
     def spread(
         self,
         function: Callable[..., Any],
         pieces: Sequence[Any],
-        together: Together,
+        together: Together | None = None,
         *,
-        most: int,
+        most: int = 1,
         enough: float = 0.5,
     ) -> Iterator[Done]:
         """Apply a function to pieces in the processes, and yield results as they finish.
@@ -104,69 +128,91 @@ class BatchWorkers:
             Called with a piece and `minimise`, which has this process minimise a stage; it must be
             importable by name, or a partial of one that is.
         pieces : sequence
-        together : callable
-            Minimises stages of one key here.
+            What the function is applied to.
+        together : callable, optional
+            Minimises stages of one key here; not given where the function minimises by itself.
         most : int
             Largest number of surfaces to minimise together.
         enough : float
-            Share of the processes for which it is called while others plan.
+            Share of the processes that must wait before `together` is called, while others work.
 
         Yields
         ------
         Done
             As by :func:`gso.parallel.spread`.
+
+        Raises
+        ------
+        OptionError
+            The workers are closed, or busy with another call.
         """
-        todo, lost = deque(range(len(pieces))), set[int]()
-        busy = -(-len(self) // 2)
-        given: dict[Connection, int] = {}
-        waiting: dict[Connection, Gathered] = {}
+        if self._closed:
+            raise OptionError("these BatchWorkers are closed; make others")
+        if not self._used.acquire(blocking=False):
+            raise OptionError("these BatchWorkers are busy; make others for another thread")
         try:
-            while todo or given:
-                for connection in self._processes:
-                    if connection not in given and todo and len(given) - len(waiting) < busy:
-                        given[connection] = todo.popleft()
-                        _told(connection, (function, given[connection], pieces[given[connection]]))
-                planning = [c for c in given if c not in waiting]
-                group = _group(waiting, most)
-                if group and (not planning or len(group) >= max(enough * len(self), 1)):
-                    parts = [waiting.pop(connection) for connection in group]
-                    for connection, answer in zip(group, _minimised(parts, together), strict=True):
-                        _told(connection, answer)
-                    continue
-                for connection in cast(list[Connection], wait(planning)):
-                    index = given[connection]
-                    try:
-                        what, value = receive(connection)
-                    except (EOFError, OSError):
-                        self._replace(connection)
-                        del given[connection]
-                        if index in lost:
-                            yield Done(index, error=DIED)
-                        else:
-                            # Another piece may have taken the memory.
-                            lost.add(index)
-                            todo.append(index)
-                        continue
-                    if what == "minimise":
-                        waiting[connection] = value
-                    else:
-                        del given[connection]
-                        yield value
+            # Of a call that was not ended properly.
+            self._end(list(self._given))
+            yield from self._spread(function, pieces, together, most, enough)
         finally:
-            # What is still in progress is not wanted any more.
-            for connection in given:
-                self._replace(connection)
+            self._end(list(self._given))
+            self._used.release()
 
-    def _replace(self, connection: Connection) -> None:
-        """Start another process in place of one."""
-        self._end(connection)
-        self._start()
-
-
-def _told(connection: Connection, value: Any) -> None:
-    """Send a value to a process, which may have died; then nothing can be received from it."""
-    with suppress(OSError):
-        send(connection, value)
+    def _spread(
+        self,
+        function: Callable[..., Any],
+        pieces: Sequence[Any],
+        together: Together | None,
+        most: int,
+        enough: float,
+    ) -> Iterator[Done]:
+        given, waiting = self._given, dict[Connection, Gathered]()
+        todo, lost = deque(range(len(pieces))), deque[int]()
+        alone = False
+        processes = self._count if together is None else 2 * self._count
+        while todo or lost or given:
+            while (lost and not given) or (
+                todo and not lost and not alone and len(given) - len(waiting) < self._count
+            ):
+                connection = self._idle(processes)
+                if connection is None:
+                    break
+                alone = bool(lost)
+                index = given[connection] = lost.popleft() if lost else todo.popleft()
+                # A process that has died is found out below.
+                with suppress(Ended):
+                    send(connection, (function, index, pieces[index]))
+            working = [c for c in given if c not in waiting]
+            group = _group(waiting, most)
+            if (
+                group
+                and together is not None
+                and (not working or len(group) >= max(enough * processes, 1))
+            ):
+                parts = [waiting.pop(connection) for connection in group]
+                for connection, answer in zip(group, _minimised(parts, together), strict=True):
+                    with suppress(Ended):
+                        send(connection, answer)
+                continue
+            for connection in cast(list[Connection], wait(working)):
+                try:
+                    what, value = receive(connection)
+                except Ended:
+                    index = given[connection]
+                    self._end([connection])
+                    if alone:
+                        alone = False
+                        yield Done(index, error=DIED)
+                    else:
+                        # Another piece may have taken the memory: this one is repeated alone.
+                        lost.append(index)
+                    continue
+                if what == "minimise":
+                    waiting[connection] = value
+                else:
+                    del given[connection]
+                    alone = False
+                    yield value
 
 
 def _group(waiting: dict[Connection, Gathered], most: int) -> list[Connection]:
@@ -203,11 +249,17 @@ def _work(connection: Connection) -> None:
     """Work until the connection ends, and have stages minimised by the other process."""
     prepare_worker()
     minimise = partial(_elsewhere, connection)
-    # They are raised when the other process has ended.
-    with suppress(EOFError, OSError):
+    with suppress(Ended):
         while True:
             function, index, piece = receive(connection)
-            send(connection, ("done", attempt(partial(function, minimise=minimise), index, piece)))
+            done = attempt(partial(function, minimise=minimise), index, piece)
+            try:
+                send(connection, ("done", done))
+            except Ended:
+                raise
+            except Exception as error:  # such as a value that cannot be pickled
+                failed = Done(index, error=f"{type(error).__name__}: {error}")
+                send(connection, ("done", failed))
 
 
 def _elsewhere(connection: Connection, gathered: Gathered) -> Solved:

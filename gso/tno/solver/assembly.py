@@ -66,13 +66,10 @@ class Assembly:
     diagonal: Ints
 
 
-_assemblies: OrderedDict[bytes, Assembly] = OrderedDict()
-
-
-_ASSEMBLIES_KEPT = 24
-
-
-_LARGEST_KEPT = 4_000_000
+#: Assemblies that were used last, and their numbers of element matrices' entries.
+_assemblies: OrderedDict[bytes, tuple[Assembly, int]] = OrderedDict()
+#: Most entries that are kept, in sum.
+_KEPT = 12_000_000
 
 
 def assemble(n: int, columns: list[Ints], quadratic) -> Assembly:
@@ -85,11 +82,11 @@ def assemble(n: int, columns: list[Ints], quadratic) -> Assembly:
     key = digest.digest()
     if key in _assemblies:
         _assemblies.move_to_end(key)
-        return _assemblies[key]
+        return _assemblies[key][0]
     assembly = _analysed(n, columns, quadratic)
-    if pairs <= _LARGEST_KEPT:
-        _assemblies[key] = assembly
-        while len(_assemblies) > _ASSEMBLIES_KEPT:
+    if pairs <= _KEPT:
+        _assemblies[key] = assembly, pairs
+        while sum(size for _, size in _assemblies.values()) > _KEPT:
             _assemblies.popitem(last=False)
     return assembly
 
