@@ -259,6 +259,8 @@ class Mesh:
             At least two components touch others, and their number is at least 0.4 of that of
             the faces.
         """
+        if not self.components.any():
+            return
         touching = np.unique(self.components[self.half_edges.origin[self.seams]]).size
         if touching >= max(2, _HEAP * len(self.faces)):
             raise MeshError(
@@ -306,7 +308,7 @@ class Mesh:
         """
         return Frame(*geometry.ball(self.vertices[self.used]))
 
-    @property
+    @cached_property
     def used(self) -> NDArray[np.bool_]:
         """Mask over vertices: those that belong to a face."""
         return self.half_edges.face_count > 0
@@ -333,6 +335,9 @@ def _grid_template(height: int, width: int) -> Mesh:
     for name in _CONNECTIVITY:
         if name != "triangle_edges" or len(faces) <= _SMALL_GRID:
             getattr(mesh, name)
+    if len(faces) > _SMALL_GRID:
+        # The largest ones, which a solve does not need.
+        del mesh.__dict__["half_edges"]
     return mesh
 
 
@@ -351,8 +356,9 @@ _CONNECTIVITY = (
     "boundary_edges",
     "boundary_loops",
     "components",
+    "used",
 )
-#: Faces of a grid up to which the half-edges of its triangulation are kept for other grids.
+#: Faces of a grid up to which half-edges are kept for other grids.
 _SMALL_GRID = 100_000
 #: Number of touching components per face from which on a mesh counts as a polygon soup.
 _HEAP = 0.4

@@ -86,7 +86,7 @@ def _part(mesh: Mesh, ids: Ints) -> Mesh:
 
 def parts(mesh: Mesh) -> list[Ints]:
     """List the vertices of each component, without those of no face."""
-    labels, used = mesh.components, mesh.half_edges.face_count > 0
+    labels, used = mesh.components, mesh.used
     return [np.flatnonzero(labels == k) for k in np.unique(labels[used])]
 
 

@@ -21,6 +21,10 @@ from gso.typing import Array, Ints
 from gso.unknowns import Layout, Variables
 
 
+#: Entries of a matrix from which its constant part is computed each time, to save memory.
+_LARGE = 5_000_000
+
+
 class Problem:
     """Objective over unknowns.
 
@@ -79,7 +83,8 @@ class Problem:
 
     @cached_property
     def _constant(self) -> Array:
-        values = np.zeros(self._assembly.pattern.nnz)
+        """Values of the quadratic terms, and a zero for what belongs to fixed coordinates."""
+        values = np.zeros(self._assembly.pattern.nnz + 1)
         values[self._assembly.quadratic] = self._quadratic.matrix.data
         return values
 
@@ -130,7 +135,9 @@ class Problem:
         coordinates = self.variables.points(x)
         n, assembly = self.variables.size, self._assembly
         # One entry past the end takes what belongs to fixed coordinates.
-        gradient, values = np.zeros(n + 1), np.append(self._constant, 0.0)
+        gradient, values = np.zeros(n + 1), self._constant.copy()
+        if len(values) > _LARGE:
+            del self._constant
         total, gradient[:n] = self._quadratic.energy_and_gradient(x)
         for number, element in enumerate(self._elements):
             total += element.add(coordinates, assembly.places[number], gradient, values)
