@@ -171,17 +171,11 @@ def pieces(mesh: Mesh) -> list[Ints]:
     out = []
     for faces in cells(mesh):
         if faces.shape[1] == 3:
-            area, sides = _corner(mesh.vertices, faces, (0, 1, 2))
-            faces = faces[np.linalg.norm(area, axis=1) > FLAT_CORNER * sides]
+            p, q, r = (mesh.vertices[faces[:, k]] for k in range(3))
+            sides = ((q - p) ** 2).sum(axis=1) + ((r - p) ** 2).sum(axis=1)
+            faces = faces[geometry.doubled_areas(mesh.vertices, faces) > FLAT_CORNER * sides]
         out.append(faces)
     return [f for f in out if len(f)]
-
-
-def _corner(vertices: Array, faces: Ints, corner: tuple[int, int, int]) -> tuple[Array, Array]:
-    """Return doubled area vectors (e, 3) of a corner, and the sums (e,) of its squared sides."""
-    p, q, r = (vertices[faces[:, k]] for k in corner)
-    area = geometry.area_vectors(vertices, faces[:, corner])
-    return area, ((q - p) ** 2).sum(axis=1) + ((r - p) ** 2).sum(axis=1)
 
 
 def corner_shares(vertices: Array, quads: Ints) -> Array:
@@ -189,10 +183,12 @@ def corner_shares(vertices: Array, quads: Ints) -> Array:
 
     The sign is relative to the normal of the face.
     """
-    normal = geometry.quad_area_vectors(vertices, quads)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    corners = [_corner(vertices, quads, c) for c in _CORNERS]
-    return np.stack([(a * normal).sum(axis=1) / np.maximum(s, 1e-300) for a, s in corners])
+    normal = geometry.quad_area_vectors(vertices, quads).T
+    normal = normal / np.maximum(geometry.norm(tuple(normal)), 1e-300)
+    corners = geometry.quad_corner_vectors(vertices, quads)
+    side2 = ((np.roll(vertices[quads], -1, axis=1) - vertices[quads]) ** 2).sum(axis=2).T
+    around = np.maximum(side2 + np.roll(side2, 1, axis=0), 1e-300)
+    return np.stack([geometry.dot(tuple(c), tuple(normal)) for c in corners]) / around
 
 
 def rest_constants(vertices: Array, faces: Ints) -> Array:
