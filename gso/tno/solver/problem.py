@@ -20,7 +20,6 @@ from gso.tno.solver.quadratic import Quadratic
 from gso.typing import Array, Ints
 from gso.unknowns import Layout, Variables
 
-
 #: Entries of a matrix from which its constant part is computed each time, to save memory.
 _LARGE = 5_000_000
 
