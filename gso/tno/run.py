@@ -46,12 +46,16 @@ class Reached:
         Coordinates before the plan's last stage; None where that was not solved.
     minimum : Minimum
         Its result.
+    energies : tuple of dict, optional
+        The objective of the stage by term at `coordinates` and at the plan's fallback, where they
+        are known.
     """
 
     stage: Stage
     coordinates: Array
     entered: Array | None
     minimum: Minimum
+    energies: tuple[dict[str, float], dict[str, float]] | None = None
 
 
 class Run:
@@ -140,7 +144,7 @@ class Run:
 
     def concluded(self, plan: Plan, reached: Reached) -> Solution:
         """Return the solution of a plan whose stages have been solved."""
-        coordinates, energy = _guard(plan, reached.stage, reached.coordinates)
+        coordinates, energy = _guard(plan, reached)
         status = reached.minimum.status
         if plan.status is not None and status is not Status.CANCELLED:
             status = plan.status
@@ -331,11 +335,12 @@ def _finished(
     )
 
 
-def _guard(plan: Plan, stage: Stage, coordinates: Array) -> tuple[Array, dict[str, float]]:
+def _guard(plan: Plan, reached: Reached) -> tuple[Array, dict[str, float]]:
     """Return the coordinates and their energy, or the fallback's if that has less."""
+    stage, coordinates = reached.stage, reached.coordinates
     if plan.fallback is None:
-        return coordinates, objective(stage, coordinates)[0]
-    energy, other = objective(stage, coordinates, plan.fallback)
+        return coordinates, (reached.energies or objective(stage, coordinates))[0]
+    energy, other = reached.energies or objective(stage, coordinates, plan.fallback)
     if not sum(energy.values()) <= sum(other.values()):
         return plan.fallback, other
     return coordinates, energy

@@ -70,6 +70,10 @@ def _solve(parts: Sequence[Gathered], device: torch.device) -> list[Solved]:
     energies, steps = torch.stack(minima.energies), torch.stack(minima.steps)
     whole = [_rows(t) for t in (minima.x, points, energies, steps)]
     flat = [t.cpu().numpy() for t in (minima.energy, minima.code, minima.iterations)]
+    wanted = [points]
+    if first.others is not None:
+        wanted.append(columns([part.others for part in parts], device))
+    found = [{n: v.cpu().numpy() for n, v in problem.by_term(at).items()} for at in wanted]
     timings.setup += time.perf_counter() - clock
     out, begin, total = [], 0, sum(map(len, parts))
     for part in parts:
@@ -78,7 +82,8 @@ def _solve(parts: Sequence[Gathered], device: torch.device) -> list[Solved]:
         share = Timings(**{k: v * len(part) / total for k, v in timings.as_dict().items()})
         x, at, energy, step = (a[own] for a in whole)
         value, code, iterations = (a[own] for a in flat)
-        out.append(Solved(x, at, value, code, iterations, energy, step, share))
+        by_term = tuple({name: each[own] for name, each in energies.items()} for energies in found)
+        out.append(Solved(x, at, value, code, iterations, energy, step, share, by_term))
     return out
 
 

@@ -84,6 +84,8 @@ class Gathered:
         As in the stage.
     method : str
         Of the options.
+    others : ndarray, (B, N), or None
+        Coordinates whose energy is wanted, too.
     """
 
     key: bytes
@@ -100,6 +102,7 @@ class Gathered:
     iterations: int
     tolerance: float
     method: str
+    others: Array | None
 
     def __len__(self) -> int:
         """Return the number of surfaces."""
@@ -121,6 +124,8 @@ class Solved:
         After each iteration, the start included; NaN after the end.
     timings : Timings
         Seconds, in sum over the surfaces.
+    by_term : tuple of dict of str to ndarray, (B,)
+        The objective by term, without continuation, at the minima and at `others`.
     """
 
     x: Array
@@ -131,10 +136,15 @@ class Solved:
     energies: Array
     steps: Array
     timings: Timings
+    by_term: tuple[dict[str, Array], ...]
 
 
 def gather(
-    stages: Sequence[Stage], coordinates: Sequence[Array], method: str, key: bytes = b""
+    stages: Sequence[Stage],
+    coordinates: Sequence[Array],
+    method: str,
+    key: bytes = b"",
+    others: Sequence[Array] | None = None,
 ) -> Gathered:
     """Gather one stage of each surface, from its coordinates at the beginning.
 
@@ -167,6 +177,7 @@ def gather(
         first.iterations,
         first.tolerance,
         method,
+        None if others is None else np.stack(others),
     )
 
 

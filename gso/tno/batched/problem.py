@@ -193,6 +193,15 @@ class Problem:
         total = torch.stack([term.energy(points) for term in self.terms]).sum(dim=0)
         return torch.where(torch.isfinite(total), total, float("inf"))
 
+    def by_term(self, points: Tensor) -> dict[str, Tensor]:
+        """Return the objectives (B,) by term at coordinates (N, B); infinity as in `energy`."""
+        out: dict[str, Tensor] = {}
+        for term in self.terms:
+            value = term.energy(points)
+            value = torch.where(torch.isfinite(value), value, float("inf"))
+            out[term.name] = out[term.name] + value if term.name in out else value
+        return out
+
     def linearise(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Return energies (B,), gradients (n, B), and values (nnz, B) of the matrices."""
         points = self.unknowns.points(x)

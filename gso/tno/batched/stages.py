@@ -45,7 +45,8 @@ def structure(plan: Plan) -> list[Any]:
     """
     if not plan.stages or plan.spline is not None or plan.convert is not None:
         raise Unbatchable
-    return [part for stage in plan.stages for part in _described(stage)]
+    parts = [part for stage in plan.stages for part in _described(stage)]
+    return [plan.fallback is None, *parts]
 
 
 def same(one: Sequence[Any], other: Sequence[Any]) -> bool:
@@ -132,7 +133,8 @@ def solve(
         stages = [plan.stages[number] for plan in plans]
         entered = coordinates
         coordinates = [s.enter(c) for s, c in zip(stages, coordinates, strict=True)]
-        gathered = gather(stages, coordinates, method, key + bytes([number]))
+        others = _fallbacks(plans) if number == count - 1 else None
+        gathered = gather(stages, coordinates, method, key + bytes([number]), others)
         timings.setup += time.perf_counter() - clock
         solved = minimise(gathered)
         for phase, seconds in solved.timings.as_dict().items():
@@ -145,8 +147,17 @@ def solve(
     reached = []
     for k, one in enumerate(found):
         one.history = histories[k]
-        reached.append(Reached(stages[k], coordinates[k], entered[k], one))
+        energies = [{name: float(e[k]) for name, e in at.items()} for at in solved.by_term]
+        reached.append(
+            Reached(stages[k], coordinates[k], entered[k], one, (energies[0], energies[-1]))
+        )
     return reached, iterations.tolist(), timings
+
+
+def _fallbacks(plans: Sequence[Plan]) -> list[Array] | None:
+    """Return the fallbacks of plans; None if they have none."""
+    found = [plan.fallback for plan in plans if plan.fallback is not None]
+    return found if len(found) == len(plans) else None
 
 
 def _minima(solved: Solved, stage: Stage, place: tuple[int, int], backend: str) -> list[Minimum]:
