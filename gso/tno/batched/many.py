@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from gso.errors import GSOError
-from gso.parallel import Done, processors, spread
+from gso.parallel import Done, processors
 from gso.result import Result
 from gso.tno.batched import device
 from gso.tno.batched.batches import Asked, solve_batch, solve_piece
@@ -50,13 +50,9 @@ def solve_all(
     # Smaller pieces where they leave no process without work.
     share = -(-len(designs) // (count * -(-len(designs) // (_BATCH * count))))
     pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
-    if isinstance(workers, BatchWorkers):
-        results = workers.spread(partial(_measured, asked), pieces)
-    else:
-        # The workers of this are replaced when they die, and end with it.
-        work, many = partial(_measured, asked, minimise=None), min(count, len(pieces))
-        results = spread(work, pieces, workers=many, caller=False)
-    yield from _in_order(results, share)
+    own = nullcontext(workers) if isinstance(workers, BatchWorkers) else BatchWorkers(count)
+    with own as ready:
+        yield from _in_order(ready.spread(partial(_measured, asked), pieces), share)
 
 
 def _on_device(
