@@ -38,6 +38,7 @@ from gso.geometry.stretches import first_form, principal_stretches
 from gso.geometry.triangle import (
     area_vectors,
     corner_angles,
+    corners,
     doubled_areas,
     quad_area_vectors,
     quad_corner_vectors,
@@ -55,6 +56,7 @@ __all__ = [
     "closest_motion",
     "corner_angles",
     "corner_area2",
+    "corners",
     "cross",
     "determinant",
     "diagonal_distance",

@@ -16,7 +16,7 @@ def area_vectors(points: Array, triangles: Ints) -> Array:
     >>> area_vectors(corners, np.array([[0, 1, 2]]))
     array([[0., 0., 6.]])
     """
-    p, q, r = _corners(points, triangles)
+    p, q, r = corners(points, triangles)
     return np.stack(cross(sub(q, p), sub(r, p)), axis=1)
 
 
@@ -32,7 +32,7 @@ def signed_areas(flat: Array, triangles: Ints) -> Array:
 
 def quad_area_vectors(points: Array, quads: Ints) -> Array:
     """Return the doubled area vectors (q, 3) of quads: the products of their diagonals."""
-    v0, v1, v2, v3 = _corners(points, quads)
+    v0, v1, v2, v3 = corners(points, quads)
     return np.stack(cross(sub(v2, v0), sub(v3, v1)), axis=1)
 
 
@@ -45,16 +45,16 @@ def quad_corner_vectors(points: Array, quads: Ints) -> Array:
     >>> quad_corner_vectors(square, np.array([[0, 1, 2, 3]]))[:, 2, 0]
     array([1., 1., 1., 1.])
     """
-    v = _corners(points, quads)
+    v = corners(points, quads)
     sides = [sub(v[(k + 1) % 4], v[k]) for k in range(4)]
     return np.stack([np.stack(cross(sides[k - 1], sides[k])) for k in range(4)])
 
 
-def _corners(points: Array, faces: Ints) -> list[Vec]:
-    """Return the component arrays of the corners of faces; contiguous ones are the fastest."""
+def corners(points: Array, faces: Ints) -> list[Vec]:
+    """Return the corners (k) of faces (m, k) as component arrays (m,), which are contiguous."""
     x, y, z = np.ascontiguousarray(points.T)
     columns = (np.ascontiguousarray(c) for c in faces.T)
-    return [(x[c], y[c], z[c]) for c in columns]
+    return [(x.take(c), y.take(c), z.take(c)) for c in columns]
 
 
 def corner_angles(points: Array, triangles: Ints) -> Array:
@@ -63,9 +63,9 @@ def corner_angles(points: Array, triangles: Ints) -> Array:
     >>> np.degrees(corner_angles(np.array([[0.0, 0], [1, 0], [0, 1]]), np.array([[0, 1, 2]])))
     array([[90., 45., 45.]])
     """
-    corners = [points[triangles[:, k]] for k in range(3)]
+    own = [points[triangles[:, k]] for k in range(3)]
     out = np.empty(triangles.shape)
-    for k, here in enumerate(corners):
-        a, b = ((corners[(k + step) % 3] - here).T for step in (1, 2))
+    for k, here in enumerate(own):
+        a, b = ((own[(k + step) % 3] - here).T for step in (1, 2))
         out[:, k] = angle(tuple(a), tuple(b))
     return out

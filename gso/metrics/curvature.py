@@ -34,10 +34,8 @@ def curvature(surface: Any, split: int = 0) -> Array:
     out = np.full(len(mesh.vertices), np.nan)
     stars = mesh.stars_by_triangulation
     for centre, ring in stars[min(split, len(stars) - 1)]:
-        out[centre] = geometry.gaussian_curvature(
-            components(mesh.vertices[centre]),
-            [components(mesh.vertices[ring[:, k]]) for k in range(ring.shape[1])],
-        )
+        (own,) = geometry.corners(mesh.vertices, centre[:, None])
+        out[centre] = geometry.gaussian_curvature(own, geometry.corners(mesh.vertices, ring))
     return out
 
 

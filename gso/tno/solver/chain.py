@@ -53,7 +53,7 @@ class ByPoint(Same):
 
     def pulled(self, slope: Array, at: slice = _ALL) -> Array:
         gather = self._gather[:, at]
-        product = slope * self._share[gather]
+        product = slope * self._share.take(gather)
         by_point = product.reshape(len(slope), -1, self._dim, gather.shape[1])
         out = by_point[:, :, 0].copy()
         for d in range(1, self._dim):

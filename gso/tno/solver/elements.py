@@ -73,7 +73,7 @@ class Values:
         key = self.item.term.residual, self.shape, len(self.constants)
         loop = loops.residual(*key, self.among)
         if loop is None:
-            return kernel(*key, False)(coordinates[self.gather], self.constants)[0]
+            return kernel(*key, False)(coordinates.take(self.gather), self.constants)[0]
         out = np.empty((loop.rows, self.item.term.count))
         loop.run(coordinates, self.gather, self._constants, 0, out.shape[1], out, _NONE)
         return out
@@ -99,7 +99,7 @@ class Elements(Values):
     def linearise(self, coordinates: Array, at: slice = _ALL) -> tuple[Array, Array]:
         """Return residuals (r, e) and their Jacobian by the unknowns (r, q, e) of some elements."""
         run = kernel(self.item.term.residual, self.shape, len(self.constants), True)
-        value, slope = run(coordinates[self.gather[:, at]], self.constants[:, at])
+        value, slope = run(coordinates.take(self.gather[:, at]), self.constants[:, at])
         return value, self._chain.pulled(slope, at)
 
     def add(self, coordinates: Array, places: Places, gradient: Array, values: Array) -> float:
@@ -168,4 +168,4 @@ class Elements(Values):
         if vectors is None:
             return None
         run = geometric_stiffness(vectors, self.shape, len(self.constants))
-        return self._chain.pulled(run(coordinates[self.gather], self.constants)[1])
+        return self._chain.pulled(run(coordinates.take(self.gather), self.constants)[1])
