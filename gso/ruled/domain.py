@@ -6,6 +6,7 @@ from copy import copy
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
@@ -78,6 +79,14 @@ class Domain:
         loop = np.asarray(shapely.normalize(whole).exterior.coords)[:-1]
         loop = loop if enclosed_area(loop) > 0 else loop[::-1]
         return np.roll(loop, -_start(loop), axis=0)
+
+    def encloses(self, places: Array) -> NDArray[np.bool_]:
+        """Return which places (k, 2) of the plane are inside :attr:`around`."""
+        import shapely
+
+        own = shapely.Polygon(self.around)
+        shapely.prepare(own)
+        return np.asarray(shapely.contains_xy(own, places))
 
     def with_normals(self, normals: Array) -> Domain:
         """Return the same domain with other normals (n, 3) at the vertices."""

@@ -18,7 +18,8 @@ def prices(domain: Domain, outline: Array) -> tuple[Array, Array]:
     -------
     price : ndarray, (n, n)
         The variance of the design's normal along the chord times the squared length of the
-        chord, plus that square times the share of the chord outside the flat image.
+        chord, plus that square times the share of the chord outside the outline; holes and narrow
+        slots are inside.
     normal : ndarray, (n, n, 3)
         The mean normals along the chords.
     """
@@ -38,5 +39,6 @@ def along(domain: Domain, one: Array, other: Array) -> tuple[Array, Array]:
     mean = normals.mean(axis=1)
     varying = ((normals - mean[:, None]) ** 2).sum(axis=2).mean(axis=1)
     gap = np.linalg.norm(feet - places, axis=1).reshape(len(one), _SAMPLES)
-    outside = (gap > 1e-6 * domain.margin).mean(axis=1)
-    return np.asarray((varying + outside) * ((one - other) ** 2).sum(axis=1)), mean
+    outside = gap > 1e-6 * domain.margin
+    outside[outside] = ~domain.encloses(places.reshape(*outside.shape, 2)[outside])
+    return np.asarray((varying + outside.mean(axis=1)) * ((one - other) ** 2).sum(axis=1)), mean
