@@ -29,7 +29,7 @@ torch = pytest.importorskip("torch")
 from gso.linalg import banded as lapack  # noqa: E402
 from gso.tno.batched import cholesky, device, exchange, many, search, stages  # noqa: E402
 from gso.tno.batched import kernels as on_tensors  # noqa: E402
-from gso.tno.batched.batches import asked, solve_piece  # noqa: E402
+from gso.tno.batched.batches import asked, solve_batch  # noqa: E402
 from gso.tno.batched.gathered import TooLarge, Unbatchable, gather  # noqa: E402
 from gso.tno.batched.many import solve_all  # noqa: E402
 from gso.tno.batched.problem import Problem as Batch  # noqa: E402
@@ -486,7 +486,7 @@ def on_cpu(parts):
 
 def by_workers(ready, some, task, together=on_cpu, most=100):
     found = {}
-    pieces, work = list(some[:, None]), partial(solve_piece, asked(task))
+    pieces, work = list(some[:, None]), partial(solve_batch, asked(task))
     for done in ready.spread(work, pieces, together, most=most, enough=1.0):
         assert done.error is None
         found[done.index] = done.value[0]

@@ -76,12 +76,17 @@ def chapters(
     return [*parts, pages.Chapter("Time against size", text, items, table, drawn["time"])]
 
 
-def _builds() -> str:
-    """Say which build the times of the tables of quality are of."""
+def _built(more: str) -> str:
+    """Say which build times are of; more is said where there are two builds."""
     if not kernels.compiled():
         return kernels.described()
-    return (
-        f'{kernels.described()} The column "time, NumPy" has the median with NumPy kernels '
+    return f"{kernels.described()} {more}"
+
+
+def _builds() -> str:
+    """Say which build the times of the tables of quality are of."""
+    return _built(
+        'The column "time, NumPy" has the median with NumPy kernels '
         f"({kernels.VARIABLE}={kernels.NUMPY}). The cell also has the number of surfaces, which "
         "are the first of the timed ones. It is empty for methods without the solver's kernels. "
         "Results of both builds are the same up to rounding."
@@ -90,10 +95,7 @@ def _builds() -> str:
 
 def _sizes() -> str:
     """Say which build the times against size are of."""
-    if not kernels.compiled():
-        return kernels.described()
-    return (
-        f"{kernels.described()} TNO, NumPy is the optimiser with NumPy kernels "
-        f"({kernels.VARIABLE}={kernels.NUMPY}). On grids of up to about 40 by 40 vertices TNO uses "
-        "NumPy kernels, too."
+    return _built(
+        f"TNO, NumPy is the optimiser with NumPy kernels ({kernels.VARIABLE}={kernels.NUMPY}). On "
+        "grids of up to about 40 by 40 vertices TNO uses NumPy kernels, too."
     )

@@ -105,7 +105,7 @@ def _from_the_design(
     return run
 
 
-def _same(name: str, run: Callable[[Case], Solved], note: str) -> Method:
+def _same(name: str, run: Callable[[Case], Solved], note: str, kernels: bool = True) -> Method:
     return Method(
         name,
         "developable",
@@ -115,8 +115,7 @@ def _same(name: str, run: Callable[[Case], Solved], note: str) -> Method:
         note=note,
         files=(Path(__file__), Path(energy.__file__)),
         solver=True,
-        # IPOPT evaluates CasADi's expressions instead.
-        kernels=name != SAME_ENERGY[3],
+        kernels=kernels,
     )
 
 
@@ -143,6 +142,7 @@ METHODS = [
         SAME_ENERGY[3],
         _from_the_design(_ipopt),
         "CasADi's expressions of the same terms, Gauss-Newton matrix; time with building them",
+        kernels=False,
     ),
     Method(
         "MeshLab developability",

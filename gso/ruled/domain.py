@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,9 +85,16 @@ class Domain:
         """Return which places (k, 2) of the plane are inside :attr:`around`."""
         import shapely
 
+        return np.asarray(shapely.contains_xy(self._enclosed, places))
+
+    @cached_property
+    def _enclosed(self) -> Any:
+        """The polygon of :attr:`around`, prepared for many points."""
+        import shapely
+
         own = shapely.Polygon(self.around)
         shapely.prepare(own)
-        return np.asarray(shapely.contains_xy(own, places))
+        return own
 
     def with_normals(self, normals: Array) -> Domain:
         """Return the same domain with other normals (n, 3) at the vertices."""

@@ -109,13 +109,6 @@ def solve_batch(
     return out
 
 
-def solve_piece(
-    asked: Asked, designs: Sequence[Any], *, minimise: Minimise
-) -> list[Result | GSOError]:
-    """Solve designs whose stages another process minimises, see :class:`BatchWorkers`."""
-    return solve_batch(asked, designs, minimise)
-
-
 def _grouped(groups: list[_Group], index: int, planned: _Planned) -> None:
     """Add a surface to the group of its structure."""
     structure = stages.structure(planned.plan)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager, nullcontext
 from functools import partial
 from multiprocessing import parent_process
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import torch
@@ -15,7 +15,7 @@ from gso.errors import GSOError
 from gso.parallel import Done, processors
 from gso.result import Result
 from gso.tno.batched import device
-from gso.tno.batched.batches import Asked, solve_batch, solve_piece
+from gso.tno.batched.batches import Asked, solve_batch
 from gso.tno.batched.gathered import Gathered, Solved
 from gso.tno.batched.workers import BatchWorkers
 
@@ -73,7 +73,7 @@ def _on_device(
         # Two for each process: while some are minimised, others are planned.
         share = min(-(-len(designs) // (2 * len(ready))), _SHARE, most)
         pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
-        work = partial(solve_piece, asked)
+        work = partial(solve_batch, asked)
         yield from _in_order(in_batches(ready, work, pieces, asked.device, vertices), share)
 
 
@@ -84,7 +84,7 @@ def in_batches(
     where: str,
     vertices: int,
     enough: float = 0.5,
-) -> Iterator[Done]:
+) -> Generator[Done, None, None]:
     """Apply a function to pieces in processes, while this one minimises for them on a device.
 
     Parameters
@@ -100,11 +100,11 @@ def in_batches(
     return workers.spread(function, pieces, together, most=most, enough=enough)
 
 
-def _in_order(results: Iterator[Done], share: int) -> Iterator[Result | GSOError]:
+def _in_order(results: Generator[Done, None, None], share: int) -> Iterator[Result | GSOError]:
     """Yield the results of pieces of `share` surfaces, which finish in any order."""
     done: dict[int, Any] = {}
     shown = 0
-    with closing(cast(Generator[Done, None, None], results)):
+    with closing(results):
         for one in results:
             if one.error is not None:
                 raise GSOError(f"surfaces from {one.index * share} on: {one.error}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection, wait
@@ -119,7 +119,7 @@ class BatchWorkers:
         *,
         most: int = 1,
         enough: float = 0.5,
-    ) -> Iterator[Done]:
+    ) -> Generator[Done, None, None]:
         """Apply a function to pieces in the processes, and yield results as they finish.
 
         Parameters
@@ -165,7 +165,7 @@ class BatchWorkers:
         together: Together | None,
         most: int,
         enough: float,
-    ) -> Iterator[Done]:
+    ) -> Generator[Done, None, None]:
         given, waiting = self._given, dict[Connection, Gathered]()
         todo, lost = deque(range(len(pieces))), deque[int]()
         alone = False
