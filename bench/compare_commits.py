@@ -61,7 +61,7 @@ def of_result(name: str, result: Any) -> Entries:
 def terms() -> Entries:
     """Residuals and Jacobians of every term's examples."""
     registry = first_of("gso.energy", "gso.terms").registry()
-    kernels = first_of("gso.tno.solver.kernels", "gso.tno.codegen")
+    kernels = first_of("gso.solver.kernels", "gso.tno.codegen")
     x, y = np.meshgrid(np.linspace(-1, 1, 6), np.linspace(-1, 1, 7), indexing="ij")
     mesh = gso.Mesh.from_grid(np.stack([x, y, 0.3 * x * y + 0.1 * x**3], axis=-1))
     random = np.random.default_rng(0)

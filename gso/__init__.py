@@ -41,9 +41,8 @@ if TYPE_CHECKING:
     from gso.mesh import Mesh, topology
     from gso.result import Result
     from gso.ruled.loft import loft
-    from gso.ruled.smooth.surface import smooth_strips
-    from gso.seams import cut
-    from gso.segmentation import pieces
+    from gso.ruled.smooth.smooth_surface import smooth_strips
+    from gso.seams import cut, pieces
     from gso.spline import BSplineSurface
     from gso.spline.fit import fit_spline
     from gso.status import Progress, Status
@@ -51,7 +50,7 @@ if TYPE_CHECKING:
     from gso.tasks.conformal import Options as ConformalOptions
     from gso.tasks.denoise import Options as DenoiseOptions
     from gso.tasks.developable import Options as DevelopableOptions
-    from gso.tasks.developable.isometry import Options as IsometryOptions
+    from gso.tasks.developable.joint_isometry import Options as IsometryOptions
     from gso.tasks.developable.ruled import Options as RuledOptions
     from gso.tasks.flatten import Options as FlattenOptions
     from gso.tasks.options import Options
@@ -136,10 +135,10 @@ _NAMES = {
     "ConvergenceWarning": "gso.errors",
     "Options": "gso.tasks.options",
     "cut": "gso.seams",
-    "pieces": "gso.segmentation",
+    "pieces": "gso.seams",
     "fabricate": "gso.workshop.fabricate",
     "loft": "gso.ruled.loft",
-    "smooth_strips": "gso.ruled.smooth.surface",
+    "smooth_strips": "gso.ruled.smooth.smooth_surface",
     "Fixed": "gso.constraints",
     "FixedBoundary": "gso.constraints",
     "FixedLengths": "gso.constraints",
@@ -154,7 +153,7 @@ _NAMES = {
 }
 _OPTIONS = {
     "DevelopableOptions": "gso.tasks.developable",
-    "IsometryOptions": "gso.tasks.developable.isometry",
+    "IsometryOptions": "gso.tasks.developable.joint_isometry",
     "RuledOptions": "gso.tasks.developable.ruled",
     "FlattenOptions": "gso.tasks.flatten",
     "DenoiseOptions": "gso.tasks.denoise",

@@ -17,25 +17,32 @@ from gso.constraints import Compiled
 from gso.dataset import bezier
 from gso.energy import registry
 from gso.linalg.base import Pattern
+from gso.pipeline.normalise import Canonical
+from gso.solver import kernels
+from gso.solver.problem import Problem
 from gso.tasks.base import Request
-from gso.tno.normalise import Canonical
-from gso.tno.solver import kernels
-from gso.tno.solver.problem import Problem
 from gso.unknowns.base import DIMENSIONS
 from tests.conftest import cylinder, meshes, saddle
 
 torch = pytest.importorskip("torch")
 
 from gso.linalg import banded as lapack  # noqa: E402
-from gso.tno.batched import cholesky, device, exchange, many, search, stages  # noqa: E402
-from gso.tno.batched import kernels as on_tensors  # noqa: E402
+from gso.solver.directions import GaussNewton  # noqa: E402
+from gso.tno.batched import (  # noqa: E402
+    batch_steps,
+    cholesky,
+    device,
+    exchange,
+    many,
+    stage_groups,
+)
+from gso.tno.batched import tensor_kernels as on_tensors  # noqa: E402
+from gso.tno.batched.batch_problem import Problem as Batch  # noqa: E402
 from gso.tno.batched.batches import asked, solve_batch  # noqa: E402
 from gso.tno.batched.gathered import TooLarge, Unbatchable, gather  # noqa: E402
 from gso.tno.batched.many import solve_all  # noqa: E402
-from gso.tno.batched.problem import Problem as Batch  # noqa: E402
 from gso.tno.batched.sums import Sums  # noqa: E402
-from gso.tno.batched.terms import stacked_loss  # noqa: E402
-from gso.tno.solver.directions import GaussNewton  # noqa: E402
+from gso.tno.batched.tensor_terms import stacked_loss  # noqa: E402
 
 CPU = torch.device("cpu")
 SIZE = 33
@@ -112,7 +119,7 @@ def test_energy_gradient_and_matrix_are_those_of_the_solver(name, designs):
     task, request, heights = CASES[name]
     points = designs[:2] if heights is None else np.stack([bump(21, h) for h in heights])
     plans = [planned(task, p, **request) for p in points]
-    assert stages.same(*(stages.structure(plan) for plan in plans))
+    assert stage_groups.same(*(stage_groups.structure(plan) for plan in plans))
     rng = np.random.default_rng(0)
     coordinates = [plan.start for plan in plans]
     for own in zip(*(plan.stages for plan in plans), strict=True):
@@ -182,7 +189,7 @@ def test_only_indefinite_matrices_are_damped():
     solver = cholesky.BlockBanded(pattern, np.arange(pattern.nnz), cholesky.divide(pattern), CPU)
     assert solver.factor(torch.as_tensor(values)).tolist() == [False, True, False]
     gradient = torch.as_tensor(np.random.default_rng(2).standard_normal((48, 3)))
-    found = search.direction(
+    found = batch_steps.direction(
         solver,
         torch.as_tensor(values.copy()),
         torch.as_tensor(diagonal),
@@ -204,7 +211,7 @@ def test_a_hopeless_matrix_gives_the_gradient():
     values[0] = 1e-12
     solver = cholesky.BlockBanded(pattern, np.arange(pattern.nnz), cholesky.divide(pattern), CPU)
     gradient = torch.ones(24, 1, dtype=torch.float64)
-    found = search.direction(
+    found = batch_steps.direction(
         solver,
         torch.as_tensor(values),
         torch.as_tensor(pattern.indptr[:-1]),
@@ -677,7 +684,7 @@ def test_what_fails_in_a_batch_is_solved_alone(designs, monkeypatch):
     def fail(*given):
         raise gso.MeshError("some surface has no image")
 
-    monkeypatch.setattr(stages, "solve", fail)
+    monkeypatch.setattr(stage_groups, "solve", fail)
     found = gso.tno.optimize_batch(designs[:2], task="flatten", workers=0)
     assert [one.backend for one in found] == [
         gso.tno.optimize(p, task="flatten", verdict=False).backend for p in designs[:2]

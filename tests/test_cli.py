@@ -353,7 +353,7 @@ def test_the_optimiser_alone(run, small, never):
 
 
 def test_without_a_net_the_optimiser_says_so(run, small, monkeypatch):
-    monkeypatch.setattr("gso.hybrid.prediction.available", lambda task: [])
+    monkeypatch.setattr("gso.hybrid.warm_start.available", lambda task: [])
     done = run("optimize", small, "-o", "out.obj", "--method", "hybrid")
     assert done.exit_code == 0
     assert "note: solved without a net: no net" in done.stdout
@@ -513,7 +513,7 @@ def test_version_and_help(run, monkeypatch):
 
 
 def test_choices_are_those_of_the_library():
-    from gso.io.svg import MILLIMETRES
+    from gso.io.flat_svg import MILLIMETRES
 
     def choices(command, name):
         return set(next(o for o in main.commands[command].params if o.name == name).type.choices)

@@ -13,11 +13,11 @@ import pytest
 import gso
 from gso import Mesh, metrics
 from gso.components import average, combined, labels, split
+from gso.pipeline import component_solves as solving
+from gso.pipeline.normalise import Canonical
 from gso.status import Status
 from gso.tasks.developable import Options
 from gso.tasks.evaluation import measured
-from gso.tno import components as solving
-from gso.tno.normalise import Canonical
 
 #: Tasks and formulations, with options.
 ASKED = [

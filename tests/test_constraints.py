@@ -13,8 +13,8 @@ import gso
 from gso import geometry
 from gso.constraints import Constraint, compile_constraints, read_constraints
 from gso.constraints.conflicts import check
+from gso.constraints.equations import Part, Pins, Relations
 from gso.constraints.linear import reduce
-from gso.constraints.parts import Part, Pins, Relations
 from gso.energy import Term, Weighted
 from gso.energy.multipliers import STIFF, hardened
 from gso.mesh import Frame, Mesh

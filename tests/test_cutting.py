@@ -9,7 +9,7 @@ import gso
 from gso import metrics, parametrization
 from gso.cli import main
 from gso.mesh import Mesh
-from gso.mesh.cutting import cut, joining
+from gso.mesh.cut import cut, joining
 from gso.pattern import Pattern
 from gso.result import Result
 from tests.conftest import is_disk, saddle, shuffled

@@ -10,14 +10,14 @@ import pytest
 import gso
 from gso import hybrid
 from gso.errors import MeshError, OptionError, WeightsError
-from gso.hybrid import prediction, solving
+from gso.hybrid import solving, warm_start
 from gso.hybrid.patch import as_patch
 from gso.hybrid.time_model import net_saves_time
 from gso.mesh import Mesh
 from gso.mesh.topology import reverse
-from gso.tasks.developable.isometry import Options as JointOptions
+from gso.pipeline.run import Run
+from gso.tasks.developable.joint_isometry import Options as JointOptions
 from gso.tno import Start, optimize
-from gso.tno.run import Run
 from tests.conftest import cylinder, saddle, shuffled, sphere_cap
 
 try:
@@ -264,17 +264,17 @@ def coarse_net(monkeypatch):
 
     def predictions(designs, task, net, passes, alone):
         if net == "none":
-            return [prediction.Prediction(refused="there is none")] * len(designs)
+            return [warm_start.Prediction(refused="there is none")] * len(designs)
         few = gso.DevelopableOptions(iterations=1)
         results = [optimize(design, options=few) for design in designs]
-        return [prediction.Prediction(r.mesh.vertices, 0.01, "fair") for r in results]
+        return [warm_start.Prediction(r.mesh.vertices, 0.01, "fair") for r in results]
 
     monkeypatch.setattr(solving, "predictions", predictions)
 
 
 def predicts(monkeypatch, points):
     """Let every net make the same of every design."""
-    found = prediction.Prediction(points, 0.01, "odd")
+    found = warm_start.Prediction(points, 0.01, "odd")
     monkeypatch.setattr(solving, "predictions", lambda designs, **_: [found] * len(designs))
 
 
@@ -434,7 +434,7 @@ def test_a_net_of_another_task_is_refused():
 
 
 def test_without_torch_it_is_the_optimiser(monkeypatch, surfaces):
-    monkeypatch.setattr(prediction, "find_spec", lambda name: None)
+    monkeypatch.setattr(warm_start, "find_spec", lambda name: None)
     cold, result = optimize(surfaces[0]), hybrid.solve(surfaces[0])
     assert same(cold, result)
     assert "torch" in result.notes[-1]
@@ -442,7 +442,7 @@ def test_without_torch_it_is_the_optimiser(monkeypatch, surfaces):
 
 
 def test_without_weights_it_is_the_optimiser(monkeypatch, surfaces):
-    monkeypatch.setattr(prediction, "available", lambda task: [])
+    monkeypatch.setattr(warm_start, "available", lambda task: [])
     cold, result = optimize(surfaces[0]), hybrid.solve(surfaces[0])
     assert same(cold, result)
     assert "no net" in result.notes[-1]
@@ -633,7 +633,7 @@ def test_passes_are_left_out_where_a_whole_solve_follows(surfaces, monkeypatch, 
     def asked(designs, task, net, passes, alone):
         assert alone is (polish is False)
         seen.append(passes)
-        return [prediction.Prediction(refused="enough")] * len(designs)
+        return [warm_start.Prediction(refused="enough")] * len(designs)
 
     monkeypatch.setattr(solving, "predictions", asked)
     hybrid.solve(surfaces[0], polish=polish)

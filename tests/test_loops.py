@@ -16,8 +16,8 @@ from gso.energy import registry
 from gso.energy.base import Weighted
 from gso.energy.losses import Absolute, Distance, Squared
 from gso.mesh.normals import vertex_normals
-from gso.tno.solver import cached_source, loops
-from gso.tno.solver.problem import Problem
+from gso.solver import cached_source, loops
+from gso.solver.problem import Problem
 from gso.unknowns import Layout
 from gso.unknowns.free import free
 from gso.unknowns.normal import normal_offsets
@@ -138,7 +138,7 @@ def test_small_meshes_do_not_load_numba():
 
 SOURCE = "def kernel(x):\n    return x + 1.0\n"
 CODE = (
-    "import logging; logging.basicConfig(); from gso.tno.solver.cached_source import compiled; "
+    "import logging; logging.basicConfig(); from gso.solver.cached_source import compiled; "
     f"assert compiled({SOURCE!r})(1.0) == 2.0"
 )
 

@@ -30,7 +30,7 @@ from gso.net import (  # noqa: E402
     tasks,
 )
 from gso.net.models.blocks import IMDB, Stencils  # noqa: E402
-from gso.net.models.grids import axes  # noqa: E402
+from gso.net.models.grid_geometry import axes  # noqa: E402
 
 
 def shaken(net, seed=0, size=0.05):

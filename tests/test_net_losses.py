@@ -16,8 +16,8 @@ from tests.conftest import cylinder, saddle
 
 torch = pytest.importorskip("torch")
 
-from gso.net.models import grids  # noqa: E402
-from gso.net.training import energy, losses  # noqa: E402
+from gso.net.models import grid_geometry  # noqa: E402
+from gso.net.training import solver_energy, training_losses  # noqa: E402
 
 
 def batch(*surfaces):
@@ -54,7 +54,7 @@ def last_stage(points):
 
 def test_developable_energy_is_the_solvers(pair):
     designs, results = pair
-    fast = energy.Developable(batch(*designs), developable.Options())
+    fast = solver_energy.Developable(batch(*designs), developable.Options())
     parts = fast.parts(batch(*results))
     for k, (design, result) in enumerate(zip(designs, results, strict=True)):
         last = last_stage(design)
@@ -69,7 +69,7 @@ def test_developable_energy_is_the_solvers(pair):
 def test_elongation_energy_is_the_solvers_where_it_is_large(pair):
     designs, _ = pair
     results = designs * [0.4, 1.0, 1.6]
-    parts = energy.Developable(batch(*designs), developable.Options()).parts(batch(*results))
+    parts = solver_energy.Developable(batch(*designs), developable.Options()).parts(batch(*results))
     for k, (design, result) in enumerate(zip(designs, results, strict=True)):
         last = last_stage(design)
         value = total(last.items, result.reshape(-1, 3))["elongation"]
@@ -81,7 +81,7 @@ def test_strain_energy_is_the_solvers(pair):
     designs, _ = pair
     rng = np.random.default_rng(1)
     flats = [rectangle(p) + 3e-3 * rng.standard_normal((*p.shape[:2], 2)) for p in designs]
-    strain = energy.Strain(batch(*designs), flatten.Options())
+    strain = solver_energy.Strain(batch(*designs), flatten.Options())
     values, levels = strain(batch(*flats)), strain.level(strain.residuals(batch(*flats)))
     for k, (design, flat) in enumerate(zip(designs, flats, strict=True)):
         mesh, level = Mesh.from_grid(design, weld=False), float(levels[k])
@@ -92,8 +92,8 @@ def test_strain_energy_is_the_solvers(pair):
 
 def test_losses_are_the_metrics(pair):
     designs, results = pair
-    gc, fair = losses.gc(batch(*results)), losses.fair(batch(*results))
-    compared = (losses.k_left, losses.d_h, losses.fair_ratio)
+    gc, fair = training_losses.gc(batch(*results)), training_losses.fair(batch(*results))
+    compared = (training_losses.k_left, training_losses.d_h, training_losses.fair_ratio)
     left, near, ratio = (f(batch(*results), batch(*designs)) for f in compared)
     for k, (design, result) in enumerate(zip(designs, results, strict=True)):
         was, is_left = (metrics.loss_gc_mean(x, scale=1.0) for x in (design, result))
@@ -111,25 +111,25 @@ def test_distances_are_to_the_nearest_vertex(steps):
     slid = np.roll(design, steps, axis=(0, 1))[2:-2, 2:-2]
     result = design.copy()
     result[2:-2, 2:-2] = slid + 1e-3
-    near = losses.d_h(batch(result), batch(design))
+    near = training_losses.d_h(batch(result), batch(design))
     assert float(near) == pytest.approx(metrics.d_H(design, result), rel=1e-12)
 
 
 def test_iso_and_the_metric():
     surface = saddle(9, 8)
     flat = rectangle(surface)
-    defect = losses.iso(batch(surface), batch(flat))
+    defect = training_losses.iso(batch(surface), batch(flat))
     by_hand = metrics.isometry_defect(surface, flat, scale=1.0)
     assert float(defect) <= (by_hand**2).mean() <= 3 * float(defect)
-    cell = float(losses.iso_cell(batch(surface), batch(flat)))
+    cell = float(training_losses.iso_cell(batch(surface), batch(flat)))
     assert cell == pytest.approx(metrics.loss_iso_cell(surface, flat, scale=1.0), rel=1e-12)
     bent = cylinder(9)
-    assert float(losses.iso(batch(bent), batch(bent))) == 0.0
+    assert float(training_losses.iso(batch(bent), batch(bent))) == 0.0
 
 
 def test_curvature_weights():
     surface = saddle(9, 8)
-    weights = losses.iso_weights(batch(surface))[0].numpy()
+    weights = training_losses.iso_weights(batch(surface))[0].numpy()
     assert weights.shape == (8, 7)
     assert weights.min() == pytest.approx(0.0, abs=1e-12) and weights.max() < 1.0
     k = np.abs(metrics.curvature_grid(surface))
@@ -144,9 +144,9 @@ def test_curvature_weights():
 
 def test_normals_and_rectangle_are_the_packages(pair):
     designs, _ = pair
-    p = grids.planes(batch(*designs))
-    normals = grids.points(grids.normals(p)).numpy()
-    flat = grids.rectangle(p).numpy()
+    p = grid_geometry.planes(batch(*designs))
+    normals = grid_geometry.points(grid_geometry.normals(p)).numpy()
+    flat = grid_geometry.rectangle(p).numpy()
     for k, design in enumerate(designs):
         expected = vertex_normals(Mesh.from_grid(design, weld=False)).reshape(design.shape)
         np.testing.assert_allclose(normals[k], expected, atol=1e-12)
@@ -157,8 +157,8 @@ def test_normals_and_rectangle_are_the_packages(pair):
 def test_degenerate_surfaces_have_finite_gradients():
     point = torch.zeros(1, 8, 8, 3, requires_grad=True)
     value = (
-        losses.gc(point).sum()
-        + energy.Strain(point.detach(), flatten.Options())(point[..., :2]).sum()
+        training_losses.gc(point).sum()
+        + solver_energy.Strain(point.detach(), flatten.Options())(point[..., :2]).sum()
     )
     value.backward()
     assert torch.isfinite(value) and torch.isfinite(point.grad).all()

@@ -26,17 +26,21 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("safetensors")
 
 from gso.net import GSONet, load, save, tasks, train  # noqa: E402
-from gso.net.models.grids import ball, normalise  # noqa: E402
-from gso.net.training import augment, checkpoint, losses  # noqa: E402
+from gso.net.models.grid_geometry import ball, normalise  # noqa: E402
+from gso.net.training import (  # noqa: E402
+    augment,
+    checkpoint,
+    training_losses,
+)
 from gso.net.training.config import FOLDER, TERMS, Config, Phase, from_dict, read  # noqa: E402
-from gso.net.training.curves import Curves  # noqa: E402
-from gso.net.training.curves import read as read_curves  # noqa: E402
 from gso.net.training.data import Batch, Source, fresh, noisy, open_source  # noqa: E402
+from gso.net.training.learning_rate import place  # noqa: E402
 from gso.net.training.muon import optimisers, orthogonal  # noqa: E402
-from gso.net.training.objective import _COSTS, Objective, aligned  # noqa: E402
+from gso.net.training.phase_objective import _COSTS, Objective, aligned  # noqa: E402
 from gso.net.training.processes import Processes  # noqa: E402
-from gso.net.training.run import begin  # noqa: E402
-from gso.net.training.schedule import place  # noqa: E402
+from gso.net.training.training_curves import Curves  # noqa: E402
+from gso.net.training.training_curves import read as read_curves  # noqa: E402
+from gso.net.training.training_run import begin  # noqa: E402
 from gso.net.training.validate import applied, mean_figures  # noqa: E402
 
 SMALL = {"kind": "coarse", "widths": [8, 8, 8], "depths": [0, 0, 1]}
@@ -198,7 +202,7 @@ def test_augmentation_keeps_what_it_should():
     assert torch.equal(2 * first, second)
     same = (first == surfaces).all(dim=(1, 2, 3)).float().mean()
     assert 0 < same < 0.4
-    assert torch.allclose(losses.fair(first), losses.fair(surfaces), rtol=1e-5)
+    assert torch.allclose(training_losses.fair(first), training_losses.fair(surfaces), rtol=1e-5)
     sheared, with_them = augment.shear([surfaces, 2 * surfaces], generator)
     assert torch.allclose(sheared.square().sum(-1).amax((1, 2)), torch.ones(40), atol=1e-5)
     assert not torch.allclose(sheared, surfaces, atol=0.1)

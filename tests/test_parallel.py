@@ -9,7 +9,7 @@ import pytest
 
 from gso.mesh import Mesh
 from gso.parallel import helpers, here
-from gso.tno.layout import strains_of
+from gso.pipeline.lay_flat import strains_of
 from tests.conftest import sphere_cap
 
 

@@ -16,9 +16,9 @@ from gso.mesh import Mesh
 from gso.mesh.paths import Paths
 from gso.mesh.separation import between
 from gso.seams import Path
-from gso.segmentation.loops import opening
-from gso.segmentation.potential import Potential
-from gso.segmentation.tree import Ground, cut_tree
+from gso.seams.disks import opening
+from gso.seams.potential import Potential
+from gso.seams.tree import Ground, cut_tree
 from tests.conftest import rotation, saddle, shuffled, sphere_cap
 from tests.test_seams import ball, cube
 
@@ -424,7 +424,7 @@ def test_a_closed_mesh_that_needs_no_cut_is_opened(darts):
 
 
 def test_a_sphere_is_opened_along_two_edges():
-    from gso.segmentation.loops import opening
+    from gso.seams.disks import opening
 
     mesh = ball(8)
     cut = gso.cut(mesh, opening(mesh))
@@ -437,8 +437,8 @@ def test_straight_seams_of_any_labels_can_be_cut(seed):
     from scipy.spatial import Delaunay
 
     from gso.seams import Edges
+    from gso.seams.compact_patches import patches
     from gso.seams.straightening import straight_seams
-    from gso.segmentation.patches import patches
 
     rng = np.random.default_rng(seed)
     n = int(rng.integers(30, 300))

@@ -14,9 +14,9 @@ import gso
 from gso import tasks
 from gso.constraints import Compiled
 from gso.mesh import Mesh
+from gso.pipeline.normalise import Canonical
+from gso.solver.problem import Problem
 from gso.tasks.base import Request
-from gso.tno.normalise import Canonical
-from gso.tno.solver.problem import Problem
 from gso.unknowns import free
 from tests.conftest import saddle
 

@@ -10,21 +10,21 @@ import pytest
 import gso
 from gso import faults, metrics, parametrization
 from gso.mesh import Mesh
-from gso.ruled import fit
+from gso.ruled import strip_fit
 from gso.ruled.chords import chords
 from gso.ruled.conditions import Conditions
 from gso.ruled.copies import copies, with_copies
 from gso.ruled.descent import planarised
+from gso.ruled.diagonal_gap import planarity
 from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
-from gso.ruled.folds import Folds
-from gso.ruled.layout import Strips
+from gso.ruled.fold_lines import Folds
 from gso.ruled.loft import loft
-from gso.ruled.measured import Weights
-from gso.ruled.planarity import planarity
 from gso.ruled.polygon import resampled
 from gso.ruled.prices import prices
 from gso.ruled.program import sequences
+from gso.ruled.strip_layout import Strips
+from gso.ruled.strip_weights import Weights
 from gso.ruled.system import System
 from tests.conftest import cylinder, rotation, saddle, shuffled
 
@@ -144,7 +144,7 @@ def test_gradient_of_the_energy_is_that_of_differences(power, conditions):
     strips, vertices = first.halved(there.points(places))
     lines = there.mesh.vertices[[[0, 288]]] + [0.0, 0.0, 0.1]
     wanted = Conditions(points=lines[0], lines=lines, radius=2.0) if conditions else Conditions()
-    job = fit.Job(Extended(there), there.lattice(200), conditions=wanted)
+    job = strip_fit.Job(Extended(there), there.lattice(200), conditions=wanted)
     energy = job.energy(strips, vertices)
     rng = np.random.default_rng(0)
     vertices = vertices + 1e-4 * rng.standard_normal(vertices.shape)

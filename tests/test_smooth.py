@@ -10,11 +10,11 @@ import pytest
 import shapely
 
 import gso
-from gso.ruled.layout import Strips
 from gso.ruled.smooth.curves import Curves, hermite
-from gso.ruled.smooth.fit import _places
 from gso.ruled.smooth.patches import patches
-from gso.ruled.smooth.surface import smooth_strips
+from gso.ruled.smooth.smooth_fit import _places
+from gso.ruled.smooth.smooth_surface import smooth_strips
+from gso.ruled.strip_layout import Strips
 from gso.ruled.untrimmed import Untrimmed
 from gso.spline import TrimmedSpline
 from tests.conftest import cylinder
@@ -178,7 +178,7 @@ def test_rhino_files_have_surfaces_and_outlines(solved, tmp_path):
 def test_surfaces_that_bend_sharply_are_written_as_planar_faces(solved, tmp_path, monkeypatch):
     pytest.importorskip("OCP")
     result = replace(solved)
-    monkeypatch.setattr("gso.ruled.smooth.surface.SmoothSurface.is_torsal", False)
+    monkeypatch.setattr("gso.ruled.smooth.smooth_surface.SmoothSurface.is_torsal", False)
     result.save(tmp_path / "a.step")
     assert "planar faces" in result.notes[-1]
     text = (tmp_path / "a.step").read_text(encoding="utf-8")

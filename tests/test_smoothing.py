@@ -6,8 +6,8 @@ from scipy.spatial import Delaunay
 
 from gso.errors import MeshError, OptionError
 from gso.smoothing import Smoothed, estimate_sigma, smooth_grid, smooth_mesh
-from gso.smoothing.grid import modes
-from gso.smoothing.patches import boundary_edges, neighbours, residuals, rings, umbrella
+from gso.smoothing.grid_smoothing import modes
+from gso.smoothing.local_fits import boundary_edges, neighbours, residuals, rings, umbrella
 from gso.smoothing.select import best_weight, factor, gcv
 from gso.smoothing.spectrum import CENTRE, Spectrum
 

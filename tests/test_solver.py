@@ -15,8 +15,8 @@ from gso.energy import Weighted, curvature, fairness, position, proximity
 from gso.energy.losses import Absolute, Distance
 from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
-from gso.tno.solver import METHODS, minimise
-from gso.tno.solver.problem import Problem
+from gso.solver import METHODS, minimise
+from gso.solver.problem import Problem
 from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets, spline_surface
 from tests.conftest import saddle
 
@@ -170,7 +170,7 @@ def test_held_coordinates_stay():
 
 
 def test_the_sorting_and_the_table_analysis_agree(monkeypatch):
-    from gso.tno.solver import ranking
+    from gso.solver import ranking
 
     rng = np.random.default_rng(3)
     columns = rng.integers(0, 40, 500) + rng.integers(0, 6, (4, 500))
@@ -208,7 +208,7 @@ def test_an_element_may_name_a_vertex_twice(held_ids):
 
 
 def test_a_problem_takes_over_the_sparsity_of_one_like_it(monkeypatch):
-    from gso.tno.solver import assembly as module
+    from gso.solver import assembly as module
 
     variables = unknowns()["normal"]
     first = Problem(items(), variables)

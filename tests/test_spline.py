@@ -16,13 +16,13 @@ import gso
 from gso import metrics
 from gso.cli import main
 from gso.energy import Weighted, congruence, fairness
-from gso.io.svg import MILLIMETRES
+from gso.io.flat_svg import MILLIMETRES
 from gso.mesh import Mesh
+from gso.solver import minimise
+from gso.solver.problem import Problem
 from gso.spline import BSplineSurface, clamped_knots
 from gso.spline.fit import fitting_controls, gap
 from gso.tasks.developable import Options
-from gso.tno.solver import minimise
-from gso.tno.solver.problem import Problem
 from gso.unknowns import Layout, spline_surface
 
 from .conftest import cylinder, rotation, saddle, shuffled, sphere_cap

@@ -15,9 +15,9 @@ from gso import metrics
 from gso.cli import main
 from gso.dataset import bezier
 from gso.mesh import Mesh
+from gso.pipeline.judgement import judged
+from gso.pipeline.lay_flat import largest_strain, lay_out
 from gso.status import Status
-from gso.tno.judged import judged
-from gso.tno.layout import largest_strain, lay_out
 from gso.verdict import Asked, headline, judge
 from tests.conftest import cylinder, saddle, shuffled
 

@@ -195,7 +195,7 @@ class TestAll:
     def test_unknown_suffixes_and_missing_packages_are_named(self, tmp_path, monkeypatch):
         with pytest.raises(OptionError, match=r"\.dwg"):
             writers.write(DRAWING, tmp_path / "a.dwg")
-        monkeypatch.setattr("gso.workshop.writers.checks.find_spec", lambda name: None)
+        monkeypatch.setattr("gso.workshop.writers.writer_checks.find_spec", lambda name: None)
         for suffix in ("dxf", "pdf"):
             with pytest.raises(GSOError, match="pip install"):
                 writers.write(DRAWING, tmp_path / f"a.{suffix}")

@@ -1,6 +1,6 @@
 """The package's objective in the form of other solvers: residuals with Jacobian, or expressions.
 
-All are built from the terms of a :class:`gso.tno.solver.problem.Problem`, so that the
+All are built from the terms of a :class:`gso.solver.problem.Problem`, so that the
 derivatives are the same to the last bit. Each loss is expressed by residuals, half of whose
 squared norm it is.
 """
@@ -16,10 +16,10 @@ from gso import tasks
 from gso.constraints import Compiled
 from gso.energy.losses import Absolute, Distance, Loss, Squared
 from gso.mesh import Mesh
+from gso.pipeline.normalise import Canonical
+from gso.solver.kernels import casadi_function
+from gso.solver.problem import Problem
 from gso.tasks.base import Request
-from gso.tno.normalise import Canonical
-from gso.tno.solver.kernels import casadi_function
-from gso.tno.solver.problem import Problem
 
 Array = NDArray[np.float64]
 

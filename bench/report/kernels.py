@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gso.tno.solver.loops import VARIABLE
+from gso.solver.loops import VARIABLE
 from report import store
 
 #: Values of the environment variable for the build without Numba, and for Numba on small meshes.

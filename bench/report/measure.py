@@ -23,7 +23,7 @@ import numpy as np
 import gso
 from gso import linalg
 from gso.dataset import bezier
-from gso.tno.solver import kernels, problem
+from gso.solver import kernels, problem
 
 #: Noise of the denoising task.
 SIGMA = 0.005

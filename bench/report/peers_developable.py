@@ -15,9 +15,9 @@ import numpy as np
 
 import gso
 from gso.mesh import Mesh
-from gso.tno.normalise import Canonical
-from gso.tno.solver import minimise
-from gso.tno.solver.problem import Problem
+from gso.pipeline.normalise import Canonical
+from gso.solver import minimise
+from gso.solver.problem import Problem
 from report import energy
 from report.energy import last_problem
 from report.method import Array, Method, Solved

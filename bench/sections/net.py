@@ -25,8 +25,8 @@ from gso.io import replacing
 from gso.net import catalogue, tasks, weights
 from gso.net.training import checkpoint
 from gso.net.training.config import from_dict
-from gso.net.training.curves import read
-from gso.net.training.run import CHECKPOINT
+from gso.net.training.training_curves import read
+from gso.net.training.training_run import CHECKPOINT
 
 OTHERS = (
     "enneper",

@@ -16,7 +16,7 @@ from report.peers_flatten import arap
 import gso
 from gso import metrics
 from gso.dataset import bezier
-from gso.tno.layout import strains_of
+from gso.pipeline.lay_flat import strains_of
 
 PRESETS = ("fast", "balanced", "accurate")
 PURE = "pure SciPy"

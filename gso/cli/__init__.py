@@ -7,10 +7,10 @@ from typing import Any
 import click
 
 from gso.cli.dataset import dataset
-from gso.cli.fabricate import fabricate
+from gso.cli.fabricate_command import fabricate
 from gso.cli.inspect import info, metrics, plot
-from gso.cli.optimize import optimize
-from gso.cli.pieces import pieces
+from gso.cli.optimize_command import optimize
+from gso.cli.pieces_command import pieces
 from gso.cli.train import train
 from gso.errors import GSOError
 

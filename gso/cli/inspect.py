@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gso.cli import files
+from gso.cli import file_options
 from gso.errors import GSOError, OptionError
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 @click.command(short_help="Compare two surfaces.")
 @click.argument("before", type=click.Path())
 @click.argument("after", type=click.Path())
-@files.weld
+@file_options.weld
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def metrics(before: str, after: str, weld: float | None, as_json: bool) -> None:
     """Print metrics of the surface AFTER, relative to the surface BEFORE.
@@ -28,7 +28,7 @@ def metrics(before: str, after: str, weld: float | None, as_json: bool) -> None:
 
     from gso.cli import report
 
-    design, result = files.load(before, weld), files.load(after, weld)
+    design, result = file_options.load(before, weld), file_options.load(after, weld)
     values, notes = _compare(design, result)
     if as_json:
         record = {"before": before, "after": after, "metrics": values, "notes": notes}
@@ -47,8 +47,8 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
 
     from gso import metrics as measure
     from gso.components import average
+    from gso.pipeline.lay_flat import strains_of
     from gso.tasks.evaluation import measured
-    from gso.tno.layout import strains_of
 
     flat = np.ptp(after.vertices[:, 2]) <= 1e-9 * after.diagonal
     values = {} if flat else strains_of(after)
@@ -70,7 +70,7 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
 
 @click.command(short_help="Say what a mesh file holds.")
 @click.argument("names", metavar="FILE...", nargs=-1, required=True, type=click.Path())
-@files.weld
+@file_options.weld
 def info(names: tuple[str, ...], weld: float | None) -> None:
     """Print properties of mesh files: size, connectivity, curvature.
 
@@ -81,7 +81,7 @@ def info(names: tuple[str, ...], weld: float | None) -> None:
     failed = False
     for number, file in enumerate(names):
         try:
-            rows = _facts(files.load(file, weld))
+            rows = _facts(file_options.load(file, weld))
         except GSOError as error:
             click.echo(f"gso: error: {' '.join(str(error).split())}", err=True)
             failed = True
@@ -179,8 +179,8 @@ def _point(point: Any) -> str:
     type=click.IntRange(min=1),
     help="Draw so many ruling lines instead, and the Gauss image: a curve if developable.",
 )
-@files.weld
-@files.force
+@file_options.weld
+@file_options.force
 def plot(
     file: str,
     out: str,
@@ -201,22 +201,24 @@ def plot(
 
     pictures.require()
     io.check_writable(out, pictures.SUFFIXES)
-    files.spare((file, before), [out], force)
+    file_options.spare((file, before), [out], force)
     if rulings is not None and colour is not None:
         raise OptionError("--rulings and --color cannot be drawn in one picture; give one of them")
     if before is None and colour is None and file.lower().endswith(".npz"):
         try:
             result = Result.load(file)
         except GSOError:
-            pass  # an .npz mesh, or a bad file: files.load reports that
+            pass  # an .npz mesh, or a bad file: file_options.load reports that
         else:
             if rulings is None:
                 pictures.plot_result(result, out)
             else:
                 pictures.plot_rulings(result.mesh, path=out, count=rulings, before=result.design)
             return
-    first = None if before is None else files.load(before, weld)
+    first = None if before is None else file_options.load(before, weld)
     if rulings is not None:
-        pictures.plot_rulings(files.load(file, weld), path=out, count=rulings, before=first)
+        pictures.plot_rulings(file_options.load(file, weld), path=out, count=rulings, before=first)
         return
-    pictures.plot_surface(files.load(file, weld), colour or "curvature", before=first, path=out)
+    pictures.plot_surface(
+        file_options.load(file, weld), colour or "curvature", before=first, path=out
+    )

@@ -2,10 +2,7 @@
 
 from gso.constraints.base import Constraint
 from gso.constraints.compiled import TIGHT, Compiled, compile_constraints, listed
-from gso.constraints.curve import OnCurve, SlidingBoundary
-from gso.constraints.glue import Glue
-from gso.constraints.linear import Reduction
-from gso.constraints.parts import (
+from gso.constraints.equations import (
     Lengths,
     OnLines,
     OnPlane,
@@ -15,10 +12,13 @@ from gso.constraints.parts import (
     Relations,
     Straight,
 )
+from gso.constraints.face_shape import FixedLengths, PlanarFaces
+from gso.constraints.glue import Glue
+from gso.constraints.linear import Reduction
+from gso.constraints.on_curve import OnCurve, SlidingBoundary
 from gso.constraints.positions import Fixed, FixedBoundary, Handle
 from gso.constraints.read import add, read_constraints
 from gso.constraints.ruling import Ruling
-from gso.constraints.shape import FixedLengths, PlanarFaces
 from gso.constraints.smooth import SmoothCurves
 from gso.constraints.symmetry import SymmetryPlane
 

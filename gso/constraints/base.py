@@ -14,7 +14,7 @@ from gso.spelling import KnownFields
 from gso.typing import Array, Ints
 
 if TYPE_CHECKING:
-    from gso.constraints.parts import Part
+    from gso.constraints.equations import Part
 
 
 class Constraint(KnownFields):

@@ -11,8 +11,8 @@ import numpy as np
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.conflicts import check
+from gso.constraints.equations import Part, Pins
 from gso.constraints.linear import Reduction, reduce
-from gso.constraints.parts import Part, Pins
 from gso.errors import OptionError
 from gso.hierarchy import Transfer
 from gso.mesh import Frame, Mesh

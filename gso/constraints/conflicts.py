@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gso.constraints.equations import Part
 from gso.constraints.linear import reduce
-from gso.constraints.parts import Part
 from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.typing import Ints

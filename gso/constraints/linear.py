@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gso.constraints.parts import OnPlane, Part, Pins, Relations
+from gso.constraints.equations import OnPlane, Part, Pins, Relations
 from gso.typing import Array, Ints
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
-from gso.constraints.parts import Part, Pins
+from gso.constraints.equations import Part, Pins
 
 
 @dataclass(frozen=True, eq=False)

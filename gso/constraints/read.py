@@ -8,11 +8,11 @@ from os import PathLike
 from typing import Any
 
 from gso.constraints.base import Constraint
-from gso.constraints.curve import OnCurve, SlidingBoundary
+from gso.constraints.face_shape import FixedLengths, PlanarFaces
 from gso.constraints.glue import Glue
+from gso.constraints.on_curve import OnCurve, SlidingBoundary
 from gso.constraints.positions import Fixed, FixedBoundary, Handle
 from gso.constraints.ruling import Ruling
-from gso.constraints.shape import FixedLengths, PlanarFaces
 from gso.constraints.smooth import SmoothCurves
 from gso.constraints.symmetry import SymmetryPlane
 from gso.errors import OptionError

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
-from gso.constraints.parts import Part, Straight
+from gso.constraints.equations import Part, Straight
 from gso.mesh.polyline import Polylines
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gso.constraints.base import Constraint, Subject
-from gso.constraints.parts import Part
+from gso.constraints.equations import Part
 from gso.energy import Weighted, smooth_curve
 from gso.mesh import Frame
 from gso.typing import Array, Ints

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
-from gso.constraints.parts import OnPlane, Part, Relations
+from gso.constraints.equations import OnPlane, Part, Relations
 from gso.typing import Array, Ints
 
 #: How far a mirrored vertex may be from its partner, relative to the mean edge length.

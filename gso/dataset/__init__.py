@@ -11,7 +11,7 @@ _NAMES = {
     "Recipe": "gso.dataset.recipe",
     "Split": "gso.dataset.store",
     "build": "gso.dataset.builder",
-    "export": "gso.dataset.folder",
+    "export": "gso.dataset.npy_folder",
     "open": "gso.dataset.store",
 }
 

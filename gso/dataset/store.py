@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.dataset import folder, hdf, manifest, noise
+from gso.dataset import hdf, manifest, noise, npy_folder
 from gso.dataset.lazy import LazyArray, Part
 from gso.dataset.screen import FEATURES, features
 from gso.errors import DatasetError
@@ -79,7 +79,7 @@ class Split:
             if surface.shape[-1] != 3:
                 raise DatasetError(f"split {self.name!r} has flat images, and no surfaces")
             blocks = (surface[k : k + _BLOCK] for k in range(0, len(self), _BLOCK))
-            table = np.concatenate([features(folder.unit(b)) for b in blocks])
+            table = np.concatenate([features(npy_folder.unit(b)) for b in blocks])
         return dict(zip(FEATURES, table.T, strict=True))
 
     @property
@@ -121,7 +121,7 @@ class Dataset(Mapping[str, Split]):
         self.path = Path(path)
         if record is None and not (self.path / manifest.NAME).exists():
             self.manifest: dict[str, Any] = {}
-            found = folder.splits(self.path)
+            found = npy_folder.splits(self.path)
             self._splits = {
                 name: Split(name, len(files), partial(_files, files))
                 for name, files in found.items()
@@ -204,8 +204,8 @@ def open(path: str | PathLike[str]) -> Dataset:
 
 def _files(files: list[Path]) -> dict[str, LazyArray]:
     """Return the surfaces of .npy files as one lazy array."""
-    shape = folder.load(files[0]).shape
-    parts = [Part(1, partial(folder.rows, path, shape)) for path in files]
+    shape = npy_folder.load(files[0]).shape
+    parts = [Part(1, partial(npy_folder.rows, path, shape)) for path in files]
     return {"surface": LazyArray(parts, shape, np.dtype(float))}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.faults.candidates import DEPTH, by_triangles, candidates, split
+from gso.faults.face_pairs import DEPTH, by_triangles, candidates, split
 from gso.mesh import Mesh
 from gso.typing import Array, Ints
 

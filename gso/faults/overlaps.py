@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import geometry
-from gso.faults.candidates import DEPTH, by_triangles, candidates, split
+from gso.faults.face_pairs import DEPTH, by_triangles, candidates, split
 from gso.mesh import Mesh
 from gso.mesh.topology import are_quads
 from gso.typing import Array, Ints

@@ -7,6 +7,13 @@ solver residuals, training losses and metrics always agree. Only :mod:`gso.geome
 :mod:`gso.geometry.triangle` and :mod:`gso.geometry.rigid` take NumPy arrays of points.
 """
 
+from gso.geometry.angle_defect import (
+    GRID_RINGS,
+    gaussian_curvature,
+    grid_curvature,
+    grid_star,
+    star_area,
+)
 from gso.geometry.cells import (
     corner_area2,
     diagonal_distance,
@@ -14,17 +21,10 @@ from gso.geometry.cells import (
     face_products,
     isometry_defect,
 )
-from gso.geometry.curvature import (
-    GRID_RINGS,
-    gaussian_curvature,
-    grid_curvature,
-    grid_star,
-    star_area,
-)
 from gso.geometry.differences import second_difference
 from gso.geometry.parametric import smooth_gaussian_curvature
 from gso.geometry.rigid import closest_motion
-from gso.geometry.shape import (
+from gso.geometry.shape_operator import (
     Matrix,
     determinant,
     eigen,

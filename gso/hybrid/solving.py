@@ -17,17 +17,18 @@ from gso import cluster, parametrization, tasks
 from gso.components import Component, several
 from gso.constraints import Compiled, compile_constraints, listed
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
-from gso.hybrid.prediction import Prediction, predictions
 from gso.hybrid.time_model import net_saves_time
+from gso.hybrid.warm_start import Prediction, predictions
 from gso.mesh import Mesh
 from gso.pattern import Pattern
+from gso.pipeline import component_solves
+from gso.pipeline.job import Job
+from gso.pipeline.normalise import Canonical
 from gso.result import Result
 from gso.spelling import known_keywords
 from gso.status import Status
-from gso.tno import Start, check, components, optimize
-from gso.tno.batch import Item
-from gso.tno.job import Job
-from gso.tno.normalise import Canonical
+from gso.tno import Start, check, optimize
+from gso.tno.optimize_many import Item
 from gso.typing import Array
 
 #: Surfaces that are read and predicted together.
@@ -184,7 +185,7 @@ def _pieces(design: Mesh, task: str, sparing: bool, keywords: dict[str, Any]) ->
         return []
     flat = getattr(tasks.get(task), "BLOCK", "surface") == "flat"
     compiled = compile_constraints(keywords["constraints"], design, flat=flat)
-    pieces = components.parts(design, compiled)
+    pieces = component_solves.parts(design, compiled)
     if sparing and not any(net_saves_time(piece.mesh, task, keywords) for piece in pieces):
         return []
     keywords["constraints"] = compiled
@@ -202,7 +203,7 @@ def _each(design: Mesh, pieces: list[Component], task: str, keywords: dict[str, 
     whole = Job(design, compiled, Start(None))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
-        result = components.solve(one, whole, pieces, callback, workers=0)
+        result = component_solves.solve(one, whole, pieces, callback, workers=0)
     if not result.converged and result.status is not Status.MAX_ITERATIONS:
         warnings.warn(str(result.status), ConvergenceWarning, stacklevel=4)
     return result

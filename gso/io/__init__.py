@@ -23,11 +23,11 @@ from gso.errors import MeshError, OptionError
 from gso.io.atomic import check_writable, replacing
 from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_faces, save_patches, save_spline
 from gso.io.convert import Unwelded, as_mesh
+from gso.io.flat_svg import save_flat
 from gso.io.lines import save_lines
+from gso.io.raw_surface import checked as checked_weld
+from gso.io.raw_surface import welded
 from gso.io.source import read_bytes
-from gso.io.surface import checked as checked_weld
-from gso.io.surface import welded
-from gso.io.svg import save_flat
 from gso.mesh import Mesh
 from gso.spelling import known_keywords
 
@@ -91,7 +91,7 @@ def add_format(suffix: str, module: ModuleType) -> None:
         Such as ".msh".
     module : module
         With ``read(data)``, which returns an object whose ``mesh(weld)`` makes the mesh, and
-        ``write(mesh, file)``; see :class:`gso.io.surface.Surface`.
+        ``write(mesh, file)``; see :class:`gso.io.raw_surface.Surface`.
 
     Raises
     ------

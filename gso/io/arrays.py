@@ -13,7 +13,7 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 
 from gso.errors import MeshError
-from gso.io.surface import Surface
+from gso.io.raw_surface import Surface
 from gso.mesh import Mesh
 from gso.mesh.attributes import Attributes
 

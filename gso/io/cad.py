@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from gso.errors import GSOError, MeshError, OptionError
 from gso.io.atomic import check_writable, replacing
-from gso.io.svg import MILLIMETRES
+from gso.io.flat_svg import MILLIMETRES
 from gso.mesh import Mesh
 from gso.spelling import choices
 from gso.spline import BSplineSurface, TrimmedSpline

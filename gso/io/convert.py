@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gso.errors import MeshError
-from gso.io.surface import Surface, welded
+from gso.io.raw_surface import Surface, welded
 from gso.mesh import Mesh
 
 

@@ -9,8 +9,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from gso.errors import MeshError
+from gso.io.raw_surface import Surface, merged
 from gso.io.source import doubles
-from gso.io.surface import Surface, merged
 from gso.mesh import Mesh
 
 _HEAD = 20

@@ -7,8 +7,8 @@ from typing import BinaryIO
 import numpy as np
 
 from gso.errors import MeshError
+from gso.io.raw_surface import Surface
 from gso.io.source import Array, Ints, face_corners, ranges
-from gso.io.surface import Surface
 from gso.io.text import Words, write_rows
 from gso.mesh import Mesh
 from gso.mesh.attributes import LABELS, Attributes, Labels

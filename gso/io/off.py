@@ -9,8 +9,8 @@ from typing import BinaryIO, NamedTuple, NoReturn
 import numpy as np
 
 from gso.errors import MeshError
+from gso.io.raw_surface import Surface
 from gso.io.source import Ints, face_table, ranges
-from gso.io.surface import Surface
 from gso.io.text import Words, write_rows
 from gso.mesh import Mesh
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gso.errors import MeshError
-from gso.io.svg import MILLIMETRES
+from gso.io.flat_svg import MILLIMETRES
 from gso.mesh import Mesh
 from gso.spline import BSplineSurface, TrimmedSpline
 from gso.spline.trimmed import Loop

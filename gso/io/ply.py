@@ -9,8 +9,8 @@ from typing import BinaryIO
 import numpy as np
 
 from gso.errors import MeshError
+from gso.io.raw_surface import Surface
 from gso.io.source import Array, Ints, doubles, face_table, ranges
-from gso.io.surface import Surface
 from gso.io.text import Words
 from gso.mesh import Mesh
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from gso import geometry
 from gso.errors import MeshError
+from gso.io.raw_surface import Surface, merged
 from gso.io.source import doubles
-from gso.io.surface import Surface, merged
 from gso.io.text import Words
 from gso.mesh import Mesh
 

@@ -14,7 +14,15 @@ import warnings
 from typing import Any
 
 from gso.metrics.areas import area, area_error, corner_areas, flipped_cells, flipped_faces, flips
-from gso.metrics.curvature import (
+from gso.metrics.distance import (
+    Distances,
+    boundary_distance,
+    d_H,
+    displacement,
+    point_to_surface,
+    surface_distance,
+)
+from gso.metrics.gaussian_curvature import (
     K_A_r,
     K_A_r_worst,
     curvature,
@@ -27,19 +35,10 @@ from gso.metrics.curvature import (
     mean_abs_K,
     worst_curvature,
 )
-from gso.metrics.distance import (
-    Distances,
-    boundary_distance,
-    d_H,
-    displacement,
-    point_to_surface,
-    surface_distance,
-)
-from gso.metrics.fairness import edge_ratios, fairness, fairness_ratio, loop_ratios, nonplanarity
 from gso.metrics.info import INFO, Info
-from gso.metrics.isometry import edge_length_error, isometry_defect, isometry_energy, loss_iso_cell
-from gso.metrics.normals import dihedral_angles, face_normals, normal_angle
-from gso.metrics.strain import (
+from gso.metrics.lengths import edge_length_error, isometry_defect, isometry_energy, loss_iso_cell
+from gso.metrics.normal_angles import dihedral_angles, face_normals, normal_angle
+from gso.metrics.principal_strain import (
     Strains,
     corner_strains,
     face_strains,
@@ -49,6 +48,7 @@ from gso.metrics.strain import (
     strains,
     stretches,
 )
+from gso.metrics.roughness import edge_ratios, fairness, fairness_ratio, loop_ratios, nonplanarity
 from gso.metrics.surfaces import components, unit
 
 __all__ = [

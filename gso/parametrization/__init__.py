@@ -3,10 +3,10 @@
 from gso.parametrization.alignment import align, settle
 from gso.parametrization.arap import Relaxed, relax, strain_level
 from gso.parametrization.embedding import embed, embeddings, flattens, parts, spanned
-from gso.parametrization.grid import rectangle
 from gso.parametrization.initial import begin, flips, given, oriented_triangles, refine, strain
 from gso.parametrization.opening import Opened, by_rows, opened, turning
 from gso.parametrization.packing import beside, closest_motion, place, upright
+from gso.parametrization.rectangle import rectangle
 
 __all__ = [
     "Opened",

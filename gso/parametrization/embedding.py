@@ -116,14 +116,14 @@ def _check(mesh: Mesh, name: int) -> None:
     if loops == 0:
         raise MeshError(
             f"{where} is closed: it has no boundary to lay it out by; cut it open along edges "
-            "(gso.mesh.cutting.cut), or delete a face"
+            "(gso.mesh.cut.cut), or delete a face"
         )
     handles = (2 - loops - mesh.euler_characteristic) // 2
     if handles > 0:
         raise MeshError(
             f"{where} has {handles} handle{'s' if handles > 1 else ''} (Euler characteristic "
             f"{mesh.euler_characteristic}, {loops} boundary loop{'s' if loops > 1 else ''}), which "
-            "do not unroll into the plane; cut it open into disks (gso.mesh.cutting.cut)"
+            "do not unroll into the plane; cut it open into disks (gso.mesh.cut.cut)"
         )
 
 

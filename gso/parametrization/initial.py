@@ -14,7 +14,7 @@ from gso.mesh import Mesh
 from gso.mesh.topology import corner_triangles
 from gso.parametrization.arap import Relaxed, relax, strain_level
 from gso.parametrization.embedding import embeddings
-from gso.parametrization.grid import rectangle
+from gso.parametrization.rectangle import rectangle
 from gso.typing import Array, Ints
 
 #: Largest side of a grid whose image starts from a rectangle.

@@ -9,7 +9,7 @@ import numpy as np
 from gso import geometry
 from gso.faults import overlaps
 from gso.mesh import Mesh
-from gso.mesh.cutting import Cut, cut, joining
+from gso.mesh.cut import Cut, cut, joining
 from gso.parametrization.embedding import parts
 from gso.parametrization.initial import DOUBTFUL, begin
 from gso.typing import Array, Ints

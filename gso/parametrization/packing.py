@@ -7,7 +7,7 @@ import numpy as np
 from gso import geometry
 from gso.mesh import Mesh
 from gso.parametrization.embedding import parts
-from gso.parametrization.grid import rectangle
+from gso.parametrization.rectangle import rectangle
 from gso.typing import Array
 
 #: Ratio of the principal variances above which an image has a long axis.

@@ -25,12 +25,12 @@ from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.plot.draw import GRAZING, SUFFIXES, Panel, draw, facing, write
 from gso.plot.heat import curvatures, distance, numbers, scales, strain, stretch
-from gso.plot.pieces import pieces
+from gso.plot.piece_panels import pieces
 from gso.plot.rulings import gauss, ruled
 from gso.plot.strips import strips
 from gso.plot.view import View
 from gso.result import Result
-from gso.segmentation import Segmentation
+from gso.seams import Segmentation
 from gso.spelling import choices, known_keywords
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import numpy as np
 from gso.mesh import Mesh
 from gso.plot.draw import GRAZING, Panel, facing
 from gso.plot.view import View
-from gso.ruled.surface import RuledSurface
+from gso.ruled.ruled_surface import RuledSurface
 from gso.typing import Array
 
 #: Colours of neighbouring strips, and of flat regions.

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.cut_pieces import Pieces
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.attributes import Attributes
-from gso.mesh.cutting import Cut
+from gso.mesh.cut import Cut
 from gso.pattern import Pattern
 from gso.result.result import Result
-from gso.seams.pieces import Pieces
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
 from gso.typing import Array
@@ -111,7 +111,7 @@ def read(path: str | PathLike[str]) -> Result:
     """Read a result; see :meth:`gso.Result.load`."""
     from gso.io.arrays import read_arrays
     from gso.io.source import read_bytes
-    from gso.ruled.surface import RuledSurface
+    from gso.ruled.ruled_surface import RuledSurface
 
     try:
         data = read_arrays(read_bytes(path))

@@ -20,9 +20,9 @@ from gso.status import Progress, Status
 from gso.typing import Array
 
 if TYPE_CHECKING:
-    from gso.ruled.folds import Folds
-    from gso.ruled.surface import RuledSurface
-    from gso.seams.pieces import Pieces
+    from gso.cut_pieces import Pieces
+    from gso.ruled.fold_lines import Folds
+    from gso.ruled.ruled_surface import RuledSurface
 
 #: Largest distance of smooth strips from planar faces, relative to the diagonal, up to which they
 #: are written in their place.
@@ -259,7 +259,7 @@ class Result:
     def _save_strips(self, ruled: RuledSurface, path: str | PathLike[str], unit: str) -> None:
         """Write a ruled surface to a CAD file."""
         from gso import io
-        from gso.ruled.smooth.surface import smooth_strips
+        from gso.ruled.smooth.smooth_surface import smooth_strips
 
         io.check_spline(path, unit)
         if ruled.untrimmed is None:

@@ -2,9 +2,9 @@
 
 A design is a function on its flat image (:mod:`~gso.ruled.domain`), continued beyond its outline
 (:mod:`~gso.ruled.extended`). First rulings are chords of the flat image
-(:mod:`~gso.ruled.chords`). The solve (:mod:`~gso.ruled.fit`) minimises an energy
-(:mod:`~gso.ruled.energy`) of the strips (:mod:`~gso.ruled.layout`), which are then cut along the
-outline (:mod:`~gso.ruled.trim`) and unrolled (:mod:`~gso.ruled.unroll`). Constraints are
+(:mod:`~gso.ruled.chords`). The solve (:mod:`~gso.ruled.strip_fit`) minimises an energy
+(:mod:`~gso.ruled.strip_energy`) of the strips (:mod:`~gso.ruled.strip_layout`), which are then cut
+along the outline (:mod:`~gso.ruled.trim`) and unrolled (:mod:`~gso.ruled.unroll`). Constraints are
 :mod:`~gso.ruled.conditions` on the strips. :mod:`gso.ruled.smooth` makes smooth strips of them.
 :func:`gso.ruled.solve.solve` does all of it; formulation "ruled" of the developable task calls it.
 """

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from gso.ruled.domain import Domain
-from gso.ruled.layout import Strips
 from gso.ruled.polygon import corners, on, resampled
 from gso.ruled.prices import along, prices
 from gso.ruled.program import Branch, sequences
+from gso.ruled.strip_layout import Strips
 from gso.typing import Array, Flags, Ints
 
 #: Points on the outline.

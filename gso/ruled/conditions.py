@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gso.ruled.layout import Strips
-from gso.ruled.mirror import Mirror
+from gso.ruled.strip_layout import Strips
+from gso.ruled.strip_mirror import Mirror
 from gso.ruled.vectors import lengths, unit
 from gso.typing import Array, Ints
 

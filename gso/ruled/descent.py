@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gso.ruled.energy import Energy
-from gso.ruled.measured import Measured, Weights
-from gso.ruled.planarity import planarity
+from gso.ruled.diagonal_gap import planarity
+from gso.ruled.strip_energy import Energy
+from gso.ruled.strip_weights import Measured, Weights
 from gso.ruled.system import System
 from gso.typing import Array
 

@@ -9,11 +9,11 @@ from gso.errors import MeshError, OptionError
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.ruled.descent import planarised
-from gso.ruled.folds import folds
-from gso.ruled.layout import Strips
-from gso.ruled.planarity import planarity
+from gso.ruled.diagonal_gap import planarity
+from gso.ruled.fold_lines import folds
+from gso.ruled.ruled_surface import RuledSurface
 from gso.ruled.sheet import unrolled_pattern
-from gso.ruled.surface import RuledSurface
+from gso.ruled.strip_layout import Strips
 from gso.ruled.system import System
 from gso.ruled.unroll import Unrolled
 from gso.ruled.untrimmed import Untrimmed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.ruled.layout import Strips
+from gso.ruled.strip_layout import Strips
 from gso.typing import Array, Ints
 
 #: Barycentric coordinates below this are on the opposite edge; nodes on an edge that are closer

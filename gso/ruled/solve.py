@@ -13,8 +13,8 @@ from gso.ruled.conditions import Conditions
 from gso.ruled.descent import Stopped, Tell
 from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
-from gso.ruled.fit import Fit, Job, evened, halved, refined, single
-from gso.ruled.surface import RuledSurface, built
+from gso.ruled.ruled_surface import RuledSurface, built
+from gso.ruled.strip_fit import Fit, Job, evened, halved, refined, single
 from gso.typing import Array, Ints
 
 #: Points of the design in the solve for one strip and for several.

@@ -11,7 +11,7 @@ from scipy.linalg import get_lapack_funcs
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from gso.ruled.layout import Strips
+from gso.ruled.strip_layout import Strips
 from gso.typing import Array, Ints
 
 #: Entry, relative to the largest, that keeps dependent constraints solvable.

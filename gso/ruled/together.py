@@ -11,8 +11,8 @@ from gso.mesh import Mesh
 from gso.mesh.validation import have_area
 from gso.parametrization import beside
 from gso.pattern import Pattern
-from gso.ruled.folds import Folds
-from gso.ruled.surface import RuledSurface
+from gso.ruled.fold_lines import Folds
+from gso.ruled.ruled_surface import RuledSurface
 from gso.typing import Array, Ints
 
 

@@ -1,7 +1,7 @@
 """Strips cut along the outline of the design.
 
 The outline and the holes of the design are projected to the strips, and the faces are clipped
-with them in the parameters of :mod:`gso.ruled.embedding`.
+with them in the parameters of :mod:`gso.ruled.strip_embedding`.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ import numpy as np
 
 from gso.mesh.closest_point import Nearest
 from gso.ruled.division import Trimmed, meshed
-from gso.ruled.embedding import plane
 from gso.ruled.extended import Extended
-from gso.ruled.layout import Strips
 from gso.ruled.nodes import Nodes
+from gso.ruled.strip_embedding import plane
+from gso.ruled.strip_layout import Strips
 from gso.ruled.unroll import Unrolled
 from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Ints

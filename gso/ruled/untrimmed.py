@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gso.ruled.layout import Strips
+from gso.ruled.strip_layout import Strips
 from gso.typing import Array, Ints
 
 

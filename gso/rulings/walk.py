@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from gso import geometry
 from gso.mesh import Mesh, topology
-from gso.rulings.normals import gauss_image
-from gso.rulings.shape import face_matrices
+from gso.rulings.face_curvature import face_matrices
+from gso.rulings.gauss_image import gauss_image
 from gso.typing import Array, Ints
 
 #: Cosine of the largest turn between two triangles, 60 degrees; at larger turns a line ends.

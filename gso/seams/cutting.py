@@ -7,12 +7,12 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gso.cut_pieces import Pieces
 from gso.errors import OptionError
 from gso.io import as_mesh
 from gso.mesh import Mesh
-from gso.mesh.cutting import cut as cut_open
+from gso.mesh.cut import cut as cut_open
 from gso.seams.kinds import Edges, Seam
-from gso.seams.pieces import Pieces
 from gso.seams.slicing import followed
 
 

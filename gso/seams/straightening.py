@@ -6,10 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from gso.cut_pieces import Pieces
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
 from gso.seams.chains import chains
-from gso.seams.pieces import Pieces
 from gso.seams.slicing import divided
 from gso.seams.walking import Walker
 from gso.typing import Array, Ints

@@ -6,8 +6,8 @@
 """
 
 from gso.smoothing.base import Smoothed
-from gso.smoothing.grid import smooth_grid
-from gso.smoothing.mesh import smooth_mesh
-from gso.smoothing.noise import estimate_sigma
+from gso.smoothing.grid_smoothing import smooth_grid
+from gso.smoothing.mesh_smoothing import smooth_mesh
+from gso.smoothing.noise_level import estimate_sigma
 
 __all__ = ["Smoothed", "estimate_sigma", "smooth_grid", "smooth_mesh"]

@@ -1,7 +1,7 @@
 """Remove noise from grids with creases: folded paper, roofs, mitred sheets.
 
-The squared penalties of :mod:`gso.smoothing.grid` round creases off and cause ripples beside
-them. Here each second difference is split into a *kink* z, whose length is penalised, and a
+The squared penalties of :mod:`gso.smoothing.grid_smoothing` round creases off and cause ripples
+beside them. Here each second difference is split into a *kink* z, whose length is penalised, and a
 *bend* w, whose change along its grid line is penalised: a second-order relative of total
 generalised variation (Bredies, Kunisch and Pock 2010),
 
@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 
 from gso.smoothing.base import Smoothed, checked_options, to_unit
-from gso.smoothing.grid import estimate
+from gso.smoothing.grid_smoothing import estimate
 from gso.typing import Array
 
 ORDERS = (2, 3)
@@ -54,7 +54,7 @@ def smooth_creased_grid(
     Returns
     -------
     Smoothed
-        `sigma` is that of :func:`gso.smoothing.grid.smooth_grid`; `dof` is estimated with
+        `sigma` is that of :func:`gso.smoothing.grid_smoothing.smooth_grid`; `dof` is estimated with
         a random probe.
 
     Notes

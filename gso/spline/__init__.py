@@ -1,6 +1,6 @@
 """B-spline surfaces, whole and trimmed."""
 
-from gso.spline.surface import BSplineSurface, Gap, basis, basis_matrix, clamped_knots
+from gso.spline.bspline import BSplineSurface, Gap, basis, basis_matrix, clamped_knots
 from gso.spline.trimmed import TrimmedSpline
 
 __all__ = ["BSplineSurface", "Gap", "TrimmedSpline", "basis", "basis_matrix", "clamped_knots"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gso.spline.surface import BSplineSurface
+from gso.spline.bspline import BSplineSurface
 from gso.typing import Array
 
 #: A closed chain of smooth curves, each given by points (k, 2) in the parameters of a spline.

@@ -12,7 +12,7 @@ from gso.constraints import Compiled
 from gso.energy import Limit, Weighted
 from gso.energy.losses import Loss
 from gso.mesh import Mesh
-from gso.mesh.cutting import Cut
+from gso.mesh.cut import Cut
 from gso.pattern import Pattern
 from gso.status import Progress, Status
 from gso.tasks.imposed import Imposed
@@ -21,7 +21,7 @@ from gso.typing import Array
 from gso.unknowns import Layout, Variables
 
 if TYPE_CHECKING:
-    from gso.ruled.surface import RuledSurface
+    from gso.ruled.ruled_surface import RuledSurface
 
 
 def same(coordinates: Array) -> Array:

@@ -2,16 +2,16 @@
 
 from typing import Any
 
-from gso.tno.batch import optimize_many
+from gso.pipeline.start import Start
 from gso.tno.optimize import check, optimize
+from gso.tno.optimize_many import optimize_many
 from gso.tno.session import Session
-from gso.tno.start import Start
 
 #: The names in :data:`_BATCHED` are not among them, as they need PyTorch.
 __all__ = ["Session", "Start", "check", "optimize", "optimize_many"]
 
 #: Names that are imported on first use, and their modules.
-_BATCHED = {"optimize_batch": "optimize", "BatchWorkers": "workers"}
+_BATCHED = {"optimize_batch": "optimize_batch", "BatchWorkers": "workers"}
 
 
 def __getattr__(name: str) -> Any:

@@ -1,36 +1,23 @@
-"""The solve of a mesh: normalise, plan, solve the stages, return to the user's frame."""
+"""The public solve of one design."""
 
 from __future__ import annotations
 
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from types import ModuleType
 from typing import Any
 
-import numpy as np
-
-from gso import linalg, tasks
-from gso.components import several
-from gso.constraints import Constraint, compile_constraints
-from gso.errors import ConvergenceWarning, MeshError, OptionError
-from gso.mesh import Mesh
+from gso.constraints import Constraint
+from gso.cut_pieces import Pieces
+from gso.errors import ConvergenceWarning
+from gso.pipeline.judgement import warning
+from gso.pipeline.solve import Asked, check, solve_mesh
+from gso.pipeline.start import Start
 from gso.result import Result
-from gso.seams import Pieces
+from gso.seams import joint_solve, strips_of_pieces
+from gso.solver import Callback
 from gso.spelling import known_keywords
-from gso.tasks.base import Options, Request
-from gso.tno import components, joint, joint_bounds, ruled_pieces
-from gso.tno.job import Job
-from gso.tno.judged import judged, requirements, warning
-from gso.tno.layout import lay_out
-from gso.tno.normalise import Canonical
-from gso.tno.packed import packed, record_violations
-from gso.tno.run import Run
-from gso.tno.solver import Callback
-from gso.tno.start import Start
-from gso.verdict import Asked as Requirements
+from gso.tasks.base import Options
 
 
 @known_keywords()
@@ -137,183 +124,17 @@ def optimize(
     if given.iterations is not None and asked.bounded:
         module.check_iterations(bounds)
     if isinstance(mesh, Pieces) and chosen == "ruled":
-        ask = ruled_pieces.Ask(settings, max_deviation, verdict)
-        result = ruled_pieces.solved(mesh, ask, constraints, given, callback, optimize)
+        ask = strips_of_pieces.Ask(settings, max_deviation, verdict)
+        result = strips_of_pieces.solved(mesh, ask, constraints, given, callback, optimize)
     elif isinstance(mesh, Pieces):
-        result = _in_pieces(mesh, asked, constraints, given, callback)
+        result = joint_solve.solve_pieces(mesh, asked, constraints, given, callback)
     else:
         from gso.io import as_mesh
 
         design = as_mesh(mesh)
         design.check_joined()
-        result = _one_mesh(asked, callback, design, constraints, given)
+        result = solve_mesh(asked, callback, design, constraints, given)
     result.seconds["total"] = time.perf_counter() - clock
     if said := warning(result):
         warnings.warn(said, ConvergenceWarning, stacklevel=3)
     return result
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What the user asked for, with checked options.
-
-    Attributes
-    ----------
-    task, formulation, options
-        As for :func:`optimize`.
-    bounds : dict
-        Bounds on the result by name, in the user's unit; None where there is none.
-    formulation_given : bool
-        Whether the user named the formulation.
-    verdict : bool
-        Whether to judge the result.
-    """
-
-    task: str
-    formulation: str
-    options: Options
-    bounds: dict[str, float | None]
-    formulation_given: bool
-    verdict: bool
-
-    @property
-    def bounded(self) -> bool:
-        """Whether there is any bound."""
-        return any(value is not None for value in self.bounds.values())
-
-
-def _in_pieces(
-    pieces: Pieces,
-    asked: Asked,
-    constraints: Sequence[Constraint],
-    start: Start,
-    callback: Callback | None,
-) -> Result:
-    """Solve a design in pieces, within a distance of it where one is given."""
-
-    def solve(what: Asked) -> Result:
-        one = partial(_one_mesh, what, callback)
-        return joint.solved(pieces, what.task, constraints, start, one)
-
-    allowed = asked.bounds["max_deviation"]
-    if allowed is None:
-        return solve(asked)
-    bounds = {**asked.bounds, "max_deviation": None}
-    free = replace(asked, bounds=bounds, verdict=False)
-    result = solve(free) if free.bounded else None
-    # A bound on strain or curvature is met with the least displacement, which may be too much.
-    if result is None or joint_bounds.deviation(pieces, result) > allowed:
-        free = replace(free, bounds=dict.fromkeys(bounds))
-        result = joint_bounds.within(
-            pieces, allowed, asked.options, lambda options: solve(replace(free, options=options))
-        )
-    if asked.verdict:
-        limits: dict[str, Any] = dict(asked.bounds)
-        result = judged(result, Requirements(**limits))
-    return result
-
-
-def _one_mesh(
-    asked: Asked,
-    callback: Callback | None,
-    design: Mesh,
-    constraints: Sequence[Constraint],
-    start: Start,
-) -> Result:
-    """Solve a mesh: each of its components that no constraint joins to others on its own."""
-    flat = getattr(tasks.get(asked.task), "BLOCK", "surface") == "flat"
-    whole = Job(design, compile_constraints(constraints, design, flat=flat), start)
-    one = partial(_solved, asked)
-    parts = components.parts(design, whole.constraints)
-    if parts and asked.formulation == "ruled":
-        raise MeshError(
-            f"the formulation 'ruled' takes one surface, and this mesh has {len(parts)} "
-            "components: solve each on its own"
-        )
-    if parts:
-        return components.solve(one, whole, parts, callback)
-    return one(whole, callback)
-
-
-def _solved(asked: Asked, job: Job, callback: Callback | None) -> Result:
-    """Solve one job: a single component, or several that constraints join."""
-    module, given = tasks.get(asked.task), job.start
-    frame = Canonical(job.design, job.names)
-    unit = frame.frame.scale
-    flat = job.constraints.flat
-    compiled = frame.constraints(job.constraints, flat=flat)
-    analysis = tasks.analyse(module, frame.mesh, compiled)
-    run = Run(
-        module,
-        analysis,
-        callback,
-        guarded=given.guarded,
-        budget=given.iterations,
-        tolerance=given.tolerance,
-        lay_out=lay_out,
-    )
-    options = asked.options.in_unit(unit)
-    request = Request(options, asked.formulation, frame.start(given.points, flat=flat))
-    if asked.bounded:
-        solution, formulation = module.search(
-            run, request, asked.bounds, unit, others=not asked.formulation_given
-        )
-    else:
-        if not run.usable_start(request):
-            request = replace(request, start=None)
-        solution, formulation = run(request), asked.formulation
-    record_violations(compiled, frame, solution)
-    result = packed(asked.task, formulation, job.design, frame, solution, run)
-    if several(job.design):
-        result.notes += ("its components are joined by constraints and solved together",)
-    if run.start_refused:
-        result.notes += (f"the start ({given.source}) was not used: {run.start_refused}",)
-    elif given.points is not None:
-        result.warm_start = given.source
-    if asked.verdict:
-        result = judged(result, requirements(frame.mesh, compiled, unit, **asked.bounds))
-    return result
-
-
-def check(
-    task: str,
-    formulation: str | None = None,
-    options: Any = None,
-    max_deviation: float | None = None,
-    target_curvature: float | None = None,
-    max_strain: float | None = None,
-) -> tuple[ModuleType, str, Options]:
-    """Check the arguments of :func:`optimize` that do not depend on the mesh.
-
-    Returns
-    -------
-    module, formulation, options
-        The task's module, its formulation, its settings.
-
-    Raises
-    ------
-    OptionError
-        Something is unknown or contradictory.
-    BackendError
-        The requested backend is not installed.
-    """
-    module = tasks.get(task)
-    formulation, kind = tasks.choose(module, formulation, options)
-    settings = kind.coerce(options)
-    if settings.backend is not None:
-        linalg.find(settings.backend)
-    bounds = {
-        "max_deviation": max_deviation,
-        "max_strain": max_strain,
-        "target_curvature": target_curvature,
-    }
-    for name, value in bounds.items():
-        if value is None:
-            continue
-        if not hasattr(module, "check_bounds"):
-            raise OptionError(f"{name} belongs to task 'developable', not {task!r}")
-        if not (isinstance(value, int | float | np.number) and 0 < value < np.inf):
-            raise OptionError(f"{name} is {value!r}; it must be a positive number")
-    if any(value is not None for value in bounds.values()):
-        module.check_bounds(formulation, bounds)
-    return module, formulation, settings

@@ -15,19 +15,19 @@ from gso import linalg, tasks
 from gso.constraints import Compiled, Constraint, Handle, listed
 from gso.deformation import ThinPlateField
 from gso.errors import ConvergenceWarning, OptionError
+from gso.pipeline.handles import moved, pinned
+from gso.pipeline.judgement import better, difference, judged, requirements, warning
+from gso.pipeline.normalise import Canonical
+from gso.pipeline.run import Run, objective
+from gso.pipeline.user_result import packed, record_violations
 from gso.result import Result
+from gso.solver import METHODS, Minimum, minimise
+from gso.solver.augmented_lagrangian import tighten
+from gso.solver.problem import Problem
 from gso.spelling import known_keywords
 from gso.status import Status
 from gso.tasks.base import Plan, Request, Solution, Stage
-from gso.tno.handles import moved, pinned
-from gso.tno.judged import better, difference, judged, requirements, warning
-from gso.tno.normalise import Canonical
 from gso.tno.optimize import check
-from gso.tno.packed import packed, record_violations
-from gso.tno.run import Run, objective
-from gso.tno.solver import METHODS, Minimum, minimise
-from gso.tno.solver.augmented_lagrangian import tighten
-from gso.tno.solver.problem import Problem
 from gso.typing import Array, Ints
 from gso.unknowns import control_points
 

@@ -10,7 +10,7 @@ import numpy as np
 from gso import tasks
 from gso.status import Status
 from gso.verdict.asked import Asked
-from gso.verdict.shape import against_itself, against_pattern, against_surface
+from gso.verdict.surface_checks import against_itself, against_pattern, against_surface
 from gso.verdict.tasks import TASKS, ruled
 from gso.wording import places
 

@@ -10,7 +10,7 @@ from gso import metrics
 from gso.typing import Array
 from gso.workshop.asking import Ask
 from gso.workshop.finish import Finish
-from gso.workshop.measured import bend_radius
+from gso.workshop.measurements import bend_radius
 from gso.workshop.panels import Panel
 from gso.workshop.parts import Fitted
 from gso.workshop.thickness import Thickness

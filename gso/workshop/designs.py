@@ -13,7 +13,7 @@ from gso.components import split
 from gso.mesh import Mesh
 from gso.seams.kinds import Labels
 from gso.typing import Ints
-from gso.workshop.folder import path_of
+from gso.workshop.job_folder import path_of
 from gso.workshop.names import different, spelled
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
-from gso.io.svg import MILLIMETRES
+from gso.io.flat_svg import MILLIMETRES
 from gso.spelling import choices, known_keywords
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import design_record, digest, plain, versions
@@ -21,7 +21,7 @@ from gso.workshop.checks import refused
 from gso.workshop.congruent import origins, united
 from gso.workshop.designs import designs_of, several
 from gso.workshop.finish import Finish
-from gso.workshop.folder import WORK, close, opened
+from gso.workshop.job_folder import WORK, close, opened
 from gso.workshop.marks import check_lines
 from gso.workshop.names import different
 from gso.workshop.nesting import checked_options, nest

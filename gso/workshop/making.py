@@ -14,14 +14,14 @@ from scipy.spatial import cKDTree as Points
 
 from gso import decimation, parallel, parametrization
 from gso.errors import ConvergenceWarning, GSOError, MeshError
-from gso.io.surface import welded
+from gso.io.raw_surface import welded
 from gso.mesh import Mesh
 from gso.result import Result
-from gso.segmentation import Segmentation
-from gso.segmentation import pieces as search
-from gso.segmentation.sheets import rectangle
+from gso.seams import Segmentation
+from gso.seams import pieces as search
+from gso.seams.sheets import rectangle
 from gso.tno import optimize
-from gso.workshop import measured
+from gso.workshop import measurements
 from gso.workshop.asking import Ask
 from gso.workshop.designs import Design
 from gso.workshop.matings import across, numbered
@@ -123,7 +123,7 @@ def _whole(name: str, design: _Target, ask: Ask, say: Say) -> Made | None:
         if result.pattern is None:
             return None
         reasons = list(result.reasons)
-        record = measured.of_pattern(
+        record = measurements.of_pattern(
             design.mesh, result.mesh, result.pattern, ask, design.allowed, reasons
         )
         return _bent(of_surface(name, result.mesh, result.pattern, record))
@@ -155,7 +155,7 @@ def _checked(made: Made, ask: Ask) -> Made:
     least = ask.min_radius or 0.0
     # Strips keep the smallest radius themselves, or say why not.
     for panel in made.panels if least > 0.0 else ():
-        radius = np.inf if len(panel.bends) else measured.bend_radius(panel)
+        radius = np.inf if len(panel.bends) else measurements.bend_radius(panel)
         if radius < least:
             reasons.append(
                 f"{panel.name} is bent to a radius of {radius:.4g}, less than {least:.4g} (in the "
@@ -178,13 +178,13 @@ def _flattened(given: Design, ask: Ask, say: Say) -> Made:
     pattern = found.pattern
     if pattern is None:
         raise MeshError(f"{name}: a piece cannot be laid flat; {'; '.join(found.reasons)}")
-    record = measured.of_pattern(design, found.design, pattern, ask, None, list(found.reasons))
+    record = measurements.of_pattern(design, found.design, pattern, ask, None, list(found.reasons))
     return _bent(of_surface(name, found.design, pattern, record | {"pieces": len(found)}))
 
 
 def _bent(made: Made) -> Made:
     """Measure the smallest radius of all panels."""
-    radius = min(measured.bend_radius(panel) for panel in made.panels)
+    radius = min(measurements.bend_radius(panel) for panel in made.panels)
     return replace(made, record=made.record | {"bend_radius_min": radius})
 
 
@@ -243,7 +243,7 @@ def _parted(name: str, design: _Target, ask: Ask, say: Say, workers: int | None)
         for panel in panels
     ]
     matings += across(found, moved, owner, panels, rims)
-    record = measured.of_panels(design.mesh, panels, ask, design.allowed)
+    record = measurements.of_panels(design.mesh, panels, ask, design.allowed)
     reasons = [
         *(r for r in found.reasons if "distance between surface and design" not in r),
         *record["reasons"],
@@ -261,7 +261,7 @@ def _ruled_record(design: _Target, result: Result, ask: Ask) -> dict[str, Any]:
     known = ruled.deviation if design.solved.mesh is design.mesh else None
     away = known or ruled.distances(design.mesh)
     reasons = list(result.reasons)
-    record = measured.of_pattern(
+    record = measurements.of_pattern(
         design.mesh, ruled.mesh, ruled.pattern, ask, design.allowed, reasons
     )
     return record | {

@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from gso.cut_pieces import Pieces
 from gso.mesh.polyline import Polylines
 from gso.pattern import Pattern
 from gso.seams.chains import chains
-from gso.seams.pieces import Pieces
 from gso.typing import Array, Ints
 from gso.workshop.panels import Mating, Panel, Side
 

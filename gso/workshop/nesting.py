@@ -250,7 +250,7 @@ class _Place:
 
 def _rectangles(items: Sequence[_Item], room: tuple[float, float], spacing: float) -> list[_Place]:
     """Pack bounding rectangles in several orders, and return the best."""
-    from gso.segmentation.sheets import rectangle
+    from gso.seams.sheets import rectangle
 
     copies: list[tuple[int, list[float]]] = []
     sizes = []

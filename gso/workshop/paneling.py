@@ -10,7 +10,7 @@ from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.result import Result
-from gso.ruled.surface import RuledSurface
+from gso.ruled.ruled_surface import RuledSurface
 from gso.typing import Array, Ints
 from gso.workshop.matings import across, numbered, of_pattern
 from gso.workshop.panels import Made, Panel

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
 from gso.pattern import Bend
-from gso.segmentation.sheets import rectangle
+from gso.seams.sheets import rectangle
 from gso.typing import Array
 from gso.workshop.finish import Finish
 from gso.workshop.marks import cut, marked

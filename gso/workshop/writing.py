@@ -9,13 +9,13 @@ from typing import Any
 
 from gso import io
 from gso.workshop import writers
-from gso.workshop.folder import CERTIFICATE, PAGE, PAPER
+from gso.workshop.job_folder import CERTIFICATE, PAGE, PAPER
 from gso.workshop.page import page
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
-from gso.workshop.writers.checks import require
 from gso.workshop.writers.layers import layer_set
 from gso.workshop.writers.pdf import check_paper
+from gso.workshop.writers.writer_checks import require
 
 #: Gap between parts that are drawn side by side, as a share of the largest.
 _GAP = 0.05

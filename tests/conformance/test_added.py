@@ -12,7 +12,7 @@ import gso
 from gso import energy, io, linalg, tasks
 from gso.energy import Term, Weighted
 from gso.geometry import sub
-from gso.io.surface import Surface
+from gso.io.raw_surface import Surface
 from gso.tasks.base import Plan, Stage
 from gso.unknowns import Layout, free
 from tests.conftest import saddle
@@ -165,7 +165,7 @@ def test_a_task_and_a_kind_of_nets(lifted, tmp_path):
 
     from gso.net.training.config import from_dict
     from gso.net.training.data import Batch
-    from gso.net.training.objective import Objective
+    from gso.net.training.phase_objective import Objective
     from gso.net.training.validate import mean_figures
 
     config = from_dict(

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gso.energy import Term, registry
-from gso.tno.solver import kernels
+from gso.solver import kernels
 from gso.unknowns.base import DIMENSIONS
 from tests.conftest import meshes
 

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from gso.net import tasks
-from gso.net.models.grids import planes, rectangle
+from gso.net.models.grid_geometry import planes, rectangle
 
 #: Samples along each side at which nets are trained.
 SIZE = 64

@@ -10,7 +10,7 @@ from gso.errors import OptionError
 from gso.net.models import inputs
 from gso.net.models.base import Net
 from gso.net.models.blocks import Residual
-from gso.net.models.grids import Frame, planes
+from gso.net.models.grid_geometry import Frame, planes
 from gso.net.models.resampling import spline_field
 
 

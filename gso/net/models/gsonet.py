@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from gso.errors import OptionError
 from gso.net.models.base import Net
 from gso.net.models.blocks import IMDB, Stencils
-from gso.net.models.grids import axes
+from gso.net.models.grid_geometry import axes
 from gso.net.models.resampling import resampled
 
 _LEVELS = 3

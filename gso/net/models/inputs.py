@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from gso import geometry
-from gso.net.models.grids import (
+from gso.net.models.grid_geometry import (
     Frame,
     Planes,
     curvature,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import ModuleType
 from typing import Any
 
 from gso.errors import OptionError
@@ -13,6 +12,12 @@ from gso.spelling import choices
 __all__ = ["NetTask", "add_task", "get", "names"]
 
 _FILES = Registry(__name__, __path__, ("base",))
+_ADDED: dict[str, NetTask] = {}
+
+
+def _tasks() -> dict[str, NetTask]:
+    files: list[NetTask] = [_FILES.get(name).TASK for name in _FILES.names()]
+    return {task.name: task for task in files} | _ADDED
 
 
 def names() -> list[str]:
@@ -21,18 +26,17 @@ def names() -> list[str]:
     >>> names()
     ['denoise', 'developable', 'flatten']
     """
-    return _FILES.names()
+    return sorted(_tasks())
 
 
 def get(name: Any) -> NetTask:
     """Return the task of a name; an OptionError if there is none."""
-    if name not in names():
-        raise OptionError(f"no task {name!r} for a net; {choices(name, names())}")
-    return _FILES.get(name).TASK
+    found = _tasks()
+    if name not in found:
+        raise OptionError(f"no task {name!r} for a net; {choices(name, sorted(found))}")
+    return found[name]
 
 
 def add_task(task: NetTask) -> None:
     """Register a task from outside the package, for this process."""
-    module = ModuleType(task.name)
-    module.TASK = task  # type: ignore[attr-defined]
-    _FILES.add(task.name, module)
+    _ADDED[task.name] = task

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from gso.net.models.grids import normalise_with
+from gso.net.models.grid_geometry import normalise_with
 
 #: Largest off-diagonal element of the random shear.
 _SHEAR = 0.3

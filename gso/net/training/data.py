@@ -16,7 +16,7 @@ from gso.dataset.drawing import draw_many
 from gso.errors import DatasetError
 from gso.io import replacing
 from gso.net import tasks
-from gso.net.models.grids import ball, normalise
+from gso.net.models.grid_geometry import ball, normalise
 from gso.net.training import augment
 from gso.net.training.config import Config, Phase
 

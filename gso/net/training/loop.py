@@ -15,10 +15,10 @@ from torch.nn.parallel import DistributedDataParallel
 from gso.errors import OptionError
 from gso.net.models.base import exact
 from gso.net.training.config import Config
-from gso.net.training.objective import Objective
+from gso.net.training.learning_rate import place
+from gso.net.training.phase_objective import Objective
 from gso.net.training.processes import interruption, processes
-from gso.net.training.run import MODEL, Run, Tick, begin
-from gso.net.training.schedule import place
+from gso.net.training.training_run import MODEL, Run, Tick, begin
 
 __all__ = ["MODEL", "Report", "train"]
 

@@ -2,5 +2,6 @@
 
 Strips of planar faces are interpolated by cubic curves through the ends of their rulings
 (:mod:`~gso.ruled.smooth.curves`). The tangent plane is made constant along every ruling
-(:mod:`~gso.ruled.smooth.fit`), and the outline is carried over (:mod:`~gso.ruled.smooth.trim`).
+(:mod:`~gso.ruled.smooth.smooth_fit`), and the outline is carried over
+(:mod:`~gso.ruled.smooth.smooth_trim`).
 """

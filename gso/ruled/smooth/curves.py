@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gso.ruled.layout import Strips
+from gso.ruled.strip_layout import Strips
 from gso.ruled.vectors import lengths
 from gso.typing import Array, Flags, Ints
 
@@ -72,7 +72,7 @@ class Curves:
         Parameter along the strip at each ruling.
     points, slopes : ndarray, (n, 3), (m, 3)
     flats : ndarray of int, (g, 4)
-        Flat triangles between sequences, as in :class:`~gso.ruled.layout.Strips`.
+        Flat triangles between sequences, as in :class:`~gso.ruled.strip_layout.Strips`.
     """
 
     index: tuple[Ints, ...]

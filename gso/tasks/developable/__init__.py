@@ -7,11 +7,11 @@ from dataclasses import replace
 from functools import partial
 
 from gso.tasks.base import Plan, Request
-from gso.tasks.developable import isometry, ruled, schedule
+from gso.tasks.developable import joint_isometry, ruled, schedule
 from gso.tasks.developable.analysis import Analysis
-from gso.tasks.developable.measures import flat_metrics, metrics, ruled_metrics
+from gso.tasks.developable.bound_search import check_bounds, check_iterations, search
+from gso.tasks.developable.developable_metrics import flat_metrics, metrics, ruled_metrics
 from gso.tasks.developable.options import Options
-from gso.tasks.developable.search import check_bounds, check_iterations, search
 from gso.unknowns import ALONG
 
 __all__ = [
@@ -32,7 +32,7 @@ __all__ = [
 #: The formulation that a preset belongs to.
 IMPLIES = {"jiang2020": "isometry"}
 #: Settings by formulation.
-OPTIONS = {"curvature": Options, "isometry": isometry.Options, "ruled": ruled.Options}
+OPTIONS = {"curvature": Options, "isometry": joint_isometry.Options, "ruled": ruled.Options}
 
 
 def plan(analysis: Analysis, request: Request) -> Plan:
@@ -56,7 +56,7 @@ def _before_isometry(analysis: Analysis, request: Request) -> Plan:
 #: How each formulation is planned; the first is the default.
 _PLANS: dict[str, Callable[[Analysis, Request], Plan]] = {
     "curvature": schedule.plan,
-    "isometry": partial(isometry.plan, curvature=_before_isometry),
+    "isometry": partial(joint_isometry.plan, curvature=_before_isometry),
     "ruled": partial(ruled.plan, before=_before_ruled),
 }
 FORMULATIONS = tuple(_PLANS)

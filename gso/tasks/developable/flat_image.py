@@ -10,7 +10,7 @@ from gso import metrics as measure
 from gso import parametrization
 from gso.hierarchy import prolong_displacement
 from gso.mesh import Mesh
-from gso.mesh.cutting import Cut
+from gso.mesh.cut import Cut
 from gso.typing import Array
 from gso.unknowns import Layout, Variables
 

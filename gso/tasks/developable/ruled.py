@@ -15,11 +15,11 @@ import numpy as np
 
 from gso import parametrization
 from gso.constraints import Compiled
-from gso.constraints.parts import OnPlane, Pins, Relations, Straight
+from gso.constraints.equations import OnPlane, Pins, Relations, Straight
 from gso.errors import MeshError, OptionError
 from gso.mesh.normals import vertex_normals
 from gso.ruled.conditions import Conditions
-from gso.ruled.mirror import Mirror
+from gso.ruled.strip_mirror import Mirror
 from gso.status import Progress, Status
 from gso.tasks.base import Plan, Request, Solution
 from gso.tasks.developable.analysis import Analysis

@@ -14,16 +14,16 @@ from gso.constraints import Compiled
 from gso.errors import ConvergenceWarning, GSOError, OptionError
 from gso.linalg import blas_threads
 from gso.mesh import Mesh
+from gso.pipeline.judgement import judged, requirements
+from gso.pipeline.normalise import Canonical
+from gso.pipeline.run import Run
+from gso.pipeline.user_result import packed
 from gso.result import Result
 from gso.tasks.base import Options, Plan, Request
-from gso.tno.batched import stages
+from gso.tno.batched import stage_groups
 from gso.tno.batched.gathered import TooLarge, Unbatchable
-from gso.tno.batched.stages import Minimise
-from gso.tno.judged import judged, requirements
-from gso.tno.normalise import Canonical
+from gso.tno.batched.stage_groups import Minimise
 from gso.tno.optimize import check, optimize
-from gso.tno.packed import packed
-from gso.tno.run import Run
 
 
 @dataclass(frozen=True)
@@ -111,9 +111,9 @@ def solve_batch(
 
 def _grouped(groups: list[_Group], index: int, planned: _Planned) -> None:
     """Add a surface to the group of its structure."""
-    structure = stages.structure(planned.plan)
+    structure = stage_groups.structure(planned.plan)
     for group in groups:
-        if stages.same(group.structure, structure):
+        if stage_groups.same(group.structure, structure):
             group.indices.append(index)
             group.planned.append(planned)
             return
@@ -159,7 +159,7 @@ def _solve_group(group: list[_Planned], asked: Asked, minimise: Minimise) -> lis
     clock = time.perf_counter()
     plans, half = [planned.plan for planned in group], len(group) // 2
     try:
-        reached, iterations, timings = stages.solve(
+        reached, iterations, timings = stage_groups.solve(
             plans, asked.options.method, f"blocks ({asked.device})", minimise
         )
     except TooLarge:

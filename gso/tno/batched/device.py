@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import torch
 
 from gso.errors import OptionError
+from gso.solver import Timings
+from gso.tno.batched.batch_minimiser import minimise
+from gso.tno.batched.batch_problem import Problem, forget
 from gso.tno.batched.gathered import Gathered, Solved, TooLarge
-from gso.tno.batched.minimiser import minimise
-from gso.tno.batched.problem import Problem, forget
-from gso.tno.batched.terms import stacked_loss
+from gso.tno.batched.tensor_terms import stacked_loss
 from gso.tno.batched.unknowns import columns
-from gso.tno.solver import Timings
 from gso.typing import Array
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from gso.energy.base import Residual, Weighted
 from gso.energy.losses import Loss
 from gso.parametrization.orientation import Orientation
+from gso.solver import Timings
+from gso.solver.elements import kind
 from gso.tasks.base import Stage
-from gso.tno.solver import Timings
-from gso.tno.solver.elements import kind
 from gso.typing import Array, Ints
 from gso.unknowns import Layout
 
@@ -37,7 +37,7 @@ class GatheredTerm:
     ----------
     name : str
     residual, vectors, shape
-        As in :class:`gso.energy.Term`; the shape is that of :func:`gso.tno.solver.elements.kind`.
+        As in :class:`gso.energy.Term`; the shape is that of :func:`gso.solver.elements.kind`.
     quadratic : bool
     gather : ndarray of int, (k, e)
         Coordinates of each element.

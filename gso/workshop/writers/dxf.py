@@ -15,9 +15,9 @@ from gso.pattern import Bend
 from gso.spelling import known_keywords
 from gso.workshop.part import Drawing
 from gso.workshop.writers import strokes
-from gso.workshop.writers.checks import check, require
 from gso.workshop.writers.layers import layer_set
 from gso.workshop.writers.strokes import Line, Text
+from gso.workshop.writers.writer_checks import check, require
 
 SUFFIX = ".dxf"
 PACKAGE = "ezdxf"

@@ -14,9 +14,9 @@ from gso.spelling import choices, known_keywords
 from gso.typing import Array
 from gso.workshop.part import Drawing
 from gso.workshop.writers import strokes
-from gso.workshop.writers.checks import check, length, require
 from gso.workshop.writers.layers import Layer, layer_set
 from gso.workshop.writers.tiles import FOOT, Tile, Tiling, tiled
+from gso.workshop.writers.writer_checks import check, length, require
 
 SUFFIX = ".pdf"
 PACKAGE = "reportlab"

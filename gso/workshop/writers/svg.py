@@ -13,9 +13,9 @@ from gso.spelling import known_keywords
 from gso.typing import Array
 from gso.workshop.part import Drawing, Part
 from gso.workshop.writers import strokes
-from gso.workshop.writers.checks import check, length
 from gso.workshop.writers.layers import Layer, layer_set
 from gso.workshop.writers.strokes import Line, Text
+from gso.workshop.writers.writer_checks import check, length
 
 SUFFIX = ".svg"
 PACKAGE = "svgwrite"

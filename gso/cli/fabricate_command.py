@@ -1,0 +1,327 @@
+"""``gso fabricate``: from designs to a folder that a workshop can use."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import click
+from click.core import ParameterSource
+
+from gso.cli import file_options
+from gso.cli.optimize_command import UNITS
+from gso.cli.pieces_command import SHARE
+from gso.errors import OptionError
+
+
+@click.command(short_help="Make designs of flat parts, for the cutter.")
+@click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=click.Path())
+@click.option(
+    "-o",
+    "--output",
+    "folder",
+    metavar="DIR",
+    required=True,
+    type=click.Path(),
+    help="Folder to write to: parts, sheets, surfaces, certificate.json, index.html. Started "
+    "again, the command goes on where it was.",
+)
+@click.option(
+    "--unit",
+    type=click.Choice(UNITS),
+    default="mm",
+    show_default=True,
+    help="Unit of the coordinates.",
+)
+@click.option(
+    "--formulation",
+    type=click.Choice(("ruled", "curvature", "isometry", "flatten")),
+    default="ruled",
+    show_default=True,
+    help="How surfaces are made developable; flatten: the shape stays as it is.",
+)
+@click.option(
+    "--max-deviation",
+    metavar="L",
+    default="1%",
+    show_default=True,
+    help="Largest distance from the design, in its unit, or such as 0.5% of its diagonal.",
+)
+@click.option(
+    "--max-strain",
+    metavar="S",
+    type=SHARE,
+    default="0.1%",
+    show_default=True,
+    help="Largest strain of the patterns (99th percentile), such as 0.01 or 1%.",
+)
+@click.option(
+    "--max-strips", metavar="N", type=int, default=8, show_default=True, help="Strips of one piece."
+)
+@click.option("--darts", is_flag=True, help="Cuts may end inside a piece.")
+@click.option("--keep-groups", is_flag=True, help="Cut between the groups (g) of IN in any case.")
+@click.option(
+    "--min-radius",
+    metavar="L",
+    type=float,
+    help="Smallest radius that the surface may be bent to, in the design's unit.",
+)
+@click.option("--thickness", metavar="MM", type=float, help="Thickness of the sheet.")
+@click.option(
+    "--k-factor",
+    metavar="K",
+    type=float,
+    default=0.5,
+    show_default=True,
+    help="Where the neutral surface is: its distance from a bend's inner face over the thickness.",
+)
+@click.option(
+    "--face",
+    type=click.Choice(("middle", "outside", "inside")),
+    default="middle",
+    show_default=True,
+    help="The face of the sheet that the design's surface is; outside: the one from which its "
+    "faces are anticlockwise.",
+)
+@click.option(
+    "--bend-radius",
+    metavar="MM",
+    type=float,
+    help="Inner radius of the tool that folds the bends; without it the sheet is rolled.",
+)
+@click.option(
+    "--bend-table",
+    metavar="FILE",
+    type=click.Path(),
+    help="Bend deductions (CSV): rows of the angle of bending in degrees, 0 for flat, and a length "
+    "in mm.",
+)
+@click.option(
+    "--kerf", metavar="MM", type=float, default=0.0, help="Width that the cutter removes."
+)
+@click.option("--allowance", metavar="MM", type=float, default=0.0, help="Width added about parts.")
+@click.option(
+    "--notches",
+    metavar="MM",
+    type=float,
+    default=50.0,
+    show_default=True,
+    help="Distance of the notches along seams: an odd number of them, at most 51, one in the "
+    "middle.",
+)
+@click.option("--no-notches", is_flag=True, help="No notches along seams.")
+@click.option(
+    "--holes",
+    metavar="D MM",
+    type=float,
+    nargs=2,
+    help="Registration holes beside the notches, on both sides of a seam: their diameter, and "
+    "their distance from the seam.",
+)
+@click.option("--tabs", metavar="MM", type=float, help="Width of tabs along seams, for paper.")
+@click.option(
+    "--labels",
+    metavar="MM",
+    type=float,
+    default=6.0,
+    show_default=True,
+    help="Height of the names on parts.",
+)
+@click.option("--no-labels", is_flag=True, help="No names on parts.")
+@click.option("--grain", is_flag=True, help="The grain runs along each part.")
+@click.option(
+    "--inside-up",
+    is_flag=True,
+    help="Draw the inside of the surface, mirrored; otherwise the "
+    "outside, from which its faces are anticlockwise.",
+)
+@click.option(
+    "--sheet", metavar="L W", type=float, nargs=2, help="Nest on sheets of this size in mm."
+)
+@click.option(
+    "--spacing",
+    metavar="MM",
+    type=float,
+    default=2.0,
+    show_default=True,
+    help="Distance between parts on a sheet.",
+)
+@click.option(
+    "--rotations",
+    metavar="N",
+    default="2",
+    show_default=True,
+    help="Number of rotations on the sheet, evenly, or any.",
+)
+@click.option(
+    "--seconds", metavar="S", type=float, default=10.0, show_default=True, help="Time for nesting."
+)
+@click.option(
+    "--format",
+    "formats",
+    metavar="NAME",
+    multiple=True,
+    default=("dxf", "svg"),
+    show_default=True,
+    help="Format of the drawings, dxf, svg or pdf; may be given several times.",
+)
+@click.option(
+    "--layers",
+    type=click.Choice(("operations", "astm")),
+    default="operations",
+    show_default=True,
+    help="Names of layers: CUT, BEND_UP and so on, or the numbers of ASTM D6673.",
+)
+@click.option("--bend-text", is_flag=True, help="Write angle and radius beside each bend.")
+@click.option("--paper", metavar="A4", help="Also write all parts as a PDF on pages of this size.")
+@click.option("--workers", metavar="N", type=int, help="Processes; one for each processor.")
+@click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that makes the parts instead.")
+@file_options.weld
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+def fabricate(inputs: tuple[str, ...], folder: str, **given: Any) -> None:
+    """Make the designs IN of flat parts, and write what a workshop needs to DIR.
+
+    The exit code is 0 only if everything can be made as it was asked for; otherwise the reasons
+    are printed, and DIR has the best that was found.
+    """
+    from gso.cli.progress import words
+    from gso.workshop import fabricate as make
+    from gso.workshop.finish import Finish
+    from gso.workshop.thickness import Thickness
+
+    _check_together()
+    thickness = None
+    if given["thickness"] is not None:
+        thickness = Thickness(
+            given["thickness"],
+            given["k_factor"],
+            given["face"],
+            given["bend_radius"],
+            None if given["bend_table"] is None else _table(given["bend_table"]),
+        )
+    finish = Finish(
+        kerf=given["kerf"],
+        allowance=given["allowance"],
+        notches=None if given["no_notches"] else given["notches"],
+        registration=given["holes"] or None,
+        tabs=given["tabs"],
+        labels=None if given["no_labels"] else given["labels"],
+        grain=given["grain"],
+        face="inside" if given["inside_up"] else "outside",
+        thickness=thickness,
+    )
+    meshes = [file_options.source(name, given["weld"]) for name in inputs]
+    with words() as say:
+        done = make.fabricate(
+            meshes,
+            folder,
+            unit=given["unit"],
+            formulation=given["formulation"],
+            max_deviation=given["max_deviation"],
+            max_strain=given["max_strain"],
+            max_strips=given["max_strips"],
+            darts=given["darts"],
+            keep_groups=given["keep_groups"],
+            min_radius=given["min_radius"],
+            finish=finish,
+            sheet=given["sheet"] or None,
+            spacing=given["spacing"],
+            rotations=_rotations(given["rotations"]),
+            seconds=given["seconds"],
+            formats=given["formats"],
+            layers=given["layers"],
+            paper=given["paper"],
+            bend_text=given["bend_text"],
+            workers=given["workers"],
+            scheduler=given["scheduler"],
+            callback=say,
+        )
+    if not given["quiet"]:
+        click.echo("\n".join(text(done)))
+    click.get_current_context().exit(0 if done.usable else 1)
+
+
+def text(done: Any) -> list[str]:
+    """Format what was made as a table, with the reasons against it."""
+    from gso.cli.report import columns
+
+    rows: list[tuple[str, ...]] = [
+        ("design", "copies", "parts", "mean mm", "largest mm", "allowed mm", "strain")
+    ]
+    for one in done.certificate["designs"]:
+        sizes = [one.get(k) for k in ("deviation_mean", "deviation_max", "allowed")]
+        strain = one.get("strain_p99")
+        rows.append(
+            (
+                one["name"],
+                str(len(one["copies"])),
+                str(len(one.get("parts", []))),
+                *("-" if x is None else f"{x:.3g}" for x in sizes),
+                "-" if strain is None else f"{100 * strain:.2g} %",
+            )
+        )
+    lines = columns(rows)
+    lines.append(f"parts to cut: {done.certificate['parts']}")
+    nesting = done.certificate.get("nesting")
+    if nesting is not None:
+        lines.append(
+            f"sheets: {len(done.sheets)}, parts take {100 * nesting['density']:.1f} % of the area "
+            "of the sheets up to the last cut"
+        )
+        lines += [f"note: {note}" for note in nesting["notes"]]
+    lines += [f"note: {note}" for note in done.certificate["notes"]]
+    lines.append(f"page to look at: {done.folder / 'index.html'}")
+    return [*lines, *(f"not usable: {reason}" for reason in done.reasons)]
+
+
+#: Options that say something only together with another one.
+_NEEDED = {
+    "thickness": ("k_factor", "face", "bend_radius", "bend_table"),
+    "sheet": ("spacing", "rotations", "seconds"),
+}
+
+
+def _check_together() -> None:
+    """Raise an error if an option would be ignored."""
+    context = click.get_current_context()
+
+    def is_given(name: str) -> bool:
+        return context.get_parameter_source(name) is not ParameterSource.DEFAULT
+
+    for needed, names in _NEEDED.items():
+        for name in filter(is_given, names):
+            if not is_given(needed):
+                option = name.replace("_", "-")
+                raise OptionError(f"--{option} needs --{needed}; give both or none")
+
+
+def _rotations(given: str) -> Any:
+    if given == "any":
+        return given
+    try:
+        return int(given)
+    except ValueError:
+        raise OptionError(f"--rotations is {given!r}; it must be a number or any") from None
+
+
+def _table(name: str) -> Any:
+    """Read a table of bend deductions."""
+    import numpy as np
+
+    try:
+        with warnings.catch_warnings():
+            # NumPy warns of empty files.
+            warnings.simplefilter("ignore", UserWarning)
+            rows = np.loadtxt(name, delimiter=",", ndmin=2)
+    except OSError as error:
+        raise OptionError(f"{name}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise OptionError(
+            f"{name} is no table of angles and deductions: {error}; begin a heading with #"
+        ) from None
+    if rows.shape[1] != 2 or not len(rows):
+        raise OptionError(
+            f"{name} has {len(rows)} rows of {rows.shape[1]} columns; it must have rows of an "
+            "angle and a length"
+        )
+    return rows * [np.pi / 180.0, 1.0]

@@ -1,0 +1,154 @@
+"""``gso pieces``: cut a design into pieces that can be laid flat."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import click
+
+from gso.cli import file_options
+from gso.cli.optimize_command import UNITS
+from gso.errors import OptionError
+
+
+class _Share(click.ParamType):
+    """A share such as ``0.01`` or ``1%``."""
+
+    name = "share"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+        if isinstance(value, float):
+            return value
+        try:
+            if value.endswith("%"):
+                return 0.01 * float(value[:-1])
+            return float(value)
+        except ValueError:
+            self.fail(f"{value!r} is no number or percentage", param, ctx)
+
+
+#: A share such as ``0.01`` or ``1%``.
+SHARE = _Share()
+
+
+@click.command(short_help="Cut a design into pieces that can be laid flat.")
+@click.argument("name", metavar="IN", type=click.Path())
+@click.option(
+    "-o",
+    "--output",
+    "folder",
+    metavar="DIR",
+    required=True,
+    type=click.Path(),
+    help="Folder to write to: the pieces as groups of an OBJ file, their patterns at 1:1 (SVG), a "
+    "picture, and the table (JSON).",
+)
+@click.option(
+    "--max-strain",
+    metavar="S",
+    type=SHARE,
+    default="1%",
+    show_default=True,
+    help="Largest strain of the patterns (99th percentile), such as 0.01 or 1%.",
+)
+@click.option(
+    "--max-deviation",
+    metavar="L",
+    type=float,
+    help="Let the shape change: largest distance from the design, in its unit of length. The "
+    "pieces become developable.",
+)
+@click.option("--max-pieces", metavar="N", type=int, help="Budget of pieces.")
+@click.option(
+    "--seam", metavar="X", type=float, help="Budget of all seams, relative to the root of the area."
+)
+@click.option("--no-darts", is_flag=True, help="No seams that end inside a piece.")
+@click.option("--symmetric", is_flag=True, help="Symmetric seams.")
+@click.option("--min-neck", metavar="L", type=float, help="Smallest width of a piece.")
+@click.option("--min-size", metavar="L", type=float, help="Smallest length of a piece.")
+@click.option("--sheet", metavar="L W", type=float, nargs=2, help="Length and width of a sheet.")
+@click.option("--keep-groups", is_flag=True, help="Cut between the groups (g) of IN in any case.")
+@click.option("--denoise", is_flag=True, help="Denoise the design first, such as a scan.")
+@click.option(
+    "--unit",
+    type=click.Choice(UNITS),
+    default="mm",
+    show_default=True,
+    help="Unit of the coordinates.",
+)
+@file_options.weld
+@file_options.force
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+def pieces(name: str, folder: str, **given: Any) -> None:
+    """Find seams of the design IN, and write its pieces and their patterns to DIR.
+
+    The exit code is 0 only if the pieces are what was asked for; otherwise the reasons are
+    printed.
+    """
+    from gso import plot
+    from gso.cli.progress import words
+    from gso.seams import Labels
+    from gso.seams import pieces as search
+    from gso.seams.piece_files import save
+
+    if os.path.isfile(folder):
+        raise OptionError(f"{folder} is a file; -o names a folder")
+    outputs = [os.path.join(folder, end) for end in ("pieces.obj", "pieces.json")]
+    file_options.spare([name], outputs, given["force"])
+    mesh = file_options.load(name, given["weld"])
+    with words() as say:
+        found = search(
+            mesh,
+            max_strain=given["max_strain"],
+            max_deviation=given["max_deviation"],
+            max_pieces=given["max_pieces"],
+            seam=given["seam"],
+            darts=not given["no_darts"],
+            symmetric=given["symmetric"],
+            min_neck=given["min_neck"],
+            min_size=given["min_size"],
+            max_size=given["sheet"] or None,
+            keep=Labels("g") if given["keep_groups"] else None,
+            denoise=given["denoise"],
+            callback=say,
+        )
+    save(found, folder, given["unit"])
+    if plot.available():
+        try:
+            plot.plot_pieces(found, os.path.join(folder, "pieces.png"))
+        except ImportError as error:
+            click.echo(f"note: no picture, as Matplotlib cannot be imported: {error}", err=True)
+    if not given["quiet"]:
+        click.echo("\n".join(text(found, given["unit"])))
+    click.get_current_context().exit(0 if found.usable else 1)
+
+
+def text(found: Any, unit: str) -> list[str]:
+    """Format pieces as a table, with what was measured."""
+    from gso.cli.report import columns
+
+    size = found.design.diagonal
+    rows: list[tuple[str, ...]] = [
+        ("piece", f"length {unit}", f"width {unit}", f"seam {unit}", f"darts {unit}", "strain")
+    ]
+    for row in found.table():
+        strain = f"{100 * row['strain_p99']:.3g} %" if "strain_p99" in row else "-"
+        sizes = [f"{row[k]:.4g}" if k in row else "-" for k in ("length", "width")]
+        rows.append((row["name"], *sizes, f"{row['seam']:.4g}", f"{row['darts']:.4g}", strain))
+    lines = columns(rows)
+    known = found.metrics
+    lines.append(
+        f"pieces: {len(found)}; seams: {found.lengths.sum():.4g} {unit} "
+        f"({found.seam_length:.3g} times the root of the area); narrowest place: "
+        f"{known['neck']:.4g} {unit}"
+    )
+    if "deviation_max" in known:
+        far, mean = known["deviation_max"], known["deviation_mean"]
+        lines.append(
+            f"distance from the design: {mean:.4g} {unit} on average, {far:.4g} {unit} at most "
+            f"({100 * far / size:.2g} % of the diagonal)"
+        )
+    lines += [f"note: {note}" for note in found.notes]
+    lines += [f"not usable: {reason}" for reason in found.reasons]
+    return lines

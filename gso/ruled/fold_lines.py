@@ -1,0 +1,103 @@
+"""Rulings and creases: edges along which planar faces meet, with angles and radii."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gso.mesh import Mesh
+from gso.ruled.strip_layout import Strips
+from gso.ruled.unroll import Unrolled
+from gso.ruled.vectors import lengths, unit
+from gso.typing import Array, Ints
+
+
+@dataclass(frozen=True)
+class Folds:
+    """Edges along which planar faces meet.
+
+    Attributes
+    ----------
+    edges : ndarray of int, (r, 2)
+        Their ends, as vertices of the mesh.
+    angles : ndarray, (r,)
+        Angles between the faces in radians: positive for mountain folds, which are convex on
+        the outside of the surface, negative for valley folds.
+    radii : ndarray, (r,)
+        Radius of the bend that a fold stands for, at the end where it is smaller, in the
+        mesh's unit; infinite where there is no fold.
+    """
+
+    edges: Ints
+    angles: Array
+    radii: Array
+
+    @property
+    def smallest_radius(self) -> float:
+        """The smallest radius; infinite without folds."""
+        return float(self.radii.min(initial=np.inf))
+
+    @property
+    def largest_angle(self) -> float:
+        """The largest angle, regardless of its sign, in radians."""
+        return float(np.abs(self.angles).max(initial=0.0))
+
+    def turns(self, vertices: Array) -> Array:
+        """Return the angles in radians by which chains of the edges turn where two of them meet.
+
+        Parameters
+        ----------
+        vertices : ndarray, (n, 3)
+            The mesh's vertices.
+        """
+        ends = np.concatenate([self.edges, self.edges[:, ::-1]])
+        ends = ends[np.argsort(ends[:, 0], kind="stable")]
+        at, first, count = np.unique(ends[:, 0], return_index=True, return_counts=True)
+        inner = first[count == 2]
+        one, two = (vertices[ends[inner + k, 1]] - vertices[at[count == 2]] for k in (0, 1))
+        cosine = -np.einsum("kd,kd->k", unit(one), unit(two))
+        return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+def folds(
+    strips: Strips, vertices: Array, unrolled: Unrolled, mesh: Mesh, owner: Ints
+) -> tuple[Folds, Folds]:
+    """Return the rulings and the creases of trimmed strips, whose faces have `owner` before."""
+    he = mesh.half_edges
+    k = np.flatnonzero((he.twin >= 0) & (he.origin < he.dest))
+    one, two = owner[he.face[k]], owner[he.face[he.twin[k]]]
+    k, one, two = k[one != two], one[one != two], two[one != two]
+    edges = np.stack([he.origin[k], he.dest[k]], axis=1)
+    n = unrolled.normals
+    sine = lengths(n[one] - n[two])
+    angle = 2.0 * np.arcsin(np.clip(0.5 * sine, 0.0, 1.0))
+    middle = vertices[strips.corners].mean(axis=1)
+    away = middle[two] - middle[one]
+    angle = np.where(np.einsum("kd,kd->k", n[two] - n[one], away) < 0, -angle, angle)
+    width = 0.5 * sum(_widths(strips, vertices, mesh.vertices[edges], face) for face in (one, two))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radius = np.asarray(width).min(axis=1) / (2.0 * np.sin(0.5 * np.abs(angle)))
+    radius[angle == 0.0] = np.inf
+    a, b, _ = strips.creases
+    size = len(strips.corners)
+    crease = np.isin(
+        np.minimum(one, two) * size + np.maximum(one, two),
+        np.minimum(a, b) * size + np.maximum(a, b),
+    )
+    every = [Folds(edges[at], angle[at], radius[at]) for at in (~crease, crease)]
+    return every[0], replace(every[1], radii=np.zeros(int(crease.sum())))
+
+
+def _widths(strips: Strips, vertices: Array, ends: Array, face: Ints) -> Array:
+    """Return the distances (r, 2) of the ends of rulings from the other ruling of a face."""
+    p, q, p1, q1 = vertices[strips.corners[face]].transpose(1, 0, 2)
+    found = []
+    for a, b in ((p, q), (p1, q1)):
+        way = unit(b - a)
+        off = ends - a[:, None]
+        off = off - np.einsum("red,rd->re", off, way)[:, :, None] * way[:, None]
+        found.append(lengths(off))
+    # The ruling itself is at no distance.
+    own = found[0].max(axis=1) < found[1].max(axis=1)
+    return np.where(own[:, None], found[1], found[0])

@@ -1,0 +1,285 @@
+"""A ruled surface of planar faces, its rulings and its exact unrolling."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from gso import faults, metrics
+from gso.errors import MeshError
+from gso.mesh import Mesh
+from gso.mesh.closest_point import Nearest
+from gso.pattern import Bend, Pattern
+from gso.ruled.fold_lines import Folds, folds
+from gso.ruled.sheet import unrolled_pattern
+from gso.ruled.strip_fit import Fit, Job
+from gso.ruled.trim import trimmed
+from gso.ruled.unroll import Unrolled
+from gso.ruled.untrimmed import Untrimmed
+from gso.ruled.vectors import cross, lengths, unit
+from gso.typing import Array, Flags, Ints
+
+#: Names of the arrays in files.
+_FOLDS, _PARTS = ("rulings", "creases"), ("edges", "angles", "radii")
+_PATTERN = ("flat", "faces", "vertex", "seams")
+#: Spacing of the samples by which distances are measured, relative to the diagonal.
+_FINE = 0.012
+
+
+@dataclass(frozen=True)
+class RuledSurface:
+    """An exactly developable surface: planar faces between straight rulings.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The surface. Faces between the same two rulings are coplanar.
+    strip : ndarray of int, (m,)
+        Strip that each face belongs to: strips side by side are separate parts of the pattern.
+    flat : ndarray of bool, (m,)
+        Whether each face belongs to a flat triangle between three strips.
+    rulings : Folds
+        The lines to bend along, inside the outline.
+    creases : Folds
+        The edges of the curves between strips side by side; empty for a single strip.
+    pattern : Pattern
+        The exact unrolling. Creases are cut.
+    moved : ndarray, (n, 3)
+        The design's vertices, moved to the nearest points of the surface.
+    crossed : int
+        Number of pairs of successive rulings that cross.
+    untrimmed : Untrimmed or None
+        The strips that it was cut out of; None in files of earlier versions.
+    deviation : Distances or None
+        Its distances from the design, where they are known; see :meth:`distances`.
+    """
+
+    mesh: Mesh
+    strip: Ints
+    flat: Flags
+    rulings: Folds
+    creases: Folds
+    pattern: Pattern
+    moved: Array
+    crossed: int
+    untrimmed: Untrimmed | None = None
+    deviation: metrics.Distances | None = None
+
+    @property
+    def strips(self) -> int:
+        """Number of strips side by side."""
+        return int(self.strip.max()) + 1
+
+    @cached_property
+    def sound(self) -> bool:
+        """Whether neither surface nor pattern is folded or meets itself, and no rulings cross."""
+        sheet = self.pattern.surface(self.mesh)
+        return not (
+            self.crossed
+            or faults.folded(self.mesh).size
+            or metrics.flipped_faces(sheet, self.pattern.flat).size
+            or faults.overlaps(sheet, self.pattern.flat).size
+            or faults.crossings(self.mesh).size
+        )
+
+    @property
+    def bend_edges(self) -> tuple[Ints, Ints]:
+        """The rulings in the pattern: edges (k, 2) of it, and the number of the ruling of each."""
+        pattern = self.pattern
+        inner = pattern.mesh.half_edges
+        k = np.flatnonzero((inner.twin >= 0) & (inner.origin < inner.dest))
+        ends = np.stack([inner.origin[k], inner.dest[k]], axis=1)
+        count = len(self.mesh.vertices)
+        key, rulings = (
+            np.sort(e, axis=1) @ [count, 1] for e in (pattern.vertex[ends], self.rulings.edges)
+        )
+        order = np.argsort(rulings)
+        at = order[np.minimum(np.searchsorted(rulings[order], key), len(order) - 1)]
+        found = np.isin(key, rulings)
+        return ends[found], at[found]
+
+    @property
+    def bends(self) -> list[Bend]:
+        """The rulings in the pattern."""
+        if not len(self.rulings.edges):
+            return []
+        ends, at = self.bend_edges
+        lines = self.pattern.flat[ends]
+        angles, radii = self.rulings.angles[at].tolist(), self.rulings.radii[at].tolist()
+        return [Bend(*bend) for bend in zip(lines, angles, radii, strict=True)]
+
+    def arrays(self) -> dict[str, Array]:
+        """Return the surface as arrays by name, except `moved`; see :meth:`from_arrays`."""
+        out: dict[str, Any] = {
+            "ruled_vertices": self.mesh.vertices,
+            "ruled_faces": self.mesh.faces,
+            "ruled_strip": self.strip,
+            "ruled_flat": self.flat.astype(np.uint8),
+            "ruled_crossed": np.array(self.crossed),
+        }
+        for name in _FOLDS:
+            folds: Folds = getattr(self, name)
+            out |= {f"ruled_{name}_{part}": getattr(folds, part) for part in _PARTS}
+        if self.untrimmed is not None:
+            out |= {f"ruled_strips_{k}": x for k, x in self.untrimmed.arrays().items()}
+        return out | {f"ruled_pattern_{part}": getattr(self.pattern, part) for part in _PATTERN}
+
+    @classmethod
+    def from_arrays(cls, data: Mapping[str, Any], moved: Array) -> RuledSurface | None:
+        """Return the surface that :meth:`arrays` describes; None if there is none.
+
+        Raises
+        ------
+        KeyError, ValueError
+            Arrays are missing or do not fit each other.
+        """
+        if "ruled_faces" not in data:
+            return None
+        mesh = Mesh(data["ruled_vertices"], data["ruled_faces"])
+        pattern = Pattern(*(data[f"ruled_pattern_{part}"] for part in _PATTERN))
+        folds = [Folds(*(data[f"ruled_{name}_{part}"] for part in _PARTS)) for name in _FOLDS]
+        for ids, end in (
+            (pattern.faces, len(pattern.flat)),
+            (pattern.vertex, len(mesh.vertices)),
+            (pattern.seams, len(pattern.flat)),
+            *((fold.edges, len(mesh.vertices)) for fold in folds),
+        ):
+            if ids.dtype.kind not in "iu" or (ids.size and not -1 <= ids.min() <= ids.max() < end):
+                raise ValueError("the arrays of the ruled surface do not fit each other")
+        if pattern.faces.shape != mesh.faces.shape or any(
+            len(data[f"ruled_{name}"]) != len(mesh.faces) for name in ("strip", "flat")
+        ):
+            raise ValueError("the arrays of the ruled surface do not fit each other")
+        crossed = int(data["ruled_crossed"])
+        flat = np.asarray(data["ruled_flat"], bool)
+        rulings, creases = folds
+        strips, source = data["ruled_strip"], None
+        named = {k[13:]: x for k, x in data.items() if k.startswith("ruled_strips_")}
+        if named:
+            source = Untrimmed.from_arrays(named)
+            if source.owner.shape != (len(mesh.faces),):
+                raise ValueError("the arrays of the ruled surface do not fit each other")
+        return cls(mesh, strips, flat, rulings, creases, pattern, moved, crossed, source)
+
+    def samples(self) -> tuple[Array, Array]:
+        """Return points (k, 3) all over the surface, and their shares (k,) of its area.
+
+        The last points, on the edges, have no share.
+        """
+        v, f = self.mesh.vertices, self.mesh.triangles
+        step = _FINE * self.mesh.diagonal
+        a, b, c = _by_longest_side(v, f)
+        long, area = lengths(b - a), 0.5 * lengths(cross(b - a, c - a))
+        rows = np.ceil(long / step).astype(np.int64)
+        columns = np.ceil(2.0 * area / (long * step)).astype(np.int64)
+        count = rows * columns
+        at = np.repeat(np.arange(len(f)), count)
+        k = np.arange(len(at)) - np.repeat(np.cumsum(count) - count, count)
+        s, t = (k % rows[at] + 0.5) / rows[at], (k // rows[at] + 0.5) / columns[at]
+        # A square with its far side shrunk to a point; t is chosen so that areas are equal.
+        t = 1.0 - np.sqrt(1.0 - t)
+        inner = a[at] + (s * (1.0 - t))[:, None] * (b - a)[at] + t[:, None] * (c - a)[at]
+        edges = self.mesh.edges
+        parts = np.ceil(lengths(v[edges[:, 1]] - v[edges[:, 0]]) / step).astype(np.int64)
+        on = np.repeat(np.arange(len(edges)), parts)
+        share = (np.arange(len(on)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[on]
+        p, q = v[edges[on]].transpose(1, 0, 2)
+        border = p + share[:, None] * (q - p)
+        weight = np.r_[(area / count)[at], np.zeros(len(border))]
+        return np.concatenate([inner, border, v]), np.r_[weight, np.zeros(len(v))] / area.sum()
+
+    def distances(self, design: Mesh) -> metrics.Distances:
+        """Measure the distances from a design, in its unit, all over both surfaces.
+
+        "There" is from the surface to the design, "back" from the design's vertices to it. The
+        largest distances include those between the boundary curves, so that a slit counts with
+        its depth.
+        """
+        points, weight = self.samples()
+        there = metrics.point_to_surface(points, design)
+        back = metrics.point_to_surface(design.vertices[design.used], self.mesh)
+        rim_there, rim_back = metrics.boundary_distance(design, self.mesh)
+        return metrics.Distances(
+            float(weight @ there),
+            max(float(there.max()), rim_there),
+            float(back.mean()),
+            max(float(back.max()), rim_back),
+        )
+
+    def on_ruling(self, line: Array, points: Array) -> Array:
+        """Move points (k, 3) to the ruling, or piece of outline, nearest to a line (2, 3)."""
+        a, b = self.mesh.vertices[self.mesh.edges].transpose(1, 0, 2)
+        way, size = unit(b - a), lengths(b - a)
+        off = [lengths(cross(x - a, way)) for x in line]
+        inside = np.einsum("kd,kd->k", line.mean(axis=0) - a, way)
+        beyond = np.maximum(np.maximum(-inside, inside - size), 0.0)
+        k = int((off[0] + off[1] + beyond).argmin())
+        along = np.clip((points - a[k]) @ way[k], 0.0, size[k])
+        return np.asarray(a[k] + along[:, None] * way[k])
+
+    def transformed(self, move: Any, scale: float, back: Any) -> RuledSurface:
+        """Return the surface in another frame.
+
+        Parameters
+        ----------
+        move : callable
+            Maps points (k, 3) by a similarity transform.
+        scale : float
+            Its factor.
+        back : callable
+            Maps the rows of `moved` to another numbering.
+        """
+        return replace(
+            self,
+            mesh=self.mesh.replaced(move(self.mesh.vertices)),
+            rulings=replace(self.rulings, radii=scale * self.rulings.radii),
+            creases=replace(self.creases, radii=scale * self.creases.radii),
+            pattern=replace(self.pattern, flat=scale * self.pattern.flat),
+            moved=move(back(self.moved)),
+            deviation=None
+            if self.deviation is None
+            else metrics.Distances(*(scale * x for x in self.deviation)),
+            untrimmed=None if self.untrimmed is None else self.untrimmed.transformed(move),
+        )
+
+
+def _by_longest_side(v: Array, f: Ints) -> tuple[Array, Array, Array]:
+    """Return the corners (t, 3) of triangles, the longest side between the first two."""
+    side = lengths(v[np.roll(f, -1, axis=1)] - v[f])
+    first = side.argmax(axis=1)[:, None]
+    a, b, c = (v[np.take_along_axis(f, (first + k) % 3, axis=1)[:, 0]] for k in range(3))
+    return a, b, c
+
+
+def built(job: Job, fit: Fit) -> RuledSurface:
+    """Trim and unroll strips."""
+    strips, vertices = fit.strips, fit.vertices
+    if not strips.is_disk:
+        raise MeshError(
+            "no rulings were found on this surface, as they all run into each other; it may be "
+            "folded or too irregular for the formulation 'ruled': take 'curvature'"
+        )
+    measured = job.energy(strips, vertices, fit.width).measure(vertices)
+    unrolled = Unrolled(strips, vertices, measured.up)
+    cut = trimmed(job.target, strips, vertices, unrolled)
+    mesh = Mesh(cut.vertices, cut.faces)
+    # Strips that are wholly outside the outline have no part.
+    _, part = np.unique(unrolled.part[cut.face], return_inverse=True)
+    place = Nearest.of(vertices, strips.divided(vertices)[0])
+    _, _, moved = place.locate(job.target.domain.mesh.vertices)
+    rulings, creases = folds(strips, vertices, unrolled, mesh, cut.face)
+    return RuledSurface(
+        mesh=mesh,
+        strip=part,
+        flat=cut.face >= len(strips.corners) - len(strips.flats),
+        rulings=rulings,
+        creases=creases,
+        pattern=unrolled_pattern(mesh, cut.face, part, unrolled),
+        moved=moved,
+        crossed=int(((measured.gap <= 0).any(axis=1) | strips.tangled(vertices)).sum()),
+        untrimmed=Untrimmed(strips, vertices, cut.face),
+    )

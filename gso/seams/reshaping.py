@@ -1,0 +1,181 @@
+"""Seams of a design whose shape may change: as few cuts as a distance and a strain allow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gso import faults, metrics
+from gso.cut_pieces import Pieces
+from gso.errors import MeshError
+from gso.pipeline.lay_flat import strains_of
+from gso.pipeline.solve import Asked
+from gso.pipeline.start import Start
+from gso.result import Result
+from gso.seams.candidates import Candidate, cuts, joined, measured, neck_of
+from gso.seams.facets import FACETS, facet_ratio
+from gso.seams.joint_solve import solve_pieces
+from gso.seams.options import Wishes
+from gso.seams.straight import straightened_pieces
+from gso.seams.tree import Ground
+from gso.tasks.developable import Options
+
+#: Bound on the estimated strain of the first cuts, the factor between attempts, and the ratio of a
+#: bound that is too large to one that is not at which the search ends.
+_FIRST, _STEP, _CLOSE = 0.04, 1.5, 1.1
+#: Smallest bound on the estimated strain.
+_LEAST = 2e-3
+#: Factor on the weight of curvature where the distance is kept and the strain is not, and on that
+#: of the distance where it is the other way round.
+_STRONGER = 4.0
+#: Ratio of the distance to its bound up to which a larger weight of it is tried, and how often;
+#: the ratio from which the weight grows by the square of the factor.
+_HOPELESS, _NEARER, _FAR = 20.0, 6, 4.0
+#: Factors on the weights of fairness and curvature where pieces have facets or folds.
+_FAIRER = (3.0, 2.0)
+#: How often these are tried, and what a folded face adds to the excess.
+_FAIR, _FOLD = 2, 0.01
+
+
+@dataclass(frozen=True)
+class _Attempt:
+    """A solve of one cut; `excess` is the largest ratio of what was measured to its bound."""
+
+    level: float
+    proximity: float
+    cut: Pieces
+    result: Result | None
+    pieces: Pieces
+    excess: float
+
+
+def reshaped(ground: Ground, wishes: Wishes) -> tuple[Candidate, Result | None]:
+    """Search for the fewest cuts whose pieces become developable within the allowed distance."""
+    allowed = np.inf if wishes.max_deviation is None else wishes.max_deviation
+    tried: list[_Attempt] = []
+    for level in _levels(tried, len(ground.kept)):
+        wishes.say(f"seams and shape, attempt {len(tried) + 1}")
+        cut_open = cuts(ground, wishes, level)
+        # An attempt begins with the weight of the distance that the one before ended with.
+        begin = tried[-1].proximity / _STRONGER if tried else 1.0
+        tried.append(_attempt(ground, cut_open, level, max(begin, 1.0), allowed, wishes))
+    best = min(
+        tried,
+        key=lambda a: (
+            max(a.excess, 1.0),
+            *wishes.value(len(a.pieces), a.pieces.seam_length),
+        ),
+    )
+    best = _with_straight_seams(ground, best, wishes, allowed)
+    shape = best.pieces
+    surface = ground.moved(shape.design)
+    found = measured(surface, shape, wishes.max_size, wishes.say, each=wishes.each)
+    if wishes.darts and found.strain <= wishes.max_strain:
+        found = joined(surface, found, wishes.max_strain, neck_of(ground, wishes), wishes)
+    return found, best.result
+
+
+def _with_straight_seams(
+    ground: Ground, best: _Attempt, wishes: Wishes, allowed: float
+) -> _Attempt:
+    """Solve again with straight seams instead of zigzags, if that is as good."""
+    if best.result is None:
+        return best
+    wishes.say("straight seams")
+    own = straightened_pieces(ground, best.cut)
+    if own is None:
+        return best
+    new = _attempt(ground, own, best.level, best.proximity, allowed, wishes)
+    return new if new.excess <= max(best.excess, 1.0) else best
+
+
+def _levels(tried: list[_Attempt], least: int) -> Iterator[float]:
+    """Yield the bound on the estimated strain of the next attempt, by bisection.
+
+    Not above one with which no more than the `least` number of edges were cut.
+    """
+    level = _FIRST
+    for _ in range(12):
+        yield level
+        good = [a.level for a in tried if a.excess <= 1.0]
+        bad = [a.level for a in tried if a.excess > 1.0]
+        if not bad:
+            if len(tried[-1].cut.edges) <= least:
+                return
+            level *= _STEP
+        elif not good:
+            level /= _STEP
+            if level < _LEAST:
+                return
+        else:
+            above = [b for b in bad if b > max(good)]
+            if not above or min(above) < _CLOSE * max(good):
+                return
+            level = float(np.sqrt(max(good) * min(above)))
+
+
+def _attempt(
+    ground: Ground,
+    cut_open: Pieces,
+    level: float,
+    proximity: float,
+    allowed: float,
+    wishes: Wishes,
+) -> _Attempt:
+    """Solve one cut, again with other weights where distance, strain or facets are too large."""
+    strain = wishes.max_strain
+    own = replace(Options().for_pieces(), w_proximity=proximity)
+    sound = not len(faults.folded(ground.mesh))
+    best: _Attempt | None = None
+    todo, nearer, fairer = [own], 0, 0
+    while todo:
+        options = todo.pop(0)
+        try:
+            result = _solved(cut_open, options)
+        except MeshError:
+            # No vertex is inside a piece: the shape stays as it is.
+            strained = strains_of(cut_open.opened.mesh).get("strain_p99", np.inf) / strain
+            return _Attempt(level, proximity, cut_open, None, cut_open, strained)
+        shape = cut_open if result.pieces is None else result.pieces
+        away = metrics.surface_distance(ground.mesh, shape.design)
+        far = max(away.there_max, away.back_max) / allowed
+        strained = uneven = 0.0
+        if far <= _HOPELESS:
+            strains = strains_of(result.mesh, wishes.each)
+            strained = strains.get("strain_p99", np.inf) / strain
+        if far <= 1.0:
+            folds = len(faults.folded(shape.design)) if sound else 0
+            uneven = max(facet_ratio(result) / FACETS, 1.0 + _FOLD * folds if folds else 0.0)
+        excess = max(far, strained, uneven)
+        attempt = _Attempt(level, options.w_proximity, cut_open, result, shape, excess)
+        if 1.0 < far <= _HOPELESS and strained < 1.0 and nearer < _NEARER:
+            # The strain is less than allowed: a shape nearer to the design may do.
+            nearer += 1
+            more = _STRONGER if far < _FAR else _STRONGER**2
+            todo.append(replace(options, w_proximity=more * options.w_proximity))
+        elif uneven > 1.0 and fairer < _FAIR:
+            fairer += 1
+            todo.append(_fairer(options))
+        elif best is None and strained > 1.0 >= far:
+            todo.append(replace(own, w_curvature=_STRONGER * own.w_curvature))
+        if best is None or attempt.excess < best.excess:
+            best = attempt
+        if best.excess <= 1.0:
+            break
+    return attempt if best is None else best
+
+
+def _fairer(options: Options) -> Options:
+    fairness, curvature = _FAIRER
+    return replace(
+        options,
+        w_fairness=fairness * options.w_fairness,
+        w_curvature=curvature * options.w_curvature,
+    )
+
+
+def _solved(pieces: Pieces, options: Options) -> Result:
+    asked = Asked("developable", "curvature", options, {}, False, verdict=False)
+    return solve_pieces(pieces, asked, (), Start(None), None)

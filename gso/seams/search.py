@@ -1,0 +1,245 @@
+"""The search for seams."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gso.cut_pieces import Pieces
+from gso.errors import ConvergenceWarning, OptionError
+from gso.mesh import Mesh
+from gso.parallel import helpers
+from gso.pipeline.solve import Asked, check, solve_mesh
+from gso.pipeline.start import Start
+from gso.seams.candidates import (
+    Candidate,
+    cuts,
+    joined,
+    measured,
+    neck_of,
+    ranked,
+)
+from gso.seams.cutting import cut
+from gso.seams.dartless import dartless
+from gso.seams.design_noise import noise
+from gso.seams.kinds import Seam
+from gso.seams.mirror_plane import mirror_of
+from gso.seams.options import Wishes, prices, too_large
+from gso.seams.reshaping import reshaped
+from gso.seams.search_result import packed
+from gso.seams.segmentation import Segmentation
+from gso.seams.straight import straight
+from gso.seams.tree import Ground
+from gso.spelling import known_keywords
+
+#: Ratio of the estimated to the measured strain of a first attempt.
+_RATIO = 1.3
+#: Share of the allowed strain from which on an attempt is not loosened any more.
+_CLOSE = 0.93
+_ATTEMPTS = 6
+#: Share of the allowed strain that is aimed at before seams are straightened.
+_ROOM = 0.97
+#: Distance, relative to the diagonal, up to which vertices count as the same.
+_SAME = 1e-9
+
+
+@known_keywords()
+def pieces(
+    mesh: Any,
+    *,
+    max_strain: float = 0.01,
+    max_deviation: float | None = None,
+    max_pieces: int | None = None,
+    seam: float | None = None,
+    darts: bool = True,
+    symmetric: bool = False,
+    min_neck: float | None = None,
+    min_size: float | None = None,
+    max_size: tuple[float, float] | None = None,
+    keep: Seam | Iterable[Seam] | ArrayLike | Pieces | None = None,
+    along: ArrayLike | None = None,
+    avoid: ArrayLike | None = None,
+    denoise: bool = False,
+    workers: int | None = 0,
+    callback: Callable[[str], None] | None = None,
+) -> Segmentation:
+    """Find seams along which a design can be cut into pieces that can be laid flat.
+
+    Without `max_deviation` the shape stays as it is, and the seams are as short as the strain
+    allows. With it the shape changes within that distance: the pieces become developable.
+
+    Parameters
+    ----------
+    mesh : Mesh, array_like or path
+        The design: closed or with boundary loops, with handles, of one or more components. Quads
+        are cut along edge rows.
+    max_strain : float
+        Bound on the 99th percentile of the strain ``|s - 1|`` of every pattern.
+    max_deviation : float, optional
+        Largest distance between the result and the design, in both directions, in the mesh's unit.
+    max_pieces : int, optional
+        Budget of pieces.
+    seam : float, optional
+        Budget of the length of all seams, relative to the root of the design's area.
+    darts : bool
+        Whether seams may end inside a piece; False for sheet metal.
+    symmetric : bool
+        Make the seams symmetric; the mesh has to be, vertex by vertex. Then pieces that overlap
+        themselves are cut, and not joined again elsewhere.
+    min_neck : float, optional
+        Smallest width of a piece, in the mesh's unit. When not given, a tenth of the root of the
+        area is aimed at, and less is taken where the strain cannot be held otherwise.
+    min_size : float, optional
+        Smallest length of a piece, in the mesh's unit. Shorter ones are joined to a neighbour where
+        the strain allows it.
+    max_size : (float, float), optional
+        Length and width of a sheet that every pattern must fit on, in the mesh's unit.
+    keep : Seam, iterable of Seam, array_like (e, 2), or Pieces, optional
+        Seams that stay: what :func:`gso.cut` takes, or an earlier result for the same mesh.
+    along : array_like of int, (k, 2), optional
+        Edges that seams should follow.
+    avoid : array_like, optional
+        Faces that seams should keep away from: indices, or a mask of all faces.
+    denoise : bool
+        Denoise the design first, such as a scan.
+    workers : int, optional
+        Number of processes, which a search with `max_deviation` uses; one for each processor when
+        None, and 0 for this one alone. The result does not depend on it.
+    callback : callable, optional
+        Called with what is being done, in words.
+
+    Returns
+    -------
+    Segmentation
+        The pieces, their patterns, and the reasons if they are not what was asked for.
+
+    Raises
+    ------
+    MeshError
+        The mesh cannot be cut into pieces: it is not orientable, or not manifold.
+    OptionError
+        A parameter is wrong.
+
+    Examples
+    --------
+    >>> import numpy as np, gso
+    >>> u, v = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
+    >>> dome = np.stack([u, v, 0.5 - 0.25 * (u * u + v * v)], axis=-1)
+    >>> found = gso.pieces(dome, max_strain=0.01)
+    >>> len(found), found.usable, found.metrics["strain_p99"] <= 0.01
+    (1, True, True)
+
+    Notes
+    -----
+    The cut is chosen by an estimate of the strain (:mod:`gso.seams.potential`), then the
+    pieces are laid flat with the least largest strain and measured, and the estimate's bound is
+    adapted.
+    """
+    clock = time.perf_counter()
+    wishes = Wishes(
+        max_strain,
+        max_deviation,
+        max_pieces,
+        seam,
+        darts,
+        min_neck,
+        min_size,
+        max_size,
+        callback or (lambda said: None),
+    )
+    notes: list[str] = []
+    ground = _ground(mesh, keep, along, avoid, symmetric, denoise)
+    aim = wishes
+    if max_size is not None and too_large(ground.mesh, max_size):
+        # The pieces are not cut to size in vain; the reason names the largest.
+        aim = replace(wishes, max_size=None)
+    said = noise(ground.mesh, ground.potential)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        if max_deviation is None:
+            found = _as_is(ground, aim)
+            out = packed(found, None, ground, wishes)
+        else:
+            with helpers(workers) as each:
+                out = packed(*reshaped(ground, replace(aim, each=each)), ground, wishes)
+    reasons = list(out.reasons)
+    if said:
+        (reasons if reasons else notes).append(said)
+    return replace(
+        out,
+        reasons=tuple(reasons),
+        notes=(*out.notes, *notes),
+        seconds=time.perf_counter() - clock,
+    )
+
+
+def _ground(mesh: Any, keep: Any, along: Any, avoid: Any, symmetric: bool, denoise: bool) -> Ground:
+    from gso.io import as_mesh
+
+    design = as_mesh(mesh)
+    design.check_joined()
+    kept = np.empty((0, 2), np.int64)
+    if isinstance(keep, Pieces):
+        design, kept = _again(design, keep), keep.edges
+    if denoise:
+        _, formulation, options = check("denoise")
+        asked = Asked("denoise", formulation, options, {}, False, verdict=False)
+        design = design.replaced(solve_mesh(asked, None, design, (), Start(None)).mesh.vertices)
+    if keep is not None and not isinstance(keep, Pieces):
+        begun = cut(design, keep)
+        design, kept = begun.design, begun.edges
+    factor = prices(design, along, avoid)
+    mirror = mirror_of(design) if symmetric else None
+    ground = Ground.of(design, factor, kept, mirror)
+    return replace(ground, kept=ground.mirrored(kept))
+
+
+def _again(design: Mesh, keep: Pieces) -> Mesh:
+    """Return a design with the vertices that were inserted on the seams of its earlier pieces."""
+    if np.array_equal(design.faces, keep.design.faces):
+        return design
+    own, earlier = design.vertices, keep.design.vertices[: len(design.vertices)]
+    if len(earlier) == len(own):
+        far = np.linalg.norm(own - earlier, axis=1)
+        if far.max(initial=0.0) <= _SAME * design.diagonal:
+            return keep.design
+    raise OptionError(
+        "keep: the seams are of pieces of another mesh; give their own design, "
+        "gso.pieces(found.design, keep=found), or seams as edges"
+    )
+
+
+def _as_is(ground: Ground, wishes: Wishes) -> Candidate:
+    """Find seams of a shape that does not change."""
+    if wishes.darts:
+        return straight(ground, _darted(ground, wishes), wishes)
+    return dartless(ground, wishes)
+
+
+def _darted(ground: Ground, wishes: Wishes) -> Candidate:
+    """Cut with darts, and adapt the bound on the estimated strain to the measured one."""
+    # The strain of triangle meshes changes when seams are straightened.
+    most = (_ROOM if ground.mesh.is_triangles else 1.0) * wishes.max_strain
+    ratio = _RATIO
+    found: list[Candidate] = []
+    for attempt in range(_ATTEMPTS):
+        wishes.say(f"seams, attempt {attempt + 1}")
+        last = measured(ground, cuts(ground, wishes, ratio * most), wishes.max_size, wishes.say)
+        found.append(last)
+        good = any(one.strain <= most and one.sound for one in found)
+        whole = len(last.pieces.edges) == len(ground.kept)
+        if good and (_CLOSE * most < last.strain <= most or attempt >= 3):
+            break
+        if whole and last.strain <= most:
+            break
+        ratio *= float(np.clip(0.985 * most / max(last.strain, 1e-300), 0.5, 1.6))
+    best = min(found, key=lambda one: (one.strain > most or not one.sound, *ranked(one, wishes)))
+    if best.strain > most:
+        return best
+    return joined(ground, best, most, neck_of(ground, wishes), wishes)

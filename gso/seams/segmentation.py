@@ -1,0 +1,183 @@
+"""Pieces with their patterns, what was measured on them, and files of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from gso import parametrization
+from gso.cut_pieces import Pieces
+from gso.mesh import Mesh
+from gso.pattern import Pattern
+from gso.result import Result
+from gso.seams.sheets import Sheet
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Segmentation(Pieces):
+    """A design cut into pieces that can be laid flat; :func:`gso.pieces` makes it.
+
+    It is :class:`~gso.seams.Pieces`, so it can be given to :func:`gso.tno.optimize`.
+
+    Attributes
+    ----------
+    sheets : tuple of Sheet or None
+        The flat pattern of each piece; None where there is none.
+    metrics : dict
+        ``pieces``, ``seam`` (relative to the root of the area), ``strain_p99`` and ``strain_max``
+        (of the worst piece), ``neck`` (the narrowest place, in the mesh's unit), ``neck_share``
+        (the least ratio of a piece's narrowest place and the root of its area), and after a
+        change of shape ``deviation_mean`` and ``deviation_max`` (in the mesh's unit) and
+        ``dihedral_mean`` with ``dihedral_mean_before`` and ``dihedral_max`` (degrees, inside
+        pieces), and ``nonplanarity_max`` on quads (distance of the diagonals over the mean edge).
+    reasons : tuple of str
+        Why it is not usable as what was asked for; empty if it is.
+    notes : tuple of str
+        Remarks.
+    result : Result or None
+        The solve that changed the shape, where `max_deviation` was given.
+    seconds : float
+        Time it took.
+    """
+
+    sheets: tuple[Sheet | None, ...] = ()
+    metrics: dict[str, float] = field(default_factory=dict)
+    reasons: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    result: Result | None = None
+    seconds: float = 0.0
+
+    @property
+    def usable(self) -> bool:
+        """Whether there is no reason against it."""
+        return not self.reasons
+
+    @property
+    def patterns(self) -> list[Pattern | None]:
+        """The flat pattern of each piece, in the mesh's unit."""
+        return [None if s is None else Pattern.whole(s.mesh, s.flat) for s in self.sheets]
+
+    @property
+    def pattern(self) -> Pattern | None:
+        """The patterns of all pieces as one, beside each other; None if one is missing."""
+        opened = self.opened
+        flat = np.zeros((len(opened.vertex), 2))
+        sheets = [sheet.flat for sheet in self.sheets if sheet is not None]
+        if len(sheets) < len(self.sheets):
+            return None
+        for part, own in zip(self.parts, parametrization.beside(sheets), strict=True):
+            flat[part.vertices] = own
+        return Pattern(flat, opened.mesh.faces, opened.vertex, opened.seams)
+
+    def alike(self, tolerance: float | None = None) -> list[list[int]]:
+        """Group pieces with congruent patterns, mirror images apart.
+
+        Patterns are alike if their outlines have the same edge lengths and angles, from some
+        starting vertex on: pieces of a design with repeated parts.
+
+        Parameters
+        ----------
+        tolerance : float, optional
+            Largest difference of lengths, in the mesh's unit; a millionth of the diagonal when
+            not given.
+        """
+        allowed = 1e-6 * self.design.diagonal if tolerance is None else tolerance
+        groups: list[list[int]] = []
+        known: list[np.ndarray[Any, Any]] = []
+        for number, sheet in enumerate(self.sheets):
+            if sheet is None:
+                groups.append([number])
+                known.append(np.empty(0))
+                continue
+            outline = _outline(sheet)
+            for group, other in zip(groups, known, strict=True):
+                if _same(outline, other, allowed):
+                    group.append(number)
+                    break
+            else:
+                groups.append([number])
+                known.append(outline)
+        return groups
+
+    def table(self) -> list[dict[str, Any]]:
+        """Return a row for each piece: name, faces, area, length, width, strain, darts."""
+        from gso.metrics import area
+
+        rows = []
+        sides, lengths = self.sides, self.lengths
+        for number, piece in enumerate(self):
+            sheet = self.sheets[number] if number < len(self.sheets) else None
+            row: dict[str, Any] = {
+                "name": piece.name,
+                "faces": len(piece.faces),
+                "area": area(piece.mesh),
+                "seam": float(lengths[(sides == number).any(axis=1)].sum()),
+                "darts": float(lengths[(sides == number).all(axis=1)].sum()),
+            }
+            if sheet is not None:
+                row |= {
+                    "length": sheet.size[0],
+                    "width": sheet.size[1],
+                    "strain_p99": sheet.strain,
+                    "strain_max": sheet.strains["strain_max"],
+                }
+            rows.append(row)
+        return rows
+
+    def save(self, folder: str | PathLike[str], *, unit: str = "mm") -> list[str]:
+        """Write a folder of files, and return their names.
+
+        Patterns that an earlier call wrote to the folder, by its ``pieces.json``, are deleted.
+        ``pieces.obj`` has the whole surface with a group for each piece, ``patterns.svg`` and
+        ``pattern_NAME.svg`` the patterns at 1:1, where `unit` is the unit of the coordinates, and
+        ``pieces.json`` the metrics and the table.
+        """
+        from gso.seams.piece_files import save
+
+        return save(self, folder, unit)
+
+    def __repr__(self) -> str:
+        said = f"{len(self)} pieces, seam {self.seam_length:.3g}"
+        if "strain_p99" in self.metrics:
+            said += f", strain (99 %) {self.metrics['strain_p99']:.2g}"
+        if "deviation_max" in self.metrics:
+            said += f", at most {self.metrics['deviation_max']:.3g} from the design"
+        return f"Segmentation({said}{'' if self.usable else '; not usable'})"
+
+
+def whole_pattern(found: Segmentation) -> tuple[Mesh, np.ndarray[Any, Any]]:
+    """Return all pieces as one mesh, and their patterns side by side, (p, 2)."""
+    from gso.parametrization.packing import beside, upright
+
+    own = [s for s in found.sheets if s is not None]
+    flats = beside([upright(s.flat) for s in own])
+    points = np.concatenate([s.mesh.vertices for s in own])
+    start = np.cumsum([0, *(len(s.mesh.vertices) for s in own)])
+    wide = max(s.mesh.faces.shape[1] for s in own)
+    faces = [
+        np.pad(s.mesh.faces, ((0, 0), (0, wide - s.mesh.faces.shape[1])), constant_values=-1)
+        for s in own
+    ]
+    shifted = [np.where(f < 0, -1, f + k) for f, k in zip(faces, start[:-1], strict=True)]
+    return Mesh(points, np.concatenate(shifted)), np.concatenate(flats)
+
+
+def _outline(sheet: Sheet) -> np.ndarray[Any, Any]:
+    """Return edge lengths and turns along the boundary of a pattern, (k, 2)."""
+    p = sheet.flat[sheet.mesh.boundary_loops[0]]
+    step = np.roll(p, -1, axis=0) - p
+    z = step @ np.array([1.0, 1j])
+    turn = np.angle(np.roll(z, -1) / np.where(z == 0, 1, z))
+    size = np.abs(z)
+    return np.stack([size, turn * 0.5 * (size + np.roll(size, -1))], axis=1)
+
+
+def _same(one: np.ndarray[Any, Any], two: np.ndarray[Any, Any], allowed: float) -> bool:
+    """Tell whether two closed outlines are equal from some vertex on."""
+    if one.shape != two.shape or not len(one):
+        return False
+    near = np.flatnonzero(np.abs(two - one[0]).max(axis=1) <= allowed)
+    return any(bool(np.abs(np.roll(two, -k, axis=0) - one).max() <= allowed) for k in near)

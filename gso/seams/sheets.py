@@ -1,0 +1,124 @@
+"""Pieces laid flat, with what a cutter asks of them: strain, overlaps, necks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gso import faults, geometry, metrics
+from gso.mesh import Mesh
+from gso.mesh.paths import Paths
+from gso.mesh.topology import corner_triangles
+from gso.pipeline.lay_flat import lay_out
+from gso.typing import Array, Ints
+
+#: Smallest share of a piece's area on both sides of a neck.
+_SHARE = 0.02
+#: Strain (99 %) up to which the objective of the other formulation may give less.
+_ISOMETRIC = 3e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """The flat pattern of one piece.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The piece in space, a disk.
+    flat : ndarray, (n, 2)
+        Its pattern, in the same unit.
+    """
+
+    mesh: Mesh
+    flat: Array
+
+    @cached_property
+    def strains(self) -> dict[str, float]:
+        """Largest, 99th percentile and mean strain of the corner triangles."""
+        return metrics.strains(self.mesh, self.flat)
+
+    @cached_property
+    def strain(self) -> float:
+        """The 99th percentile of the strain, by area."""
+        values = metrics.corner_strains(self.mesh, self.flat)
+        known = np.flatnonzero(~np.isnan(values))
+        known = known[np.argsort(values[known], kind="stable")]
+        corners = corner_triangles(self.mesh.faces)[known]
+        level = np.cumsum(geometry.doubled_areas(self.mesh.vertices, corners))
+        return float(values[known[np.searchsorted(level, 0.99 * level[-1])]])
+
+    @cached_property
+    def overlaps(self) -> Ints:
+        """Pairs of faces (p, 2) that overlap."""
+        return faults.overlapping(self.mesh, self.flat)
+
+    @cached_property
+    def inverted(self) -> Ints:
+        """Faces that are inverted."""
+        return metrics.flipped_faces(self.mesh, self.flat)
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing overlaps and nothing is inverted."""
+        return not (len(self.inverted) or len(faults.overlaps(self.mesh, self.flat)))
+
+    @cached_property
+    def size(self) -> tuple[float, float]:
+        """Length and width of the smallest bounding rectangle."""
+        return rectangle(self.flat)[1]
+
+    def neck(self, limit: float) -> float:
+        """Return the width at the narrowest place, or a limit where that is less.
+
+        It is the distance along edges between two boundary vertices with at least 2 % of the
+        area on both sides.
+        """
+        loop = self.mesh.boundary_loops[0]
+        away = Paths(self.mesh).between(loop, limit)[:, loop]
+        i, j = np.nonzero(np.isfinite(away))
+        i, j = i[i < j], j[i < j]
+        p = self.flat[loop]
+        q = np.roll(p, -1, axis=0)
+        swept = np.r_[0.0, np.cumsum(p[:, 0] * q[:, 1] - q[:, 0] * p[:, 1])]
+        part = swept[j] - swept[i] + p[j, 0] * p[i, 1] - p[i, 0] * p[j, 1]
+        share = part / swept[-1]
+        real = np.minimum(share, 1.0 - share) >= _SHARE
+        return min(float(away[i, j][real].min(initial=np.inf)), limit)
+
+
+def flattened(mesh: Mesh) -> Sheet | None:
+    """Lay a disk flat with the least largest strain; None where that fails."""
+    found: list[Sheet] = []
+    for formulation in ("minimax", "strain"):
+        pattern = lay_out(mesh, formulation=formulation)
+        if pattern is None or pattern.is_cut or not np.isfinite(pattern.flat).all():
+            continue
+        found.append(Sheet(mesh, pattern.flat))
+        if found[0].strain > _ISOMETRIC:
+            break
+    return min(found, key=lambda sheet: sheet.strain, default=None)
+
+
+def rectangle(flat: Array) -> tuple[float, tuple[float, float]]:
+    """Return the smallest rectangle about points (n, 2): its angle, its length and its width.
+
+    One side of it lies on the convex hull.
+
+    >>> angle, size = rectangle(np.array([[0.0, 0], [3, 3], [2, 4], [-1, 1]]))
+    >>> round(float(np.degrees(angle))), [round(x, 6) for x in size]
+    (45, [4.242641, 1.414214])
+    """
+    from scipy.spatial import ConvexHull
+
+    hull = flat[ConvexHull(flat).vertices]
+    side = np.roll(hull, -1, axis=0) - hull
+    angle = np.arctan2(side[:, 1], side[:, 0])
+    turn = np.exp(-1j * angle)[:, None] * (hull @ np.array([1.0, 1j]))[None]
+    wide, high = np.ptp(turn.real, axis=1), np.ptp(turn.imag, axis=1)
+    k = int((wide * high).argmin())
+    if wide[k] >= high[k]:
+        return float(angle[k]), (float(wide[k]), float(high[k]))
+    return float(angle[k] + 0.5 * np.pi), (float(high[k]), float(wide[k]))

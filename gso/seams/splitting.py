@@ -1,0 +1,67 @@
+"""Cuts through a piece that overlaps itself when it is laid flat, or is too large."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from gso.mesh import Mesh
+from gso.mesh.separation import between, spans
+from gso.seams.sheets import Sheet, rectangle
+from gso.typing import Array, Ints
+
+#: Radius of the two parts that an overlap is cut between, relative to their distance.
+_BALL = 0.3
+
+
+def apart(sheet: Sheet, factor: Array | None = None) -> Ints:
+    """Choose the edges (e, 2) of a shortest cut between two faces that overlap.
+
+    Of all pairs that overlap, the one that is farthest apart on the surface. The factor (k,) is on
+    the cost of each edge of the piece.
+    """
+    mesh = sheet.mesh
+    pairs = sheet.overlaps
+    graph = _dual(mesh, spans(mesh)[0])
+    firsts = np.unique(pairs[:, 0])
+    some = firsts[:: max(len(firsts) // 20, 1)]
+    away = dijkstra(graph, directed=False, indices=some)
+    row = np.searchsorted(some, pairs[:, 0])
+    known = (row < len(some)) & (some[np.minimum(row, len(some) - 1)] == pairs[:, 0])
+    pairs, row = pairs[known], row[known]
+    apart = away[row, pairs[:, 1]]
+    k = int(apart.argmax())
+    from_one = away[row[k]]
+    from_two = dijkstra(graph, directed=False, indices=int(pairs[k, 1]))
+    reach = _BALL * float(apart[k])
+    return between(mesh, from_one <= reach, from_two <= reach, factor=factor)
+
+
+def halves(sheet: Sheet, most: tuple[float, float], factor: Array | None = None) -> Ints:
+    """Choose the edges (e, 2) of a shortest cut across a pattern that is larger than a sheet.
+
+    The parts are as few as the sheet allows, and about equal.
+    """
+    mesh = sheet.mesh
+    angle, size = rectangle(sheet.flat)
+    limits = max(most), min(most)
+    axis = int(size[1] / limits[1] > size[0] / limits[0])
+    length, longest = size[axis], limits[axis]
+    turn = angle + axis * 0.5 * np.pi
+    along = sheet.flat @ np.array([np.cos(turn), np.sin(turn)])
+    along = (along - along.min()) / length
+    corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
+    middle = along[corners].mean(axis=1)
+    parts = max(int(np.ceil(length / longest)), 2)
+    place = (parts // 2) / parts
+    room = float(np.clip(0.5 * (longest / length - 1.0 / parts), 0.01, 0.1))
+    price = 1.0 + 0.1 * np.abs(along - place) / room
+    return between(mesh, middle < place - room, middle > place + room, price, factor)
+
+
+def _dual(mesh: Mesh, distance: Array) -> coo_matrix:
+    he, k = mesh.half_edges, spans(mesh)[2]
+    f, g = he.face[k], he.face[he.twin[k]]
+    shape = (len(mesh.faces), len(mesh.faces))
+    return coo_matrix((np.maximum(distance, 1e-300), (f, g)), shape=shape).tocsr()
