@@ -281,10 +281,10 @@ def test_scripts_without_a_guard_and_workers_of_a_batch(tmp_path, monkeypatch):
     script = tmp_path / "script.py"
     script.write_text(
         "import numpy as np, gso\n"
-        "from gso.tno import components\n"
+        "from gso.pipeline import component_solves\n"
         "print('once')\n"
-        "components._WORTH = 0\n"
-        "components.processors = lambda: 2\n"
+        "component_solves._WORTH = 0\n"
+        "component_solves.processors = lambda: 2\n"
         "u, v = np.meshgrid(*2 * [np.linspace(-1, 1, 9)], indexing='ij')\n"
         "one = gso.Mesh.from_grid(np.stack([u, v, 0.3 * u * v], axis=-1))\n"
         "two = one.replaced(one.vertices * [1, 1, 2] + 9)\n"
