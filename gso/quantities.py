@@ -1,0 +1,116 @@
+"""Lengths and strains as users write them: ``5``, ``"5mm"``, ``"0.5%"``; ``0.01``, ``"1%"``."""
+
+from __future__ import annotations
+
+import re
+from typing import TypeAlias
+
+import numpy as np
+
+from gso.errors import OptionError
+from gso.spelling import choices
+
+#: Units of length, in millimetres.
+MILLIMETRES = {
+    "mm": 1.0,
+    "um": 1e-3,
+    "cm": 10.0,
+    "dm": 100.0,
+    "m": 1000.0,
+    "in": 25.4,
+    "ft": 304.8,
+    "yd": 914.4,
+}
+
+#: A length: a number in the mesh's unit, or a text such as "5", "5mm" or "0.5%".
+Length: TypeAlias = "float | str"
+#: A strain: a ratio such as 0.01, or a text such as "0.01" or "1%".
+Strain: TypeAlias = "float | str"
+
+_TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*([a-z%]*)\s*", re.I)
+
+
+def as_length(value: Length, name: str, *, diagonal: float, unit: str = "mm") -> float:
+    """Return a positive length in the unit of a mesh.
+
+    Parameters
+    ----------
+    value : float or str
+        A number is in the mesh's unit. A text may have a unit, or a per cent sign: then it is
+        a share of the diagonal of the mesh's bounding box.
+    name : str
+        The option, for errors.
+    diagonal : float
+        Diagonal of the bounding box, in the mesh's unit.
+    unit : str
+        Unit of the mesh's coordinates.
+
+    Raises
+    ------
+    OptionError
+        The value is no positive length, or its unit is not known.
+
+    Examples
+    --------
+    >>> as_length(5, "max_deviation", diagonal=200.0)
+    5.0
+    >>> as_length("5mm", "max_deviation", diagonal=2.0, unit="m")
+    0.005
+    >>> as_length("0.5%", "max_deviation", diagonal=200.0)
+    1.0
+    """
+    number, sign = _split(value)
+    if sign == "%":
+        number *= 0.01 * diagonal
+    elif sign:
+        number *= millimetres(sign, name) / millimetres(unit)
+    if not 0.0 < number < np.inf:
+        raise OptionError(
+            f"{name} is {value!r}; it must be a positive length, such as 5, '5mm' or '0.5%' (of "
+            "the diagonal)"
+        )
+    return number
+
+
+def as_strain(value: Strain, name: str) -> float:
+    """Return a positive strain as a ratio.
+
+    Raises
+    ------
+    OptionError
+        The value is no positive ratio.
+
+    Examples
+    --------
+    >>> as_strain("1%", "max_strain"), as_strain(0.01, "max_strain")
+    (0.01, 0.01)
+    """
+    number, sign = _split(value)
+    if sign == "%":
+        number *= 0.01
+    if sign not in ("", "%") or not 0.0 < number < np.inf:
+        raise OptionError(
+            f"{name} is {value!r}; it must be a positive ratio, such as 0.01 or '1%'"
+        )
+    return number
+
+
+def millimetres(unit: str, name: str = "unit") -> float:
+    """Return the length of a unit in millimetres; an OptionError if it is not known.
+
+    >>> millimetres("in")
+    25.4
+    """
+    if unit not in MILLIMETRES:
+        raise OptionError(f"{name}: unknown unit {unit!r}; {choices(unit, MILLIMETRES)}")
+    return MILLIMETRES[unit]
+
+
+def _split(value: object) -> tuple[float, str]:
+    """Divide a value into its number, NaN if it has none, and its unit."""
+    if isinstance(value, str):
+        found = _TEXT.fullmatch(value)
+        return (float(found[1]), found[2].lower()) if found else (np.nan, "")
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+        return np.nan, ""
+    return float(value), ""
