@@ -89,9 +89,7 @@ def as_strain(value: Strain, name: str) -> float:
     if sign == "%":
         number *= 0.01
     if sign not in ("", "%") or not 0.0 < number < np.inf:
-        raise OptionError(
-            f"{name} is {value!r}; it must be a positive ratio, such as 0.01 or '1%'"
-        )
+        raise OptionError(f"{name} is {value!r}; it must be a positive ratio, such as 0.01 or '1%'")
     return number
 
 

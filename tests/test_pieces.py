@@ -104,7 +104,7 @@ def test_a_flat_sheet_needs_no_cut():
 
 def test_a_sphere_becomes_one_piece_with_darts():
     mesh = ball(24)
-    found = gso.pieces(mesh, max_strain=0.03)
+    found = gso.pieces(mesh, max_strain=0.03, darts=True)
     sound(found)
     assert len(found) == 1
     assert found.usable
@@ -117,7 +117,7 @@ def test_a_sphere_becomes_one_piece_with_darts():
 
 
 def test_less_strain_takes_longer_seams():
-    lengths = [gso.pieces(dome(), max_strain=s).seam_length for s in (0.04, 0.01)]
+    lengths = [gso.pieces(dome(), max_strain=s, darts=True).seam_length for s in (0.04, 0.01)]
     assert lengths[0] < lengths[1]
 
 
@@ -133,7 +133,7 @@ def test_without_darts_no_seam_ends_inside():
     "mesh", [torus(), plate_with_handles(), cube()], ids=["torus", "plate", "cube"]
 )
 def test_closed_surfaces_with_handles_become_disks(mesh):
-    found = gso.pieces(mesh, max_strain=0.1)
+    found = gso.pieces(mesh, max_strain=0.1, darts=True)
     assert all(piece.is_disk for piece in found)
     assert all(sheet is not None and sheet.sound for sheet in found.sheets)
     assert found.usable
@@ -157,13 +157,13 @@ def test_holes_are_opened():
     away = np.linalg.norm(middle[:, None] - spots, axis=2).min(axis=1)
     mesh = Mesh(mesh.vertices, mesh.faces[away > 0.15])
     assert len(mesh.boundary_loops) == 6
-    found = gso.pieces(mesh, max_strain=0.02)
+    found = gso.pieces(mesh, max_strain=0.02, darts=True)
     sound(found)
     assert found.usable
 
 
 def test_saddles_are_divided_so_that_nothing_overlaps():
-    found = gso.pieces(gso.as_mesh(saddle(25, strength=0.5)), max_strain=0.02)
+    found = gso.pieces(gso.as_mesh(saddle(25, strength=0.5)), max_strain=0.02, darts=True)
     sound(found)
     assert found.usable
     assert len(found) > 1
@@ -171,18 +171,18 @@ def test_saddles_are_divided_so_that_nothing_overlaps():
 
 def test_seams_do_not_depend_on_pose_unit_and_order():
     mesh = triangulated(dome(15))
-    first = gso.pieces(mesh, max_strain=0.02)
-    again = gso.pieces(mesh, max_strain=0.02)
+    first = gso.pieces(mesh, max_strain=0.02, darts=True)
+    again = gso.pieces(mesh, max_strain=0.02, darts=True)
     np.testing.assert_array_equal(first.edges, again.edges)
     moved = shuffled(mesh.replaced(1000.0 * mesh.vertices @ rotation(4).T))
-    other = gso.pieces(moved, max_strain=0.02)
+    other = gso.pieces(moved, max_strain=0.02, darts=True)
     assert len(other) == len(first)
     assert other.seam_length == pytest.approx(first.seam_length, rel=0.2)
 
 
 def test_quads_are_cut_along_rows():
     mesh = dome(21)
-    found = gso.pieces(mesh, max_strain=0.02)
+    found = gso.pieces(mesh, max_strain=0.02, darts=True)
     assert all((piece.mesh.faces >= 0).all() for piece in found)
     # Few turns: most vertices on seams have both seam edges in one line.
     edges = found.edges
@@ -201,7 +201,7 @@ def test_symmetric_seams():
     mesh = triangulated(dome(17))
     mesh = Mesh(mesh.vertices, np.concatenate([mesh.faces]))
     quads = dome(17)
-    found = gso.pieces(quads, max_strain=0.02, symmetric=True)
+    found = gso.pieces(quads, max_strain=0.02, symmetric=True, darts=True)
     points = quads.vertices
     for axis in (0, 1):
         flip = points.copy()
@@ -213,7 +213,7 @@ def test_symmetric_seams():
     else:
         raise AssertionError("the seams are not symmetric")
     with pytest.raises(gso.OptionError, match="symmetric"):
-        gso.pieces(Mesh(*_skew()), symmetric=True)
+        gso.pieces(Mesh(*_skew()), symmetric=True, darts=True)
 
 
 def _skew():
@@ -225,13 +225,15 @@ def _skew():
 def test_seams_that_are_kept_and_followed_and_avoided():
     mesh = dome(21)
     across = np.arange(21) * 21 + 5
-    found = gso.pieces(mesh, max_strain=0.05, keep=Path(across[[0, -1]]))
+    found = gso.pieces(mesh, max_strain=0.05, keep=Path(across[[0, -1]]), darts=True)
     kept = {tuple(sorted(e)) for e in np.stack([across[:-1], across[1:]], axis=1).tolist()}
     assert kept <= {tuple(sorted(e)) for e in found.edges.tolist()}
-    again = gso.pieces(mesh, max_strain=0.05, keep=found)
+    again = gso.pieces(mesh, max_strain=0.05, keep=found, darts=True)
     assert len(again.edges) >= len(found.edges)
     region = np.abs(mesh.vertices[mesh.faces].mean(axis=1)[:, 0]) < 0.3
-    plain, spared = (gso.pieces(mesh, max_strain=0.02, avoid=faces) for faces in (None, region))
+    plain, spared = (
+        gso.pieces(mesh, max_strain=0.02, avoid=faces, darts=True) for faces in (None, region)
+    )
 
     def inside(found):
         middle = np.abs(mesh.vertices[found.edges].mean(axis=1)[:, 0]) < 0.25
@@ -242,7 +244,7 @@ def test_seams_that_are_kept_and_followed_and_avoided():
 
 def test_pieces_fit_on_the_sheet():
     flat = np.dstack([*np.mgrid[:5.0, :17.0], np.zeros((5, 17))])
-    found = gso.pieces(flat, max_size=(9.0, 4.5))
+    found = gso.pieces(flat, sheet=(9.0, 4.5), darts=True)
     assert found.usable
     assert len(found) == 2
     assert all(sheet.size[0] <= 9.0 for sheet in found.sheets)
@@ -251,22 +253,22 @@ def test_pieces_fit_on_the_sheet():
 
 def test_faces_larger_than_the_sheet_are_named():
     for mesh in (Mesh(np.eye(3), [[0, 1, 2]]), ball(8)):
-        found = gso.pieces(mesh, max_strain=0.1, max_size=(0.01, 0.01))
+        found = gso.pieces(mesh, max_strain=0.1, sheet=(0.01, 0.01), darts=True)
         assert not found.usable
         assert any("larger than the sheet" in reason for reason in found.reasons)
 
 
 def test_budgets_that_are_missed_are_named():
-    found = gso.pieces(ball(16), max_strain=0.05, seam=0.5)
+    found = gso.pieces(ball(16), max_strain=0.05, seam=0.5, darts=True)
     assert not found.usable
     assert "seams" in found.reasons[0]
-    narrow = gso.pieces(ball(16), max_strain=0.01, min_neck=1.5)
+    narrow = gso.pieces(ball(16), max_strain=0.01, min_neck=1.5, darts=True)
     assert any("strain" in reason for reason in narrow.reasons)
 
 
 def test_a_changed_shape_is_developable_and_closed():
     mesh = ball(32)
-    found = gso.pieces(mesh, max_strain=1e-3, max_deviation=0.12)
+    found = gso.pieces(mesh, max_strain=1e-3, max_deviation=0.12, darts=True)
     sound(found)
     assert found.usable, found.reasons
     assert found.metrics["strain_p99"] <= 1e-3
@@ -310,7 +312,7 @@ def test_noise_is_named():
     noisy = mesh.replaced(  # a scan
         mesh.vertices * (1 + 0.02 * rng.standard_normal((len(mesh.vertices), 1)))
     )
-    found = gso.pieces(noisy, max_strain=0.01, max_pieces=40)
+    found = gso.pieces(noisy, max_strain=0.01, max_pieces=40, darts=True)
     said = [*found.reasons, *found.notes]
     assert any("denoise" in one for one in said)
 
@@ -325,7 +327,7 @@ def test_what_is_no_surface_is_refused():
     strip = np.stack([k, (k + 1) % 12, (k + 1) % 12 + 12, k + 12], axis=1)
     strip[-1] = [11, 12, 0, 23]
     with pytest.raises(gso.MeshError, match="orient"):
-        gso.pieces((np.concatenate([ring - side, ring + side]), strip))
+        gso.pieces((np.concatenate([ring - side, ring + side]), strip), darts=True)
     fins = [[0, 1, 2], [1, 0, 3], [0, 1, 4]]
     with pytest.raises(gso.MeshError, match="0"):
         gso.pieces((np.random.default_rng(0).random((5, 3)), fins))
@@ -337,8 +339,8 @@ def test_what_is_no_surface_is_refused():
         ({"max_strain": 0}, "max_strain"),
         ({"max_deviation": -1}, "max_deviation"),
         ({"max_pieces": 0}, "max_pieces"),
-        ({"max_size": (1.0,)}, "max_size"),
-        ({"max_size": 3.0}, "max_size"),
+        ({"sheet": (1.0,)}, "sheet"),
+        ({"sheet": 3.0}, "sheet"),
         ({"min_neck": "wide"}, "min_neck"),
         ({"along": [[0, 99]]}, "0-99"),
         ({"avoid": [999]}, "face 999"),
@@ -456,20 +458,20 @@ def test_straight_seams_of_any_labels_can_be_cut(seed):
 
 def test_kept_pieces_have_to_be_of_the_same_mesh():
     mesh = ball(16)
-    found = gso.pieces(mesh, max_strain=0.05)
-    again = gso.pieces(mesh, max_strain=0.02, keep=found)
+    found = gso.pieces(mesh, max_strain=0.05, darts=True)
+    again = gso.pieces(mesh, max_strain=0.02, keep=found, darts=True)
     assert np.allclose(again.design.vertices[: len(found.design.vertices)], found.design.vertices)
-    smooth = gso.pieces(mesh, max_strain=0.05, keep=found, denoise=True)
+    smooth = gso.pieces(mesh, max_strain=0.05, keep=found, denoise=True, darts=True)
     assert not np.array_equal(smooth.design.vertices[:50], mesh.vertices[:50])
     with pytest.raises(OptionError, match="another mesh"):
-        gso.pieces(ball(8), keep=found)
+        gso.pieces(ball(8), keep=found, darts=True)
 
 
 def test_a_mesh_without_inner_vertices_takes_a_max_deviation():
-    found = gso.pieces(tetrahedron(), max_deviation=0.1)
+    found = gso.pieces(tetrahedron(), max_deviation=0.1, darts=True)
     assert found.usable and found.result is None
     quad = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1.0, 0]], [[0, 1, 2, 3]])
-    assert gso.pieces(quad, max_deviation=0.1).usable
+    assert gso.pieces(quad, max_deviation=0.1, darts=True).usable
 
 
 @pytest.mark.parametrize("darts", [True, False])
@@ -485,11 +487,11 @@ def test_seams_follow_and_avoid_edges_also_without_darts(darts):
     free = gso.pieces(mesh, max_strain=0.08, darts=darts)
     away = gso.pieces(mesh, max_strain=0.08, darts=darts, avoid=avoid)
     assert inside(away) < 0.8 * inside(free)
-    assert len(gso.pieces(mesh, max_strain=0.05, along=[], avoid=[])) == len(
-        gso.pieces(mesh, max_strain=0.05)
+    assert len(gso.pieces(mesh, max_strain=0.05, along=[], avoid=[], darts=True)) == len(
+        gso.pieces(mesh, max_strain=0.05, darts=True)
     )
     with pytest.raises(OptionError, match="vertices are 0 to"):
-        gso.pieces(mesh, along=[[0, 10**6]])
+        gso.pieces(mesh, along=[[0, 10**6]], darts=True)
 
 
 def test_a_coarse_smooth_torus_is_not_noisy():
@@ -499,7 +501,7 @@ def test_a_coarse_smooth_torus_is_not_noisy():
     i = np.arange(160).reshape(16, 10)
     j = np.roll(i, -1, axis=0)
     faces = np.stack([i, j, np.roll(j, -1, 1), np.roll(i, -1, 1)], axis=-1).reshape(-1, 4)
-    found = gso.pieces(Mesh(points, faces), max_strain=0.1)
+    found = gso.pieces(Mesh(points, faces), max_strain=0.1, darts=True)
     assert not any("noisy" in said for said in (*found.notes, *found.reasons))
 
 
@@ -507,16 +509,21 @@ def test_pieces_shorter_than_min_size_are_joined_or_named():
     mesh = ball(16)
     found = gso.pieces(mesh, max_strain=0.03, darts=False)
     short = min(sheet.size[0] for sheet in found.sheets)
-    assert any("shorter" in r for r in gso.pieces(mesh, max_strain=0.03, min_size=20.0).reasons)
+    assert any(
+        "shorter" in r for r in gso.pieces(mesh, max_strain=0.03, min_size=20.0, darts=True).reasons
+    )
     longer = gso.pieces(mesh, max_strain=0.03, darts=False, min_size=1.001 * short)
     assert longer.usable == all(s.size[0] >= 1.001 * short for s in longer.sheets)
     with pytest.raises(OptionError, match="min_size"):
-        gso.pieces(mesh, min_size=2.0, max_size=(1.0, 1.0))
+        gso.pieces(mesh, min_size=2.0, sheet=(1.0, 1.0), darts=True)
 
 
 def test_patterns_of_an_earlier_search_are_deleted(tmp_path):
     mesh = ball(16)
-    many, one = gso.pieces(mesh, max_strain=0.03, darts=False), gso.pieces(mesh, max_strain=0.03)
+    many, one = (
+        gso.pieces(mesh, max_strain=0.03, darts=False),
+        gso.pieces(mesh, max_strain=0.03, darts=True),
+    )
     (tmp_path / "pattern_mine.svg").write_text("mine")
     many.save(tmp_path)
     assert len(list(tmp_path.glob("pattern_*.svg"))) == len(many) + 1

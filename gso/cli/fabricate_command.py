@@ -9,8 +9,7 @@ import click
 from click.core import ParameterSource
 
 from gso.cli import file_options
-from gso.cli.optimize_command import UNITS
-from gso.cli.pieces_command import SHARE
+from gso.cli import shared_options as shared
 from gso.errors import OptionError
 
 
@@ -26,13 +25,7 @@ from gso.errors import OptionError
     help="Folder to write to: parts, sheets, surfaces, certificate.json, index.html. Started "
     "again, the command goes on where it was.",
 )
-@click.option(
-    "--unit",
-    type=click.Choice(UNITS),
-    default="mm",
-    show_default=True,
-    help="Unit of the coordinates.",
-)
+@shared.unit
 @click.option(
     "--formulation",
     type=click.Choice(("ruled", "curvature", "isometry", "flatten")),
@@ -40,33 +33,13 @@ from gso.errors import OptionError
     show_default=True,
     help="How surfaces are made developable; flatten: the shape stays as it is.",
 )
-@click.option(
-    "--max-deviation",
-    metavar="L",
-    default="1%",
-    show_default=True,
-    help="Largest distance from the design, in its unit, or such as 0.5% of its diagonal.",
-)
-@click.option(
-    "--max-strain",
-    metavar="S",
-    type=SHARE,
-    default="0.1%",
-    show_default=True,
-    help="Largest strain of the patterns (99th percentile), such as 0.01 or 1%.",
-)
-@click.option(
-    "--max-strips", metavar="N", type=int, default=8, show_default=True, help="Strips of one piece."
-)
-@click.option("--darts", is_flag=True, help="Cuts may end inside a piece.")
-@click.option("--keep-groups", is_flag=True, help="Cut between the groups (g) of IN in any case.")
-@click.option(
-    "--min-radius",
-    metavar="L",
-    type=float,
-    help="Smallest radius that the surface may be bent to, in the design's unit.",
-)
-@click.option("--thickness", metavar="MM", type=float, help="Thickness of the sheet.")
+@shared.max_deviation
+@shared.max_strain
+@shared.max_strips
+@shared.darts
+@shared.keep_groups
+@shared.min_radius
+@click.option("--thickness", metavar="MM", type=shared.MM, help="Thickness of the sheet.")
 @click.option(
     "--k-factor",
     metavar="K",
@@ -135,9 +108,7 @@ from gso.errors import OptionError
     help="Draw the inside of the surface, mirrored; otherwise the "
     "outside, from which its faces are anticlockwise.",
 )
-@click.option(
-    "--sheet", metavar="L W", type=float, nargs=2, help="Nest on sheets of this size in mm."
-)
+@shared.sheet
 @click.option(
     "--spacing",
     metavar="MM",
@@ -174,10 +145,10 @@ from gso.errors import OptionError
 )
 @click.option("--bend-text", is_flag=True, help="Write angle and radius beside each bend.")
 @click.option("--paper", metavar="A4", help="Also write all parts as a PDF on pages of this size.")
-@click.option("--workers", metavar="N", type=int, help="Processes; one for each processor.")
-@click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that makes the parts instead.")
+@shared.workers
+@shared.scheduler
 @file_options.weld
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@shared.quiet
 def fabricate(inputs: tuple[str, ...], folder: str, **given: Any) -> None:
     """Make the designs IN of flat parts, and write what a workshop needs to DIR.
 
@@ -250,7 +221,7 @@ def text(done: Any) -> list[str]:
     ]
     for one in done.certificate["designs"]:
         sizes = [one.get(k) for k in ("deviation_mean", "deviation_max", "allowed")]
-        strain = one.get("strain_p99")
+        strain = one.get("strain_max")
         rows.append(
             (
                 one["name"],

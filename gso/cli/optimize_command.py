@@ -10,14 +10,12 @@ import click
 
 from gso import tasks
 from gso.cli import file_options
+from gso.cli import shared_options as shared
 from gso.cli.optimize_job import Job, is_cad
 from gso.errors import MeshError, OptionError
 
 if TYPE_CHECKING:
     from gso.mesh import Mesh
-
-#: Units of :func:`gso.io.save_flat`.
-UNITS = ("um", "mm", "cm", "dm", "m", "in", "ft", "yd")
 
 
 @click.command(short_help="Make surfaces developable, flatten or denoise them.")
@@ -53,12 +51,7 @@ UNITS = ("um", "mm", "cm", "dm", "m", "in", "ft", "yd")
     is_flag=True,
     help='Developable by "ruled": the strip may branch at flat triangles.',
 )
-@click.option(
-    "--min-radius",
-    type=float,
-    metavar="LENGTH",
-    help='Developable by "ruled": smallest radius of the bends, in the mesh\'s unit.',
-)
+@shared.min_radius
 @click.option(
     "--options",
     "preset",
@@ -67,18 +60,8 @@ UNITS = ("um", "mm", "cm", "dm", "m", "in", "ft", "yd")
     show_default=True,
     help="How much work to do; jiang2020: the classical reference, by isometry.",
 )
-@click.option(
-    "--max-deviation",
-    metavar="L",
-    type=float,
-    help="developable: largest distance from the input, both ways, in its unit of length.",
-)
-@click.option(
-    "--max-strain",
-    metavar="S",
-    type=float,
-    help="developable: largest strain of the flat pattern, such as 0.005.",
-)
+@shared.max_deviation
+@shared.max_strain
 @click.option(
     "--target-curvature",
     metavar="K",
@@ -108,15 +91,8 @@ UNITS = ("um", "mm", "cm", "dm", "m", "in", "ft", "yd")
     "--net", metavar="NET", help="Name or .safetensors file; the task's own net by default."
 )
 @click.option("--backend", metavar="NAME", help="Linear solver; the fastest installed by default.")
-@click.option(
-    "--workers",
-    metavar="N",
-    type=click.IntRange(0),
-    help="Processes for many inputs; all cores by default, 0 for none beside this one.",
-)
-@click.option(
-    "--scheduler", metavar="ADDRESS", help="Dask cluster that solves many inputs instead."
-)
+@shared.workers
+@shared.scheduler
 @click.option(
     "--suffix", metavar=".EXT", help="Format of many outputs; that of each input by default."
 )
@@ -129,16 +105,10 @@ UNITS = ("um", "mm", "cm", "dm", "m", "in", "ft", "yd")
 @click.option(
     "--metrics", "table", metavar="JSON", type=click.Path(), help="File for status and metrics."
 )
-@click.option(
-    "--unit",
-    type=click.Choice(UNITS),
-    default="mm",
-    show_default=True,
-    help="Unit of the coordinates, for .svg, .step, .iges and .3dm, and for what is printed.",
-)
+@shared.unit
 @file_options.weld
 @file_options.force
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@shared.quiet
 def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
     """Optimise the surface IN and write it to OUT.
 

@@ -8,28 +8,8 @@ from typing import Any
 import click
 
 from gso.cli import file_options
-from gso.cli.optimize_command import UNITS
+from gso.cli import shared_options as shared
 from gso.errors import OptionError
-
-
-class _Share(click.ParamType):
-    """A share such as ``0.01`` or ``1%``."""
-
-    name = "share"
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> float:
-        if isinstance(value, float):
-            return value
-        try:
-            if value.endswith("%"):
-                return 0.01 * float(value[:-1])
-            return float(value)
-        except ValueError:
-            self.fail(f"{value!r} is no number or percentage", param, ctx)
-
-
-#: A share such as ``0.01`` or ``1%``.
-SHARE = _Share()
 
 
 @click.command(short_help="Cut a design into pieces that can be laid flat.")
@@ -44,42 +24,26 @@ SHARE = _Share()
     help="Folder to write to: the pieces as groups of an OBJ file, their patterns at 1:1 (SVG), a "
     "picture, and the table (JSON).",
 )
-@click.option(
-    "--max-strain",
-    metavar="S",
-    type=SHARE,
-    default="1%",
-    show_default=True,
-    help="Largest strain of the patterns (99th percentile), such as 0.01 or 1%.",
-)
-@click.option(
-    "--max-deviation",
-    metavar="L",
-    type=float,
-    help="Let the shape change: largest distance from the design, in its unit of length. The "
-    "pieces become developable.",
-)
+@shared.max_strain
+@shared.max_deviation
 @click.option("--max-pieces", metavar="N", type=int, help="Budget of pieces.")
 @click.option(
     "--seam", metavar="X", type=float, help="Budget of all seams, relative to the root of the area."
 )
-@click.option("--no-darts", is_flag=True, help="No seams that end inside a piece.")
+@shared.darts
 @click.option("--symmetric", is_flag=True, help="Symmetric seams.")
-@click.option("--min-neck", metavar="L", type=float, help="Smallest width of a piece.")
-@click.option("--min-size", metavar="L", type=float, help="Smallest length of a piece.")
-@click.option("--sheet", metavar="L W", type=float, nargs=2, help="Length and width of a sheet.")
-@click.option("--keep-groups", is_flag=True, help="Cut between the groups (g) of IN in any case.")
-@click.option("--denoise", is_flag=True, help="Denoise the design first, such as a scan.")
+@click.option("--min-neck", metavar="LENGTH", type=shared.LENGTH, help="Smallest width of a piece.")
 @click.option(
-    "--unit",
-    type=click.Choice(UNITS),
-    default="mm",
-    show_default=True,
-    help="Unit of the coordinates.",
+    "--min-size", metavar="LENGTH", type=shared.LENGTH, help="Smallest length of a piece."
 )
+@shared.sheet
+@shared.keep_groups
+@click.option("--denoise", is_flag=True, help="Denoise the design first, such as a scan.")
+@shared.unit
+@shared.workers
 @file_options.weld
 @file_options.force
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@shared.quiet
 def pieces(name: str, folder: str, **given: Any) -> None:
     """Find seams of the design IN, and write its pieces and their patterns to DIR.
 
@@ -104,11 +68,13 @@ def pieces(name: str, folder: str, **given: Any) -> None:
             max_deviation=given["max_deviation"],
             max_pieces=given["max_pieces"],
             seam=given["seam"],
-            darts=not given["no_darts"],
+            darts=given["darts"],
             symmetric=given["symmetric"],
             min_neck=given["min_neck"],
             min_size=given["min_size"],
-            max_size=given["sheet"] or None,
+            sheet=given["sheet"] or None,
+            unit=given["unit"],
+            workers=given["workers"],
             keep=Labels("g") if given["keep_groups"] else None,
             denoise=given["denoise"],
             callback=say,
@@ -133,7 +99,7 @@ def text(found: Any, unit: str) -> list[str]:
         ("piece", f"length {unit}", f"width {unit}", f"seam {unit}", f"darts {unit}", "strain")
     ]
     for row in found.table():
-        strain = f"{100 * row['strain_p99']:.3g} %" if "strain_p99" in row else "-"
+        strain = f"{100 * row['strain_max']:.3g} %" if "strain_max" in row else "-"
         sizes = [f"{row[k]:.4g}" if k in row else "-" for k in ("length", "width")]
         rows.append((row["name"], *sizes, f"{row['seam']:.4g}", f"{row['darts']:.4g}", strain))
     lines = columns(rows)

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 
 from gso.errors import GSOError, MeshError, OptionError
 from gso.io.atomic import check_writable, replacing
-from gso.io.flat_svg import MILLIMETRES
 from gso.mesh import Mesh
-from gso.spelling import choices
+from gso.quantities import millimetres
 from gso.spline import BSplineSurface, TrimmedSpline
 
 
@@ -51,8 +50,7 @@ def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
         needs is missing (OpenCASCADE: libGL). The message says which.
     """
     check_writable(path, SPLINE_SUFFIXES)
-    if unit not in MILLIMETRES:
-        raise OptionError(f"unknown unit {unit!r}; {choices(unit, MILLIMETRES)}")
+    millimetres(unit)
     form = _FORMATS[_suffix(path)]
     try:
         importlib.import_module(form.package)

@@ -10,25 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.errors import MeshError, OptionError
+from gso.errors import MeshError
 from gso.io.atomic import check_writable, replacing
 from gso.io.lines import polyline
 from gso.io.source import Array, Ints
 from gso.mesh import Mesh
 from gso.pattern import Bend
-from gso.spelling import choices, known_keywords
-
-MILLIMETRES = {
-    "um": 1e-3,
-    "mm": 1.0,
-    "cm": 10.0,
-    "dm": 100.0,
-    "m": 1000.0,
-    "in": 25.4,
-    "ft": 304.8,
-    "yd": 914.4,
-}
-"""Length of each unit that :func:`save_flat` knows, in millimetres."""
+from gso.quantities import MILLIMETRES, millimetres
+from gso.spelling import known_keywords
 
 # Line width on paper in millimetres, and its largest fraction of the pattern's size.
 _LINE = 0.1
@@ -88,8 +77,7 @@ def save_flat(
     >>> save_flat(mesh.vertices[:, :2], mesh, path, unit="cm")
     """
     check_writable(path, (".svg",))
-    if unit not in MILLIMETRES:
-        raise OptionError(f"unknown unit {unit!r}; {choices(unit, MILLIMETRES)}")
+    millimetres(unit)
     points = np.array(flat, dtype=np.float64)
     if points.shape != (len(mesh.vertices), 2):
         raise MeshError(

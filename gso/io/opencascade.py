@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from gso.errors import MeshError
-from gso.io.flat_svg import MILLIMETRES
 from gso.mesh import Mesh
+from gso.quantities import MILLIMETRES
 from gso.spline import BSplineSurface, TrimmedSpline
 from gso.spline.trimmed import Loop
 from gso.typing import Array

@@ -44,7 +44,7 @@ class Candidate:
 
     @cached_property
     def strain(self) -> float:
-        """The largest 99th percentile of the strain; infinite without a pattern."""
+        """The largest strain; infinite without a pattern."""
         return max(np.inf if s is None else s.strain for s in self.sheets)
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,10 +13,13 @@ from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
 from gso.parallel import Each, here
+from gso.quantities import Length, as_length, millimetres
 from gso.typing import Array
 
 #: Factors on the cost of edges in regions to avoid, and on edges to follow.
 _AVOID, _FOLLOW = 20.0, 0.2
+#: Largest strain where none is given: of a shape that stays, and of one that may change.
+STAYS, CHANGES = 0.01, 0.001
 #: Smallest neck, relative to the root of the area, unless given.
 NECK = 0.1
 
@@ -37,10 +40,8 @@ class Wishes:
     each: Each = here
 
     def __post_init__(self) -> None:
-        for name in ("max_strain", "max_deviation", "seam", "min_neck", "min_size"):
-            value = getattr(self, name)
-            if value is not None and not _positive(value):
-                raise OptionError(f"{name} is {value!r}; it must be a positive number")
+        if self.seam is not None and not _positive(self.seam):
+            raise OptionError(f"seam is {self.seam!r}; it must be a positive number")
         if not callable(self.say):
             raise OptionError(f"callback is {self.say!r}; it must be a function of a text")
         count = self.max_pieces
@@ -48,13 +49,9 @@ class Wishes:
         if count is not None and not (whole and count >= 1):
             raise OptionError(f"max_pieces is {count!r}; it must be a whole number from 1 up")
         size = self.max_size
-        pair = isinstance(size, tuple | list | np.ndarray) and np.shape(size) == (2,)
-        if size is not None and not (pair and all(map(_positive, size))):
-            raise OptionError(f"max_size is {size!r}; it must be length and width of a sheet")
         if size is not None and self.min_size is not None and self.min_size > max(size):
             raise OptionError(
-                f"min_size is {self.min_size!r}, more than the length of a sheet (max_size); "
-                "lower it"
+                f"min_size is {self.min_size!r}, more than the length of a sheet; lower it"
             )
 
     def value(self, pieces: int, seam: float) -> tuple[int, float, float]:
@@ -72,6 +69,20 @@ class Wishes:
         if self.seam is not None and seam > self.seam:
             out.append(f"the seams are {seam:.3g} times the root of the area long, not {self.seam}")
         return out
+
+
+def as_sheet(sheet: Sequence[Length] | None, unit: str) -> tuple[float, float] | None:
+    """Return length and width of a sheet in the unit of a mesh; numbers are in millimetres.
+
+    >>> as_sheet((3000, "1.5m"), "m")
+    (3.0, 1.5)
+    """
+    if sheet is None:
+        return None
+    if isinstance(sheet, str) or np.shape(sheet) != (2,):
+        raise OptionError(f"sheet is {sheet!r}; it must be length and width of a sheet")
+    long, wide = (as_length(side, "sheet", diagonal=np.nan) / millimetres(unit) for side in sheet)
+    return long, wide
 
 
 def too_large(mesh: Mesh, sheet: tuple[float, float]) -> bool:

@@ -136,7 +136,7 @@ def _attempt(
             result = _solved(cut_open, options)
         except MeshError:
             # No vertex is inside a piece: the shape stays as it is.
-            strained = strains_of(cut_open.opened.mesh).get("strain_p99", np.inf) / strain
+            strained = strains_of(cut_open.opened.mesh).get("strain_max", np.inf) / strain
             return _Attempt(level, proximity, cut_open, None, cut_open, strained)
         shape = cut_open if result.pieces is None else result.pieces
         away = metrics.surface_distance(ground.mesh, shape.design)
@@ -144,7 +144,7 @@ def _attempt(
         strained = uneven = 0.0
         if far <= _HOPELESS:
             strains = strains_of(result.mesh, wishes.each)
-            strained = strains.get("strain_p99", np.inf) / strain
+            strained = strains.get("strain_max", np.inf) / strain
         if far <= 1.0:
             folds = len(faults.folded(shape.design)) if sound else 0
             uneven = max(facet_ratio(result) / FACETS, 1.0 + _FOLD * folds if folds else 0.0)

@@ -17,6 +17,7 @@ from gso.mesh import Mesh
 from gso.parallel import helpers
 from gso.pipeline.solve import Asked, check, solve_mesh
 from gso.pipeline.start import Start
+from gso.quantities import Length, Strain, as_length, as_strain
 from gso.seams.candidates import (
     Candidate,
     cuts,
@@ -30,7 +31,7 @@ from gso.seams.dartless import dartless
 from gso.seams.design_noise import noise
 from gso.seams.kinds import Seam
 from gso.seams.mirror_plane import mirror_of
-from gso.seams.options import Wishes, prices, too_large
+from gso.seams.options import CHANGES, STAYS, Wishes, as_sheet, prices, too_large
 from gso.seams.reshaping import reshaped
 from gso.seams.search_result import packed
 from gso.seams.segmentation import Segmentation
@@ -53,20 +54,21 @@ _SAME = 1e-9
 def pieces(
     mesh: Any,
     *,
-    max_strain: float = 0.01,
-    max_deviation: float | None = None,
+    max_strain: Strain | None = None,
+    max_deviation: Length | None = None,
     max_pieces: int | None = None,
     seam: float | None = None,
-    darts: bool = True,
+    darts: bool = False,
     symmetric: bool = False,
-    min_neck: float | None = None,
-    min_size: float | None = None,
-    max_size: tuple[float, float] | None = None,
+    min_neck: Length | None = None,
+    min_size: Length | None = None,
+    sheet: tuple[Length, Length] | None = None,
+    unit: str = "mm",
     keep: Seam | Iterable[Seam] | ArrayLike | Pieces | None = None,
     along: ArrayLike | None = None,
     avoid: ArrayLike | None = None,
     denoise: bool = False,
-    workers: int | None = 0,
+    workers: int | None = None,
     callback: Callable[[str], None] | None = None,
 ) -> Segmentation:
     """Find seams along which a design can be cut into pieces that can be laid flat.
@@ -79,27 +81,32 @@ def pieces(
     mesh : Mesh, array_like or path
         The design: closed or with boundary loops, with handles, of one or more components. Quads
         are cut along edge rows.
-    max_strain : float
-        Bound on the 99th percentile of the strain ``|s - 1|`` of every pattern.
-    max_deviation : float, optional
-        Largest distance between the result and the design, in both directions, in the mesh's unit.
+    max_strain : float or str, optional
+        Largest strain ``|s - 1|`` of every pattern, such as 0.01 or "1%". By default 1 % where
+        the shape stays, and 0.1 % where it may change.
+    max_deviation : float or str, optional
+        Largest distance between design and result, both ways: a number in the mesh's unit, or a
+        text such as "5mm" or "0.5%" (of the diagonal of the bounding box).
     max_pieces : int, optional
         Budget of pieces.
     seam : float, optional
         Budget of the length of all seams, relative to the root of the design's area.
     darts : bool
-        Whether seams may end inside a piece; False for sheet metal.
+        Whether seams may end inside a piece, as in cloth and paper.
     symmetric : bool
         Make the seams symmetric; the mesh has to be, vertex by vertex. Then pieces that overlap
         themselves are cut, and not joined again elsewhere.
-    min_neck : float, optional
-        Smallest width of a piece, in the mesh's unit. When not given, a tenth of the root of the
-        area is aimed at, and less is taken where the strain cannot be held otherwise.
-    min_size : float, optional
-        Smallest length of a piece, in the mesh's unit. Shorter ones are joined to a neighbour where
-        the strain allows it.
-    max_size : (float, float), optional
-        Length and width of a sheet that every pattern must fit on, in the mesh's unit.
+    min_neck : float or str, optional
+        Smallest width of a piece, as for `max_deviation`. When not given, a tenth of the root of
+        the area is aimed at, and less is taken where the strain cannot be held otherwise.
+    min_size : float or str, optional
+        Smallest length of a piece, as for `max_deviation`. Shorter ones are joined to a neighbour
+        where the strain allows it.
+    sheet : (float, float), optional
+        Length and width of a sheet that every pattern must fit on, in millimetres, or texts such
+        as "3m".
+    unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
+        Unit of the coordinates.
     keep : Seam, iterable of Seam, array_like (e, 2), or Pieces, optional
         Seams that stay: what :func:`gso.cut` takes, or an earlier result for the same mesh.
     along : array_like of int, (k, 2), optional
@@ -109,8 +116,8 @@ def pieces(
     denoise : bool
         Denoise the design first, such as a scan.
     workers : int, optional
-        Number of processes, which a search with `max_deviation` uses; one for each processor when
-        None, and 0 for this one alone. The result does not depend on it.
+        Number of processes, which a search with `max_deviation` uses; one for each processor by
+        default, 0 for this one alone. The result does not depend on it.
     callback : callable, optional
         Called with what is being done, in words.
 
@@ -132,7 +139,7 @@ def pieces(
     >>> u, v = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
     >>> dome = np.stack([u, v, 0.5 - 0.25 * (u * u + v * v)], axis=-1)
     >>> found = gso.pieces(dome, max_strain=0.01)
-    >>> len(found), found.usable, found.metrics["strain_p99"] <= 0.01
+    >>> len(found), found.usable, found.metrics["strain_max"] <= 0.01
     (1, True, True)
 
     Notes
@@ -142,19 +149,30 @@ def pieces(
     adapted.
     """
     clock = time.perf_counter()
+    from gso.io import as_mesh
+
+    design = as_mesh(mesh)
+
+    def length(value: Length | None, name: str) -> float | None:
+        if value is None:
+            return None
+        return as_length(value, name, diagonal=design.diagonal, unit=unit)
+
+    default = STAYS if max_deviation is None else CHANGES
     wishes = Wishes(
-        max_strain,
-        max_deviation,
-        max_pieces,
-        seam,
-        darts,
-        min_neck,
-        min_size,
-        max_size,
-        callback or (lambda said: None),
+        max_strain=default if max_strain is None else as_strain(max_strain, "max_strain"),
+        max_deviation=length(max_deviation, "max_deviation"),
+        max_pieces=max_pieces,
+        seam=seam,
+        darts=darts,
+        min_neck=length(min_neck, "min_neck"),
+        min_size=length(min_size, "min_size"),
+        max_size=as_sheet(sheet, unit),
+        say=callback or (lambda said: None),
     )
+    max_size = wishes.max_size
     notes: list[str] = []
-    ground = _ground(mesh, keep, along, avoid, symmetric, denoise)
+    ground = _ground(design, keep, along, avoid, symmetric, denoise)
     aim = wishes
     if max_size is not None and too_large(ground.mesh, max_size):
         # The pieces are not cut to size in vain; the reason names the largest.
@@ -179,10 +197,9 @@ def pieces(
     )
 
 
-def _ground(mesh: Any, keep: Any, along: Any, avoid: Any, symmetric: bool, denoise: bool) -> Ground:
-    from gso.io import as_mesh
-
-    design = as_mesh(mesh)
+def _ground(
+    design: Mesh, keep: Any, along: Any, avoid: Any, symmetric: bool, denoise: bool
+) -> Ground:
     design.check_joined()
     kept = np.empty((0, 2), np.int64)
     if isinstance(keep, Pieces):

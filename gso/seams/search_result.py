@@ -32,9 +32,9 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
     own, sheets = found.pieces, found.sheets
     count, length = len(own), own.seam_length
     size = float(np.sqrt(ground.potential.area.sum()))
-    numbers = {"pieces": float(count), "seam": length, "strain_p99": found.strain}
+    numbers = {"pieces": float(count), "seam": length, "strain_max": found.strain}
     whole = [s for s in sheets if s is not None]
-    numbers["strain_max"] = max((s.strains["strain_max"] for s in whole), default=np.inf)
+    numbers["strain_p99"] = max((s.strains["strain_p99"] for s in whole), default=np.inf)
     necks = found.necks(2.0 * NECK * size)
     numbers["neck"] = float(necks.min())
     roots = np.sqrt([metrics.area(piece.mesh) for piece in own])

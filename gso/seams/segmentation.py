@@ -121,8 +121,8 @@ class Segmentation(Pieces):
                 row |= {
                     "length": sheet.size[0],
                     "width": sheet.size[1],
-                    "strain_p99": sheet.strain,
-                    "strain_max": sheet.strains["strain_max"],
+                    "strain_max": sheet.strain,
+                    "strain_p99": sheet.strains["strain_p99"],
                 }
             rows.append(row)
         return rows
@@ -141,8 +141,8 @@ class Segmentation(Pieces):
 
     def __repr__(self) -> str:
         said = f"{len(self)} pieces, seam {self.seam_length:.3g}"
-        if "strain_p99" in self.metrics:
-            said += f", strain (99 %) {self.metrics['strain_p99']:.2g}"
+        if "strain_max" in self.metrics:
+            said += f", largest strain {self.metrics['strain_max']:.2g}"
         if "deviation_max" in self.metrics:
             said += f", at most {self.metrics['deviation_max']:.3g} from the design"
         return f"Segmentation({said}{'' if self.usable else '; not usable'})"

@@ -7,10 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from gso import faults, geometry, metrics
+from gso import faults, metrics
 from gso.mesh import Mesh
 from gso.mesh.paths import Paths
-from gso.mesh.topology import corner_triangles
 from gso.pipeline.lay_flat import lay_out
 from gso.typing import Array, Ints
 
@@ -42,13 +41,8 @@ class Sheet:
 
     @cached_property
     def strain(self) -> float:
-        """The 99th percentile of the strain, by area."""
-        values = metrics.corner_strains(self.mesh, self.flat)
-        known = np.flatnonzero(~np.isnan(values))
-        known = known[np.argsort(values[known], kind="stable")]
-        corners = corner_triangles(self.mesh.faces)[known]
-        level = np.cumsum(geometry.doubled_areas(self.mesh.vertices, corners))
-        return float(values[known[np.searchsorted(level, 0.99 * level[-1])]])
+        """The largest strain of the corner triangles."""
+        return self.strains["strain_max"]
 
     @cached_property
     def overlaps(self) -> Ints:

@@ -40,7 +40,7 @@ def _of_sheet(panel: Panel, before: Panel, scale: float, ask: Ask, sheet: Thickn
         strain = sheet.strain(1.0 / radius)
         if 0.5 * sheet.sheet >= radius:
             return [f"{panel.name}: {thick} is too thick for its radius of {radius:.4g} mm"]
-        if strain > ask.max_strain:
+        if strain > ask.strain:
             return [
                 f"{panel.name} has no bend lines, so its pattern is that of the design's surface; "
                 f"the neutral surface of {thick} is longer or shorter by up to "
@@ -102,7 +102,7 @@ def _of_seams(own: Fitted, ask: Ask, sheet: Thickness) -> list[str]:
     """Tell whether the thickness makes the sides of a seam differ in length."""
     worst, why = 0.0, []
     for seam in own.made.matings:
-        bound = own.scale * (seam.mismatch(own.made.panels) + ask.max_strain * seam.length)
+        bound = own.scale * (seam.mismatch(own.made.panels) + ask.strain * seam.length)
         apart = seam.mismatch(own.panels)
         more = apart - bound - _SEAM * sheet.sheet
         if more > worst:

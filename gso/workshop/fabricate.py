@@ -10,11 +10,14 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
-from gso.io.flat_svg import MILLIMETRES
-from gso.spelling import choices, known_keywords
+from gso.mesh import Mesh
+from gso.quantities import Length, Strain, as_length, as_strain, millimetres
+from gso.seams.options import as_sheet
+from gso.spelling import known_keywords
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import design_record, digest, plain, versions
 from gso.workshop.checks import refused
@@ -73,16 +76,16 @@ def fabricate(
     *,
     unit: str = "mm",
     formulation: str = "ruled",
-    max_deviation: float | str = "1%",
-    max_strain: float = 1e-3,
+    max_deviation: Length | None = None,
+    max_strain: Strain | None = None,
     max_strips: int = 8,
     darts: bool = False,
     keep_groups: bool = False,
-    min_radius: float | None = None,
+    min_radius: Length | None = None,
     finish: Finish = Finish(),  # noqa: B008
     marks: Sequence[ArrayLike] = (),
     holes: Sequence[ArrayLike] = (),
-    sheet: tuple[float, float] | None = None,
+    sheet: tuple[Length, Length] | None = None,
     spacing: float = 2.0,
     rotations: Any = (0, 180),
     seconds: float = 10.0,
@@ -112,25 +115,28 @@ def fabricate(
         "ruled": exactly developable strips, with bend lines; pieces that no strips follow are
         only nearly developable. "curvature", "isometry": all of them are nearly developable.
         "flatten": the shape stays as it is.
-    max_deviation : float or str
-        Largest distance from the design, in its unit, or such as "0.5%" of its diagonal.
-    max_strain : float
-        Largest strain of the patterns (99th percentile).
+    max_deviation : float or str, optional
+        Largest distance between design and result, both ways: a number in the design's unit, or a
+        text such as "5mm" or "0.5%" (of the diagonal of the bounding box); 1 % by default.
+    max_strain : float or str, optional
+        Largest strain of the patterns, such as 0.01 or "1%". By default 1 % where the shape stays
+        ("flatten"), and 0.1 % where it may change.
     max_strips : int
         Largest number of strips side by side of one piece.
     darts : bool
         Whether cuts may end inside a piece.
     keep_groups : bool
         Whether to cut between the groups of faces (``g``) of an OBJ file in any case.
-    min_radius : float, optional
-        Smallest radius that the surface may be bent to, in the design's unit.
+    min_radius : float or str, optional
+        Smallest radius that the surface may be bent to, as for `max_deviation`; a share is of the
+        diagonal of all designs together.
     finish : Finish
         Kerf, allowance, notches, holes, tabs, labels, thickness; in millimetres.
     marks, holes : sequence of array_like, (k, 3)
         Lines to engrave, and closed lines to cut (the last point is the first), on the designs'
         surfaces and in their unit.
     sheet : (float, float), optional
-        Length and width of the sheets to nest on, in millimetres.
+        Length and width of the sheets to nest on, in millimetres, or texts such as "3m".
     spacing : float
         Distance between parts on a sheet, in millimetres.
     rotations : sequence of float, int or "any"
@@ -173,21 +179,29 @@ def fabricate(
     (True, 1, [3142, 1571])
     """
     clock = time.perf_counter()
-    if unit not in MILLIMETRES:
-        raise OptionError(f"unknown unit {unit!r}; {choices(unit, MILLIMETRES)}")
-    scale = MILLIMETRES[unit]
+    scale = millimetres(unit)
     if not isinstance(finish, Finish):
         raise OptionError(f"finish is {finish!r}; it must be a gso.workshop.finish.Finish")
     drawings = Drawings(tuple(dict.fromkeys(formats)), layers, paper, bend_text)
     most = None
-    if sheet is not None:
-        checked_options(sheet, spacing, 0.0, rotations, seconds)
-        most = finish.room(sheet, scale)
-    ask = Ask(formulation, max_deviation, max_strain, max_strips, darts, most, min_radius)
+    size = as_sheet(sheet, "mm")
+    if size is not None:
+        checked_options(size, spacing, 0.0, rotations, seconds)
+        most = finish.room(size, scale)
     say = callback or (lambda said: None)
     place = Path(os.fsdecode(folder))
     every = designs_of(designs, keep_groups=keep_groups)
     meshes = [design.mesh for design in every]
+    ask = Ask(
+        formulation,
+        "1%" if max_deviation is None else max_deviation,
+        None if max_strain is None else as_strain(max_strain, "max_strain"),
+        max_strips,
+        darts,
+        most,
+        None if min_radius is None else _radius(min_radius, meshes, unit),
+        unit,
+    )
     drawn = [
         (given, check_lines(given, meshes, what, closed=what == "hole"))
         for given, what in ((marks, "mark"), (holes, "hole"))
@@ -229,12 +243,12 @@ def fabricate(
         "reasons": [f"{r['name']}: {why}" for r in records for why in r["reasons"]],
     }
     sheets: list[Drawing] = []
-    if sheet is not None and parts:
+    if size is not None and parts:
         say("nesting")
         try:
             nested = nest(
                 parts,
-                sheet,
+                size,
                 spacing=spacing,
                 rotations=rotations,
                 seconds=seconds,
@@ -250,7 +264,7 @@ def fabricate(
                     "method": nested.method,
                     "density": nested.density,
                     "spacing": spacing,
-                    "sheet": list(sheet),
+                    "sheet": list(size),
                     "notes": list(nested.notes),
                 }
             )
@@ -262,6 +276,12 @@ def fabricate(
     certificate["seconds"] = time.perf_counter() - clock
     close(place, certificate)
     return Fabrication(place, tuple(parts), tuple(sheets), certificate, tuple(files))
+
+
+def _radius(given: Length, meshes: Sequence[Mesh], unit: str) -> float:
+    points = np.concatenate([mesh.vertices for mesh in meshes])
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    return as_length(given, "min_radius", diagonal=diagonal, unit=unit)
 
 
 def _named(found: dict[int, Made]) -> dict[int, Made]:

@@ -118,7 +118,7 @@ def _whole(name: str, design: _Target, ask: Ask, say: Say) -> Made | None:
             design.solved.mesh,
             formulation=ask.formulation,
             max_deviation=design.left,
-            max_strain=ask.max_strain,
+            max_strain=ask.strain,
         )
         if result.pattern is None:
             return None
@@ -195,10 +195,11 @@ def _searched(
     triangles = Mesh(given.mesh.vertices, given.mesh.triangles)
     return search(
         triangles,
-        max_strain=ask.max_strain,
+        max_strain=ask.strain,
         max_deviation=allowed,
         darts=ask.darts,
-        max_size=ask.max_size,
+        sheet=ask.sheet,
+        unit=ask.unit,
         keep=given.kept if len(given.kept) else None,
         workers=workers,
         callback=lambda said: say(f"{given.name}: {said}"),

@@ -71,10 +71,10 @@ def of_pattern(
             f"the surface is up to {far:.4g} from the design, more than {allowed:.4g} (in the "
             "design's unit)"
         )
-    if strains["strain_p99"] > ask.max_strain and not reasons:
+    if strains["strain_max"] > ask.strain and not reasons:
         reasons.append(
-            f"the strain of the patterns is {100 * strains['strain_p99']:.3g} % (99 %), more than "
-            f"{100 * ask.max_strain:.3g} %"
+            f"the strain of the patterns is {100 * strains['strain_max']:.3g} %, more than "
+            f"{100 * ask.strain:.3g} %"
         )
     if overlaps and not reasons:
         reasons.append(f"{overlaps} faces of the patterns overlap")

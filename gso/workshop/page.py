@@ -90,7 +90,7 @@ def _designs(designs: Sequence[dict[str, Any]]) -> str:
     more = ("strain % (99 %)", "smallest bend radius mm", "seam mismatch mm", "verdict")
     rows = ["<table><tr>", *(f"<th>{h}</th>" for h in (*heads, *more)), "</tr>"]
     for one in designs:
-        strain = one.get("strain_p99")
+        strain = one.get("strain_max")
         cells = [
             escape(one["name"]),
             str(len(one["copies"])),

@@ -1,0 +1,116 @@
+"""Options that several commands share: one name, one unit, one default and one spelling each."""
+
+from __future__ import annotations
+
+import click
+
+from gso.errors import OptionError
+from gso.quantities import MILLIMETRES, as_length, as_strain
+
+
+class _Length(click.ParamType):
+    """A length such as ``5``, ``5mm`` or ``0.5%``, checked; the command's function converts it."""
+
+    name = "length"
+
+    def convert(
+        self, value: str | float, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | float:
+        try:
+            as_length(value, "it", diagonal=1.0)
+        except OptionError:
+            self.fail(
+                f"{value!r} is no positive length such as 5, 5mm or 0.5% (of the diagonal of the "
+                "bounding box)",
+                param,
+                ctx,
+            )
+        return value
+
+
+class _Millimetres(click.ParamType):
+    """A length in millimetres, such as ``2`` or ``0.2cm``, as a number."""
+
+    name = "mm"
+
+    def convert(
+        self, value: str | float, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        try:
+            # There is no design yet that a per cent could refer to.
+            return as_length(value, "it", diagonal=float("nan"))
+        except OptionError:
+            self.fail(f"{value!r} is no positive length such as 2, 2mm or 0.2cm", param, ctx)
+
+
+class _Strain(click.ParamType):
+    """A strain such as ``0.01`` or ``1%``, as a ratio."""
+
+    name = "strain"
+
+    def convert(
+        self, value: str | float, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        try:
+            return as_strain(value, "it")
+        except OptionError:
+            self.fail(f"{value!r} is no positive strain such as 0.01 or 1%", param, ctx)
+
+
+LENGTH, MM, STRAIN = _Length(), _Millimetres(), _Strain()
+
+max_deviation = click.option(
+    "--max-deviation",
+    metavar="LENGTH",
+    type=LENGTH,
+    help="Largest distance between design and result, both ways: 5 (in the design's unit), 5mm, or "
+    "0.5% of its diagonal.",
+)
+max_strain = click.option(
+    "--max-strain",
+    metavar="STRAIN",
+    type=STRAIN,
+    help="Largest strain of the flat patterns: 0.01 or 1%.",
+)
+min_radius = click.option(
+    "--min-radius",
+    metavar="LENGTH",
+    type=LENGTH,
+    help="Smallest radius that the surface may be bent to, as for --max-deviation.",
+)
+max_strips = click.option(
+    "--max-strips",
+    metavar="N",
+    type=click.IntRange(1),
+    help="Largest number of strips side by side of one piece; 64 by default.",
+)
+sheet = click.option(
+    "--sheet",
+    metavar="L W",
+    type=MM,
+    nargs=2,
+    help="Length and width of a sheet, in mm: every part must fit on one.",
+)
+darts = click.option(
+    "--darts/--no-darts", default=False, show_default=True, help="Whether cuts may end in a piece."
+)
+keep_groups = click.option(
+    "--keep-groups", is_flag=True, help="Cut between the groups (g) of IN in any case."
+)
+unit = click.option(
+    "--unit",
+    type=click.Choice(tuple(MILLIMETRES)),
+    default="mm",
+    show_default=True,
+    help="Unit of the coordinates.",
+)
+workers = click.option(
+    "--workers",
+    metavar="N",
+    type=click.IntRange(0),
+    help="Processes; one for each processor by default, 0 for none beside this one.",
+)
+scheduler = click.option(
+    "--scheduler", metavar="ADDRESS", help="Dask cluster that does the work instead."
+)
+quiet = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
