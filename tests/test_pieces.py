@@ -75,9 +75,9 @@ def sound(found) -> None:
         a, b = piece.mesh.edges.T
         before = np.linalg.norm(piece.mesh.vertices[a] - piece.mesh.vertices[b], axis=1)
         after = np.linalg.norm(sheet.flat[a] - sheet.flat[b], axis=1)
-        assert np.percentile(np.abs(after / before - 1), 99) <= 1.1 * sheet.strain + 1e-9
+        assert np.abs(after / before - 1).max() <= 1.1 * sheet.strain + 1e-9
     worst = max(sheet.strain for sheet in found.sheets)
-    assert found.metrics["strain_p99"] == pytest.approx(worst)
+    assert found.metrics["strain_max"] == pytest.approx(worst)
 
 
 def test_the_potential_of_a_cap_is_known():
@@ -108,7 +108,7 @@ def test_a_sphere_becomes_one_piece_with_darts():
     sound(found)
     assert len(found) == 1
     assert found.usable
-    assert found.metrics["strain_p99"] <= 0.03
+    assert found.metrics["strain_max"] <= 0.03
     # Strips of the same strain and no waste would be sqrt(pi / 0.03) / 2 long.
     assert found.seam_length < 1.6 * 0.5 * np.sqrt(np.pi / 0.03)
     # The area of the pattern is the surface's, up to the strain.
@@ -271,7 +271,7 @@ def test_a_changed_shape_is_developable_and_closed():
     found = gso.pieces(mesh, max_strain=1e-3, max_deviation=0.12, darts=True)
     sound(found)
     assert found.usable, found.reasons
-    assert found.metrics["strain_p99"] <= 1e-3
+    assert found.metrics["strain_max"] <= 1e-3
     # Distances by another route: vertices and midpoints of faces, both ways.
     from gso.mesh.closest_point import Nearest
 
@@ -376,7 +376,7 @@ def test_command(tmp_path):
     assert done.exit_code == 0, done.output
     said = json.loads((out / "pieces.json").read_text())
     assert said["usable"]
-    assert said["metrics"]["strain_p99"] <= 0.03
+    assert said["metrics"]["strain_max"] <= 0.03
     again = gso.load(out / "pieces.obj")
     assert set(again.attributes.labels["g"].names) == {row["name"] for row in said["pieces"]}
     for row in said["pieces"]:
@@ -484,12 +484,11 @@ def test_seams_follow_and_avoid_edges_also_without_darts(darts):
         z = found.design.vertices[found.edges].mean(axis=1)[:, 2]
         return float(found.lengths[z > 0.72].sum())
 
-    free = gso.pieces(mesh, max_strain=0.08, darts=darts)
-    away = gso.pieces(mesh, max_strain=0.08, darts=darts, avoid=avoid)
+    free = gso.pieces(mesh, max_strain=0.1, darts=darts)
+    away = gso.pieces(mesh, max_strain=0.1, darts=darts, avoid=avoid)
     assert inside(away) < 0.8 * inside(free)
-    assert len(gso.pieces(mesh, max_strain=0.05, along=[], avoid=[], darts=True)) == len(
-        gso.pieces(mesh, max_strain=0.05, darts=True)
-    )
+    same = gso.pieces(mesh, max_strain=0.1, along=[], avoid=[], darts=darts)
+    assert len(same) == len(free)
     with pytest.raises(OptionError, match="vertices are 0 to"):
         gso.pieces(mesh, along=[[0, 10**6]], darts=True)
 
@@ -545,7 +544,7 @@ def test_bounds_on_the_joint_solve_hold():
 
 
 def test_pieces_become_exactly_ruled(tmp_path):
-    cut = gso.pieces(ball(26), max_strain=0.03, darts=False)
+    cut = gso.pieces(ball(26), max_strain=0.035, darts=False)
     options = gso.RuledOptions(strips=2, starts=("design",))
     result = gso.tno.optimize(cut, formulation="ruled", options=options)
     assert result.ruled.strips == 2 * len(cut)

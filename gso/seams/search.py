@@ -140,7 +140,7 @@ def pieces(
     >>> dome = np.stack([u, v, 0.5 - 0.25 * (u * u + v * v)], axis=-1)
     >>> found = gso.pieces(dome, max_strain=0.01)
     >>> len(found), found.usable, found.metrics["strain_max"] <= 0.01
-    (1, True, True)
+    (2, True, True)
 
     Notes
     -----
