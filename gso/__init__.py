@@ -115,69 +115,37 @@ __all__ = [
     "verdict",
 ]
 
-_NAMES = {
-    "Mesh": "gso.mesh",
-    "load": "gso.io",
-    "save": "gso.io",
-    "save_spline": "gso.io",
-    "fit_spline": "gso.spline.fit",
-    "BSplineSurface": "gso.spline",
-    "as_mesh": "gso.io",
-    "Result": "gso.result",
-    "Status": "gso.status",
-    "Progress": "gso.status",
-    "GSOError": "gso.errors",
-    "MeshError": "gso.errors",
-    "OptionError": "gso.errors",
-    "BackendError": "gso.errors",
-    "WeightsError": "gso.errors",
-    "DatasetError": "gso.errors",
-    "ConvergenceWarning": "gso.errors",
-    "Options": "gso.tasks.options",
-    "cut": "gso.seams",
-    "pieces": "gso.seams",
-    "fabricate": "gso.workshop.fabricate",
-    "loft": "gso.ruled.loft",
-    "smooth_strips": "gso.ruled.smooth.smooth_surface",
-    "Fixed": "gso.constraints",
-    "FixedBoundary": "gso.constraints",
-    "FixedLengths": "gso.constraints",
-    "Glue": "gso.constraints",
-    "Handle": "gso.constraints",
-    "OnCurve": "gso.constraints",
-    "PlanarFaces": "gso.constraints",
-    "Ruling": "gso.constraints",
-    "SlidingBoundary": "gso.constraints",
-    "SmoothCurves": "gso.constraints",
-    "SymmetryPlane": "gso.constraints",
+#: Names by their modules.
+_PLACES = {
+    "gso.constraints": (
+        "Fixed FixedBoundary FixedLengths Glue Handle OnCurve PlanarFaces Ruling SlidingBoundary "
+        "SmoothCurves SymmetryPlane"
+    ),
+    "gso.errors": (
+        "BackendError ConvergenceWarning DatasetError GSOError MeshError OptionError WeightsError"
+    ),
+    "gso.io": "as_mesh load save save_spline",
+    "gso.mesh": "Mesh topology",
+    "gso.result": "Result",
+    "gso.ruled.loft": "loft",
+    "gso.ruled.smooth.smooth_surface": "smooth_strips",
+    "gso.seams": "cut pieces",
+    "gso.spline": "BSplineSurface",
+    "gso.spline.fit": "fit_spline",
+    "gso.status": "Progress Status",
+    "gso.tasks.options": "Options",
+    "gso.workshop.fabricate": "fabricate",
 }
+_NAMES = {name: module for module, names in _PLACES.items() for name in names.split()}
 _OPTIONS = {
-    "DevelopableOptions": "gso.tasks.developable",
-    "IsometryOptions": "gso.tasks.developable.joint_isometry",
-    "RuledOptions": "gso.tasks.developable.ruled",
-    "FlattenOptions": "gso.tasks.flatten",
-    "DenoiseOptions": "gso.tasks.denoise",
     "BendOptions": "gso.tasks.bend",
     "ConformalOptions": "gso.tasks.conformal",
+    "DenoiseOptions": "gso.tasks.denoise",
+    "DevelopableOptions": "gso.tasks.developable",
+    "FlattenOptions": "gso.tasks.flatten",
+    "IsometryOptions": "gso.tasks.developable.joint_isometry",
+    "RuledOptions": "gso.tasks.developable.ruled",
 }
-_MODULES = (
-    "constraints",
-    "tno",
-    "verdict",
-    "metrics",
-    "topology",
-    "io",
-    "dataset",
-    "net",
-    "hybrid",
-    "plot",
-    "rulings",
-    "seams",
-)
-
-
-#: Modules whose public name differs from their place.
-_MOVED = {"topology": "gso.mesh.topology"}
 
 
 def __getattr__(name: str) -> Any:
@@ -189,8 +157,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         value = version("gso")
-    elif name in _MODULES:
-        value = importlib.import_module(_MOVED.get(name, f"gso.{name}"))
+    elif name in __all__:
+        value = importlib.import_module(f"gso.{name}")
     else:
         raise AttributeError(f"module 'gso' has no attribute {name!r}")
     globals()[name] = value

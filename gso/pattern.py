@@ -34,6 +34,16 @@ class Bend(NamedTuple):
     angle: float
     radius: float
 
+    def in_words(self) -> str:
+        """Describe the bend, with a radius in millimetres.
+
+        >>> Bend(np.zeros((2, 2)), np.radians(12.3), 45.6).in_words()
+        'mountain 12.3 degrees, radius 45.6 mm'
+        """
+        name = "mountain" if self.angle > 0 else "valley"
+        radius = f", radius {self.radius:.4g} mm" if np.isfinite(self.radius) else ""
+        return f"{name} {abs(np.degrees(self.angle)):.4g} degrees{radius}"
+
 
 @dataclass(frozen=True)
 class Pattern:

@@ -422,14 +422,6 @@ class TestRefused:
         with pytest.raises(gso.OptionError, match="device 'cuda' cannot be used"):
             gso.tno.optimize_batch(designs, device="cuda")
 
-    def test_a_misspelt_option(self, designs):
-        with pytest.raises(gso.OptionError, match="did you mean 'device'"):
-            gso.tno.optimize_batch(designs, devise="cpu")
-
-    def test_options_of_single_solves(self, designs):
-        with pytest.raises(gso.OptionError, match="takes no 'max_deviation'"):
-            gso.tno.optimize_batch(designs, max_deviation=0.1)
-
 
 def test_without_torch():
     code = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -530,21 +530,12 @@ def test_nearest_points_of_polylines():
 class Within(Part):
     """Vertices at a distance `radius` from the point `centre`: a part from outside the package."""
 
+    POSITIONS = ("centre",)
+    LENGTHS = ("radius",)
+
     ids: np.ndarray
     centre: np.ndarray
     radius: float
-
-    @property
-    def vertices(self):
-        return self.ids[:, None]
-
-    def mapped(self, frame, order):
-        centre = frame.to_unit(self.centre[None])[0]
-        radius = self.radius / frame.scale
-        return replace(self, ids=order[self.ids], centre=centre, radius=radius)
-
-    def kept(self, rows):
-        return replace(self, ids=self.ids[rows])
 
     def violation(self, points):
         return np.abs(np.linalg.norm(points[self.ids] - self.centre, axis=1) - self.radius)

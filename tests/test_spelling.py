@@ -19,22 +19,13 @@ from tests.conftest import saddle
 def calls():
     """Calls with a misspelt option, and the option that is meant."""
     grid = saddle(5)
-    many = gso.tno.optimize_many
     return {
-        "optimize": (lambda: gso.tno.optimize(grid, max_deviatoin=1.0), "max_deviation"),
-        "optimize_many": (lambda: many([grid], target_curvatur=1.0), "target_curvature"),
-        "optimize_many itself": (lambda: many([grid], worker=0), "workers"),
-        "session": (lambda: gso.tno.Session(grid, constraint=[]), "constraints"),
-        "solve": (lambda: gso.hybrid.solve(grid, polsh=3), "polish"),
-        "solve for the optimiser": (lambda: gso.hybrid.solve(grid, option="fast"), "options"),
-        "solve_many": (lambda: gso.hybrid.solve_many([grid], sparring=True), "sparing"),
         "options": (lambda: gso.DevelopableOptions(w_curvatur=1.0), "w_curvature"),
         "replace": (
             lambda: dataclasses.replace(gso.DenoiseOptions(), ordre=2),
             "order",
         ),
         "constraint": (lambda: gso.Handle(id=[0], positions=[[0, 0, 0]]), "ids"),
-        "load": (lambda: gso.load("a.obj", wled=0.1), "weld"),
         "task": (lambda: gso.tno.optimize(grid, task="flaten"), "flatten"),
         "formulation": (lambda: gso.tno.optimize(grid, formulation="isometrie"), "isometry"),
         "preset": (lambda: gso.tno.optimize(grid, options="balnced"), "balanced"),
@@ -54,15 +45,22 @@ def test_a_misspelt_option_names_the_nearest(name):
         call()
 
 
-def test_predict():
-    pytest.importorskip("torch")
-    with pytest.raises(OptionError, match="did you mean 'repeat'"):
-        gso.net.predict(saddle(5), repeats=2)
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda grid, **keywords: list(gso.tno.optimize_many(grid, workers=0, **keywords)),
+        lambda grid, **keywords: gso.hybrid.solve(grid[0], **keywords),
+        lambda grid, **keywords: list(gso.hybrid.solve_many(grid, workers=0, **keywords)),
+    ],
+)
+def test_keywords_that_are_passed_on_are_checked_before_anything_is_solved(call):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'max_deviatoin'"):
+        call([saddle(5)], max_deviatoin=1.0)
 
 
 def test_what_is_like_nothing_lists_what_there_is():
-    with pytest.raises(OptionError, match="takes no 'zebra'; there are mesh, task, formulation"):
-        gso.tno.optimize(saddle(5), zebra=1)
+    with pytest.raises(OptionError, match="takes no 'zebra'; there are iterations, tolerance"):
+        gso.DenoiseOptions(zebra=1)
 
 
 @pytest.mark.parametrize(
@@ -82,11 +80,6 @@ def test_constraints_in_json(entry, message, tmp_path):
 
 
 def test_signatures_are_kept():
-    assert list(inspect.signature(gso.tno.optimize).parameters)[:3] == [
-        "mesh",
-        "task",
-        "formulation",
-    ]
     assert list(inspect.signature(gso.Handle).parameters) == ["ids", "positions", "weight"]
     assert "w_curvature" in inspect.signature(gso.DevelopableOptions).parameters
 

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -128,6 +129,15 @@ class TestSVG:
             assert f'label="{name}"' in text
         assert "mountain 30 degrees, radius 12.5 mm" in text
         assert "side/1" in text
+
+    def test_names_with_special_characters_stay_themselves(self, tmp_path):
+        name = """9 <&"'> größe"""
+        part = replace(PART, name=name, labels=(Label(name, np.array([100.0, 60]), 6.0, 0.3),))
+        writers.write(Drawing((part,)), tmp_path / "a.svg")
+        root = ElementTree.parse(tmp_path / "a.svg").getroot()
+        svg = "{http://www.w3.org/2000/svg}"
+        assert {e.text for e in root.iterfind(f"{svg}g/{svg}g/{svg}title")} == {f"{name}, 2 times"}
+        assert name in {e.text for e in root.iter(f"{svg}text")}
 
 
 class TestPDF:

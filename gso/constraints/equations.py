@@ -8,6 +8,7 @@ Hard `Pins`, `Relations` and `OnPlane` are linear, and are eliminated from the u
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ from gso.mesh import Frame
 from gso.mesh.polyline import Polylines
 from gso.typing import Array, Ints
 
+P = TypeVar("P", bound="Part")
+
 
 @dataclass(frozen=True)
 class Part:
@@ -31,15 +34,24 @@ class Part:
         Number of the constraint.
     """
 
+    #: Fields of vertex numbers, (k,) or (k, .), and other fields with a row for each equation.
+    INDICES: ClassVar[tuple[str, ...]] = ("ids",)
+    ROWS: ClassVar[tuple[str, ...]] = ()
+    #: Fields that are positions, and fields that are lengths.
+    POSITIONS: ClassVar[tuple[str, ...]] = ()
+    LENGTHS: ClassVar[tuple[str, ...]] = ()
+
     owner: int
 
-    def mapped(self, frame: Frame, order: Ints) -> Part:
+    def mapped(self: P, frame: Frame, order: Ints) -> P:
         """Return the part in the unit of a frame, with vertex i numbered ``order[i]``."""
-        raise NotImplementedError
+        new = {name: order[getattr(self, name)] for name in self.INDICES}
+        new |= {name: frame.to_unit(getattr(self, name)) for name in self.POSITIONS}
+        return replace(self, **new, **{n: getattr(self, n) / frame.scale for n in self.LENGTHS})
 
-    def kept(self, rows: NDArray[np.bool_]) -> Part:
+    def kept(self: P, rows: NDArray[np.bool_]) -> P:
         """Return the part with only those equations that a mask (k,) selects."""
-        raise NotImplementedError
+        return replace(self, **{n: getattr(self, n)[rows] for n in (*self.INDICES, *self.ROWS)})
 
     def on(self, transfer: Transfer) -> Part | None:
         """Return equations like these on a coarser copy of the design; None if it has none.
@@ -61,7 +73,7 @@ class Part:
     @property
     def vertices(self) -> Ints:
         """Vertices of each equation, (k, .)."""
-        raise NotImplementedError
+        return np.column_stack([getattr(self, name) for name in self.INDICES])
 
     @property
     def count(self) -> int:
@@ -98,19 +110,11 @@ class Part:
 class Pins(Part):
     """Vertices `ids` (k,) are at `positions` (k, dim); the part is soft if it has a weight."""
 
+    ROWS = POSITIONS = ("positions",)
+
     ids: Ints
     positions: Array
     weight: float | None = None
-
-    @property
-    def vertices(self) -> Ints:
-        return self.ids[:, None]
-
-    def mapped(self, frame: Frame, order: Ints) -> Pins:
-        return replace(self, ids=order[self.ids], positions=frame.to_unit(self.positions))
-
-    def kept(self, rows: NDArray[np.bool_]) -> Pins:
-        return replace(self, ids=self.ids[rows], positions=self.positions[rows])
 
     def on(self, transfer: Transfer) -> Pins | None:
         ids, rows = _kept(transfer, self.ids)
@@ -142,25 +146,13 @@ class Pins(Part):
 class Relations(Part):
     """``p[second] = anchor + matrix (p[first] - anchor)``, `matrix` orthogonal."""
 
+    INDICES = ("first", "second")
+    POSITIONS = ("anchor",)
+
     first: Ints
     second: Ints
     matrix: Array
     anchor: Array
-
-    @property
-    def vertices(self) -> Ints:
-        return np.stack([self.first, self.second], axis=1)
-
-    def mapped(self, frame: Frame, order: Ints) -> Relations:
-        return replace(
-            self,
-            first=order[self.first],
-            second=order[self.second],
-            anchor=frame.to_unit(self.anchor),
-        )
-
-    def kept(self, rows: NDArray[np.bool_]) -> Relations:
-        return replace(self, first=self.first[rows], second=self.second[rows])
 
     def on(self, transfer: Transfer) -> Relations | None:
         first, second = transfer.place(self.first), transfer.place(self.second)
@@ -198,24 +190,16 @@ class Relations(Part):
 class OnPlane(Part):
     """Vertices `ids` lie on the plane (or line) through `anchor` with a unit `normal`."""
 
+    POSITIONS = ("anchor",)
+
     ids: Ints
     normal: Array
     anchor: Array
 
     @property
-    def vertices(self) -> Ints:
-        return self.ids[:, None]
-
-    def mapped(self, frame: Frame, order: Ints) -> OnPlane:
-        return replace(self, ids=order[self.ids], anchor=frame.to_unit(self.anchor))
-
-    @property
     def offset(self) -> float:
         """The value of ``normal . x`` on the plane."""
         return float(self.anchor @ self.normal)
-
-    def kept(self, rows: NDArray[np.bool_]) -> OnPlane:
-        return replace(self, ids=self.ids[rows])
 
     def on(self, transfer: Transfer) -> OnPlane:
         # A plane of symmetry may lie between two rows of vertices.
@@ -233,6 +217,9 @@ class OnPlane(Part):
         return equation.build(self.vertices, np.tile(row, (len(self.ids), 1)), block=block)
 
 
+L = TypeVar("L", bound="OnLines")
+
+
 @dataclass(frozen=True)
 class OnLines(Part):
     """Vertices `ids` lie on polylines."""
@@ -241,15 +228,8 @@ class OnLines(Part):
     lines: Polylines
     weight: float | None = None
 
-    @property
-    def vertices(self) -> Ints:
-        return self.ids[:, None]
-
-    def mapped(self, frame: Frame, order: Ints) -> OnLines:
-        return replace(self, ids=order[self.ids], lines=self.lines.mapped(frame))
-
-    def kept(self, rows: NDArray[np.bool_]) -> OnLines:
-        return replace(self, ids=self.ids[rows])
+    def mapped(self: L, frame: Frame, order: Ints) -> L:
+        return replace(super().mapped(frame, order), lines=self.lines.mapped(frame))
 
     def on(self, transfer: Transfer) -> OnLines | None:
         ids, _ = _kept(transfer, self.ids)
@@ -285,18 +265,10 @@ class Straight(OnLines):
 class Planar(Part):
     """Quads (k, 4), each planar."""
 
+    INDICES = ("quads",)
+
     quads: Ints
     weight: float | None = None
-
-    @property
-    def vertices(self) -> Ints:
-        return self.quads
-
-    def mapped(self, frame: Frame, order: Ints) -> Planar:
-        return replace(self, quads=order[self.quads])
-
-    def kept(self, rows: NDArray[np.bool_]) -> Planar:
-        return replace(self, quads=self.quads[rows])
 
     def on(self, transfer: Transfer) -> Planar | None:
         """Constrain the quads of the copy whose corners are all corners of these quads."""
@@ -323,19 +295,12 @@ class Planar(Part):
 class Lengths(Part):
     """Pairs of vertices (k, 2) are `lengths` (k,) apart."""
 
+    INDICES = ("pairs",)
+    ROWS = LENGTHS = ("lengths",)
+
     pairs: Ints
     lengths: Array
     weight: float | None = None
-
-    @property
-    def vertices(self) -> Ints:
-        return self.pairs
-
-    def mapped(self, frame: Frame, order: Ints) -> Lengths:
-        return replace(self, pairs=order[self.pairs], lengths=self.lengths / frame.scale)
-
-    def kept(self, rows: NDArray[np.bool_]) -> Lengths:
-        return replace(self, pairs=self.pairs[rows], lengths=self.lengths[rows])
 
     def on(self, transfer: Transfer) -> Lengths | None:
         """Constrain the edges of the copy, and pairs of its vertices that are in the design's.

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gso.constraints.equations import OnPlane, Part, Pins, Relations
+from gso.mesh.topology import edge_graph, label_components
 from gso.typing import Array, Ints
 
 if TYPE_CHECKING:
@@ -190,18 +191,12 @@ def _follow(count: int, joints: _Joints, dim: int) -> tuple[Ints, Array, Array]:
 
 def _forest(count: int, joints: _Joints) -> tuple[Ints, Ints, Ints]:
     """Return the children, parents and joints of a spanning forest."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
+    from scipy.sparse.csgraph import breadth_first_order
 
     a, b = joints.first, joints.second
-    links = coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
-    label = connected_components(links, directed=False)[1]
-    roots = np.unique(label, return_index=True)[1]
+    roots = np.unique(label_components(count, a, b), return_index=True)[1]
     # An extra vertex, linked to one vertex of every component, makes the forest a tree.
-    tied = coo_matrix(
-        (np.ones(len(a) + len(roots)), (np.r_[a, np.full(len(roots), count)], np.r_[b, roots])),
-        shape=(count + 1, count + 1),
-    )
+    tied = edge_graph(count + 1, np.r_[a, np.full(len(roots), count)], np.r_[b, roots])
     order, before = breadth_first_order(tied, count, directed=False)
     child = order[1:][before[order[1:]] != count].astype(np.int64)
     above = before[child].astype(np.int64)

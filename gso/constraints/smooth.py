@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.equations import Part
 from gso.energy import Weighted, smooth_curve
-from gso.mesh import Frame
 from gso.typing import Array, Ints
 
 
@@ -71,19 +70,12 @@ class SmoothCurves(Constraint):
 class Smooth(Part):
     """Second derivatives at the middle of `triples` (k, 3), with `steps` (k, 2) between them."""
 
+    INDICES = ("triples",)
+    ROWS = LENGTHS = ("steps",)
+
     triples: Ints
     steps: Array
     weight: float | None = None
-
-    @property
-    def vertices(self) -> Ints:
-        return self.triples
-
-    def mapped(self, frame: Frame, order: Ints) -> Smooth:
-        return replace(self, triples=order[self.triples], steps=self.steps / frame.scale)
-
-    def kept(self, rows: NDArray[np.bool_]) -> Smooth:
-        return replace(self, triples=self.triples[rows], steps=self.steps[rows])
 
     def violation(self, points: Array) -> Array:
         """Return the distance of each middle vertex from the chord of its neighbours."""

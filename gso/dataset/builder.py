@@ -30,7 +30,7 @@ from gso.errors import DatasetError, MeshError, OptionError
 from gso.io import replacing
 from gso.linalg import blas_threads
 from gso.parallel import Done
-from gso.spelling import choices, known_keywords
+from gso.spelling import choices
 
 _OTHER_RECIPE = "give its own options, or another folder"
 _OTHER_VERSIONS = "install what it was begun with, or build in another folder"
@@ -41,7 +41,6 @@ Tick = Callable[[str, int, int], None]
 Spread = Callable[[Callable[..., bytes], Sequence[shard.Task]], Generator[Done, None, None]]
 
 
-@known_keywords()
 def build(
     folder: str | PathLike[str],
     recipe: Recipe | None = None,

@@ -69,10 +69,8 @@ class Kind:
 
     @property
     def options(self) -> dict[str, Any]:
-        """Settings of the solver, by the names that files have had from the beginning."""
-        settings = tno.check(**self.arguments)[2]
-        former = {new: old for old, new in settings.RENAMED.items()}
-        return {former.get(name, name): value for name, value in asdict(settings).items()}
+        """Settings of the solver."""
+        return asdict(tno.check(**self.arguments)[2])
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
+from inspect import signature
 from itertools import islice
 from typing import Any
 
@@ -25,7 +26,6 @@ from gso.pipeline import component_solves
 from gso.pipeline.job import Job
 from gso.pipeline.normalise import Canonical
 from gso.result import Result
-from gso.spelling import known_keywords
 from gso.status import Status
 from gso.tno import Start, check, optimize
 from gso.tno.optimize_many import Item
@@ -41,7 +41,6 @@ _PASSES = 1
 _NEARLY = 2e-3
 
 
-@known_keywords(optimize)
 def solve(
     mesh: Any,
     *,
@@ -130,7 +129,6 @@ def solve(
     return result
 
 
-@known_keywords(optimize)
 def solve_many(
     meshes: Iterable[Any],
     *,
@@ -205,7 +203,7 @@ def _each(design: Mesh, pieces: list[Component], task: str, keywords: dict[str, 
         warnings.simplefilter("ignore", ConvergenceWarning)
         result = component_solves.solve(one, whole, pieces, callback, workers=0)
     if not result.converged and result.status is not Status.MAX_ITERATIONS:
-        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=4)
+        warnings.warn(str(result.status), ConvergenceWarning, stacklevel=3)
     return result
 
 
@@ -259,6 +257,7 @@ def _checked(task: str, polish: Any, keywords: dict[str, Any]) -> bool | int:
     """Check the arguments that need no mesh, make the constraints a list, return `polish`."""
     if not isinstance(polish, bool | np.bool_ | int | np.integer) or polish < 0:
         raise OptionError(f"polish is {polish!r}; take True, False, or a number of iterations")
+    signature(optimize).bind(None, **keywords)
     if "x0" in keywords:
         raise OptionError("the net makes the start; for one of your own call gso.tno.optimize")
     names = ("formulation", "options", "max_deviation", "max_strain", "target_curvature")

@@ -29,7 +29,6 @@ from gso.io.raw_surface import checked as checked_weld
 from gso.io.raw_surface import welded
 from gso.io.source import read_bytes
 from gso.mesh import Mesh
-from gso.spelling import known_keywords
 
 __all__ = [
     "SPLINE_SUFFIXES",
@@ -103,7 +102,6 @@ def add_format(suffix: str, module: ModuleType) -> None:
     _FORMATS[suffix.lower()] = _Format(module)
 
 
-@known_keywords()
 def load(path: str | PathLike[str], *, weld: float | None = None) -> Mesh:
     """Read a mesh file; its suffix selects the format.
 

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-import struct
-import tokenize
 import zipfile
-import zlib
 from typing import IO, Any, BinaryIO
 
 import numpy as np
@@ -19,21 +16,6 @@ from gso.mesh.attributes import Attributes
 
 # Largest expansion factor of a deflate stream.
 _DEFLATE_RATIO = 1032
-# Exceptions that zipfile and NumPy's header readers raise on damaged files.
-_DAMAGE = (
-    zipfile.BadZipFile,
-    zlib.error,
-    struct.error,
-    tokenize.TokenError,
-    ArithmeticError,
-    EOFError,
-    LookupError,
-    OSError,
-    RuntimeError,
-    SyntaxError,
-    TypeError,
-    ValueError,
-)
 
 
 def read_npy(data: bytes) -> Surface:
@@ -70,9 +52,10 @@ def read_arrays(data: bytes) -> dict[str, np.ndarray]:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = [m for m in archive.infolist() if m.filename.endswith(".npy")]
             return {m.filename[:-4]: _member(archive, m) for m in members}
-    except MeshError:
+    except (MeshError, MemoryError):
         raise
-    except _DAMAGE as error:
+    # The reader may raise any exception on a damaged file.
+    except Exception as error:
         raise MeshError(f"is no intact .npz file: {error}; write it again") from None
 
 
@@ -118,7 +101,8 @@ def _array(stream: IO[bytes], size: int) -> np.ndarray:
         if len(raw) < wanted:
             raise MeshError("the file is cut off; write it again")
         return np.frombuffer(raw, dtype).reshape(shape, order="F" if fortran else "C")
-    except MeshError:
+    except (MeshError, MemoryError):
         raise
-    except _DAMAGE as error:
+    # The reader of headers may raise any exception on a damaged one.
+    except Exception as error:
         raise MeshError(f"is no intact array of NumPy: {str(error)[:200]}") from None

@@ -6,7 +6,7 @@ import importlib
 import os
 from collections.abc import Sequence
 from os import PathLike
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from gso.errors import GSOError, MeshError, OptionError
 from gso.io.atomic import check_writable, replacing
@@ -15,24 +15,19 @@ from gso.quantities import millimetres
 from gso.spline import BSplineSurface, TrimmedSpline
 
 
-class _Format(NamedTuple):
-    """Module and functions that write a format, and the package that they need."""
+class _Writer(NamedTuple):
+    """Module with a function ``write(content, unit, suffix)``, and the package that it needs."""
 
     module: str
-    write: str
-    faces: str
-    trimmed: str
     package: str
     name: str
 
 
-_CASCADE = "OpenCASCADE (cadquery-ocp-novtk)"
-_STEP = _Format("opencascade", "step", "step_faces", "step_trimmed", "OCP", _CASCADE)
-_IGES = _STEP._replace(write="iges", faces="iges_faces", trimmed="iges_trimmed")
-_RHINO = _Format("rhino", "write", "write_faces", "write_trimmed", "rhino3dm", "rhino3dm")
-_FORMATS = {".step": _STEP, ".stp": _STEP, ".iges": _IGES, ".igs": _IGES, ".3dm": _RHINO}
+_CASCADE = _Writer("opencascade", "OCP", "OpenCASCADE (cadquery-ocp-novtk)")
+_WRITERS = dict.fromkeys((".step", ".stp", ".iges", ".igs"), _CASCADE)
+_WRITERS[".3dm"] = _Writer("rhino", "rhino3dm", "rhino3dm")
 
-SPLINE_SUFFIXES = tuple(_FORMATS)
+SPLINE_SUFFIXES = tuple(_WRITERS)
 """Suffixes of the CAD files that are written."""
 
 
@@ -51,9 +46,9 @@ def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
     """
     check_writable(path, SPLINE_SUFFIXES)
     millimetres(unit)
-    form = _FORMATS[_suffix(path)]
+    writer = _WRITERS[_suffix(path)]
     try:
-        importlib.import_module(form.package)
+        importlib.import_module(writer.package)
     except ImportError as error:
         missing = isinstance(error, ModuleNotFoundError)
         what = (
@@ -62,7 +57,7 @@ def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
             else f"it is there but cannot be loaded: {error}"
         )
         raise GSOError(
-            f"{os.fsdecode(path)}: {_suffix(path)} files need {form.name}: {what}"
+            f"{os.fsdecode(path)}: {_suffix(path)} files need {writer.name}: {what}"
         ) from None
 
 
@@ -103,7 +98,7 @@ def save_spline(spline: BSplineSurface, path: str | PathLike[str], *, unit: str 
         raise OptionError(
             f"a spline is needed, not {type(spline).__name__}; gso.fit_spline makes one of a grid"
         )
-    _write(path, unit, "write", spline)
+    _write(path, unit, spline)
 
 
 def save_faces(mesh: Mesh, path: str | PathLike[str], *, unit: str = "mm") -> None:
@@ -131,7 +126,7 @@ def save_faces(mesh: Mesh, path: str | PathLike[str], *, unit: str = "mm") -> No
         The package that writes the format is not installed: ``pip install ".[cad]"`` in the
         folder of gso.
     """
-    _write(path, unit, "faces", mesh)
+    _write(path, unit, mesh)
 
 
 def save_patches(
@@ -164,16 +159,17 @@ def save_patches(
     """
     if not any(patch.faces for patch in patches):
         raise MeshError(f"{os.fsdecode(path)}: there are no surfaces to write")
-    _write(path, unit, "trimmed", patches)
+    _write(path, unit, patches)
 
 
-def _write(path: str | PathLike[str], unit: str, kind: str, content: Any) -> None:
+def _write(
+    path: str | PathLike[str], unit: str, content: BSplineSurface | Mesh | Sequence[TrimmedSpline]
+) -> None:
     check_spline(path, unit)
-    form = _FORMATS[_suffix(path)]
-    write: Any = getattr(importlib.import_module(f"gso.io.{form.module}"), getattr(form, kind))
+    module = importlib.import_module(f"gso.io.{_WRITERS[_suffix(path)].module}")
     with replacing(path) as file:
         try:
-            file.write(write(content, unit))
+            file.write(module.write(content, unit, _suffix(path)))
         except MeshError as error:
             raise MeshError(f"{os.fsdecode(path)}: {error}") from None
 

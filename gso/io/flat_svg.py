@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from os import PathLike
 from typing import Any
@@ -13,18 +12,16 @@ from numpy.typing import ArrayLike
 from gso.errors import MeshError
 from gso.io.atomic import check_writable, replacing
 from gso.io.lines import polyline
-from gso.io.source import Array, Ints
+from gso.io.svg_page import SVGPage
 from gso.mesh import Mesh
 from gso.pattern import Bend
-from gso.quantities import MILLIMETRES, millimetres
-from gso.spelling import known_keywords
+from gso.quantities import millimetres
 
 # Line width on paper in millimetres, and its largest fraction of the pattern's size.
 _LINE = 0.1
 _FINEST = 1 / 500
 
 
-@known_keywords()
 def save_flat(
     flat: ArrayLike,
     mesh: Mesh,
@@ -77,7 +74,7 @@ def save_flat(
     >>> save_flat(mesh.vertices[:, :2], mesh, path, unit="cm")
     """
     check_writable(path, (".svg",))
-    millimetres(unit)
+    scale = millimetres(unit)
     points = np.array(flat, dtype=np.float64)
     if points.shape != (len(mesh.vertices), 2):
         raise MeshError(
@@ -87,85 +84,26 @@ def save_flat(
     loops = mesh.boundary_loops
     if not loops:
         raise MeshError("a closed surface has no outline; cut it open before flattening")
-    used = np.unique(mesh.faces[mesh.faces >= 0])
-    points *= MILLIMETRES[unit]
-    if not np.isfinite(points[used]).all():
+    points *= scale
+    inside = points[mesh.used]
+    if not np.isfinite(inside).all():
         raise MeshError("the flat pattern has coordinates that are not finite")
-    extra = [MILLIMETRES[unit] * polyline(line, k, 2) for k, line in enumerate(lines)]
-    scale = MILLIMETRES[unit]
-    folds = [Bend(scale * np.asarray(b.line), b.angle, scale * b.radius) for b in bends]
-    text = _drawing(points, used, loops, mesh.edges if mesh_lines else None, extra, folds)
-    with replacing(path) as file:
-        file.write(text.encode("utf-8"))
-
-
-def _drawing(
-    points: Array,
-    used: Ints,
-    loops: list[Ints],
-    edges: Ints | None,
-    lines: Sequence[Array],
-    bends: Sequence[Bend],
-) -> str:
-    """Return the SVG text of a pattern; `points` are in millimetres with y up."""
-    import svgwrite
-    from svgwrite.extensions import Inkscape
-
-    low, high = points[used].min(axis=0), points[used].max(axis=0)
-    line = min(_LINE, _FINEST * float((high - low).max()))
-    margin = 10 * line
-    width, height = (high - low + 2 * margin).tolist()
-
-    # In SVG y points down: flip the coordinates here, so that the file needs no transform.
-    def on_paper(p: Array) -> Array:
-        return np.stack([p[:, 0] - low[0], high[1] - p[:, 1]], axis=1) + margin
-
-    paper = on_paper(points)
-    drawing = svgwrite.Drawing(
-        size=(f"{width:.9g}mm", f"{height:.9g}mm"),
-        viewBox=f"0 0 {width:.9g} {height:.9g}",
-        debug=False,
-    )
-    layers = Inkscape(drawing)
-
-    def layer(name: str, colour: str) -> Any:
-        group = layers.layer(
-            label=name, id=name, fill="none", stroke=colour, stroke_width=f"{line:.9g}"
-        )
-        return drawing.add(group)
-
-    if edges is not None:
-        rim = np.concatenate([np.stack([p, np.roll(p, -1)], axis=1) for p in loops])
-        n = np.int64(len(points))
-        inner = edges[~np.isin(_keys(edges, n), _keys(rim, n))]
-        pairs = paper[inner].reshape(-1, 4)
-        if len(pairs):
-            path = ("M%.9g %.9gL%.9g %.9g" * len(pairs)) % tuple(pairs.ravel().tolist())
-            layer("mesh", "#808080").add(drawing.path(d=path))
-    if lines:
-        inside = layer("lines", "#0050a0")
-        for given in lines:
-            inside.add(drawing.path(d=_path(on_paper(given))))
+    low, high = inside.min(axis=0), inside.max(axis=0)
+    width = min(_LINE, _FINEST * float((high - low).max()))
+    page = SVGPage(low - 10 * width, high + 10 * width)
+    inner = mesh.edges[~mesh.boundary_edges] if mesh_lines else np.empty((0, 2), np.int64)
+    page.path(page.layer("mesh", "#808080", width), points[inner])
+    layer = page.layer("lines", "#0050a0", width)
+    for number, line in enumerate(lines):
+        page.path(layer, [scale * polyline(line, number, 2)])
     for name, sign, colour in (("mountain", 1.0, "#c02020"), ("valley", -1.0, "#2040c0")):
-        chosen = [bend for bend in bends if sign * bend.angle > 0]
-        if chosen:
-            folds = layer(name, colour)
-            for bend in chosen:
-                drawn = drawing.path(d=_path(on_paper(bend.line)))
-                angle = abs(np.degrees(bend.angle))
-                drawn.set_desc(title=f"{name}, {angle:.2f} degrees, radius {bend.radius:.4g} mm")
-                folds.add(drawn)
-    outline = layer("outline", "#000000")
+        layer = page.layer(name, colour, width)
+        for bend in bends:
+            if sign * bend.angle > 0:
+                title = bend._replace(radius=scale * bend.radius).in_words()
+                page.path(layer, [scale * np.asarray(bend.line)], title=title)
+    layer = page.layer("outline", "#000000", width)
     for loop in loops:
-        outline.add(drawing.path(d=_path(paper[loop]) + "Z"))
-    text = io.StringIO()
-    drawing.write(text)
-    return text.getvalue()
-
-
-def _path(points: Array) -> str:
-    return "M" + "L".join(f"{x:.9g} {y:.9g}" for x, y in points.tolist())
-
-
-def _keys(edges: Ints, count: np.int64) -> Ints:
-    return edges.min(axis=1) * count + edges.max(axis=1)
+        page.path(layer, [points[loop]], closed=True)
+    with replacing(path) as file:
+        file.write(page.content())

@@ -15,7 +15,7 @@ from gso.mesh import Mesh
 from gso.quantities import MILLIMETRES
 from gso.spline import BSplineSurface, TrimmedSpline
 from gso.spline.trimmed import Loop
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 #: OpenCASCADE's names of the units that both formats know; IGES has another one for inches.
 _UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
@@ -31,38 +31,34 @@ _TOLERANCE = 1e-7
 _SEWN = 1e-5
 
 
-def step(spline: BSplineSurface, unit: str) -> bytes:
-    """Return the contents of a STEP file with one face, bounded by the edges of the surface."""
+def write(
+    content: BSplineSurface | Mesh | Sequence[TrimmedSpline], unit: str, suffix: str
+) -> bytes:
+    """Return the contents of a STEP or IGES file.
+
+    A spline becomes one face, bounded by the edges of the surface (in IGES entity 128). The
+    faces of a mesh, which must be planar, and trimmed splines become a shell; in STEP files its
+    faces share their edges.
+    """
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 
-    surface, name = _converted(spline, unit)
-    content = _step(BRepBuilderAPI_MakeFace(surface, _TOLERANCE).Shape(), name)
-    if b"B_SPLINE_SURFACE_WITH_KNOTS" not in content:
-        raise MeshError(
-            f"the surface has a side shorter than {_TOLERANCE:g} {unit}, which STEP takes for a "
-            "point; is the unit right?"
-        )
-    return content
-
-
-def step_faces(mesh: Mesh, unit: str) -> bytes:
-    """Return the contents of a STEP file with a shell of planar faces that share their edges."""
-    return _step(*_shell(mesh, unit))
-
-
-def iges_faces(mesh: Mesh, unit: str) -> bytes:
-    """Return the contents of an IGES file with planar faces."""
-    return _iges_shell(*_shell(mesh, unit))
-
-
-def _iges_shell(shell: Any, name: str) -> bytes:
-    """Return the contents of an IGES file of a shell in a unit."""
-    from OCP.IGESControl import IGESControl_Writer
-
-    with _quiet():
-        session = IGESControl_Writer("IN" if name == "INCH" else name, 1)
-        session.AddShape(shell)
-        return _iges(session)
+    scale, name = (1.0, _UNITS[unit]) if unit in _UNITS else (MILLIMETRES[unit], "MM")
+    step = suffix in (".step", ".stp")
+    small = f"shorter than {_TOLERANCE:g} {unit}, which OpenCASCADE takes for a point"
+    if isinstance(content, Mesh):
+        shape = _shell(scale * content.vertices, content.faces, small)
+    elif not isinstance(content, BSplineSurface):
+        shape = _trimmed_shell([patch.moved(scale) for patch in content])
+    else:
+        shape = _surface(content.moved(scale))
+        if step:
+            shape = BRepBuilderAPI_MakeFace(shape, _TOLERANCE).Shape()
+    if not step:
+        return _iges(shape, name, whole=isinstance(content, BSplineSurface))
+    written = _step(shape, name)
+    if isinstance(content, BSplineSurface) and b"B_SPLINE_SURFACE_WITH_KNOTS" not in written:
+        raise MeshError(f"the surface has a side {small}; is the unit right?")
+    return written
 
 
 def _step(shape: Any, name: str) -> bytes:
@@ -75,24 +71,31 @@ def _step(shape: Any, name: str) -> bytes:
         session = STEPControl_Writer()
         session.Transfer(shape, kind)
         writer = StepData_StepWriter(session.Model())
-        writer.FloatWriter().SetFormat(_FORMAT, True)
-        writer.SendModel(session.WS().Protocol())
-    return _printed(writer)
+        return _printed(writer, session.WS().Protocol())
 
 
-def _iges(session: Any) -> bytes:
-    """Return the contents of the IGES file of a session."""
+def _iges(shape: Any, name: str, whole: bool) -> bytes:
+    """Return the contents of an IGES file of a shape, or of a whole surface, in a unit."""
+    from OCP.GeomToIGES import GeomToIGES_GeomSurface
+    from OCP.IGESControl import IGESControl_Writer
     from OCP.IGESData import IGESData_IGESWriter
     from OCP.IGESSelect import IGESSelect_WorkLibrary
 
-    writer = IGESData_IGESWriter(session.Model())
-    writer.FloatWriter().SetFormat(_FORMAT, True)
-    writer.SendModel(IGESSelect_WorkLibrary.DefineProtocol_s())
-    return _printed(writer)
+    with _quiet():
+        session = IGESControl_Writer("IN" if name == "INCH" else name, 0 if whole else 1)
+        if whole:
+            maker = GeomToIGES_GeomSurface()
+            maker.SetModel(session.Model())
+            maker.SetUnit(1.0)
+            session.AddEntity(maker.TransferSurface(shape, *shape.Bounds()))
+        else:
+            session.AddShape(shape)
+        writer = IGESData_IGESWriter(session.Model())
+        return _printed(writer, IGESSelect_WorkLibrary.DefineProtocol_s())
 
 
-def _shell(mesh: Mesh, unit: str) -> tuple[Any, str]:
-    """Return a shell of planar faces, and the name of its unit."""
+def _shell(points: Array, faces: Ints, small: str) -> Any:
+    """Return a shell of planar faces; `small` describes what is too small."""
     from OCP.BRepBuilderAPI import (
         BRepBuilderAPI_MakeFace,
         BRepBuilderAPI_MakePolygon,
@@ -100,48 +103,30 @@ def _shell(mesh: Mesh, unit: str) -> tuple[Any, str]:
     )
     from OCP.gp import gp_Pnt
 
-    known = unit in _UNITS
-    points = mesh.vertices if known else mesh.vertices * MILLIMETRES[unit]
     sewing = BRepBuilderAPI_Sewing(_TOLERANCE)
-    for k, face in enumerate(mesh.faces):
+    for k, face in enumerate(faces):
         polygon = BRepBuilderAPI_MakePolygon()
         for point in points[face[face >= 0]].tolist():
             polygon.Add(gp_Pnt(*point))
         polygon.Close()
         made = BRepBuilderAPI_MakeFace(polygon.Wire(), True) if polygon.IsDone() else None
         if made is None or not made.IsDone():
-            raise MeshError(
-                f"face {k} is not planar, or has a side shorter than {_TOLERANCE:g} {unit}, which "
-                "OpenCASCADE takes for a point; is the unit right?"
-            )
+            raise MeshError(f"face {k} is not planar, or has a side {small}; is the unit right?")
         sewing.Add(made.Shape())
     sewing.Perform()
-    return sewing.SewedShape(), _UNITS[unit if known else "mm"]
+    return sewing.SewedShape()
 
 
-def step_trimmed(patches: Sequence[TrimmedSpline], unit: str) -> bytes:
-    """Return the contents of a STEP file with a shell of trimmed splines that share edges."""
-    return _step(*_trimmed_shell(patches, unit))
-
-
-def iges_trimmed(patches: Sequence[TrimmedSpline], unit: str) -> bytes:
-    """Return the contents of an IGES file with trimmed splines."""
-    return _iges_shell(*_trimmed_shell(patches, unit))
-
-
-def _trimmed_shell(patches: Sequence[TrimmedSpline], unit: str) -> tuple[Any, str]:
-    """Return a shell of trimmed splines, and the name of its unit."""
+def _trimmed_shell(patches: Sequence[TrimmedSpline]) -> Any:
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
 
-    known = unit in _UNITS
-    size = max(patch.spline.size for patch in patches)
-    sewing = BRepBuilderAPI_Sewing(_SEWN * size * (1.0 if known else MILLIMETRES[unit]))
+    sewing = BRepBuilderAPI_Sewing(_SEWN * max(patch.spline.size for patch in patches))
     for patch in patches:
-        surface, _ = _converted(patch.spline, unit)
+        surface = _surface(patch.spline)
         for loops in patch.faces:
             sewing.Add(_trimmed_face(surface, loops))
     sewing.Perform()
-    return sewing.SewedShape(), _UNITS[unit if known else "mm"]
+    return sewing.SewedShape()
 
 
 def _trimmed_face(surface: Any, loops: Sequence[Loop]) -> Any:
@@ -198,58 +183,39 @@ def _plane_curve(points: Array) -> Any:
     poles = collections.Array1_gp_Pnt2d(1, len(spline.c))
     for k, point in enumerate(spline.c.tolist(), 1):
         poles.SetValue(k, gp_Pnt2d(*point))
-    knots, times = np.unique(spline.t, return_counts=True)
-    arrays = _array(collections.Array1_double, knots), _array(collections.Array1_int, times)
-    return Geom2d_BSplineCurve(poles, *arrays, spline.k)
+    return Geom2d_BSplineCurve(poles, *_knots(spline.t), spline.k)
 
 
-def iges(spline: BSplineSurface, unit: str) -> bytes:
-    """Return the contents of an IGES file with one B-spline surface (entity 128)."""
-    from OCP.GeomToIGES import GeomToIGES_GeomSurface
-    from OCP.IGESControl import IGESControl_Writer
-
-    surface, name = _converted(spline, unit)
-    with _quiet():
-        session = IGESControl_Writer("IN" if name == "INCH" else name, 0)
-        maker = GeomToIGES_GeomSurface()
-        maker.SetModel(session.Model())
-        maker.SetUnit(1.0)
-        ends = [k[i] for k in (spline.knots_u, spline.knots_v) for i in (0, -1)]
-        session.AddEntity(maker.TransferSurface(surface, *ends))
-        return _iges(session)
-
-
-def _converted(spline: BSplineSurface, unit: str) -> tuple[Any, str]:
-    """Return the OpenCASCADE surface in a supported unit, and the name of that unit."""
+def _surface(spline: BSplineSurface) -> Any:
+    """Return the OpenCASCADE surface of a spline."""
     from OCP import collections
     from OCP.Geom import Geom_BSplineSurface
     from OCP.gp import gp_Pnt
 
-    known = unit in _UNITS
-    net = spline.net if known else spline.net * MILLIMETRES[unit]
-    n, m = net.shape[:2]
-    poles = collections.Array2_gp_Pnt(1, n, 1, m)
-    for i, row in enumerate(net.tolist(), 1):
+    poles = collections.Array2_gp_Pnt(1, spline.net.shape[0], 1, spline.net.shape[1])
+    for i, row in enumerate(spline.net.tolist(), 1):
         for j, point in enumerate(row, 1):
             poles.SetValue(i, j, gp_Pnt(*point))
-    knots, multiplicities = [], []
-    for every in (spline.knots_u, spline.knots_v):
-        different, count = np.unique(every, return_counts=True)
-        knots.append(_array(collections.Array1_double, different))
-        multiplicities.append(_array(collections.Array1_int, count))
-    surface = Geom_BSplineSurface(poles, *knots, *multiplicities, *spline.degrees)
-    return surface, _UNITS[unit if known else "mm"]
+    (u, u_times), (v, v_times) = _knots(spline.knots_u), _knots(spline.knots_v)
+    return Geom_BSplineSurface(poles, u, v, u_times, v_times, *spline.degrees)
 
 
-def _array(kind: Any, values: Any) -> Any:
-    out = kind(1, len(values))
-    for k, value in enumerate(values.tolist(), 1):
-        out.SetValue(k, value)
+def _knots(every: Array) -> tuple[Any, Any]:
+    """Return the different knots and their multiplicities as arrays of OpenCASCADE."""
+    from OCP import collections
+
+    knots, times = np.unique(every, return_counts=True)
+    out = collections.Array1_double(1, len(knots)), collections.Array1_int(1, len(knots))
+    for k, (knot, time) in enumerate(zip(knots.tolist(), times.tolist(), strict=True), 1):
+        out[0].SetValue(k, knot)
+        out[1].SetValue(k, time)
     return out
 
 
-def _printed(writer: Any) -> bytes:
+def _printed(writer: Any, protocol: Any) -> bytes:
     """Return the text of a file writer."""
+    writer.FloatWriter().SetFormat(_FORMAT, True)
+    writer.SendModel(protocol)
     text = io.BytesIO()
     if not writer.Print(text):
         raise MeshError("OpenCASCADE could not write the surface")

@@ -6,8 +6,10 @@ import base64
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from gso.errors import MeshError
-from gso.mesh import Mesh
+from gso.mesh import Mesh, topology
 from gso.spline import BSplineSurface, TrimmedSpline
 
 _UNITS = {
@@ -21,47 +23,62 @@ _UNITS = {
     "yd": "Yards",
 }
 
+#: Knots of one span of degree one.
+_ENDS = np.array([0.0, 0.0, 1.0, 1.0])
+
 #: Absolute tolerance of the model in the file, as a fraction of the spline's size.
 _TOLERANCE = 1e-5
 
 
-def write(spline: BSplineSurface, unit: str) -> bytes:
-    """Return the contents of a .3dm file with one surface, in double precision."""
+def write(
+    content: BSplineSurface | Mesh | Sequence[TrimmedSpline], unit: str, suffix: str
+) -> bytes:
+    """Return the contents of a .3dm file, in double precision.
+
+    A mesh becomes a ruled surface of degree one for each face. Their corners are the same points,
+    so that they can be joined; rhino3dm cannot join them. It cannot make trimmed surfaces either:
+    for trimmed splines, the layer "surfaces" has the whole splines, and the layer "outlines"
+    closed polylines on them.
+    """
     import rhino3dm
 
     # The type stubs of rhino3dm lack some setters.
     rhino: Any = rhino3dm
-    model = _model(rhino, unit, spline.size)
-    model.Objects.AddSurface(_surface(rhino, spline))
+    model = rhino.File3dm()
+    model.ApplicationName = "gso"
+    model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, _UNITS[unit])
+    if isinstance(content, BSplineSurface):
+        size = content.size
+        model.Objects.AddSurface(_surface(rhino, content, "the spline"))
+    elif isinstance(content, Mesh):
+        size = content.diagonal
+        # A triangle has a side without length.
+        corners = content.vertices[topology.four_corners(content.faces)]
+        for k, (a, b, c, d) in enumerate(corners):
+            surface = BSplineSurface(np.array([[a, d], [b, c]]), _ENDS, _ENDS)
+            model.Objects.AddSurface(_surface(rhino, surface, f"face {k}"))
+    else:
+        size = max(patch.spline.size for patch in content)
+        surfaces, outlines = (_layer(rhino, model, name) for name in ("surfaces", "outlines"))
+        for k, patch in enumerate(content):
+            model.Objects.AddSurface(_surface(rhino, patch.spline, f"patch {k}"), surfaces)
+            for line in patch.outlines():
+                points = [rhino.Point3d(*p) for p in [*line.tolist(), line[0].tolist()]]
+                model.Objects.AddPolyline(rhino.Polyline(points), outlines)
+    model.Settings.ModelAbsoluteTolerance = _TOLERANCE * size
     return base64.b64decode(model.Encode())
 
 
-def write_trimmed(patches: Sequence[TrimmedSpline], unit: str) -> bytes:
-    """Return the contents of a .3dm file with whole splines and the outlines to trim them by.
-
-    rhino3dm cannot make trimmed surfaces. The layer "surfaces" has the splines, and the layer
-    "outlines" closed polylines on them.
-    """
-    import rhino3dm
-
-    rhino: Any = rhino3dm
-    model = _model(rhino, unit, max(patch.spline.size for patch in patches))
-    layers = []
-    for name in ("surfaces", "outlines"):
-        layer = rhino.Layer()
-        layer.Name = name
-        attributes = rhino.ObjectAttributes()
-        attributes.LayerIndex = model.Layers.Add(layer)
-        layers.append(attributes)
-    for patch in patches:
-        model.Objects.AddSurface(_surface(rhino, patch.spline), layers[0])
-        for line in patch.outlines():
-            points = [rhino.Point3d(*p) for p in [*line.tolist(), line[0].tolist()]]
-            model.Objects.AddPolyline(rhino.Polyline(points), layers[1])
-    return base64.b64decode(model.Encode())
+def _layer(rhino: Any, model: Any, name: str) -> Any:
+    """Add a layer, and return the attributes of objects on it."""
+    layer = rhino.Layer()
+    layer.Name = name
+    attributes = rhino.ObjectAttributes()
+    attributes.LayerIndex = model.Layers.Add(layer)
+    return attributes
 
 
-def _surface(rhino: Any, spline: BSplineSurface) -> Any:
+def _surface(rhino: Any, spline: BSplineSurface, what: str) -> Any:
     n, m = spline.net.shape[:2]
     p, q = spline.degrees
     surface = rhino.NurbsSurface.Create(3, False, p + 1, q + 1, n, m)
@@ -69,41 +86,9 @@ def _surface(rhino: Any, spline: BSplineSurface) -> Any:
         for j, point in enumerate(row):
             surface.Points[i, j] = rhino.Point4d(*point, 1.0)
     # openNURBS omits the first and the last knot, on which no basis function depends.
-    for k, knot in enumerate(spline.knots_u[1:-1].tolist()):
-        surface.KnotsU[k] = knot
-    for k, knot in enumerate(spline.knots_v[1:-1].tolist()):
-        surface.KnotsV[k] = knot
+    for places, knots in ((surface.KnotsU, spline.knots_u), (surface.KnotsV, spline.knots_v)):
+        for k, knot in enumerate(knots[1:-1].tolist()):
+            places[k] = knot
     if not surface.IsValid:
-        raise MeshError(f"is no valid surface to openNURBS: {surface.IsValidWithLog[1]}")
+        raise MeshError(f"{what} is no valid surface to openNURBS: {surface.IsValidWithLog[1]}")
     return surface
-
-
-def write_faces(mesh: Mesh, unit: str) -> bytes:
-    """Return the contents of a .3dm file with a ruled surface of degree one for each face.
-
-    Their corners are the same points, so that they can be joined; rhino3dm cannot join them.
-    """
-    import rhino3dm
-
-    rhino: Any = rhino3dm
-    model = _model(rhino, unit, mesh.diagonal)
-    for k, face in enumerate(mesh.faces.tolist()):
-        # A triangle has a side without length.
-        a, b, c, d = [v for v in face if v >= 0] + [face[2]] * (4 - sum(v >= 0 for v in face))
-        surface = rhino.NurbsSurface.Create(3, False, 2, 2, 2, 2)
-        for (i, j), vertex in zip(((0, 0), (1, 0), (1, 1), (0, 1)), (a, b, c, d), strict=True):
-            surface.Points[i, j] = rhino.Point4d(*mesh.vertices[vertex].tolist(), 1.0)
-        for end in (0, 1):
-            surface.KnotsU[end] = surface.KnotsV[end] = float(end)
-        if not surface.IsValid:
-            raise MeshError(f"face {k} is no valid surface to openNURBS")
-        model.Objects.AddSurface(surface)
-    return base64.b64decode(model.Encode())
-
-
-def _model(rhino: Any, unit: str, size: float) -> Any:
-    model = rhino.File3dm()
-    model.ApplicationName = "gso"
-    model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, _UNITS[unit])
-    model.Settings.ModelAbsoluteTolerance = _TOLERANCE * size
-    return model

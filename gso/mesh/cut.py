@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from gso.errors import MeshError
 from gso.mesh import Mesh
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import edge_graph, edge_keys, label_components
 from gso.typing import Ints
 
 #: Relative difference below which two path lengths count as equal.
@@ -75,9 +75,6 @@ def cut(mesh: Mesh, edges: ArrayLike) -> Cut:
     >>> slit.seams.tolist()
     [[[4, 5], [4, 9]]]
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     he, n = mesh.half_edges, len(mesh.vertices)
     wanted = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
     keys, own = edge_keys(wanted[:, 0], wanted[:, 1], n), edge_keys(he.origin, he.dest, n)
@@ -92,8 +89,7 @@ def cut(mesh: Mesh, edges: ArrayLike) -> Cut:
     after = he.twin[he.prev]
     joined = np.flatnonzero((after >= 0) & ~divided[he.prev])
     corners = len(own)
-    links = coo_matrix((np.ones(joined.size), (joined, after[joined])), shape=(corners, corners))
-    _, fan = connected_components(links, directed=False)
+    fan = label_components(corners, joined, after[joined])
     _, first = np.unique(fan, return_index=True)
     owner = he.origin[first]
     order = np.lexsort((first, owner))
@@ -137,7 +133,6 @@ def joining(mesh: Mesh, loops: Sequence[Ints]) -> Ints:
     >>> joining(tube, tube.boundary_loops).tolist()
     [[0, 8], [8, 16]]
     """
-    from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import dijkstra
 
     n, (a, b) = len(mesh.vertices), mesh.edges.T
@@ -146,7 +141,7 @@ def joining(mesh: Mesh, loops: Sequence[Ints]) -> Ints:
     others[np.concatenate(loops)] = False
     # Penalty on edges that touch other loops: any path that avoids them is shorter.
     length[others[mesh.edges].any(axis=1)] += length.sum()
-    graph = coo_matrix((length, (a, b)), shape=(n, n)).tocsr()
+    graph = edge_graph(n, a, b, length)
     reached, left = np.unique(loops[0]), list(loops[1:])
     lines = [np.empty((0, 2), np.int64)]
     while left:

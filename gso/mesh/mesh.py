@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,8 +16,8 @@ from gso.mesh.validation import (
     JOINED,
     check_area,
     checked_faces,
+    checked_grid,
     checked_vertices,
-    numbers,
     reordered,
     unjoined,
     weld_poles,
@@ -117,18 +115,8 @@ class Mesh:
         mesh with triangles at the pole, and `notes` says so. With ``weld=False`` it stays
         a grid.
         """
-        grid = numbers(points, "a grid is an array of numbers (H, W, 3)")
-        if grid.ndim != 3 or grid.shape[2] != 3:
-            raise MeshError(f"a grid is an array (H, W, 3), not {grid.shape}")
-        height, width = grid.shape[:2]
-        if height < 3 or width < 3:
-            raise MeshError(
-                f"a grid of {height} x {width} points has no interior vertex; give at least 3 x 3"
-            )
-        if not np.isfinite(grid).all():
-            i, j = np.argwhere(~np.isfinite(grid))[0][:2]
-            raise MeshError(f"the coordinates of grid vertex ({i}, {j}) are not finite")
-        template = _grid_template(height, width)
+        grid = checked_grid(points)
+        template = _grid_template(*grid.shape[:2])
         welded = weld_poles(grid, template.faces) if weld else None
         if welded is not None:
             return cls(welded[0], welded[1], notes=welded[2])
@@ -151,13 +139,6 @@ class Mesh:
             notes=self.notes + tuple(notes),
         )
         return other
-
-    def __getattr__(self, name: str) -> Any:
-        new = _RENAMED.get(name)
-        if new is None:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        warnings.warn(f"Mesh.{name} is now called {new}", DeprecationWarning, stacklevel=2)
-        return getattr(self, new)
 
     def __repr__(self) -> str:
         if self.grid_shape:
@@ -231,13 +212,7 @@ class Mesh:
     @cached_property
     def components(self) -> Ints:
         """Component number of each vertex, (n,)."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
-        n = len(self.vertices)
-        e = self.edges
-        links = coo_matrix((np.ones(len(e)), (e[:, 0], e[:, 1])), shape=(n, n))
-        return connected_components(links, directed=False)[1].astype(np.int64)
+        return topology.label_components(len(self.vertices), *self.edges.T)
 
     @property
     def seams(self) -> NDArray[np.bool_]:
@@ -340,9 +315,6 @@ def _grid_template(height: int, width: int) -> Mesh:
         del mesh.__dict__["half_edges"]
     return mesh
 
-
-#: Attributes that were renamed, by their former names.
-_RENAMED = {"splits": "stars_by_triangulation", "rim": "boundary_edges"}
 
 #: Cached attributes that meshes of the same faces share.
 _CONNECTIVITY = (

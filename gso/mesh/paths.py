@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gso.mesh import Mesh
+from gso.mesh.topology import edge_graph
 from gso.typing import Array, Ints
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 #: Cost of a right-angled turn on a quad mesh, in mean edge lengths.
 _TURN = 4.0
@@ -34,14 +38,10 @@ class Paths:
         self._plain = self._graph(self.length)
         self._turns = None if mesh.has_triangles else _Turns(mesh, self.ends, self.length)
 
-    def _graph(self, weight: Array) -> Any:
-        from scipy.sparse import coo_matrix
-
+    def _graph(self, weight: Array) -> csr_matrix:
         keep = np.isfinite(weight)
-        weight, (a, b) = weight[keep], self.ends[keep].T
-        shape = (self.count, self.count)
-        # Zero would mean that there is no edge.
-        return coo_matrix((np.maximum(weight, 1e-300), (a, b)), shape=shape).tocsr()
+        a, b = self.ends[keep].T
+        return edge_graph(self.count, a, b, weight[keep])
 
     def distance(self, sources: Ints, limit: float = np.inf) -> Array:
         """Return the distance along edges (n,) from the nearest of some vertices."""
@@ -134,7 +134,6 @@ class _Turns:
 
     def cheapest(self, target: int, reached: NDArray[np.bool_], cost: Array) -> Ints:
         """See :meth:`Paths.cheapest`; the costs (e,) include the factors."""
-        from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import dijkstra
 
         count, each = len(self.head), cost[self.edge]
@@ -144,9 +143,7 @@ class _Turns:
         rows = np.r_[self.before[keep], np.full(len(begin), count)]
         columns = np.r_[self.after[keep], begin]
         values = np.r_[weight[keep], each[begin]]
-        graph = coo_matrix(
-            (np.maximum(values, 1e-300), (rows, columns)), shape=(count + 1, count + 1)
-        ).tocsr()
+        graph = edge_graph(count + 1, rows, columns, values)
         away, before = dijkstra(graph, indices=count, return_predecessors=True)
         goals = np.flatnonzero(reached[self.head] & np.isfinite(away[:-1]))
         if not goals.size:

@@ -54,6 +54,28 @@ def checked_vertices(vertices: ArrayLike) -> Array:
     return points
 
 
+def checked_grid(points: ArrayLike) -> Array:
+    """Copy a grid of points (H, W, 3) to double precision.
+
+    Raises
+    ------
+    MeshError
+        Another shape, fewer than 3 rows or columns, or a coordinate that is not finite.
+    """
+    grid = numbers(points, "a grid is an array of numbers (H, W, 3)")
+    if grid.ndim != 3 or grid.shape[2] != 3:
+        raise MeshError(f"a grid is an array (H, W, 3), not {grid.shape}")
+    height, width = grid.shape[:2]
+    if height < 3 or width < 3:
+        raise MeshError(
+            f"a grid of {height} x {width} points has no interior vertex; give at least 3 x 3"
+        )
+    if not np.isfinite(grid).all():
+        i, j = np.argwhere(~np.isfinite(grid))[0][:2]
+        raise MeshError(f"the coordinates of grid vertex ({i}, {j}) are not finite")
+    return grid
+
+
 def checked_faces(faces: Any, points: Array) -> tuple[Ints, NDArray[np.bool_], tuple[str, ...]]:
     """Check and orient faces; return them, a mask of the reversed ones, and notes."""
     try:

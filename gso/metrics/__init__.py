@@ -10,9 +10,6 @@ they are. :data:`INFO` lists the meaning, unit and direction of every metric.
 
 from __future__ import annotations
 
-import warnings
-from typing import Any
-
 from gso.metrics.areas import area, area_error, corner_areas, flipped_cells, flipped_faces, flips
 from gso.metrics.distance import (
     Distances,
@@ -100,14 +97,3 @@ __all__ = [
     "unit",
     "worst_curvature",
 ]
-
-#: Functions that were renamed, by their former names.
-_RENAMED = {"folds": dihedral_angles, "loss_gc_both": loss_gc_mean}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _RENAMED:
-        raise AttributeError(f"module 'gso.metrics' has no attribute {name!r}")
-    new = _RENAMED[name]
-    warnings.warn(f"{name} is now called {new.__name__}", DeprecationWarning, stacklevel=2)
-    return new

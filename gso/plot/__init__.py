@@ -31,7 +31,7 @@ from gso.plot.strips import strips
 from gso.plot.view import View
 from gso.result import Result
 from gso.seams import Segmentation
-from gso.spelling import choices, known_keywords
+from gso.spelling import choices
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,7 +68,6 @@ def require() -> None:
         raise GSOError('plots need Matplotlib: pip install ".[plot]" in the folder of gso')
 
 
-@known_keywords()
 def plot_surface(
     mesh: Any,
     values: str | ArrayLike = "none",
@@ -246,7 +245,6 @@ def plot_pieces(found: Segmentation, path: str | PathLike[str] | None = None) ->
     return write(draw(pieces(found)), path)
 
 
-@known_keywords()
 def plot_rulings(
     mesh: Any,
     *,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -132,12 +131,6 @@ class Result:
         from gso.wording import summary
 
         return summary(self)
-
-    @property
-    def device(self) -> str:
-        """The processor that solved: always "cpu". Deprecated."""
-        warnings.warn("Result.device is always 'cpu'", DeprecationWarning, stacklevel=2)
-        return "cpu"
 
     @property
     def converged(self) -> bool:

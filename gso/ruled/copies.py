@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso.mesh.topology import label_components
 from gso.typing import Array, Ints
 
 
@@ -24,9 +25,6 @@ def copies(faces: Ints, part: Ints) -> tuple[Ints, Ints]:
     table : ndarray of int, (m, 4)
         The faces as copies.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     face, corner = np.nonzero(faces >= 0)
     ids = faces[face, corner]
     number = np.full(faces.shape, -1)
@@ -42,8 +40,7 @@ def copies(faces: Ints, part: Ints) -> tuple[Ints, Ints]:
     same = (ids[sides[1:]] == ids[sides[:-1]]).all(axis=1)
     same &= part[face][order][1:] == part[face][order][:-1]
     i, j = sides[:-1][same].ravel(), sides[1:][same].ravel()
-    graph = coo_matrix((np.ones(len(i)), (i, j)), shape=(len(ids), len(ids)))
-    _, which = connected_components(graph, directed=False)
+    which = label_components(len(ids), i, j)
     _, first = np.unique(which, return_index=True)
     order = np.lexsort((ids[first], part[face][first]))
     rank = np.empty(len(order), np.int64)

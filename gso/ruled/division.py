@@ -133,18 +133,15 @@ def _triangles(rings: list[Ints], flats: list[Array]) -> list[list[int]]:
 
 def _connected(table: Ints, owner: Ints) -> tuple[Ints, Ints]:
     """Keep the largest set of faces that are joined by edges."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     four = topology.four_corners(table)
     sides = np.stack([four, np.roll(four, -1, axis=1)], axis=2).reshape(-1, 2)
     face = np.repeat(np.arange(len(table)), 4)
     kept = sides[:, 0] != sides[:, 1]
     low, high = sides[kept].min(axis=1), sides[kept].max(axis=1)
     _, edge = np.unique(low * (table.max() + 1) + high, return_inverse=True)
-    shape = (len(table), int(edge.max()) + 1)
-    meets = coo_matrix((np.ones(len(edge)), (face[kept], edge)), shape=shape).tocsr()
-    _, label = connected_components(meets @ meets.T, directed=False)
+    # Faces and their edges are the nodes of one graph.
+    count = len(table)
+    label = topology.label_components(count + int(edge.max()) + 1, face[kept], count + edge)[:count]
     most = label == np.bincount(label).argmax()
     return table[most], owner[most]
 

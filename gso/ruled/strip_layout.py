@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
+from gso.mesh.topology import label_components
 from gso.ruled.vectors import cross
 from gso.typing import Array, Flags, Ints
 
@@ -182,9 +183,6 @@ class Strips:
     @cached_property
     def is_disk(self) -> bool:
         """Whether the faces are a disk: one border, without points where it touches itself."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
         triangles, _ = self.split
         if not len(triangles):
             return False
@@ -193,10 +191,7 @@ class Strips:
         rim = ~np.isin(key, other)
         if len(np.unique(key)) < len(key) or len(np.unique(start[rim])) < int(rim.sum()):
             return False
-        graph = coo_matrix(
-            (np.ones(int(rim.sum())), (start[rim], end[rim])), shape=(self.size, self.size)
-        )
-        _, label = connected_components(graph, directed=False)
+        label = label_components(self.size, start[rim], end[rim])
         return len(np.unique(label[start[rim]])) == 1
 
     def halved(self, vertices: Array, which: Ints | None = None) -> tuple[Strips, Array]:
@@ -240,15 +235,11 @@ class Strips:
 
     def merged(self, vertices: Array, pairs: Ints) -> tuple[Strips, Array]:
         """Merge pairs (m, 2) of vertices, and what they are chained to, at their means."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
-        graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(self.size, self.size))
-        count, label = connected_components(graph, directed=False)
-        number = np.bincount(label, minlength=count)[:, None]
-        mean = np.stack([np.bincount(label, v, minlength=count) for v in vertices.T], 1) / number
-        index = tuple(label[i].astype(np.int64) for i in self.index)
-        flats = label[self.flats].astype(np.int64)
+        label = label_components(self.size, *pairs.T)
+        number = np.bincount(label)[:, None]
+        mean = np.stack([np.bincount(label, v) for v in vertices.T], 1) / number
+        index = tuple(label[i] for i in self.index)
+        flats = label[self.flats]
         a, b, c = flats[:, [0, 1, 3]].T
         return Strips(index, flats[(a != b) & (b != c) & (a != c)]), mean
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso.mesh.topology import edge_graph
 from gso.ruled.strip_layout import Strips
 from gso.ruled.vectors import cross, unit
 from gso.typing import Array, Ints
@@ -70,11 +71,10 @@ class Unrolled:
 
 def _order(strips: Strips, count: int) -> tuple[list[tuple[int, int]], Ints, Ints]:
     """Return (face, face before), the rulings that they share, and the part of each face."""
-    from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 
     one, two, rulings = strips.hinges
-    graph = coo_matrix((np.arange(1, len(one) + 1), (one, two)), shape=(count, count)).tocsr()
+    graph = edge_graph(count, one, two, np.arange(1.0, len(one) + 1))
     graph = graph + graph.T
     number, part = connected_components(graph, directed=False)
     follow: list[tuple[int, int]] = []

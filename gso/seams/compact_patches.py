@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from gso.mesh import Mesh
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import edge_graph, edge_keys
 from gso.typing import Ints
 
 
@@ -25,9 +24,7 @@ def patches(mesh: Mesh, count: int, kept: Ints) -> Ints:
     centre = mesh.vertices[corners].mean(axis=1)
     f, g = he.face[k], he.face[he.twin[k]]
     length = np.linalg.norm(centre[f] - centre[g], axis=1)
-    graph = coo_matrix(
-        (np.maximum(length, 1e-300), (f, g)), shape=(len(centre), len(centre))
-    ).tocsr()
+    graph = edge_graph(len(centre), f, g, length)
     middle = centre.mean(axis=0)
     seed = int(np.linalg.norm(centre - middle, axis=1).argmax())
     best, owner = np.full(len(centre), np.inf), np.zeros(len(centre), np.int64)

@@ -9,10 +9,10 @@ boundary, cut the surface to a disk.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
 from gso.mesh import Mesh
+from gso.mesh.topology import edge_graph
 from gso.typing import Array, Ints
 
 
@@ -47,9 +47,8 @@ def opening(mesh: Mesh, factor: Array | None = None) -> Ints:
     count = n + int(label.max()) + 1
     a = np.r_[ends[:, 0], root]
     b = np.r_[ends[:, 1], sources]
-    graph = coo_matrix((np.r_[length, np.full(len(root), 1e-300)], (a, b)), (count, count))
     away, before, _ = dijkstra(
-        graph.tocsr(),
+        edge_graph(count, a, b, np.r_[length, np.zeros(len(root))]),
         directed=False,
         indices=np.unique(root),
         min_only=True,
@@ -72,8 +71,8 @@ def opening(mesh: Mesh, factor: Array | None = None) -> Ints:
     f, g, longest, edge = f[rank], g[rank], longest[rank], edge[rank]
     first = np.r_[True, (f[1:] != f[:-1]) | (g[1:] != g[:-1])] if f.size else np.zeros(0, bool)
     faces = len(mesh.faces)
-    price = coo_matrix((size - longest[first], (f[first], g[first])), (faces, faces))
-    tree = minimum_spanning_tree(price.tocsr()).tocoo()
+    price = edge_graph(faces, f[first], g[first], size - longest[first])
+    tree = minimum_spanning_tree(price).tocoo()
     pair = np.sort(np.stack([tree.row, tree.col]), axis=0)
     used = np.isin(f * faces + g, pair[0] * faces + pair[1]) & first
     out = [np.empty((0, 2), np.int64), _slits(mesh, ends[edge[~used]], length)]

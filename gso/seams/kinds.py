@@ -13,6 +13,7 @@ from gso.errors import MeshError, OptionError
 from gso.mesh import Mesh
 from gso.mesh.attributes import LABELS
 from gso.mesh.separation import between
+from gso.mesh.topology import edge_graph
 from gso.seams.slicing import sliced
 from gso.spelling import choices
 from gso.typing import Array, Ints
@@ -86,7 +87,6 @@ class Path(Seam):
     closed: bool = False
 
     def edges(self, mesh: Mesh) -> Ints:
-        from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import dijkstra
 
         ids = _indices(self.vertices, mesh, 1, "a list of vertices")
@@ -95,8 +95,7 @@ class Path(Seam):
         stops = np.r_[ids, ids[:1]] if self.closed else ids
         a, b = mesh.edges.T
         length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
-        count = len(mesh.vertices)
-        graph = coo_matrix((length, (a, b)), shape=(count, count)).tocsr()
+        graph = edge_graph(len(mesh.vertices), a, b, length)
         starts = np.unique(stops[:-1])
         away, before = dijkstra(graph, directed=False, indices=starts, return_predecessors=True)
         out = []

@@ -37,7 +37,6 @@ from gso.seams.search_result import packed
 from gso.seams.segmentation import Segmentation
 from gso.seams.straight import straight
 from gso.seams.tree import Ground
-from gso.spelling import known_keywords
 
 #: Ratio of the estimated to the measured strain of a first attempt.
 _RATIO = 1.3
@@ -50,7 +49,6 @@ _ROOM = 0.97
 _SAME = 1e-9
 
 
-@known_keywords()
 def pieces(
     mesh: Any,
     *,

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import edge_keys, label_components
 from gso.seams.chains import chains
 from gso.seams.merging import Merging
 from gso.seams.tree import Ground
@@ -141,6 +139,5 @@ def _divided(ground: Ground, faces: Ints, path: Ints) -> NDArray[np.bool_] | Non
     f, g = local[he.face[k]], local[he.face[he.twin[k]]]
     cut = np.isin(edge_keys(he.origin[k], he.dest[k], n), edge_keys(path[:-1], path[1:], n))
     keep = (f >= 0) & (g >= 0) & ~cut
-    graph = coo_matrix((np.ones(int(keep.sum())), (f[keep], g[keep])), (len(faces),) * 2)
-    count, side = connected_components(graph, directed=False)
-    return side == 0 if count == 2 else None
+    side = label_components(len(faces), f[keep], g[keep])
+    return side == 0 if side.max(initial=0) == 1 else None

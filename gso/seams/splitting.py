@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from gso.mesh import Mesh
 from gso.mesh.separation import between, spans
+from gso.mesh.topology import edge_graph
 from gso.seams.sheets import Sheet, rectangle
 from gso.typing import Array, Ints
 
@@ -23,7 +22,8 @@ def apart(sheet: Sheet, factor: Array | None = None) -> Ints:
     """
     mesh = sheet.mesh
     pairs = sheet.overlaps
-    graph = _dual(mesh, spans(mesh)[0])
+    he, (distance, _, h) = mesh.half_edges, spans(mesh)
+    graph = edge_graph(len(mesh.faces), he.face[h], he.face[he.twin[h]], distance)
     firsts = np.unique(pairs[:, 0])
     some = firsts[:: max(len(firsts) // 20, 1)]
     away = dijkstra(graph, directed=False, indices=some)
@@ -58,10 +58,3 @@ def halves(sheet: Sheet, most: tuple[float, float], factor: Array | None = None)
     room = float(np.clip(0.5 * (longest / length - 1.0 / parts), 0.01, 0.1))
     price = 1.0 + 0.1 * np.abs(along - place) / room
     return between(mesh, middle < place - room, middle > place + room, price, factor)
-
-
-def _dual(mesh: Mesh, distance: Array) -> coo_matrix:
-    he, k = mesh.half_edges, spans(mesh)[2]
-    f, g = he.face[k], he.face[he.twin[k]]
-    shape = (len(mesh.faces), len(mesh.faces))
-    return coo_matrix((np.maximum(distance, 1e-300), (f, g)), shape=shape).tocsr()

@@ -1,13 +1,12 @@
 """Noise removal from surfaces, with an amount of smoothing estimated from the data alone.
 
 :func:`smooth_grid` smooths grids in closed form, in some milliseconds at 64 x 64;
-:func:`smooth_mesh` smooths any mesh of triangles and quads. Both preserve creases on request.
+:func:`smooth_mesh` smooths any mesh. Both preserve creases on request.
 :func:`estimate_sigma` only estimates the standard deviation of a grid's noise, and is faster.
 """
 
 from gso.smoothing.base import Smoothed
-from gso.smoothing.grid_smoothing import smooth_grid
+from gso.smoothing.grid_smoothing import estimate_sigma, smooth_grid
 from gso.smoothing.mesh_smoothing import smooth_mesh
-from gso.smoothing.noise_level import estimate_sigma
 
 __all__ = ["Smoothed", "estimate_sigma", "smooth_grid", "smooth_mesh"]

@@ -1,13 +1,13 @@
-"""Shared code of the smoothers: input checks, a common unit of length, the result."""
+"""Shared code of the smoothers: checks of options, a common unit of length, the result."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from gso.errors import MeshError, OptionError
+from gso.errors import OptionError
+from gso.mesh import Frame
 from gso.spelling import choices
 from gso.typing import Array
 
@@ -41,58 +41,6 @@ class Smoothed:
     dof: float
 
 
-@dataclass(frozen=True)
-class Frame:
-    """Centroid and root-mean-square radius: smoothers work in ``(points - centre) / scale``.
-
-    `rounding` is the standard deviation of rounding errors in that unit. It accounts for
-    coordinates far from the origin, which are less exact.
-    """
-
-    centre: Array
-    scale: float
-    rounding: float
-
-    def to_user(self, points: Array) -> Array:
-        """Transform points back to the frame of the input."""
-        return self.centre + self.scale * points
-
-
-def checked_points(points: ArrayLike, ndim: int) -> Array:
-    """Convert points to float64 (..., 3) with `ndim` axes.
-
-    Raises
-    ------
-    MeshError
-        Wrong shape, or a coordinate that is not finite.
-    """
-    array = np.asarray(points, np.float64)
-    if array.ndim != ndim or array.shape[-1] != 3:
-        shape = "(H, W, 3)" if ndim == 3 else "(n, 3)"
-        raise MeshError(f"points have shape {array.shape}; give {shape}")
-    bad = ~np.isfinite(array).all(axis=-1)
-    if bad.any():
-        where = tuple(int(i) for i in np.argwhere(bad)[0])
-        name = where[0] if len(where) == 1 else where
-        raise MeshError(f"vertex {name} has a coordinate that is not finite: remove or repair it")
-    return array
-
-
-def checked_grid(points: ArrayLike) -> Array:
-    """Convert a grid to float64 (H, W, 3).
-
-    Raises
-    ------
-    MeshError
-        As of :func:`checked_points`, or fewer than 3 rows or columns.
-    """
-    array = checked_points(points, 3)
-    height, width = array.shape[:2]
-    if min(height, width) < 3:
-        raise MeshError(f"the grid is {height} x {width}: smoothing needs at least 3 x 3 vertices")
-    return array
-
-
 def checked_options(
     order: int | None, orders: tuple[int, ...], weight: float | None, norm: str
 ) -> None:
@@ -112,17 +60,19 @@ def checked_options(
         raise OptionError(f"weight {weight} must be a number that is not negative")
 
 
-def to_unit(points: Array) -> tuple[Array, Frame]:
+def to_unit(points: Array) -> tuple[Array, Frame, float]:
     """Centre the points and scale them to root-mean-square radius one.
 
-    >>> unit, frame = to_unit(np.array([[9.0, 0.0, 0.0], [11.0, 0.0, 0.0]]))
+    Also return the frame of the input, and the standard deviation of rounding errors in the new
+    unit, which accounts for coordinates far from the origin.
+
+    >>> unit, frame, _ = to_unit(np.array([[9.0, 0.0, 0.0], [11.0, 0.0, 0.0]]))
     >>> unit[:, 0], frame.scale
     (array([-1.,  1.]), 1.0)
     """
     flat = points.reshape(-1, 3)
     centre = flat.mean(axis=0)
-    moved = points - centre
-    radius = np.sqrt((moved**2).sum() / len(flat))
-    scale = float(radius) if radius > 0 else 1.0
-    rounding = np.finfo(float).eps * (1.0 + float(np.abs(flat).max()) / scale)
-    return moved / scale, Frame(centre, scale, rounding)
+    radius = float(np.sqrt(((flat - centre) ** 2).sum() / len(flat)))
+    frame = Frame(centre, radius if radius > 0 else 1.0)
+    rounding = np.finfo(float).eps * (1.0 + float(np.abs(flat).max()) / frame.scale)
+    return frame.to_unit(points), frame, rounding

@@ -14,7 +14,7 @@ flattening the remaining creases.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -75,9 +75,9 @@ def smooth_creased_grid(
     """
     checked_options(order, ORDERS, weight, "l1")
     charge = DEFAULT_WEIGHT if weight is None else float(weight)
-    unit, frame = to_unit(points)
-    sigma = float(np.sqrt(estimate(unit, 2, frame.rounding, None)[0].variance))
-    if charge == 0 or sigma < 10 * frame.rounding:
+    unit, frame, rounding = to_unit(points)
+    sigma = float(np.sqrt(estimate(unit, 2, rounding, None)[0].variance))
+    if charge == 0 or sigma < 10 * rounding:
         spent = float(unit[..., 0].size)
         return Smoothed(points.copy(), order or 2, charge, frame.scale * sigma, spent)
     turn = _attached_frame(unit)
@@ -150,52 +150,37 @@ def _axis(n: int, stiffness: float) -> Axis:
     return Axis(resist, second.T @ resist, np.maximum(values, 0.0), vectors)
 
 
-@dataclass(frozen=True)
-class State:
-    """Kinks, scaled multipliers and kink weights along both grid directions."""
-
-    kink_u: Array
-    kink_v: Array
-    dual_u: Array
-    dual_v: Array
-    charge_u: Array | float = 1.0
-    charge_v: Array | float = 1.0
+#: Kinks and scaled multipliers, each along both grid directions.
+State = tuple[list[Array], list[Array]]
 
 
 def _split(
     data: Array, charge: float, stiffness: float, start: State | None
 ) -> tuple[Array, State]:
     """Minimise the energy for a batch (b, 3, H, W) in units of the noise."""
-    height, width = data.shape[2:]
-    along_u, along_v = _axis(height, stiffness), _axis(width, stiffness)
+    along_u, along_v = (_axis(n, stiffness) for n in data.shape[2:])
     rho = charge / STEP
     keep = 1 / (1 + rho * (along_u.values[:, None] + along_v.values))
-    if start is None:
-        zero_u, zero_v = np.zeros_like(data[:, :, 2:]), np.zeros_like(data[..., 2:])
-        state = State(zero_u, zero_v, zero_u, zero_v)
-    else:
-        state = replace(start, charge_u=1.0, charge_v=1.0)
+    zeros = [np.zeros_like(data[:, :, 2:]), np.zeros_like(data[..., 2:])]
+    kinks, duals = (zeros, zeros) if start is None else start
+    charges: list[Array | float] = [1.0, 1.0]
     smooth = data
     for iteration in range(ITERATIONS):
         if iteration in REWEIGHTED_AT:
-            state = replace(
-                state,
-                charge_u=KINK / (KINK + _length(state.kink_u)),
-                charge_v=KINK / (KINK + _length(state.kink_v)),
-            )
-        aim_u, aim_v = state.kink_u - state.dual_u, state.kink_v - state.dual_v
+            charges = [KINK / (KINK + _length(kink)) for kink in kinks]
+        aim_u, aim_v = (kink - dual for kink, dual in zip(kinks, duals, strict=True))
         pull = data + rho * (along_u.spread @ aim_u + aim_v @ along_v.spread.T)
         inner = along_u.vectors.T @ pull @ along_v.vectors
         smooth = along_u.vectors @ (keep * inner) @ along_v.vectors.T
         bent_u = smooth[:, :, 2:] - 2 * smooth[:, :, 1:-1] + smooth[:, :, :-2]
         bent_v = smooth[..., 2:] - 2 * smooth[..., 1:-1] + smooth[..., :-2]
-        wish_u = aim_u + along_u.resist @ (bent_u - aim_u) + state.dual_u
-        wish_v = aim_v + (bent_v - aim_v) @ along_v.resist + state.dual_v
-        dual_u, dual_v = _clip(wish_u, STEP * state.charge_u), _clip(wish_v, STEP * state.charge_v)
-        state = replace(
-            state, kink_u=wish_u - dual_u, kink_v=wish_v - dual_v, dual_u=dual_u, dual_v=dual_v
-        )
-    return smooth, state
+        wishes = [
+            aim_u + along_u.resist @ (bent_u - aim_u) + duals[0],
+            aim_v + (bent_v - aim_v) @ along_v.resist + duals[1],
+        ]
+        duals = [_clip(wish, STEP * c) for wish, c in zip(wishes, charges, strict=True)]
+        kinks = [wish - dual for wish, dual in zip(wishes, duals, strict=True)]
+    return smooth, (kinks, duals)
 
 
 def _length(vectors: Array) -> Array:

@@ -1,13 +1,15 @@
-"""Noise removal from grids, with an amount of smoothing estimated from the data alone."""
+"""Noise of grids: its removal, with an amount estimated from the data alone, and its size."""
 
 from __future__ import annotations
 
 from functools import lru_cache
+from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.smoothing.base import Smoothed, checked_grid, checked_options, to_unit
+from gso.mesh.validation import checked_grid
+from gso.smoothing.base import Smoothed, checked_options, to_unit
 from gso.smoothing.spectrum import Law, Spectrum, bins, shrinkage
 from gso.typing import Array
 
@@ -16,6 +18,11 @@ TRIED = (8, 4, 2)
 DEFAULT_ORDER = 4
 # Coefficients of x, y and z share parameters, so the likelihood overstates its evidence.
 TEMPERATURE = 4.0
+# Order of the differences in each direction from which the noise alone is estimated.
+DIFFERENCES = 3
+# Median of the squared length of vectors of three independent standard normal numbers, that is
+# 2 gammaincinv(3/2, 1/2). Written out, as scipy.special takes a tenth of a second to load.
+MEDIAN = 2.3659738843753377
 
 
 def smooth_grid(
@@ -91,6 +98,52 @@ def smooth_grid(
     return _blind(array, TRIED if order is None else (order,))
 
 
+def estimate_sigma(points: ArrayLike) -> float:
+    """Estimate the standard deviation of a grid's noise, per coordinate.
+
+    The estimate uses mixed differences, of third order in both directions at once; Immerkaer
+    (1996) uses second differences of images. They nearly cancel surfaces with wavelengths above
+    ten vertices, and creases along the grid. Their median (Donoho and Johnstone 1994) is robust
+    to the few large differences at other creases and steps. Noise that is correlated between
+    neighbours is underestimated. At 64 x 64 the estimate scatters by 1.8 %, more than twice as
+    much as that of :func:`smooth_grid`, which takes over ten times as long.
+
+    Parameters
+    ----------
+    points : array_like, (H, W, 3)
+        Noisy surface in any unit of length and any position, at least 3 x 3. The noise is
+        assumed to be independent and of equal variance in every coordinate. Orders are lowered
+        to H - 1 and W - 1 on smaller grids.
+
+    Returns
+    -------
+    float
+        In the unit of the input.
+
+    Raises
+    ------
+    MeshError
+        Not an (H, W, 3) array of finite numbers with at least 3 rows and columns.
+
+    Examples
+    --------
+    >>> u, v = np.meshgrid(np.linspace(0, 1, 40), np.linspace(0, 1, 30), indexing="ij")
+    >>> clean = np.stack([u, v, np.sin(9 * u) * np.sin(9 * v)], axis=-1)
+    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(clean.shape)
+    >>> bool(abs(estimate_sigma(clean + noise) - 0.01) < 0.0005)
+    True
+    """
+    rest = checked_grid(points)
+    size = float(np.abs(rest).max()) or 1.0
+    rest, gain = rest / size, 1
+    for axis in (0, 1):
+        order = min(DIFFERENCES, rest.shape[axis] - 1)
+        rest = np.diff(rest, order, axis=axis)
+        # Variances grow by the sum of the squared binomial coefficients.
+        gain *= comb(2 * order, order)
+    return size * float(np.sqrt(np.median((rest**2).sum(axis=-1)) / (gain * MEDIAN)))
+
+
 @lru_cache(maxsize=32)
 def modes(n: int, order: int) -> tuple[Array, Array]:
     """Compute the eigenvectors and eigenvalues of the free-ended difference penalty.
@@ -133,12 +186,12 @@ def estimate(unit: Array, order: int, rounding: float, start: Array | None) -> t
 
 
 def _blind(array: Array, orders: tuple[int, ...]) -> Smoothed:
-    unit, frame = to_unit(array)
+    unit, frame, rounding = to_unit(array)
     height, width = unit.shape[:2]
     laws, results, kept = [], [], []
     start = None
     for order in orders:
-        law, coefficients = estimate(unit, order, frame.rounding, start)
+        law, coefficients = estimate(unit, order, rounding, start)
         start = law.parameters
         share = shrinkage(law, height, width)
         laws.append(law)
@@ -161,7 +214,7 @@ def _blind(array: Array, orders: tuple[int, ...]) -> Smoothed:
 
 
 def _whittaker(array: Array, order: int, weight: float) -> Smoothed:
-    unit, frame = to_unit(array)
+    unit, frame, _ = to_unit(array)
     height, width = unit.shape[:2]
     penalty = modes(height, order)[1][:, None] + modes(width, order)[1]
     share = 1 / (1 + weight * penalty)

@@ -16,93 +16,41 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.errors import MeshError
+from gso.mesh import Mesh
 from gso.typing import Array, Ints
 
 # Largest number of vertices in a fit; more, as around a pole with hundreds of faces, are sampled.
 LARGEST = 64
 
 
-def checked_faces(faces: Any, count: int) -> Ints:
-    """Convert faces to integers (m, 3) or (m, 4), with a missing fourth corner as -1.
-
-    Raises
-    ------
-    MeshError
-        Another shape, numbers that are not whole, or a vertex that does not exist.
-    """
-    array = np.asarray(faces)
-    if array.ndim != 2 or array.shape[1] not in (3, 4) or not len(array):
-        raise MeshError(f"faces have shape {array.shape}; give (m, 3) or (m, 4) with m > 0")
-    table = array.astype(np.int64)
-    if (table != array).any():
-        raise MeshError("faces hold numbers that are not whole; give vertex indices")
-    bad = (table >= count) | (table < 0)
-    if table.shape[1] == 4:
-        bad[:, 3] &= table[:, 3] != -1
-    if bad.any():
-        face = int(np.flatnonzero(bad.any(axis=1))[0])
-        raise MeshError(f"face {face} refers to a vertex outside 0 to {count - 1}")
-    return table
-
-
-def used_only(faces: Ints) -> tuple[Ints, Ints]:
-    """Return the vertices that faces refer to, ascending, and the faces renumbered to them.
-
-    >>> used, table = used_only(np.array([[7, 3, 5, -1], [3, 7, 9, 4]]))
-    >>> used, table.tolist()
-    (array([3, 4, 5, 7, 9]), [[3, 0, 2, -1], [0, 3, 4, 1]])
-    """
-    real = faces >= 0
-    used, index = np.unique(faces[real], return_inverse=True)
-    table = np.full_like(faces, -1)
-    table[real] = index.ravel()
-    return used, table
-
-
-def neighbours(faces: Ints, count: int) -> Any:
+def neighbours(mesh: Mesh) -> Any:
     """Build the sparse (n, n) pattern of ones of vertices that share a face, with diagonal."""
-    from scipy.sparse import csr_matrix, identity
+    from scipy.sparse import csr_matrix
 
-    real = faces >= 0
-    face = np.broadcast_to(np.arange(len(faces))[:, None], faces.shape)[real]
-    shape = (count, len(faces))
-    incidence = csr_matrix((np.ones(face.size), (faces[real], face)), shape=shape)
-    return _pattern(incidence @ incidence.T + identity(count))
-
-
-def boundary_edges(faces: Ints, count: int) -> Ints:
-    """Return the edges (b, 2) with one face."""
-    if faces.shape[1] == 4:
-        last = np.where(faces[:, 3:] < 0, faces[:, :1], faces[:, 3:])
-        faces = np.hstack([faces[:, :3], last])
-    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    edges = edges[edges[:, 0] != edges[:, 1]]
-    keys, uses = np.unique(edges[:, 0] * np.int64(count) + edges[:, 1], return_counts=True)
-    return np.stack(np.divmod(keys[uses == 1], count), axis=1)
+    he = mesh.half_edges
+    shape = (len(mesh.vertices), len(mesh.faces))
+    incidence = csr_matrix((np.ones(he.origin.size), (he.origin, he.face)), shape=shape)
+    return _pattern(incidence @ incidence.T)
 
 
-def umbrella(near: Any, boundary: Ints) -> Any:
+def umbrella(mesh: Mesh, near: Any) -> Any:
     """Build the sparse (n, n) umbrella operator: each vertex minus the mean of its neighbours.
 
     Boundary vertices use their neighbours along the boundary only, so that the operator does
     not pull the boundary inwards (Taubin 1995).
 
-    >>> faces = np.array([[0, 1, 2, 3]])
-    >>> umbrella(neighbours(faces, 4), boundary_edges(faces, 4)).toarray()[0]
+    >>> mesh = Mesh(np.eye(4, 3), [[0, 1, 2, 3]])
+    >>> umbrella(mesh, neighbours(mesh)).toarray()[0]
     array([ 1. , -0.5,  0. , -0.5])
     """
     from scipy.sparse import csr_matrix, diags
 
-    count = near.shape[0]
-    inner = np.ones(count)
-    inner[boundary] = 0.0
-    i, j = boundary.T
-    ones = np.ones(2 * len(boundary))
-    along = csr_matrix((ones, (np.r_[i, j], np.r_[j, i])), shape=near.shape)
-    links = diags(inner) @ (near - diags(near.diagonal())) + along
+    i, j = mesh.edges[mesh.boundary_edges].T
+    along = csr_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=near.shape)
+    inner = ~mesh.half_edges.boundary_vertex
+    links = diags(inner * 1.0) @ (near - diags(near.diagonal())) + along
     valence = np.asarray(links.sum(axis=1)).ravel()
-    return diags((valence > 0).astype(float)) - diags(1 / np.maximum(valence, 1)) @ links
+    return diags((valence > 0) * 1.0) - diags(1 / np.maximum(valence, 1)) @ links
 
 
 @dataclass(frozen=True)

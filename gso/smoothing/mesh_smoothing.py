@@ -5,20 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from gso.smoothing.base import Smoothed, checked_options, checked_points, to_unit
-from gso.smoothing.local_fits import (
-    Residuals,
-    Rings,
-    boundary_edges,
-    checked_faces,
-    neighbours,
-    residuals,
-    rings,
-    umbrella,
-    used_only,
-)
+from gso.mesh import Mesh
+from gso.smoothing.base import Smoothed, checked_options, to_unit
+from gso.smoothing.local_fits import Residuals, Rings, neighbours, residuals, rings, umbrella
 from gso.smoothing.select import Choice, best_weight, factor, gcv, largest_weight, unbiased_risk
 from gso.typing import Array
 
@@ -37,8 +27,7 @@ FALLING = (np.inf, 4.0, 3.0, 2.0, 2.0, 2.0)
 
 
 def smooth_mesh(
-    vertices: ArrayLike,
-    faces: ArrayLike,
+    mesh: Mesh,
     *,
     order: int | None = None,
     weight: float | None = None,
@@ -48,11 +37,12 @@ def smooth_mesh(
 
     The result minimises
 
-        mean |x - vertices|^2 + weight sum_p share_p |residual_p(x)|^2 / radius_p^(2 order)
+        mean |x - x_0|^2 + weight sum_p share_p |residual_p(x)|^2 / radius_p^(2 order)
 
-    over patches p of neighbouring vertices. The residual is that of a fit by a polynomial of
-    degree below `order` over the plane of the patch (:mod:`gso.smoothing.local_fits`), shares are
-    shares of area, and the unit of length is the root-mean-square distance from the centroid.
+    over patches p of neighbouring vertices; x_0 are the given vertices. The residual is that of
+    a fit by a polynomial of degree below `order` over the plane of the patch
+    (:mod:`gso.smoothing.local_fits`), shares are shares of area, and the unit of length is the
+    root-mean-square distance from the centroid.
     The planes come from a mesh smoothed beforehand: by an umbrella operator whose weight
     minimises a generalised cross-validation, then with planes on single rings. The noise is
     estimated from the patches, and the weight minimises Mallows' unbiased risk estimate
@@ -60,11 +50,9 @@ def smooth_mesh(
 
     Parameters
     ----------
-    vertices : array_like, (n, 3)
-        Noisy vertices in any unit of length and any position. The noise is assumed to be
-        independent and of equal variance in every coordinate.
-    faces : array_like of int, (m, 3) or (m, 4)
-        Vertex indices; a triangle among quads ends in -1. Boundaries and holes are free.
+    mesh : Mesh
+        Noisy surface in any unit of length and any position. The noise is assumed to be
+        independent and of equal variance in every coordinate. Boundaries and holes are free.
         Vertices of no face are ignored and returned unchanged.
     order : {2, 3, 4}, optional
         Patches have one ring of faces for 2, two rings for 3 and 4. 4 by default; for
@@ -79,11 +67,10 @@ def smooth_mesh(
     Returns
     -------
     Smoothed
+        Its `points` are the vertices (n, 3).
 
     Raises
     ------
-    MeshError
-        Vertices that are not finite, faces that refer to vertices that do not exist.
     OptionError
         An order, weight or norm that does not exist.
 
@@ -94,19 +81,17 @@ def smooth_mesh(
     >>> plane = rng.uniform(size=(400, 2))
     >>> saddle = np.column_stack([plane, plane[:, 0] * plane[:, 1]])
     >>> noisy = saddle + 0.01 * rng.standard_normal(saddle.shape)
-    >>> x, y, z = smooth_mesh(noisy, Delaunay(plane).simplices).points.T
+    >>> x, y, z = smooth_mesh(Mesh(noisy, Delaunay(plane).simplices)).points.T
     >>> bool((z - x * y).std() < 0.003)
     True
     """
-    given = checked_points(vertices, 2)
-    every = checked_faces(faces, len(given))
     checked_options(order, ORDERS if norm == "l2" else ORDERS[:2], weight, norm)
     # Vertices of no face may lie anywhere: they must not affect sizes, medians and traces.
-    used, table = used_only(every)
-    points = given[used]
-    unit, frame = to_unit(points)
-    near = neighbours(table, len(points))
-    flat = umbrella(near, boundary_edges(table, len(points)))
+    used = np.flatnonzero(mesh.used)
+    unit, frame, _ = to_unit(mesh.vertices[used])
+    near = neighbours(mesh)
+    flat = umbrella(mesh, near)[used][:, used]
+    near = near[used][:, used]
     pilot = best_weight((flat.T @ flat).tocsc(), unit, 1.0, gcv(CAUTION)).points
     at_most = SLACK * noise(unit, residuals(unit, rings(near, 1), 2))
     if norm == "l2":
@@ -116,7 +101,7 @@ def smooth_mesh(
         trials = [_creased(unit, pilot, near, k, weight, at_most) for k in orders]
         # Residuals of both are as large as the noise; the fewer degrees of freedom win.
         done, order, sigma = min(trials, key=lambda trial: trial[0].dof)
-    smoothed = given.copy()
+    smoothed = mesh.vertices.copy()
     smoothed[used] = frame.to_user(done.points)
     return Smoothed(
         points=smoothed,

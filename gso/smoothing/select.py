@@ -15,14 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from gso.linalg import spd
+from gso.linalg import Pattern, SingularError, choose, spd
 from gso.typing import Array
 
 STEPS = 10
 PROBES = 2
 ROUNDS = 6
 REACH = np.arange(-1.5, 3.05, 0.1)  # decades around the shift that are evaluated
-BAND = 500  # largest bandwidth for a banded factorisation
 NEAR = 1.2  # an optimum within this many decades of the shift is accepted
 STEEPEST = 1e14  # with larger entries of weight K, the identity is lost to rounding
 
@@ -162,39 +161,20 @@ def unbiased_risk(variance: float) -> Criterion:
 def factor(penalty: Any, weight: float) -> Callable[[Array], Array]:
     """Factorise I + weight K and return a solver for right-hand sides (n, c).
 
-    In the order of Cuthill and McKee (1969) the matrix of a mesh of some thousand vertices has
-    a narrow band, which LAPACK factorises several times faster than a sparse solver does.
-
     >>> from scipy.sparse import identity
     >>> factor(identity(3), 1.0)(np.ones((3, 1))).ravel()
     array([0.5, 0.5, 0.5])
     """
-    from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
-    from scipy.sparse import identity
-    from scipy.sparse.csgraph import reverse_cuthill_mckee
+    from scipy.sparse import identity, tril
 
-    count = penalty.shape[0]
-    matrix = (identity(count) + weight * penalty).tocsc()
-    order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
-    place = np.argsort(order)
-    entries = matrix.tocoo()
-    row, column = place[entries.row], place[entries.col]
-    below = row >= column
-    row, column = row[below], column[below]
-    width = int((row - column).max())
-    if width <= BAND:
-        band = np.zeros((width + 1, count))
-        band[row - column, column] = entries.data[below]
-        try:
-            lower = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
-        except LinAlgError:
-            pass  # indefinite by rounding, which the LU factorisation tolerates
-        else:
-
-            def solve(right: Array) -> Array:
-                out = np.empty_like(right)
-                out[order] = cho_solve_banded((lower, True), right[order], check_finite=False)
-                return out
-
-            return solve
-    return spd(matrix)
+    matrix = identity(penalty.shape[0]) + weight * penalty
+    lower = tril(matrix, format="csc")
+    lower.sort_indices()
+    solver = choose(Pattern(lower.shape[0], lower.indptr, lower.indices))
+    try:
+        solver.factor(lower.data)
+    except SingularError:
+        # Indefinite by rounding, which an LU factorisation tolerates.
+        return spd(matrix)
+    solve: Callable[[Array], Array] = solver.solve
+    return solve

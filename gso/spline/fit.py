@@ -10,7 +10,6 @@ import numpy as np
 from gso import metrics
 from gso.errors import MeshError, OptionError
 from gso.mesh import Mesh
-from gso.spelling import known_keywords
 from gso.spline import BSplineSurface, Gap, basis, clamped_knots
 from gso.typing import Array
 
@@ -20,7 +19,6 @@ _REFINED = 4
 _LARGE = 100_000
 
 
-@known_keywords()
 def fit_spline(surface: Any, controls: int | tuple[int, int] = 16) -> BSplineSurface:
     """Fit a bicubic B-spline to a grid at uniform parameters, by least squares.
 

@@ -58,7 +58,6 @@ class Options(BaseOptions):
         diagonals.
     """
 
-    RENAMED: ClassVar[dict[str, str]] = {"stiff": "w_bending_start"}
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
         "fast": {"w_bending": 1e-5, "tolerance": 1e-2},
         "balanced": {},

@@ -77,7 +77,7 @@ def _smoothed(mesh: Mesh, request: Request) -> tuple[Array, dict[str, Any]]:
     if mesh.grid is not None:
         smoothed = smooth_grid(mesh.grid, **settings)
     else:
-        smoothed = smooth_mesh(mesh.vertices, mesh.faces, **settings)
+        smoothed = smooth_mesh(mesh, **settings)
     names = ("order", "weight", "sigma", "dof")
     return smoothed.points.reshape(-1, 3), {name: getattr(smoothed, name) for name in names}
 

@@ -16,11 +16,9 @@ from gso.pipeline.start import Start
 from gso.result import Result
 from gso.seams import joint_solve, strips_of_pieces
 from gso.solver import Callback
-from gso.spelling import known_keywords
 from gso.tasks.base import Options
 
 
-@known_keywords()
 def optimize(
     mesh: Any,
     *,
@@ -136,5 +134,5 @@ def optimize(
         result = solve_mesh(asked, callback, design, constraints, given)
     result.seconds["total"] = time.perf_counter() - clock
     if said := warning(result):
-        warnings.warn(said, ConvergenceWarning, stacklevel=3)
+        warnings.warn(said, ConvergenceWarning, stacklevel=2)
     return result

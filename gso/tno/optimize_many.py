@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
+from inspect import signature
 from typing import Any
 
 from gso import cluster
 from gso.result import Result
-from gso.spelling import known_keywords
 from gso.tno.optimize import optimize
 
 
@@ -34,7 +34,6 @@ def _one(keywords: dict[str, Any], mesh: Any) -> Result:
     return result
 
 
-@known_keywords(optimize)
 def optimize_many(
     meshes: Iterable[Any],
     *,
@@ -69,6 +68,7 @@ def optimize_many(
     >>> [item.index for item in gso.tno.optimize_many([flat], workers=0)]
     [0]
     """
+    signature(optimize).bind(None, **keywords)
     keywords.pop("callback", None)
     if isinstance(keywords.get("constraints"), Iterator):
         # The first surface would exhaust the iterator.

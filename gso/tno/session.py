@@ -24,7 +24,6 @@ from gso.result import Result
 from gso.solver import METHODS, Minimum, minimise
 from gso.solver.augmented_lagrangian import tighten
 from gso.solver.problem import Problem
-from gso.spelling import known_keywords
 from gso.status import Status
 from gso.tasks.base import Plan, Request, Solution, Stage
 from gso.tno.optimize import check
@@ -84,7 +83,6 @@ class Session:
     True
     """
 
-    @known_keywords()
     def __init__(
         self,
         mesh: Any,

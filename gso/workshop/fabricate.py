@@ -17,7 +17,6 @@ from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.quantities import Length, Strain, as_length, as_strain, millimetres
 from gso.seams.options import as_sheet
-from gso.spelling import known_keywords
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import design_record, digest, plain, versions
 from gso.workshop.checks import refused
@@ -69,7 +68,6 @@ class Fabrication:
         return list(self.certificate["reasons"])
 
 
-@known_keywords()
 def fabricate(
     designs: Any,
     folder: str | PathLike[str],

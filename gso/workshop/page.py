@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from html import escape
 from typing import Any
+from xml.etree.ElementTree import tostring
 
 import numpy as np
 
-from gso.typing import Array
+from gso.io.svg_page import SVGPage
 from gso.workshop.part import Drawing, Part
+from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import layer_set
 
 #: Number of parts that are drawn, and the least number other than 0 that is written.
@@ -24,7 +27,6 @@ figure { display: inline-block; margin: 8px; vertical-align: top; }
 figcaption { font-size: 12px; }
 svg { border: 1px solid #ddd; background: #fff; }
 path, line { fill: none; stroke-width: 1px; vector-effect: non-scaling-stroke; }
-text { font-family: sans-serif; text-anchor: middle; dominant-baseline: central; }
 .legend span { margin-right: 1.5em; white-space: nowrap; }
 .legend i { display: inline-block; width: 2em;
 border-top-style: solid; border-top-width: 3px; vertical-align: middle; margin-right: 0.4em; }
@@ -118,35 +120,21 @@ def _figure(drawing: Drawing, text: str, width: int) -> str:
     if height > 2 * width:
         width, height = int(2 * width * size[0] / size[1]) + 1, 2 * width
     room = 0.01 * float(size.max())
-    box = f"{-room:.6g} {-room:.6g} {size[0] + 2 * room:.6g} {size[1] + 2 * room:.6g}"
-    out = [f'<figure><svg width="{width}" height="{height}" viewBox="{box}">']
-    corner = np.array([low[0], high[1]])
-    if drawing.sheet is not None:
-        x, y = drawing.sheet
-        out.append(_path([np.array([[0, 0], [x, 0], [x, y], [0, y]])], corner, "sheet", True))
-    depth = 0.012 * float(size.max())
+    page = SVGPage(low - room, high + room, digits=5)
+    page.root.attrib |= {"width": str(width), "height": str(height)}
+    draw = partial(page.path, page.root)
+    for border in strokes.sheet(drawing):
+        draw([border.points], closed=True, kind="sheet")
     for part in drawing.parts:
-        out.append(_path([part.outline, *part.holes], corner, "outline", True))
-        notches = [np.stack([n.at, n.at + depth * n.inward]) for n in part.notches]
-        out.append(_path([*part.marks, *part.creases, *notches], corner, "mark", False))
-        out.append(_path(list(part.seams), corner, "seam", False))
-        for name, sign in (("mountain", 1), ("valley", -1)):
-            lines = [b.line for b in part.bends if sign * b.angle > 0]
-            out.append(_path(lines, corner, name, False))
+        draw([part.outline, *part.holes], closed=True, kind="outline")
+        notches = [np.stack([n.at, n.at + 1.2 * room * n.inward]) for n in part.notches]
+        draw([*part.marks, *part.creases, *notches], kind="mark")
+        draw(part.seams, kind="seam")
+        for kind, sign in (("mountain", 1), ("valley", -1)):
+            draw([b.line for b in part.bends if sign * b.angle > 0], kind=kind)
         if drawing.sheet is not None:
-            x, y = ((0.5 * (part.low + part.outline.max(axis=0)) - corner) * [1.0, -1.0]).tolist()
-            tall = min(0.016 * float(size.max()), 1.2 * part.size[0] / max(len(part.name), 1))
-            said = escape(part.name)
-            out.append(f'<text x="{x:.5g}" y="{y:.5g}" font-size="{tall:.4g}">{said}</text>')
-    return "".join([*out, f"</svg><figcaption>{escape(text)}</figcaption></figure>"])
-
-
-def _path(lines: list[Array], corner: Array, name: str, closed: bool) -> str:
-    if not lines:
-        return ""
-    text = []
-    for line in lines:
-        points = (line - corner) * [1.0, -1.0]
-        text.append("M" + "L".join(f"{x:.5g} {y:.5g}" for x, y in points.tolist()))
-        text.append("Z" if closed else "")
-    return f'<path class="{name}" d="{"".join(text)}"/>'
+            tall = min(1.1 * room, 0.8 * part.size[0] / max(len(part.name), 1))
+            middle = 0.5 * (part.low + part.outline.max(axis=0))
+            page.text(page.root, part.name, middle - [0.0, 0.5 * tall], tall)
+    picture = tostring(page.root, "unicode")
+    return f"<figure>{picture}<figcaption>{escape(text)}</figcaption></figure>"

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
+from gso.mesh.topology import label_components
 from gso.spelling import choices
 from gso.typing import Array, Ints
 from gso.workshop.panels import Panel
@@ -161,9 +162,6 @@ def _plates(panel: Panel) -> tuple[Ints, Ints, Ints]:
 
     Seen along a bend from its first end, the second plate lies to the left.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     he, n = panel.surface.half_edges, len(panel.flat)
     k = np.flatnonzero(he.twin > np.arange(he.twin.size))
     keys = np.sort(np.stack([he.origin[k], he.dest[k]], axis=1), axis=1) @ np.array([n, 1])
@@ -172,10 +170,7 @@ def _plates(panel: Panel) -> tuple[Ints, Ints, Ints]:
     bent = k[order[np.searchsorted(keys[order], wanted)]]
     keep = k[~np.isin(k, bent)]
     count = len(panel.surface.faces)
-    graph = coo_matrix(
-        (np.ones(len(keep)), (he.face[keep], he.face[he.twin[keep]])), shape=(count, count)
-    )
-    plate = connected_components(graph, directed=False)[1].astype(np.int64)
+    plate = label_components(count, he.face[keep], he.face[he.twin[keep]])
     # The faces of a half-edge lie to its left.
     pairs = np.stack([plate[he.face[he.twin[bent]]], plate[he.face[bent]]], axis=1)
     return plate, pairs, np.stack([he.origin[bent], he.dest[bent]], axis=1)

@@ -15,7 +15,6 @@ from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.writers.layers import layer_set
 from gso.workshop.writers.pdf import check_paper
-from gso.workshop.writers.writer_checks import require
 
 #: Gap between parts that are drawn side by side, as a share of the largest.
 _GAP = 0.05
@@ -48,9 +47,7 @@ class Drawings:
 
     def __post_init__(self) -> None:
         for name in (*self.formats, *(() if self.paper is None else ("pdf",))):
-            package = getattr(writers.get(name), "PACKAGE", None)
-            if package is not None:
-                require(package, f"{name.upper()} files")
+            writers.require_package(writers.get(name))
         layer_set(self.layers)
         if self.paper is not None:
             check_paper(self.paper)

@@ -7,6 +7,7 @@ a vertex or the side of a grid, never over elements.
 
 from __future__ import annotations
 
+from gso.mesh.topology.graph import edge_graph, label_components
 from gso.mesh.topology.grid import grid_faces, recognise_grid
 from gso.mesh.topology.half_edges import (
     HalfEdges,
@@ -39,6 +40,7 @@ __all__ = [
     "by_size",
     "check_vertices",
     "corner_triangles",
+    "edge_graph",
     "edge_keys",
     "edges",
     "four_corners",
@@ -46,6 +48,7 @@ __all__ = [
     "grid_stars",
     "half_edges",
     "hinges",
+    "label_components",
     "orient",
     "polyline_crosses",
     "polyline_triples",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.errors import MeshError
+from gso.mesh.topology.graph import edge_graph, label_components
 from gso.typing import Ints
 
 
@@ -86,22 +87,17 @@ def _tree_parity(
     Returns the parity and the component label of each node. Pointer jumping takes
     log2(depth) vectorised passes.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
+    from scipy.sparse.csgraph import breadth_first_order
 
     _, once = np.unique(edge_keys(a, b, count), return_index=True)
     a, b, odd = a[once], b[once], odd[once]
-    parts, label = connected_components(
-        coo_matrix((np.ones(a.size), (a, b)), shape=(count, count)), directed=False
-    )
+    label = label_components(count, a, b)
+    parts = int(label.max(initial=-1)) + 1
     roots = np.zeros(parts, np.int64)
     roots[label[::-1]] = np.arange(count)[::-1]
     # An extra node, joined to a root of every component, turns the forest into a tree.
-    top = np.full(parts, count)
-    graph = coo_matrix(
-        (np.r_[odd + 1, np.ones(parts, int)], (np.r_[a, top], np.r_[b, roots])),
-        shape=(count + 1, count + 1),
-    ).tocsr()
+    tail, weight = np.r_[a, np.full(parts, count)], np.r_[odd + 1.0, np.ones(parts)]
+    graph = edge_graph(count + 1, tail, np.r_[b, roots], weight)
     graph = graph + graph.T
     _, parent = breadth_first_order(graph, count, directed=False)
     parent = np.where(parent < 0, count, parent)
@@ -183,17 +179,12 @@ def check_vertices(he: HalfEdges) -> None:
     MeshError
         There is such a vertex; the message names the first one.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     count = he.origin.size
     turn = he.twin[he.prev]
     inner = np.flatnonzero(turn >= 0)
-    links = coo_matrix((np.ones(inner.size), (inner, turn[inner])), shape=(count, count))
-    fans, label = connected_components(links, directed=False)
-    if fans == np.count_nonzero(he.face_count):
+    _, one = np.unique(label_components(count, inner, turn[inner]), return_index=True)
+    if one.size == np.count_nonzero(he.face_count):
         return
-    _, one = np.unique(label, return_index=True)
     per_vertex = np.bincount(he.origin[one], minlength=he.vertex_count)
     bad = np.flatnonzero(per_vertex > 1)
     raise MeshError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso.mesh.topology.graph import edge_graph, label_components
 from gso.mesh.topology.half_edges import HalfEdges
 from gso.typing import Ints
 
@@ -54,8 +55,7 @@ def hinges(he: HalfEdges) -> Ints:
 
 def boundary_loops(he: HalfEdges) -> list[Ints]:
     """List the vertex ids of the boundary loops, anticlockwise round the surface, longest first."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components, depth_first_order
+    from scipy.sparse.csgraph import depth_first_order
 
     rim = np.flatnonzero(he.twin < 0)
     if rim.size == 0:
@@ -66,19 +66,12 @@ def boundary_loops(he: HalfEdges) -> list[Ints]:
     while (he.twin[ahead] >= 0).any():
         ahead = np.where(he.twin[ahead] >= 0, he.next[he.twin[ahead]], ahead)
     n, after = rim.size, np.searchsorted(rim, ahead)
-    links = coo_matrix((np.ones(n), (np.arange(n), after)), shape=(n, n))
-    _, label = connected_components(links, directed=False)
+    label = label_components(n, np.arange(n), after)
     order = np.lexsort((he.origin[rim], label))
     starts = order[np.unique(label[order], return_index=True)[1]]
     # An extra node, joined to a start of every loop, makes one depth-first walk visit all.
-    links = coo_matrix(
-        (
-            np.ones(n + starts.size),
-            (np.r_[np.arange(n), np.full(starts.size, n)], np.r_[after, starts]),
-        ),
-        shape=(n + 1, n + 1),
-    )
-    walk = depth_first_order(links.tocsr(), n)[0][1:]
+    tail = np.r_[np.arange(n), np.full(starts.size, n)]
+    walk = depth_first_order(edge_graph(n + 1, tail, np.r_[after, starts]), n)[0][1:]
     cuts = np.flatnonzero(np.diff(label[walk])) + 1
     loops = np.split(he.origin[rim[walk]], cuts)
     return sorted(loops, key=len, reverse=True)

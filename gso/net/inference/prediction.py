@@ -16,7 +16,6 @@ from gso.net.catalogue import chain
 from gso.net.inference import denoising
 from gso.net.models.base import SIZE, Net, exact
 from gso.net.weights import cached
-from gso.spelling import known_keywords
 from gso.typing import Array
 
 #: Smallest side of a grid that is resampled to the size of the nets.
@@ -25,7 +24,6 @@ SMALLEST = 4
 _BATCH = 64
 
 
-@known_keywords()
 def predict(
     surface: Any,
     *,

@@ -97,10 +97,6 @@ class Options(BaseOptions):
         with its flat image, unless there are constraints, `x0` or variables "surface".
     """
 
-    RENAMED: ClassVar[dict[str, str]] = {
-        "enough": "isometry_threshold",
-        "stiff": "w_fairness_start",
-    }
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
         "fast": {"iterations": 6},
         "balanced": {},

@@ -71,7 +71,6 @@ class Options(BaseOptions):
         unless there are constraints, `x0` or variables "surface".
     """
 
-    RENAMED: ClassVar[dict[str, str]] = {"near": "quadratic_below"}
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
         "fast": {
             "iterations": 4,

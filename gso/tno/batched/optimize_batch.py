@@ -10,7 +10,6 @@ import torch
 
 from gso.errors import GSOError, MeshError, OptionError
 from gso.result import Result
-from gso.spelling import known_keywords
 from gso.tno.batched import batches
 from gso.tno.batched import device as devices
 from gso.tno.batched.many import solve_all
@@ -18,7 +17,6 @@ from gso.tno.batched.workers import BatchWorkers
 from gso.typing import Array
 
 
-@known_keywords()
 def optimize_batch(
     points: Any,
     *,

@@ -1,9 +1,9 @@
 """Writers of flat parts: one file each, chosen by the suffix of the file to be written.
 
-A writer has ``SUFFIX``, with its dot, ``PACKAGE``, which it needs, and ``write(drawing, path,
-**options)``, whose options ``layers`` and ``bend_text`` every writer has. It takes its lines
-and texts from :mod:`gso.workshop.writers.strokes` and their layers from
-:mod:`gso.workshop.writers.layers`. A new format is one file in this folder.
+A writer has ``SUFFIX``, with its dot, ``PACKAGE`` if it needs one, and ``content(drawing, layers,
+**options)``, which returns the bytes of the file; every writer has the option ``bend_text``. It
+takes its lines and texts from :mod:`gso.workshop.writers.strokes`. A new format is one file in this
+folder.
 """
 
 from __future__ import annotations
@@ -14,9 +14,12 @@ from types import ModuleType
 from typing import Any
 
 from gso.errors import OptionError
+from gso.io.atomic import check_writable, replacing
 from gso.registry import Registry
 from gso.spelling import choices
 from gso.workshop.part import Drawing
+from gso.workshop.writers.layers import layer_set
+from gso.workshop.writers.writer_checks import check, require
 
 _MODULES = Registry(__name__, __path__, ("layers", "strokes", "tiles", "writer_checks"))
 #: Register a writer from outside the package: ``add(name, module)``.
@@ -43,6 +46,12 @@ def get(name: str) -> ModuleType:
     return _MODULES.get(name)
 
 
+def require_package(writer: ModuleType) -> None:
+    """Raise a GSOError if the package that a writer needs is not installed."""
+    if hasattr(writer, "PACKAGE"):
+        require(writer.PACKAGE, f"{writer.SUFFIX[1:].upper()} files")
+
+
 def suffixes() -> dict[str, str]:
     """Return the names of the writers by the suffixes of their files.
 
@@ -52,7 +61,9 @@ def suffixes() -> dict[str, str]:
     return {get(name).SUFFIX: name for name in names()}
 
 
-def write(drawing: Drawing, path: str | PathLike[str], **options: Any) -> None:
+def write(
+    drawing: Drawing, path: str | PathLike[str], *, layers: str = "operations", **options: Any
+) -> None:
     """Write a drawing to a file, at the scale 1:1 in millimetres.
 
     Parameters
@@ -62,14 +73,17 @@ def write(drawing: Drawing, path: str | PathLike[str], **options: Any) -> None:
     path : str or PathLike
         A .dxf, .svg or .pdf file, or one of a writer that was added. It is replaced only when
         the new one is complete.
+    layers : {"operations", "astm"}
+        Names of the layers: operations, or the numbers of ASTM D6673.
     **options
-        Those of the writer: see ``write`` in :mod:`gso.workshop.writers.dxf`,
+        Those of the writer: see ``content`` in :mod:`gso.workshop.writers.dxf`,
         :mod:`gso.workshop.writers.svg` and :mod:`gso.workshop.writers.pdf`.
 
     Raises
     ------
     OptionError
-        No writer has this suffix, or the writer does not take an option or its value.
+        No writer has this suffix, unknown layers, or the writer does not take the value of an
+        option.
     MeshError
         The drawing is empty, a part is not usable, or the file cannot be written.
     GSOError
@@ -93,4 +107,10 @@ def write(drawing: Drawing, path: str | PathLike[str], **options: Any) -> None:
     if suffix not in known:
         what = f"{suffix!r} files" if suffix else "files without a suffix"
         raise OptionError(f"{name}: no writer for {what}; there are {', '.join(known)}")
-    get(known[suffix]).write(drawing, path, **options)
+    writer = get(known[suffix])
+    require_package(writer)
+    check_writable(path)
+    check(drawing)
+    content: bytes = writer.content(drawing, layer_set(layers), **options)
+    with replacing(path) as file:
+        file.write(content)

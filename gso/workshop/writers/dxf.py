@@ -5,19 +5,15 @@ from __future__ import annotations
 import io
 import re
 import uuid
-from os import PathLike
 from typing import Any
 
 import numpy as np
 
-from gso.io.atomic import check_writable, replacing
 from gso.pattern import Bend
-from gso.spelling import known_keywords
 from gso.workshop.part import Drawing
 from gso.workshop.writers import strokes
-from gso.workshop.writers.layers import layer_set
+from gso.workshop.writers.layers import Layer
 from gso.workshop.writers.strokes import Line, Text
-from gso.workshop.writers.writer_checks import check, require
 
 SUFFIX = ".dxf"
 PACKAGE = "ezdxf"
@@ -33,15 +29,13 @@ _DATE = "2451544.5"
 _NO_GUID = "{00000000-0000-0000-0000-000000000000}"
 
 
-@known_keywords()
-def write(
+def content(
     drawing: Drawing,
-    path: str | PathLike[str],
+    layers: dict[str, Layer],
     *,
-    layers: str = "operations",
     bend_text: bool = False,
-) -> None:
-    """Write parts as a DXF drawing (R2010) at the scale 1:1, in millimetres.
+) -> bytes:
+    """Return parts as a DXF drawing (R2010) at the scale 1:1, in millimetres.
 
     Everything is in the modelspace: outlines and holes as closed polylines, bends as lines,
     labels as texts. Each part is a group of its name. Bends have their direction, angle in
@@ -51,58 +45,41 @@ def write(
     Parameters
     ----------
     drawing : Drawing
-    path : str or PathLike
-        A file whose name ends in .dxf. It is replaced only when the new one is complete.
-    layers : {"operations", "astm"}
-        Names of the layers: operations, or the numbers of ASTM D6673.
+    layers : dict of Layer
+        Layers by kind of line, from :func:`gso.workshop.writers.layers.layer_set`.
     bend_text : bool
         Also write the direction, angle and radius beside each bend.
 
-    Raises
-    ------
-    OptionError
-        Unknown layers.
-    MeshError
-        The drawing is empty, a part is not usable, or the file cannot be written.
-    GSOError
-        ezdxf is not installed.
-
     Examples
     --------
-    >>> import os, tempfile
     >>> from gso.workshop.part import Part
+    >>> from gso.workshop.writers.layers import layer_set
     >>> plate = Part("plate", np.array([[0.0, 0], [80, 0], [80, 50], [0, 50]]))
-    >>> path = os.path.join(tempfile.mkdtemp(), "plate.dxf")
-    >>> write(Drawing((plate,)), path)
     >>> import ezdxf
-    >>> [(e.dxftype(), e.dxf.layer) for e in ezdxf.readfile(path).modelspace()]
+    >>> text = content(Drawing((plate,)), layer_set("operations")).decode()
+    >>> [(e.dxftype(), e.dxf.layer) for e in ezdxf.read(io.StringIO(text)).modelspace()]
     [('LWPOLYLINE', 'CUT')]
     """
-    require(PACKAGE, "DXF files")
-    check_writable(path, (SUFFIX,))
-    check(drawing)
-    chosen = layer_set(layers)
     document = _document(drawing)
-    for layer in dict.fromkeys(chosen.values()):
+    for layer in dict.fromkeys(layers.values()):
         made = document.layers.add(layer.name, color=layer.aci, lineweight=_WIDTH)
         made.dxf.plot = int(layer.plotted)
     space = document.modelspace()
     for border in strokes.sheet(drawing):
-        _line(space, border, chosen["sheet"].name)
+        _line(space, border, layers["sheet"].name)
     for part, name in zip(drawing.parts, strokes.identifiers(drawing.parts), strict=True):
         made = [
-            _line(space, line, chosen[line.kind].name)
+            _line(space, line, layers[line.kind].name)
             for line in strokes.lines(part)
-            if line.kind in chosen
+            if line.kind in layers
         ]
-        made += [_text(space, t, chosen["text"].name) for t in strokes.texts(part, bend_text)]
-        times = f", {part.count} times" if part.count != 1 else ""
-        group = document.groups.new(name, description=strokes.printable(part.name) + times)
+        made += [_text(space, t, layers["text"].name) for t in strokes.texts(part, bend_text)]
+        group = document.groups.new(name, description=strokes.title(part))
         group.extend(made)
     stream = io.StringIO()
     document.write(stream)
-    with replacing(path) as file:
-        file.write(document.encode(_without_clock(stream.getvalue())))
+    encoded: bytes = document.encode(_without_clock(stream.getvalue()))
+    return encoded
 
 
 def _document(drawing: Drawing) -> Any:

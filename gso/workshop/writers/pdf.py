@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import io
-from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from gso.errors import OptionError
-from gso.io.atomic import check_writable, replacing
-from gso.spelling import choices, known_keywords
+from gso.spelling import choices
 from gso.typing import Array
 from gso.workshop.part import Drawing
 from gso.workshop.writers import strokes
-from gso.workshop.writers.layers import Layer, layer_set
+from gso.workshop.writers.layers import Layer
 from gso.workshop.writers.tiles import FOOT, Tile, Tiling, tiled
-from gso.workshop.writers.writer_checks import check, length, require
+from gso.workshop.writers.writer_checks import length
 
 SUFFIX = ".pdf"
 PACKAGE = "reportlab"
@@ -40,18 +38,16 @@ _BARS, _TEXT = (100.0, 50.0), 3.0
 _CROSS = 4.0
 
 
-@known_keywords()
-def write(
+def content(
     drawing: Drawing,
-    path: str | PathLike[str],
+    layers: dict[str, Layer],
     *,
     paper: str = "A4",
     overlap: float = 10.0,
     margin: float = 10.0,
-    layers: str = "operations",
     bend_text: bool = False,
-) -> None:
-    """Write parts as a PDF at the scale 1:1, divided into pages.
+) -> bytes:
+    """Return parts as a PDF at the scale 1:1, divided into pages.
 
     Each page has a window of the drawing with crosses at its corners, dashed lines where the
     neighbouring pages begin, its name (A1 is the upper left page) and a scale bar. Pages without
@@ -60,51 +56,38 @@ def write(
     Parameters
     ----------
     drawing : Drawing
-    path : str or PathLike
-        A file whose name ends in .pdf. It is replaced only when the new one is complete.
     paper : {"A0", "A1", "A2", "A3", "A4"}
     overlap, margin : float
         By how much pages overlap, and what stays free around each, in millimetres.
-    layers : {"operations", "astm"}
-        Colours of the lines.
+    layers : dict of Layer
+        Colours of the lines by kind, from :func:`gso.workshop.writers.layers.layer_set`.
     bend_text : bool
         Also write the direction, angle and radius beside each bend.
 
     Raises
     ------
     OptionError
-        Unknown paper or layers, or lengths that leave no room on the paper.
-    MeshError
-        The drawing is empty, a part is not usable, or the file cannot be written.
-    GSOError
-        ReportLab is not installed.
+        Unknown paper, or lengths that leave no room on the paper.
 
     Examples
     --------
-    >>> import os, tempfile
     >>> from gso.workshop.part import Part
+    >>> from gso.workshop.writers.layers import layer_set
     >>> plate = Part("plate", np.array([[0.0, 0], [300, 0], [300, 150], [0, 150]]))
-    >>> path = os.path.join(tempfile.mkdtemp(), "plate.pdf")
-    >>> write(Drawing((plate,)), path, paper="A4")
-    >>> os.path.getsize(path) > 0
-    True
+    >>> content(Drawing((plate,)), layer_set("operations"), paper="A4")[:5]
+    b'%PDF-'
     """
-    require(PACKAGE, "PDF files")
-    check_writable(path, (SUFFIX,))
-    check(drawing)
     check_paper(paper)
-    chosen = layer_set(layers)
     gap, free = length("overlap", overlap, zero=True), length("margin", margin, zero=True)
     tiling = tiled(drawing, PAPERS[paper], gap, free)
     stream = io.BytesIO()
     book = _Book(stream, tiling, free, gap)
     if len(tiling.tiles) > 1:
-        book.overview(drawing, chosen)
+        book.overview(drawing, layers)
     for tile in tiling.tiles:
-        book.tile(drawing, tile, chosen, bend_text)
+        book.tile(drawing, tile, layers, bend_text)
     book.close()
-    with replacing(path) as file:
-        file.write(stream.getvalue())
+    return stream.getvalue()
 
 
 def check_paper(paper: Any) -> None:

@@ -160,17 +160,6 @@ def sheet(drawing: Drawing) -> list[Line]:
     return [Line("sheet", corners, closed=True)]
 
 
-def about(bend: Bend) -> str:
-    """Describe a bend.
-
-    >>> about(Bend(np.zeros((2, 2)), np.radians(12.3), 45.6))
-    'mountain 12.3 degrees, radius 45.6 mm'
-    """
-    name = "mountain" if bend.angle > 0 else "valley"
-    radius = f", radius {bend.radius:.4g} mm" if np.isfinite(bend.radius) else ""
-    return f"{name} {abs(np.degrees(bend.angle)):.4g} degrees{radius}"
-
-
 def identifiers(parts: Iterable[Part]) -> list[str]:
     """Make names of groups from the names of parts: without special characters, all different.
 
@@ -181,6 +170,16 @@ def identifiers(parts: Iterable[Part]) -> list[str]:
     return different(
         re.sub(r"[^\w.-]+", "_", part.name)[:100].strip("_") or "part" for part in parts
     )
+
+
+def title(part: Part) -> str:
+    """Return the name of a part, and how many of it are needed if more than one.
+
+    >>> square = np.array([[0.0, 0], [60, 0], [60, 60], [0, 60]])
+    >>> title(Part("left", square, count=2))
+    'left, 2 times'
+    """
+    return printable(part.name) + (f", {part.count} times" if part.count != 1 else "")
 
 
 def printable(text: str) -> str:
