@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gso.cli import shared_options as shared
 from gso.errors import DatasetError, OptionError
 
 if TYPE_CHECKING:
@@ -59,12 +60,12 @@ def dataset() -> None:
     show_default=True,
     help="Split that gets them. May be repeated.",
 )
-@click.option("--workers", metavar="N", type=click.IntRange(0), help="Processes; all cores.")
-@click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that does the work instead.")
+@shared.workers
+@shared.scheduler
 @click.option(
     "--device", metavar="NAME", help="cpu, cuda ...: label in batches there (needs PyTorch)."
 )
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@shared.quiet
 def build(out: str, quiet: bool, **given: Any) -> None:
     """Build a dataset of surfaces in the folder DIR.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gso.cli import progress
+from gso.cli import shared_options as shared
 
 if TYPE_CHECKING:
     from gso.net.training.loop import Report
@@ -31,7 +32,7 @@ _MAPPED, _TRIMMED, _LARGE = -3, -1, 2**25
 @click.option("--through", metavar="NET", help="Net whose results take the surfaces' place.")
 @click.option("--teacher", metavar="NET", help="Net whose results are the labels.")
 @click.option("--device", metavar="NAME", help="cpu, cuda ...; the GPU when there is one.")
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@shared.quiet
 def train(
     config: str,
     data: str,

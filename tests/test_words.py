@@ -1,0 +1,93 @@
+"""Options that several commands or functions share have one name, unit, default and spelling."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+
+import gso
+from gso.cli import main
+from gso.errors import OptionError
+from gso.quantities import MILLIMETRES, as_length, as_strain
+
+COMMANDS = dict(main.commands)
+FUNCTIONS = {
+    "optimize": gso.tno.optimize,
+    "pieces": gso.pieces,
+    "fabricate": gso.fabricate,
+    "hybrid": gso.hybrid.solve,
+}
+TERMS = (Path(__file__).parents[1] / "docs" / "terms.rst").read_text()
+#: Options that mean the same wherever they are, by the names of Python.
+SHARED = ("max_deviation", "max_strain", "min_radius", "max_strips", "darts", "sheet", "unit")
+
+
+def options(name):
+    """The options of a name in all commands and groups of commands."""
+    found = {}
+    for command, made in COMMANDS.items():
+        for part in getattr(made, "commands", {command: made}).values():
+            for param in part.params:
+                if param.name == name:
+                    found[command] = param
+    return found
+
+
+@pytest.mark.parametrize("name", [*SHARED, "workers", "scheduler", "keep_groups", "quiet"])
+def test_commands_agree(name):
+    first, *others = options(name).values()
+    for other in others:
+        assert other.opts == first.opts
+        assert type(other.type) is type(first.type)
+        assert (other.default, other.nargs) == (first.default, first.nargs)
+        assert (other.metavar, other.help) == (first.metavar, first.help)
+
+
+@pytest.mark.parametrize("name", SHARED)
+def test_functions_agree_with_each_other_and_with_the_page_of_terms(name):
+    assert f"``{name}``" in TERMS
+    defaults = {
+        key: function.__kwdefaults__[name]
+        for key, function in FUNCTIONS.items()
+        if name in (function.__kwdefaults__ or {})
+    }
+    assert len(set(map(repr, defaults.values()))) <= 1, defaults
+    kinds = {inspect.signature(FUNCTIONS[key]).parameters[name].annotation for key in defaults}
+    assert len(kinds) <= 1, kinds
+
+
+@pytest.mark.parametrize("command", ["optimize", "pieces", "fabricate"])
+def test_options_of_a_command_have_the_defaults_of_its_function(command):
+    given = FUNCTIONS[command].__kwdefaults__
+    for param in COMMANDS[command].params:
+        if param.name in SHARED and param.name in given:
+            default = param.get_default(click.Context(COMMANDS[command]))
+            assert default == given[param.name], param.name
+
+
+def test_every_spelling_of_a_length_is_one_length():
+    for text in ("5", " 5.0 ", "5mm", "5 mm", "0.5cm", "5e-3m", 5, np.float64(5.0), "2.5%"):
+        assert as_length(text, "it", diagonal=200.0, unit="mm") == pytest.approx(5.0)
+    for unit, size in MILLIMETRES.items():
+        assert as_length(f"3{unit}", "it", diagonal=1.0, unit="m") == pytest.approx(3e-3 * size)
+        assert as_length("3", "it", diagonal=1.0, unit=unit) == 3.0
+
+
+def test_every_spelling_of_a_strain_is_one_strain():
+    for text in ("0.01", "1%", " 1 %", 0.01, np.float32(0.01)):
+        assert as_strain(text, "it") == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("bad", ["", "-1", "0", "5 miles", "nan", "inf", True, None, [1], "1%%"])
+def test_what_is_no_quantity_is_named(bad):
+    with pytest.raises(OptionError, match=re.escape("max_deviation")):
+        as_length(bad, "max_deviation", diagonal=1.0)
+    with pytest.raises(OptionError, match="max_strain"):
+        as_strain(bad, "max_strain")
+    with pytest.raises(OptionError, match="max_strain"):
+        as_strain("5mm", "max_strain")
