@@ -480,7 +480,7 @@ class TestSurvival:
         psutil = pytest.importorskip("psutil")
         place = tmp_path / "set"
         options = ["--n", "64", "--size", "16", "--no-extras", "--label", "strain"]
-        command = [sys.executable, "-m", "gso.cli", "dataset", "build", "-o", str(place)]
+        command = [sys.executable, "-m", "gso", "dataset", "build", "-o", str(place)]
         for files in (0, 1, 3):
             run = subprocess.Popen([*command, *options, "--workers", "2"], stderr=subprocess.PIPE)
             while run.poll() is None and len(list(place.rglob("*.h5"))) < files + 1:

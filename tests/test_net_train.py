@@ -575,7 +575,7 @@ def launch(folder, out, path, processes=0):
     start = [sys.executable, "-m"]
     if processes:
         start += ["torch.distributed.run", "--standalone", "--nproc-per-node", str(processes), "-m"]
-    command = [*start, "gso.cli", "train", str(path), "--data", str(folder), "--out", str(out)]
+    command = [*start, "gso", "train", str(path), "--data", str(folder), "--out", str(out)]
     command += ["--device", "cpu"]
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=200)
