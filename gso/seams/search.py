@@ -168,15 +168,9 @@ def pieces(
         else:
             with helpers(workers) as each:
                 out = packed(*reshaped(ground, replace(aim, each=each)), ground, wishes)
-    reasons = list(out.reasons)
     if said:
-        (reasons if reasons else notes).append(said)
-    return replace(
-        out,
-        reasons=tuple(reasons),
-        notes=(*out.notes, *notes),
-        seconds=time.perf_counter() - clock,
-    )
+        notes.append(said)
+    return replace(out, notes=(*out.notes, *notes), seconds=time.perf_counter() - clock)
 
 
 def _ground(mesh: Any, keep: Any, along: Any, avoid: Any, symmetric: bool, denoise: bool) -> Ground:
