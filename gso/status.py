@@ -17,7 +17,7 @@ class Status(enum.Enum):
     MAX_ITERATIONS = "done: all iterations that the options allow were used"
     STALLED = "stopped: no step lowers the energy any further"
     CANCELLED = "stopped by the callback; the best iterate so far is returned"
-    UNUSABLE = "not usable as what was asked for; the notes say why and where"
+    UNUSABLE = "not usable as what was asked for; the reasons say why and where"
 
     @property
     def converged(self) -> bool:

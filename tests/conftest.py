@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import pytest
 
 from gso.dataset import bezier
 from gso.mesh import Mesh
 from gso.mesh.topology import reverse
+from gso.verdict import Code, Reason
 
 
 def is_disk(mesh: Mesh) -> bool:
     """Whether a mesh is a disk: one component, one boundary loop, no handles."""
     return mesh.euler_characteristic == 1 and len(mesh.boundary_loops) == 1
+
+
+def codes(reasons: Iterable[Reason]) -> list[Code]:
+    """Codes of reasons, in their order."""
+    return [reason.code for reason in reasons]
 
 
 def saddle(height: int = 9, width: int | None = None, strength: float = 0.4) -> np.ndarray:

@@ -328,7 +328,7 @@ def test_a_net_alone(run, small, net):
     done = run("optimize", small, "-o", "out.npz", "--method", "net", "--net", net)
     # It moves nothing, and the surface is as curved as before.
     assert done.exit_code == 1
-    assert "note: nothing was done" in done.stdout
+    assert "not usable: nothing was done" in done.stdout
     result = gso.Result.load("out.npz")
     assert (result.warm_start, result.iterations) == ("net", 0)
     assert np.allclose(result.mesh.vertices, gso.load(small).vertices)

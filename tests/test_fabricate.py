@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 import shutil
@@ -12,12 +13,14 @@ import pytest
 from click.testing import CliRunner
 
 import gso
-from gso.cli import main
+from gso.cli import fabricate_command, main
 from gso.errors import GSOError, MeshError, OptionError
 from gso.mesh import Mesh
+from gso.verdict import Code, describe
 from gso.workshop import work
 from gso.workshop.finish import Finish
 from gso.workshop.part import signed_area
+from gso.workshop.thickness import Thickness
 from tests.test_pieces import dome
 from tests.test_workshop import arch
 
@@ -148,11 +151,20 @@ class TestRuns:
             np.testing.assert_allclose(one.outline, two.outline, atol=1e-9)
 
     def test_what_cannot_be_made_is_refused_with_the_numbers(self, tmp_path):
-        job = gso.fabricate(dome(9, 1.0), tmp_path, max_deviation=1e-6, workers=0)
+        thick = Finish(thickness=Thickness(50.0))
+        job = gso.fabricate(dome(9, 1.0), tmp_path, max_deviation=1e-6, workers=0, finish=thick)
         assert not job.usable
-        assert "design" in job.reasons[0]
-        assert job.parts and (tmp_path / "index.html").exists()
-        assert "cannot be made" in (tmp_path / "index.html").read_text()
+        (design,) = job.certificate["designs"]
+        why = next(r for r in job.reasons if r.code is Code.DEVIATION)
+        assert (why.value, why.bound) == (design["deviation_max"], design["allowed"])
+        assert why.bound == pytest.approx(1e-6) and why.value > why.bound
+        page = (tmp_path / "index.html").read_text()
+        assert job.parts and "cannot be made" in page
+        # Every place shows all reasons, with the same words.
+        said = [describe(reason, "mm") for reason in job.reasons]
+        assert len(said) > 1 and said == [r["text"] for r in job.certificate["reasons"]]
+        assert all(f"<li>{html.escape(text)}</li>" in page for text in said)
+        assert [f"not usable: {text}" for text in said] == fabricate_command.text(job)[-len(said) :]
 
     @pytest.mark.parametrize(
         "bad",
@@ -193,7 +205,8 @@ class TestCommand:
         shutil.rmtree(tmp_path / "out")
         done = CliRunner().invoke(main, [*words.split(), "--max-deviation", "1e-7"])
         assert done.exit_code == 1
-        assert "not usable" in done.output
+        assert "no: target_missed, deviation" in done.output
+        assert done.output.count("not usable: ") == 2
 
     def test_a_bend_table_is_read(self, tmp_path):
         gso.save(arch(33), tmp_path / "arch.obj")

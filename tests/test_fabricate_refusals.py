@@ -15,15 +15,17 @@ from gso.errors import GSOError, MeshError, OptionError
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.pattern import Bend
+from gso.verdict import Code
 from gso.workshop import work
 from gso.workshop.asking import Ask
-from gso.workshop.checks import refused
+from gso.workshop.checks import judge_sheet
 from gso.workshop.designs import Design, designs_of
 from gso.workshop.finish import Finish
 from gso.workshop.making import made
 from gso.workshop.marks import to_pattern, to_surface
 from gso.workshop.parts import drawn, fitted, parts_of
 from gso.workshop.thickness import Thickness, thickened
+from tests.conftest import codes
 from tests.test_pieces import dome
 from tests.test_workshop import arch, bent
 
@@ -83,7 +85,7 @@ class TestFolder:
         with pytest.raises(KeyboardInterrupt):
             gso.fabricate(dome(5), tmp_path, workers=0)
         said = json.loads((tmp_path / "certificate.json").read_text())
-        assert not said["usable"] and said["reasons"] == ["the run has not ended"]
+        assert not said["usable"] and [r["code"] for r in said["reasons"]] == ["unfinished"]
         monkeypatch.undo()
         # The drawings of the first run are known and deleted.
         gso.fabricate(dome(5, 0.05), tmp_path, unit="m", workers=0, formats=("dxf",))
@@ -144,45 +146,50 @@ class TestSheets:
 
     def why(self, whole, **thickness):
         finish = Finish(thickness=Thickness(**thickness))
-        return refused(fitted(whole, 1.0, finish), Ask(), finish)
+        return judge_sheet(fitted(whole, 1.0, finish), Ask(), finish)
 
     def test_a_thin_sheet_is_fine(self, cylinder):
-        assert self.why(cylinder, sheet=0.02) == []
-        assert self.why(cylinder, sheet=0.002, radius=0.001) == []
+        assert self.why(cylinder, sheet=0.02) == ()
+        assert self.why(cylinder, sheet=0.002, radius=0.001) == ()
 
     def test_a_sheet_thicker_than_the_radius_is_refused(self, cylinder):
         (why,) = self.why(cylinder, sheet=2.5, face="outside")
-        assert "too thick to be rolled" in why
+        assert (why.code, why.bound, why.places.ids) == (Code.TOO_THICK, 2.5, ("arch",))
+        assert why.value == pytest.approx(cylinder.record["bend_radius_min"])
 
     def test_a_bend_beyond_the_table_is_refused(self, cylinder):
         (why,) = self.why(cylinder, sheet=0.01, table=[[0.0, 0.0], [1e-3, 1e-4]])
-        assert "the bend table ends at" in why
+        assert (why.code, why.bound) == (Code.BEND_ANGLE, pytest.approx(np.degrees(1e-3)))
+        assert why.value == pytest.approx(np.degrees(np.abs(cylinder.panels[0].angles).max()))
 
     def test_bends_without_room_for_the_tool_are_refused(self, cylinder):
         (why,) = self.why(cylinder, sheet=0.02, radius=3.0)
-        assert "mm apart" in why and "they need" in why
+        assert why.code is Code.BENDS_NEAR and why.value < why.bound
 
     def test_a_part_without_bend_lines_is_refused_where_the_thickness_matters(self):
         flat = made(Design("arch", arch()), Ask(formulation="curvature"))
         assert not len(flat.panels[0].bends)
         assert flat.record["bend_radius_min"] == pytest.approx(1.0, rel=0.05)
-        assert self.why(flat, sheet=0.02) == []
+        assert self.why(flat, sheet=0.02) == ()
         (why,) = self.why(flat, sheet=0.02, face="outside")
-        assert "no bend lines" in why
+        assert (why.code, why.bound) == (Code.NEUTRAL_STRAIN, 1e-3)
+        assert why.value == pytest.approx(0.01, rel=0.05)
         (why,) = self.why(flat, sheet=2.5)
-        assert "too thick" in why
+        assert (why.code, why.bound) == (Code.TOO_THICK, 1.25)
 
     def test_seams_that_the_thickness_parts_are_refused(self, strips):
-        assert self.why(strips, sheet=1e-4, face="outside") == []
+        assert self.why(strips, sheet=1e-4, face="outside") == ()
         why = self.why(strips, sheet=0.05, face="outside")
-        assert any("the sides of seam" in each for each in why)
+        assert Code.SEAM_SIDES in codes(why)
 
     @pytest.mark.parametrize("formulation", ["curvature", "flatten"])
     def test_the_smallest_radius_counts_without_bend_lines(self, formulation):
         flat = made(Design("arch", arch()), Ask(formulation=formulation, min_radius=0.5))
         assert not flat.reasons
         flat = made(Design("arch", arch()), Ask(formulation=formulation, min_radius=2.0))
-        assert "radius" in flat.reasons[0]
+        (why,) = flat.reasons
+        assert (why.code, why.bound) == (Code.BEND_RADIUS, 2.0)
+        assert why.value == flat.record["bend_radius_min"] < 2.0
 
     def test_a_bend_has_the_radius_of_its_inner_face(self):
         panel = bent([0.1, -0.1])
@@ -224,10 +231,10 @@ class TestLines:
         design = dome(17, height=0.6)
         ring = Nearest.of(design.vertices, design.triangles).locate(ring)[2]
         ring[-1] = ring[0]
-        with pytest.raises(OptionError, match="across the seam of"):
+        with pytest.raises(OptionError, match="across a seam"):
             parts_of(strips, 100.0, Finish(), [], [ring])
         job = gso.fabricate(design, tmp_path, max_deviation="3%", holes=[ring], workers=0)
-        assert not job.usable and "across the seam" in job.reasons[0]
+        assert not job.usable and Code.HOLE_ACROSS_SEAM in codes(job.reasons)
 
     def test_registration_holes_are_on_both_sides_of_a_seam(self, strips):
         finish = Finish(notches=None, registration=(1.0, 3.0), labels=None)

@@ -19,7 +19,8 @@ from gso.seams import Path
 from gso.seams.disks import opening
 from gso.seams.potential import Potential
 from gso.seams.tree import Ground, cut_tree
-from tests.conftest import rotation, saddle, shuffled, sphere_cap
+from gso.verdict import Code
+from tests.conftest import codes, rotation, saddle, shuffled, sphere_cap
 from tests.test_seams import ball, cube
 
 
@@ -255,15 +256,22 @@ def test_faces_larger_than_the_sheet_are_named():
     for mesh in (Mesh(np.eye(3), [[0, 1, 2]]), ball(8)):
         found = gso.pieces(mesh, max_strain=0.1, sheet=(0.01, 0.01), darts=True)
         assert not found.usable
-        assert any("larger than the sheet" in reason for reason in found.reasons)
+        why = [r for r in found.reasons if r.code in (Code.TOO_LONG, Code.TOO_WIDE)]
+        assert len(why) == 2 and all(r.value > r.bound == 0.01 for r in why)
+        assert set(why[0].places.ids) == {found.name(k) for k in range(len(found))}
 
 
 def test_budgets_that_are_missed_are_named():
     found = gso.pieces(ball(16), max_strain=0.05, seam=0.5, darts=True)
     assert not found.usable
-    assert "seams" in found.reasons[0]
+    (why,) = found.reasons
+    assert (why.code, why.value, why.bound) == (Code.SEAM_LENGTH, found.seam_length, 0.5)
     narrow = gso.pieces(ball(16), max_strain=0.01, min_neck=1.5, darts=True)
-    assert any("strain" in reason for reason in narrow.reasons)
+    strain, neck = narrow.reasons
+    assert (strain.code, strain.value) == (Code.STRAIN, narrow.metrics["strain_max"])
+    assert (neck.code, neck.value, neck.bound) == (Code.NECK, narrow.metrics["neck"], 1.5)
+    many = gso.pieces(ball(16), max_strain=0.03, darts=False, max_pieces=2)
+    assert (many.reasons[0].code, many.reasons[0].value) == (Code.PIECES, len(many))
 
 
 def test_a_changed_shape_is_developable_and_closed():
@@ -313,8 +321,7 @@ def test_noise_is_named():
         mesh.vertices * (1 + 0.02 * rng.standard_normal((len(mesh.vertices), 1)))
     )
     found = gso.pieces(noisy, max_strain=0.01, max_pieces=40, darts=True)
-    said = [*found.reasons, *found.notes]
-    assert any("denoise" in one for one in said)
+    assert any("denoise" in note for note in found.notes)
 
 
 def test_what_is_no_surface_is_refused():
@@ -383,7 +390,9 @@ def test_command(tmp_path):
         assert (out / f"pattern_{row['name']}.svg").exists()
     tight = CliRunner().invoke(main, ["pieces", str(source), "-o", str(out), "--seam", "0.001"])
     assert tight.exit_code == 1
-    assert "not usable" in tight.output
+    (why,) = json.loads((out / "pieces.json").read_text())["reasons"]
+    assert (why["code"], why["bound"]) == ("seam_length", 0.001)
+    assert f"not usable: {why['text']}" in tight.output.splitlines()
     bad = CliRunner().invoke(main, ["pieces", str(source), "-o", str(out), "--max-strain", "x"])
     assert bad.exit_code != 0
     kept = CliRunner().invoke(
@@ -501,18 +510,18 @@ def test_a_coarse_smooth_torus_is_not_noisy():
     j = np.roll(i, -1, axis=0)
     faces = np.stack([i, j, np.roll(j, -1, 1), np.roll(i, -1, 1)], axis=-1).reshape(-1, 4)
     found = gso.pieces(Mesh(points, faces), max_strain=0.1, darts=True)
-    assert not any("noisy" in said for said in (*found.notes, *found.reasons))
+    assert not any("noisy" in note for note in found.notes)
 
 
 def test_pieces_shorter_than_min_size_are_joined_or_named():
     mesh = ball(16)
-    found = gso.pieces(mesh, max_strain=0.03, darts=False)
-    short = min(sheet.size[0] for sheet in found.sheets)
-    assert any(
-        "shorter" in r for r in gso.pieces(mesh, max_strain=0.03, min_size=20.0, darts=True).reasons
-    )
-    longer = gso.pieces(mesh, max_strain=0.03, darts=False, min_size=1.001 * short)
-    assert longer.usable == all(s.size[0] >= 1.001 * short for s in longer.sheets)
+    found = gso.pieces(mesh, max_strain=0.05, darts=False)
+    least = 1.2 * min(sheet.size[0] for sheet in found.sheets)
+    longer = gso.pieces(mesh, max_strain=0.05, darts=False, min_size=least)
+    assert longer.usable and len(longer) < len(found)
+    assert min(sheet.size[0] for sheet in longer.sheets) >= least
+    (why,) = gso.pieces(mesh, max_strain=0.03, min_size=20.0, darts=True).reasons
+    assert why.code is Code.TOO_SHORT and why.value < why.bound == 20.0
     with pytest.raises(OptionError, match="min_size"):
         gso.pieces(mesh, min_size=2.0, sheet=(1.0, 1.0), darts=True)
 
@@ -557,11 +566,13 @@ def test_pieces_become_exactly_ruled(tmp_path):
     path = tmp_path / "ruled.npz"
     result.save(path)
     again = gso.Result.load(path)
-    assert again.usable == result.usable
+    assert result.usable and again.usable
     assert len(again.pieces) == len(cut)
     assert np.allclose(again.pieces.design.vertices, result.pieces.design.vertices)
     result.save(tmp_path / "ruled.svg")
     result.save(tmp_path / "ruled.step")
     near = gso.tno.optimize(cut, formulation="ruled", max_deviation=0.08)
-    assert near.usable == (near.details["seam_gap"] <= 0.08 and not near.reasons)
-    assert near.ruled.deviation.there_max <= 0.08 or not near.usable
+    far, gap = near.ruled.deviation.there_max, near.details["seam_gap"]
+    assert (Code.DEVIATION in codes(near.reasons)) == (far > 0.08)
+    assert (Code.SEAM_GAP in codes(near.reasons)) == (gap > 0.08)
+    assert max(far, gap) <= 1.1 * 0.08

@@ -26,7 +26,8 @@ from gso.ruled.program import sequences
 from gso.ruled.strip_layout import Strips
 from gso.ruled.strip_weights import Weights
 from gso.ruled.system import System
-from tests.conftest import cylinder, rotation, saddle, shuffled
+from gso.verdict import Code
+from tests.conftest import codes, cylinder, rotation, saddle, shuffled
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -245,7 +246,8 @@ def test_unreachable_bounds_are_said():
         result = gso.tno.optimize(points, options=options, max_deviation=1e-4)
     assert not result.usable
     assert result.status is gso.Status.TARGET_MISSED
-    assert any("away from the input" in reason for reason in result.reasons)
+    assert codes(result.reasons) == [Code.TARGET_MISSED, Code.DEVIATION]
+    assert result.reasons[1].value == result.details["verdict"]["deviation"] > 1e-4
 
 
 def test_triangles_holes_and_numbering():

@@ -215,9 +215,11 @@ def fabricate(inputs: tuple[str, ...], folder: str, **given: Any) -> None:
 def text(done: Any) -> list[str]:
     """Format what was made as a table, with the reasons against it."""
     from gso.cli.report import columns
+    from gso.verdict import describe
+    from gso.workshop.certificate import codes
 
     rows: list[tuple[str, ...]] = [
-        ("design", "copies", "parts", "mean mm", "largest mm", "allowed mm", "strain")
+        ("design", "copies", "parts", "mean mm", "largest mm", "allowed mm", "strain", "usable")
     ]
     for one in done.certificate["designs"]:
         sizes = [one.get(k) for k in ("deviation_mean", "deviation_max", "allowed")]
@@ -229,6 +231,7 @@ def text(done: Any) -> list[str]:
                 str(len(one.get("parts", []))),
                 *("-" if x is None else f"{x:.3g}" for x in sizes),
                 "-" if strain is None else f"{100 * strain:.2g} %",
+                f"no: {codes(one['reasons'])}" if one["reasons"] else "yes",
             )
         )
     lines = columns(rows)
@@ -242,7 +245,7 @@ def text(done: Any) -> list[str]:
         lines += [f"note: {note}" for note in nesting["notes"]]
     lines += [f"note: {note}" for note in done.certificate["notes"]]
     lines.append(f"page to look at: {done.folder / 'index.html'}")
-    return [*lines, *(f"not usable: {reason}" for reason in done.reasons)]
+    return [*lines, *(f"not usable: {describe(reason, 'mm')}" for reason in done.reasons)]
 
 
 #: Options that say something only together with another one.

@@ -91,8 +91,9 @@ def pieces(name: str, folder: str, **given: Any) -> None:
 
 
 def text(found: Any, unit: str) -> list[str]:
-    """Format pieces as a table, with what was measured."""
+    """Format pieces as a table, with what was measured and the reasons against them."""
     from gso.cli.report import columns
+    from gso.verdict import describe
 
     size = found.design.diagonal
     rows: list[tuple[str, ...]] = [
@@ -116,5 +117,5 @@ def text(found: Any, unit: str) -> list[str]:
             f"({100 * far / size:.2g} % of the diagonal)"
         )
     lines += [f"note: {note}" for note in found.notes]
-    lines += [f"not usable: {reason}" for reason in found.reasons]
+    lines += [f"not usable: {describe(reason, unit)}" for reason in found.reasons]
     return lines

@@ -28,7 +28,7 @@ def status_only() -> Iterator[None]:
 
 def record(file: str, out: str, result: Result, unit: str = "") -> dict[str, Any]:
     """Summarise a result without its geometry; `unit` names its unit of length, if known."""
-    from gso.verdict import headline
+    from gso.result import headline
 
     return {
         "input": file,
@@ -39,7 +39,7 @@ def record(file: str, out: str, result: Result, unit: str = "") -> dict[str, Any
         "message": str(result.status),
         "usable": result.usable,
         "headline": headline(result, unit),
-        "reasons": list(result.reasons),
+        "reasons": [reason.record(unit) for reason in result.reasons],
         "iterations": result.iterations,
         "seconds": result.seconds.get("total", 0.0),
         "backend": result.backend,
@@ -51,7 +51,7 @@ def record(file: str, out: str, result: Result, unit: str = "") -> dict[str, Any
 
 
 def text(record: Mapping[str, Any]) -> str:
-    """Format a record: the headline, a table of metrics, the status and the notes."""
+    """Format a record: headline, table of metrics, status, notes, and reasons against it."""
     lines = [*filter(None, [record["headline"]]), f"{record['input']} -> {record['output']}", ""]
     lines += table(record["metrics"])
     lines += ["", f"{record['task']}: {record['message']}"]
@@ -62,7 +62,8 @@ def text(record: Mapping[str, Any]) -> str:
     if record["spline"]:
         lines.append(_spline(record["spline"]))
     lines += [f"note: {note}" for note in record["notes"]]
-    if not record["usable"]:
+    lines += [f"not usable: {reason['text']}" for reason in record["reasons"]]
+    if not (record["usable"] or record["reasons"]):
         lines.append("this result is not usable as it is")
     return "\n".join(lines)
 
@@ -85,11 +86,8 @@ def line(record: Mapping[str, Any]) -> str:
         was = f"{_short(values[f'{name}_before'])} -> " if f"{name}_before" in values else ""
         shown.append(f"{name} {was}{_short(values[name])}")
     shown += [] if record["usable"] else ["not usable"]
-    # The headline already gives the largest strain.
-    said = [r for r in record["reasons"] if not r.startswith("largest strain")]
-    return "; ".join(
-        [f"{record['input']} -> {record['output']}", *shown, *said[:1], record["message"]]
-    )
+    shown += [reason["text"] for reason in record["reasons"]]
+    return "; ".join([f"{record['input']} -> {record['output']}", *shown, record["message"]])
 
 
 def table(metrics: Mapping[str, Any]) -> list[str]:

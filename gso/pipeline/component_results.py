@@ -16,6 +16,7 @@ from gso.pipeline.job import Job
 from gso.result import Result
 from gso.status import Progress, Status
 from gso.typing import Array, Ints
+from gso.verdict import ordered
 
 #: Gap beside the flat images whose position is prescribed, as a share of their width.
 _GAP = 0.05
@@ -99,7 +100,9 @@ def together(
         details=_details(results, areas),
         components=list(results),
         pattern=pattern,
-        reasons=tuple(f"component {k}: {why}" for k, r in enumerate(results) for why in r.reasons),
+        reasons=ordered(
+            why.within(f"component {k}") for k, r in enumerate(results) for why in r.reasons
+        ),
     )
 
 

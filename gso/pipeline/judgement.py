@@ -12,14 +12,14 @@ from gso.metrics import nonplanarity
 from gso.pipeline.lay_flat import lay_out
 from gso.result import Result
 from gso.status import Status
-from gso.verdict import Asked, judge
+from gso.verdict import Limits, judge
 
 #: Distance of a quad's diagonals over the mean edge length: up to the first value quads count
 #: as planar, above the second they are visibly not.
 _PLANAR, _BENT = 1e-6, 1e-3
 
 
-def requirements(mesh: Mesh, compiled: Compiled, scale: float, **limits: float | None) -> Asked:
+def requirements(mesh: Mesh, compiled: Compiled, scale: float, **limits: float | None) -> Limits:
     """Gather what a result has to meet, in the user's unit.
 
     Design and constraints are the solver's, in the unit ball of radius `scale`. `moved` is the
@@ -30,14 +30,14 @@ def requirements(mesh: Mesh, compiled: Compiled, scale: float, **limits: float |
         misses = compiled.violations(mesh.vertices).values()
         # Violations below rounding errors do not count.
         moved = max((miss.length for miss in misses if miss.length > 1e-9), default=0.0)
-    return Asked(**limits, moved=scale * moved)
+    return Limits(**limits, moved=scale * moved)
 
 
-def judged(result: Result, asked: Asked) -> Result:
+def judged(result: Result, limits: Limits) -> Result:
     """Add to a result the pattern of its surface, the reasons against it, and its final status.
 
     `seconds` gets entries "pattern" and "verdict". If there are reasons against the result, a
-    status that does not refuse it becomes ``Status.UNUSABLE``. Each reason becomes a note.
+    status that does not refuse it becomes ``Status.UNUSABLE``.
     """
     known = result.ruled is not None
     if result.task == "developable" and not known and np.isfinite(result.mesh.vertices).all():
@@ -46,9 +46,7 @@ def judged(result: Result, asked: Asked) -> Result:
         result.seconds["pattern"] = time.perf_counter() - clock
         result.notes += _planarity(result)
     clock = time.perf_counter()
-    result.reasons = judge(result, asked)
-    said = str(result.status)
-    result.notes += tuple(r for r in result.reasons if r != said and r not in result.notes)
+    result.reasons = judge(result, limits)
     if result.reasons and not result.status.is_failure:
         result.status = Status.UNUSABLE
     result.seconds["verdict"] = time.perf_counter() - clock
@@ -69,12 +67,12 @@ def _planarity(result: Result) -> tuple[str, ...]:
 
 
 def warning(result: Result) -> str:
-    """Return what to warn of: the status or the first reason against the result; else empty."""
+    """Return what to warn of: the status or the reasons against the result; else empty."""
     if result.status.converged or result.status is Status.MAX_ITERATIONS:
         return ""
     if result.status is not Status.UNUSABLE:
         return str(result.status)
-    return f"not usable as what was asked for: {result.reasons[0]}"
+    return "\n  ".join(["not usable as what was asked for:", *map(str, result.reasons)])
 
 
 #: Relative difference up to which two energies count as the same minimum.

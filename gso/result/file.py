@@ -21,8 +21,9 @@ from gso.result.result import Result
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
 from gso.typing import Array
+from gso.verdict.reason import Reason
 
-_FORMAT = 1
+_FORMAT = 2
 _PATTERN = ("flat", "faces", "vertex", "seams")
 
 
@@ -40,7 +41,7 @@ def _record(result: Result) -> dict[str, Any]:
         "device": "cpu",
         "warm_start": result.warm_start,
         "notes": list(result.notes),
-        "reasons": list(result.reasons),
+        "reasons": [reason.record() for reason in result.reasons],
         "details": result.details,
         "metrics": result.metrics,
         "history": [asdict(p) for p in result.history],
@@ -175,8 +176,7 @@ def _read(
         record["details"],
         cell_scale=cell_scale,
         pattern=pattern,
-        # Files of earlier versions have none.
-        reasons=tuple(record.get("reasons", ())),
+        reasons=tuple(map(Reason.read, record["reasons"])),
     )
     result.__dict__["metrics"] = record["metrics"]
     return result

@@ -17,6 +17,7 @@ from gso.pattern import Pattern
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
 from gso.typing import Array
+from gso.verdict.reason import Reason
 
 if TYPE_CHECKING:
     from gso.cut_pieces import Pieces
@@ -67,11 +68,11 @@ class Result:
     warm_start : str
         Initial guess of the solve: "cold" for a cold start, "x0", "session", "net"
         (:func:`gso.hybrid.solve`), or the source named by a :class:`gso.tno.Start`.
-    reasons : tuple of str
-        Why the result is not usable for its task, and where; see :mod:`gso.verdict`. They are
-        also part of `notes`.
+    reasons : tuple of Reason
+        Why the result is not usable for its task, and where, the most severe first; see
+        :mod:`gso.verdict`.
     notes : tuple of str
-        What was repaired in the input or restricted in the run, and the reasons.
+        What was repaired in the input or restricted in the run, and why.
     details : dict
         Numbers specific to the task, such as chosen weights. For `denoise`: "sigma", the
         estimated standard deviation of the noise, in the input's unit; "dof", the effective
@@ -116,7 +117,7 @@ class Result:
     details: dict[str, Any] = field(default_factory=dict)
     spline: BSplineSurface | None = None
     cell_scale: Array | None = None
-    reasons: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
     pattern: Pattern | None = None
     components: list[Result] = field(default_factory=list)
     names: NDArray[np.int64] | None = None
@@ -128,7 +129,7 @@ class Result:
             self.pattern = Pattern.whole(self.design, self.flat)
 
     def __repr__(self) -> str:
-        from gso.wording import summary
+        from gso.result.summary import summary
 
         return summary(self)
 

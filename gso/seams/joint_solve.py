@@ -23,7 +23,7 @@ from gso.seams import joint_bounds
 from gso.seams.chains import chains
 from gso.solver import Callback
 from gso.typing import Ints
-from gso.verdict import Asked as Requirements
+from gso.verdict import Limits
 
 #: Weight of the smoothness of seams.
 _SMOOTH = 8e-6
@@ -143,5 +143,5 @@ def solve_pieces(
         )
     if asked.verdict:
         limits: dict[str, Any] = dict(asked.bounds)
-        result = judged(result, Requirements(**limits))
+        result = judged(result, Limits(**limits))
     return result

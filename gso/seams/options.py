@@ -15,6 +15,7 @@ from gso.mesh.topology import edge_keys
 from gso.parallel import Each, here
 from gso.quantities import Length, as_length, millimetres
 from gso.typing import Array
+from gso.verdict import Code
 
 #: Factors on the cost of edges in regions to avoid, and on edges to follow.
 _AVOID, _FOLLOW = 20.0, 0.2
@@ -61,14 +62,20 @@ class Wishes:
         # One piece fewer is worth a seam of half the root of the area.
         return many, long, seam + 0.5 * pieces
 
-    def missed(self, pieces: int, seam: float) -> list[str]:
-        """Say which budgets are exceeded."""
-        out = []
-        if self.max_pieces is not None and pieces > self.max_pieces:
-            out.append(f"there are {pieces} pieces, more than {self.max_pieces}")
-        if self.seam is not None and seam > self.seam:
-            out.append(f"the seams are {seam:.3g} times the root of the area long, not {self.seam}")
-        return out
+    @property
+    def limits(self) -> dict[Code, float | None]:
+        """What the pieces are judged by."""
+        wide, long = (None, None) if self.max_size is None else sorted(self.max_size)
+        return {
+            Code.STRAIN: self.max_strain,
+            Code.DEVIATION: self.max_deviation,
+            Code.PIECES: self.max_pieces,
+            Code.SEAM_LENGTH: self.seam,
+            Code.NECK: self.min_neck,
+            Code.TOO_SHORT: self.min_size,
+            Code.TOO_LONG: long,
+            Code.TOO_WIDE: wide,
+        }
 
 
 def as_sheet(sheet: Sequence[Length] | None, unit: str) -> tuple[float, float] | None:

@@ -82,7 +82,7 @@ def record(found: Segmentation, unit: str) -> dict[str, Any]:
         "unit": unit,
         "usable": found.usable,
         "metrics": _plain(found.metrics),
-        "reasons": list(found.reasons),
+        "reasons": [reason.record(unit) for reason in found.reasons],
         "notes": list(found.notes),
         "pieces": [_plain(row) for row in found.table()],
         "seams": [

@@ -184,15 +184,9 @@ def pieces(
         else:
             with helpers(workers) as each:
                 out = packed(*reshaped(ground, replace(aim, each=each)), ground, wishes)
-    reasons = list(out.reasons)
     if said:
-        (reasons if reasons else notes).append(said)
-    return replace(
-        out,
-        reasons=tuple(reasons),
-        notes=(*out.notes, *notes),
-        seconds=time.perf_counter() - clock,
-    )
+        notes.append(said)
+    return replace(out, notes=(*out.notes, *notes), seconds=time.perf_counter() - clock)
 
 
 def _ground(

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from gso import metrics
+from gso import faults, metrics
+from gso.cut_pieces import Pieces
 from gso.mesh import Mesh
 from gso.result import Result
-from gso.seams.candidates import Candidate, fits
+from gso.seams.candidates import Candidate
 from gso.seams.facets import FACETS, mean_angle
 from gso.seams.options import NECK, Wishes
 from gso.seams.segmentation import Segmentation
 from gso.seams.tree import Ground
-from gso.verdict.surface_checks import against_surface
-from gso.wording import beyond, percent
+from gso.verdict import Code, Measurement, compare
+from gso.verdict.surface_checks import of_surface
 from gso.wording import length as said
+from gso.wording import percent
 
 
 def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wishes) -> Segmentation:
-    """Measure what was found, and say what is not as it was asked for.
+    """Measure what was found, and judge it by what was asked for.
 
     Parameters
     ----------
@@ -29,8 +33,8 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
         The design, to measure distances from.
     wishes : Wishes
     """
-    own, sheets = found.pieces, found.sheets
-    count, length = len(own), own.seam_length
+    own, sheets, length = found.pieces, found.sheets, found.pieces.seam_length
+    count, names = len(own), _names(own)
     size = float(np.sqrt(ground.potential.area.sum()))
     numbers = {"pieces": float(count), "seam": length, "strain_max": found.strain}
     whole = [s for s in sheets if s is not None]
@@ -40,26 +44,19 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
     roots = np.sqrt([metrics.area(piece.mesh) for piece in own])
     thin = int((necks / roots).argmin())
     numbers["neck_share"] = float(necks[thin] / roots[thin])
-    reasons = wishes.missed(count, length)
-    reasons += _unfit(found, wishes)
-    if wishes.max_strain < found.strain < np.inf:
-        reasons.append(
-            f"the strain is {beyond(found.strain, wishes.max_strain, percent)}: allow "
-            + ", or ".join(_remedies(own.design, wishes))
-        )
+    measured: dict[Code, Measurement] = {
+        Code.PIECES: Measurement(count),
+        Code.SEAM_LENGTH: Measurement(length),
+        Code.NECK: Measurement(necks, "piece", names),
+        **_of_sheets(found),
+    }
     notes = []
-    if wishes.min_neck is not None and numbers["neck"] < wishes.min_neck:
-        reasons.append(f"a neck is {said(numbers['neck'])} wide, less than {said(wishes.min_neck)}")
-    elif numbers["neck_share"] < NECK:
-        notes.append(
-            f"piece {own.name(thin)} is {said(necks[thin])} wide at its narrowest place, "
-            f"{percent(numbers['neck_share'])} of the root of its area"
-        )
     if result is not None:
-        reasons += against_surface(result.design, result.mesh)
+        measured |= of_surface(result.design, result.mesh)
         away = metrics.surface_distance(ground.mesh, own.design)
         numbers["deviation_mean"] = away.there_mean
         numbers["deviation_max"] = max(away.there_max, away.back_max)
+        measured[Code.DEVIATION] = Measurement(numbers["deviation_max"])
         numbers["dihedral_mean_before"] = mean_angle(result.design)
         numbers["dihedral_mean"] = mean_angle(result.mesh)
         numbers["dihedral_max"] = float(metrics.dihedral_angles(result.mesh).max(initial=0.0))
@@ -71,54 +68,57 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
                 f"{numbers['dihedral_mean_before']:.3g} to {numbers['dihedral_mean']:.3g} degrees: "
                 "the pieces have facets or wrinkles"
             )
-        allowed = wishes.max_deviation
-        if allowed is not None and numbers["deviation_max"] > allowed:
-            far = beyond(numbers["deviation_max"], allowed)
-            reasons.append(f"the largest distance between surface and design is {far}")
+    reasons = compare(measured, wishes.limits)
+    codes = {reason.code for reason in reasons}
+    if Code.STRAIN in codes:
+        notes += _bent(own.design, wishes.max_strain)
+    if Code.NECK not in codes and numbers["neck_share"] < NECK:
+        notes.append(
+            f"piece {own.name(thin)} is {said(necks[thin])} wide at its narrowest place, "
+            f"{percent(numbers['neck_share'])} of the root of its area"
+        )
     return Segmentation(
-        own.design, own.opened, own.names, sheets, numbers, tuple(reasons), tuple(notes), result
+        own.design, own.opened, own.names, sheets, numbers, reasons, tuple(notes), result
     )
 
 
-def _remedies(design: Mesh, wishes: Wishes) -> list[str]:
-    """List what would lower the strain."""
-    out = ["more strain (max_strain)"]
-    if wishes.min_neck is not None:
-        out.append("narrower necks (min_neck)")
-    more = "a change" if wishes.max_deviation is None else "more change"
-    out.append(f"{more} of shape (max_deviation)")
-    if not design.is_triangles:
-        bent = float(np.nanmax(metrics.nonplanarity(design)))
-        # The strain of a bent quad grows with the square of the distance of its diagonals.
-        if bent**2 > wishes.max_strain:
-            out.append(
-                "triangles instead of quads (the diagonals of a quad are "
-                f"{percent(bent)} of the mean edge apart)"
-            )
-    return out
+def _of_sheets(found: Candidate) -> dict[Code, Measurement]:
+    """Measure the patterns of the pieces."""
+    named = list(zip(_names(found.pieces), found.sheets, strict=True))
+    flat = [(name, sheet) for name, sheet in named if sheet is not None]
+    names = [name for name, _ in flat]
+
+    count = partial(Measurement.count, "piece")
+
+    def each(values: list[float]) -> Measurement:
+        return Measurement(np.array(values), "piece", names)
+
+    return {
+        Code.NO_PATTERN: count([name for name, sheet in named if sheet is None]),
+        Code.PATTERN_INVERTED: count([name for name, s in flat if len(s.inverted)]),
+        Code.PATTERN_OVERLAPS: count(
+            [name for name, s in flat if len(faults.overlaps(s.mesh, s.flat))]
+        ),
+        Code.STRAIN: each([s.strain for _, s in flat]),
+        Code.TOO_SHORT: each([s.size[0] for _, s in flat]),
+        Code.TOO_LONG: each([s.size[0] for _, s in flat]),
+        Code.TOO_WIDE: each([s.size[1] for _, s in flat]),
+    }
 
 
-def _unfit(found: Candidate, wishes: Wishes) -> list[str]:
-    """Say which pieces have no pattern that can be used."""
-    out = []
-    large: list[tuple[float, str]] = []
-    small: list[tuple[float, str]] = []
-    for number, sheet in enumerate(found.sheets):
-        name = found.pieces.name(number)
-        if sheet is None:
-            out.append(f"piece {name} cannot be laid flat")
-            continue
-        long, wide = sheet.size
-        if not sheet.sound:
-            out.append(f"the pattern of piece {name} overlaps itself or is inverted")
-        if wishes.max_size is not None and not fits(sheet, wishes.max_size):
-            large.append((-long, f"that of piece {name} is {said(long)} by {said(wide)}"))
-        if wishes.min_size is not None and long < wishes.min_size:
-            small.append((long, f"that of piece {name} is {said(long)} long"))
-    for pieces, what in ((large, "larger than the sheet"), (small, "shorter than min_size")):
-        if pieces:
-            many = (
-                f"the patterns of {len(pieces)} pieces are" if len(pieces) > 1 else "a pattern is"
-            )
-            out.append(f"{many} {what}: {min(pieces)[1]}")
-    return out
+def _names(pieces: Pieces) -> list[str]:
+    return [pieces.name(k) for k in range(len(pieces))]
+
+
+def _bent(design: Mesh, strain: float) -> list[str]:
+    """Make a note if triangles would be strained less than the quads of a design."""
+    if design.is_triangles:
+        return []
+    bent = float(np.nanmax(metrics.nonplanarity(design)))
+    # The strain of a bent quad grows with the square of the distance of its diagonals.
+    if bent**2 <= strain:
+        return []
+    return [
+        "triangles may be strained less than these quads, whose diagonals are up to "
+        f"{percent(bent)} of the mean edge apart"
+    ]

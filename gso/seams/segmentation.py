@@ -14,6 +14,7 @@ from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.result import Result
 from gso.seams.sheets import Sheet
+from gso.verdict import Reason
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,8 +34,8 @@ class Segmentation(Pieces):
         change of shape ``deviation_mean`` and ``deviation_max`` (in the mesh's unit) and
         ``dihedral_mean`` with ``dihedral_mean_before`` and ``dihedral_max`` (degrees, inside
         pieces), and ``nonplanarity_max`` on quads (distance of the diagonals over the mean edge).
-    reasons : tuple of str
-        Why it is not usable as what was asked for; empty if it is.
+    reasons : tuple of Reason
+        Why it is not usable as what was asked for, the most severe first; empty if it is.
     notes : tuple of str
         Remarks.
     result : Result or None
@@ -45,7 +46,7 @@ class Segmentation(Pieces):
 
     sheets: tuple[Sheet | None, ...] = ()
     metrics: dict[str, float] = field(default_factory=dict)
-    reasons: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
     notes: tuple[str, ...] = ()
     result: Result | None = None
     seconds: float = 0.0

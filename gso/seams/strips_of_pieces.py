@@ -20,7 +20,7 @@ from gso.seams.joint_solve import gap
 from gso.solver import Callback
 from gso.status import Status
 from gso.tasks.base import Options
-from gso.verdict import Asked, judge
+from gso.verdict import Code, Limits, Reason, compare, judge, ordered
 from gso.wording import length
 
 if TYPE_CHECKING:
@@ -145,18 +145,15 @@ def _merged(
         # What counts is the distance of the whole from the design.
         if result.status is Status.TARGET_MISSED and (allowed is None or far <= allowed):
             result.status = Status.CONVERGED
-    reasons: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
     if ask.verdict:
-        reasons = tuple(
-            f"piece {shape.name(k)}: {why}"
+        own = [
+            why.within(f"piece {shape.name(k)}")
             for k, r in enumerate(strips)
-            for why in judge(r, Asked())
-        )
-        for size, what in ((far, "from the design"), (apart, "apart at seams")):
-            if allowed is not None and size > allowed:
-                reasons += (
-                    f"the strips are up to {length(size)} {what}, more than {length(allowed)}",
-                )
+            for why in judge(r, Limits())
+        ]
+        whole = {Code.DEVIATION: far, Code.SEAM_GAP: apart}
+        reasons = ordered([*own, *compare(whole, dict.fromkeys(whole, allowed))])
     status = worst([joint.status, *(result.status for result in strips)])
     seconds = dict(joint.seconds)
     seconds["strips"] = sum(result.seconds["total"] for result in strips)
@@ -164,7 +161,6 @@ def _merged(
         *joint.notes,
         f"both sides of a seam are up to {length(apart)} apart, as strips follow the joint result "
         f"within a distance; number of strips of each piece: {', '.join(map(str, numbers))}",
-        *reasons,
     )
     return Result(
         task="developable",

@@ -1,7 +1,23 @@
 """The verdict: whether a result is usable for the task, and if not, why and where."""
 
-from gso.verdict.asked import Asked, asked_curvature
+from gso.verdict.codes import TIGHT, Code, Kind
+from gso.verdict.compare import Measurement, compare, failure, merge
 from gso.verdict.judge import judge
-from gso.wording import headline
+from gso.verdict.limits import Limits
+from gso.verdict.reason import Places, Reason, describe, ordered
 
-__all__ = ["Asked", "asked_curvature", "headline", "judge"]
+__all__ = [
+    "TIGHT",
+    "Code",
+    "Kind",
+    "Limits",
+    "Measurement",
+    "Places",
+    "Reason",
+    "compare",
+    "describe",
+    "failure",
+    "judge",
+    "merge",
+    "ordered",
+]

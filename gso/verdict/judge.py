@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso import tasks
 from gso.status import Status
-from gso.verdict.asked import Asked
-from gso.verdict.surface_checks import against_itself, against_pattern, against_surface
-from gso.verdict.tasks import TASKS, ruled
-from gso.wording import places
+from gso.verdict.codes import Code
+from gso.verdict.compare import Measurement, compare, failure
+from gso.verdict.limits import Limits
+from gso.verdict.reason import Reason, ordered
+from gso.verdict.surface_checks import Measured, of_pattern, of_surface
+from gso.verdict.task_checks import TASKS, Bounds, ruled
 
 if TYPE_CHECKING:
     from gso.result import Result
@@ -21,44 +22,48 @@ if TYPE_CHECKING:
 _STRETCHED = ("conformal",)
 
 
-def judge(result: Result, asked: Asked) -> tuple[str, ...]:
-    """List the reasons why a result is not usable, with their places; empty if it is usable.
+def judge(result: Result, limits: Limits) -> tuple[Reason, ...]:
+    """List the reasons why a result is not usable, the most severe first; empty if it is usable.
+
+    For developable surfaces the largest strain, the deviation and the given limits are stored in
+    the result's details under "verdict".
 
     Parameters
     ----------
     result : Result
         The solver's result, with its `pattern` if it has one.
-    asked : Asked
+    limits : Limits
         Limits that were given.
 
     Returns
     -------
-    tuple of str
+    tuple of Reason
     """
-    return tuple(_reasons(result, asked))
+    measured, bounds = _measured(result, limits)
+    stopped = [failure(Code[result.status.name])] if result.status.is_failure else []
+    return ordered([*stopped, *compare(measured, bounds)])
 
 
-def _reasons(result: Result, asked: Asked) -> Iterator[str]:
-    if result.status.is_failure:
-        yield str(result.status)
+def _measured(result: Result, limits: Limits) -> tuple[Measured, Bounds]:
     pattern = result.pattern
     for points in (result.mesh.vertices, None if pattern is None else pattern.flat):
-        if points is None or np.isfinite(points).all():
-            continue
-        wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
-        yield f"the coordinates of {places('vertex', wrong)} are not finite"
-        return
+        if points is not None and not np.isfinite(points).all():
+            wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
+            return {Code.NOT_FINITE: Measurement.count("vertex", wrong)}, {}
+    measured: Measured = {}
     if getattr(tasks.get(result.task), "BLOCK", "surface") == "flat":
         surface = result.design
     else:
         surface = result.mesh
         if result.ruled is not None:
-            yield from against_itself(surface)
+            # Its faces are not those of the design.
+            measured |= of_surface(None, surface)
         elif result.status is not Status.ALREADY_GOOD:
-            yield from against_surface(result.design, surface)
+            measured |= of_surface(result.design, surface)
     if pattern is not None:
-        yield from against_pattern(surface, pattern, lengths=result.task not in _STRETCHED)
-    if result.ruled is not None:
-        yield from ruled(result, asked)
-    elif result.task in TASKS:
-        yield from TASKS[result.task](result, asked)
+        measured |= of_pattern(surface, pattern, lengths=result.task not in _STRETCHED)
+    check = ruled if result.ruled is not None else TASKS.get(result.task)
+    if check is None:
+        return measured, {}
+    own, bounds = check(result, limits)
+    return measured | own, bounds

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,62 +9,58 @@ from gso import faults, metrics
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.typing import Array, Ints
-from gso.wording import places
+from gso.verdict.codes import Code
+from gso.verdict.compare import Measurement
+
+Measured = dict[Code, Measurement]
 
 
-def against_surface(design: Mesh, surface: Mesh) -> Iterator[str]:
-    """Check a surface for folds, self-intersections and collapsed edges.
+def of_surface(design: Mesh | None, surface: Mesh) -> Measured:
+    """Find folds, self-intersections and collapsed edges of a surface.
 
-    Folds and self-intersections that the design has already are ignored.
+    Folds and self-intersections that the design has already are ignored; without a design with
+    the same faces all of them count, and edges are not measured.
     """
     bad = faults.folded(surface)
-    if bad.size:
+    if bad.size and design is not None:
         bad = np.setdiff1d(bad, faults.folded(design))
-    if bad.size:
-        yield f"the surface is folded onto itself at {places('face', bad)}"
     pairs = faults.crossings(surface)
-    if pairs.size:
+    if pairs.size and design is not None:
         pairs = pairs[~_known(design, pairs)]
-    if pairs.size:
-        yield f"the surface passes through itself at {places('face', np.unique(pairs))}"
-    yield from _collapsed(design, surface.vertices, "the surface")
+    found = {
+        Code.FOLDED: Measurement.count("face", bad),
+        Code.CROSSES_ITSELF: Measurement.count("face", np.unique(pairs)),
+    }
+    if design is not None:
+        found[Code.COLLAPSED] = _shortest(design, surface.vertices)
+    return found
 
 
-def against_itself(surface: Mesh) -> Iterator[str]:
-    """Check a surface that has not the faces of its design for folds and self-intersections."""
-    bad = faults.folded(surface)
-    if bad.size:
-        yield f"the surface is folded onto itself at {places('face', bad)}"
-    pairs = faults.crossings(surface)
-    if pairs.size:
-        yield f"the surface passes through itself at {places('face', np.unique(pairs))}"
+def of_pattern(surface: Mesh, pattern: Pattern, *, lengths: bool = True) -> Measured:
+    """Find inverted faces and overlaps of the pattern of a surface.
 
-
-def against_pattern(surface: Mesh, pattern: Pattern, *, lengths: bool = True) -> Iterator[str]:
-    """Check the pattern of a surface for inverted faces and overlaps.
-
-    Edges are checked for collapse if the pattern should preserve `lengths`.
+    Edges are measured if the pattern should preserve `lengths`.
     """
     surface, flat = pattern.surface(surface), pattern.flat
     bad = metrics.flipped_faces(surface, flat)
-    if bad.size:
-        yield f"the pattern is inverted at {places('face', bad)}"
-    bad = np.setdiff1d(faults.overlaps(surface, flat), bad)
-    if bad.size:
-        yield (f"the pattern lies on itself at {places('face', bad)}: cut the surface into pieces")
+    found = {
+        Code.PATTERN_INVERTED: Measurement.count("face", bad),
+        Code.PATTERN_OVERLAPS: Measurement.count(
+            "face", np.setdiff1d(faults.overlaps(surface, flat), bad)
+        ),
+    }
     if lengths:
-        yield from _collapsed(surface, flat, "the pattern", pattern.vertex)
+        found[Code.PATTERN_COLLAPSED] = _shortest(surface, flat, pattern.vertex)
+    return found
 
 
-def _collapsed(before: Mesh, after: Array, what: str, names: Ints | None = None) -> Iterator[str]:
-    """Check for collapsed edges; `names` are the vertex numbers to show to the user."""
+def _shortest(before: Mesh, after: Array, names: Ints | None = None) -> Measurement:
+    """Measure the edges that have collapsed; `names` are the vertex numbers to show to the user."""
     edges = faults.collapsed(before, after)
-    if names is not None:
-        edges = names[edges]
-    if len(edges):
-        share = f"{100 * faults.SHORT:.0f} %"
-        named = [f"{a}-{b}" for a, b in edges]
-        yield f"{what} has edges of less than {share} of their length: {places('edge', named)}"
+    a, b = edges.T
+    was, now = (np.linalg.norm(x[a] - x[b], axis=1) for x in (before.vertices, after))
+    named = edges if names is None else names[edges]
+    return Measurement(now / was, "edge", [f"{a}-{b}" for a, b in named])
 
 
 def _known(design: Mesh, pairs: Ints) -> NDArray[np.bool_]:

@@ -21,6 +21,11 @@ _LENGTHS = ("diagonal", "allowed", "deviation_mean", "deviation_max", "bend_radi
 _PACKAGES = ("gso", "numpy", "scipy", "shapely", "ezdxf", "spyrrow")
 
 
+def codes(reasons: Sequence[Mapping[str, Any]]) -> str:
+    """Return the codes of a record's reasons, each once."""
+    return ", ".join(dict.fromkeys(reason["code"] for reason in reasons))
+
+
 def digest(mesh: Mesh) -> str:
     """Return the SHA-256 of a mesh's vertices and faces."""
     out = hashlib.sha256()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -17,9 +17,10 @@ from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.quantities import Length, Strain, as_length, as_strain, millimetres
 from gso.seams.options import as_sheet
+from gso.verdict import Code, Reason, failure, ordered
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import design_record, digest, plain, versions
-from gso.workshop.checks import refused
+from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
 from gso.workshop.designs import designs_of, several
 from gso.workshop.finish import Finish
@@ -63,9 +64,9 @@ class Fabrication:
         return bool(self.certificate["usable"])
 
     @property
-    def reasons(self) -> list[str]:
-        """Why not."""
-        return list(self.certificate["reasons"])
+    def reasons(self) -> tuple[Reason, ...]:
+        """Why not, the most severe first; lengths in millimetres."""
+        return tuple(map(Reason.read, self.certificate["reasons"]))
 
 
 def fabricate(
@@ -214,18 +215,23 @@ def fabricate(
     say("parts")
     parts: list[Part] = []
     records: list[dict[str, Any]] = []
+    reasons: list[Reason] = []
     for k in chosen:
         copies = [every[j].name for j, origin in enumerate(first) if origin == k]
         if k not in found:
-            records.append({"name": every[k].name, "copies": copies, "reasons": [failed[k]]})
+            why: tuple[Reason, ...] = (failure(Code.FAILED, failed[k]),)
+            records.append({"name": every[k].name, "copies": copies, "reasons": _words(why)})
+            reasons += [reason.within(every[k].name) for reason in why]
             continue
         one = found[k]
         lines = ([x for x, n in zip(given, on, strict=True) if n == k] for given, on in drawn)
         fit = fitted(one, scale, finish, *lines)
         own = [replace(part, count=len(copies)) for part in parts_from(fit, finish)]
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
-        record["reasons"] = [*record["reasons"], *refused(fit, ask, finish)]
+        why = (*(r.scaled(scale) for r in one.reasons), *judge_sheet(fit, ask, finish))
+        record["reasons"] = _words(why)
         records.append(record)
+        reasons += [reason.within(one.name) for reason in why]
         parts += own
     parts, same = united(parts)
     for record in records:
@@ -238,7 +244,6 @@ def fabricate(
         "designs": records,
         "sheets": [],
         "notes": _notes(records, ask),
-        "reasons": [f"{r['name']}: {why}" for r in records for why in r["reasons"]],
     }
     sheets: list[Drawing] = []
     if size is not None and parts:
@@ -253,7 +258,7 @@ def fabricate(
                 callback=callback,
             )
         except OptionError as error:
-            certificate["reasons"].append(str(error))
+            reasons.append(failure(Code.NOT_NESTED, str(error)))
         else:
             sheets = list(nested.sheets)
             certificate["sheets"] = [{"utilisation": u} for u in nested.utilisation]
@@ -266,7 +271,7 @@ def fabricate(
                     "notes": list(nested.notes),
                 }
             )
-    certificate["usable"] = not certificate["reasons"]
+    certificate["reasons"], certificate["usable"] = _words(reasons), not reasons
     certificate["parts"] = sum(part.count for part in parts)
     say("files")
     files = written(place, parts, sheets, found.values(), certificate, drawings, earlier)
@@ -282,15 +287,17 @@ def _radius(given: Length, meshes: Sequence[Mesh], unit: str) -> float:
     return as_length(given, "min_radius", diagonal=diagonal, unit=unit)
 
 
+def _words(reasons: Iterable[Reason]) -> list[dict[str, Any]]:
+    """Return records of reasons, the most severe first."""
+    return [reason.record("mm") for reason in ordered(reasons)]
+
+
 def _named(found: dict[int, Made]) -> dict[int, Made]:
     """Give the panels of all designs names that differ."""
     # In the order of the designs, whichever of them an earlier run had made.
-    ordered = dict(sorted(found.items()))
-    names = iter(different(panel.name for one in ordered.values() for panel in one.panels))
-    return {
-        k: replace(one, panels=tuple(replace(p, name=next(names)) for p in one.panels))
-        for k, one in ordered.items()
-    }
+    in_order = dict(sorted(found.items()))
+    names = iter(different(panel.name for one in in_order.values() for panel in one.panels))
+    return {k: one.named([next(names) for _ in one.panels]) for k, one in in_order.items()}
 
 
 def _notes(records: Sequence[dict[str, Any]], ask: Ask) -> list[str]:

@@ -11,6 +11,7 @@ from typing import Any
 from gso import io
 from gso.errors import MeshError, OptionError
 from gso.io.convert import Unwelded
+from gso.verdict import Code, failure
 
 #: Folders of drawings and surfaces, the folder of what was made, and files.
 FOLDERS, WORK, CERTIFICATE, PAGE, PAPER = (
@@ -69,7 +70,8 @@ def opened(place: Path, inputs: Iterable[Any]) -> set[str]:
     except OSError as error:
         raise MeshError(f"{place}: {error.strerror}; -o names a folder") from None
     files = _certificate(place) or []
-    close(place, {"usable": False, "reasons": ["the run has not ended"], "files": files})
+    why = [failure(Code.UNFINISHED).record("mm")]
+    close(place, {"usable": False, "reasons": why, "files": files})
     return {n for n in files if n.count("/") == 1 and n.split("/")[0] in FOLDERS and ".." not in n}
 
 

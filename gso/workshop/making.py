@@ -19,7 +19,6 @@ from gso.mesh import Mesh
 from gso.result import Result
 from gso.seams import Segmentation
 from gso.seams import pieces as search
-from gso.seams.sheets import rectangle
 from gso.tno import optimize
 from gso.workshop import measurements
 from gso.workshop.asking import Ask
@@ -122,11 +121,11 @@ def _whole(name: str, design: _Target, ask: Ask, say: Say) -> Made | None:
         )
         if result.pattern is None:
             return None
-        reasons = list(result.reasons)
         record = measurements.of_pattern(
-            design.mesh, result.mesh, result.pattern, ask, design.allowed, reasons
+            design.mesh, result.mesh, result.pattern, ask, design.allowed
         )
-        return _bent(of_surface(name, result.mesh, result.pattern, record))
+        whole = of_surface(name, result.mesh, result.pattern, record)
+        return _bent(replace(whole, reasons=result.reasons))
     try:
         result = optimize(
             design.solved.mesh,
@@ -136,33 +135,13 @@ def _whole(name: str, design: _Target, ask: Ask, say: Say) -> Made | None:
         )
     except MeshError:
         return None
-    return of_ruled(name, result, _ruled_record(design, result, ask))
+    record = _ruled_record(design, result, ask)
+    return replace(of_ruled(name, result, record), reasons=result.reasons)
 
 
 def _checked(made: Made, ask: Ask) -> Made:
-    """Add a reason if a pattern is larger than a sheet, or a panel bent to a smaller radius."""
-    reasons = made.reasons
-    limit = np.sort(ask.max_size)[::-1] if ask.max_size is not None else np.full(2, np.inf)
-    for panel in made.panels:
-        size = np.array(rectangle(panel.flat)[1])
-        if (size > limit * (1.0 + 1e-9)).any():
-            long, wide = size.tolist()
-            reasons.append(
-                f"the pattern of {panel.name} is {long:.4g} by {wide:.4g}, larger than a sheet "
-                "(in the design's unit)"
-            )
-            break
-    least = ask.min_radius or 0.0
-    # Strips keep the smallest radius themselves, or say why not.
-    for panel in made.panels if least > 0.0 else ():
-        radius = np.inf if len(panel.bends) else measurements.bend_radius(panel)
-        if radius < least:
-            reasons.append(
-                f"{panel.name} is bent to a radius of {radius:.4g}, less than {least:.4g} (in the "
-                "design's unit)"
-            )
-            break
-    return replace(made, record=made.record | {"reasons": reasons})
+    """Add the reasons against the panels."""
+    return replace(made, reasons=measurements.judge(made, ask))
 
 
 def _options(ask: Ask) -> Any:
@@ -177,9 +156,12 @@ def _flattened(given: Design, ask: Ask, say: Say) -> Made:
     found = _searched(given, ask, None, say)
     pattern = found.pattern
     if pattern is None:
-        raise MeshError(f"{name}: a piece cannot be laid flat; {'; '.join(found.reasons)}")
-    record = measurements.of_pattern(design, found.design, pattern, ask, None, list(found.reasons))
-    return _bent(of_surface(name, found.design, pattern, record | {"pieces": len(found)}))
+        raise MeshError(
+            f"{name}: a piece cannot be laid flat; {'; '.join(map(str, found.reasons))}"
+        )
+    record = measurements.of_pattern(design, found.design, pattern, ask, None)
+    whole = of_surface(name, found.design, pattern, record | {"pieces": len(found)})
+    return _bent(replace(whole, reasons=found.reasons))
 
 
 def _bent(made: Made) -> Made:
@@ -211,7 +193,9 @@ def _parted(name: str, design: _Target, ask: Ask, say: Say, workers: int | None)
     share = _PIECES if ask.formulation == "ruled" else 1.0
     found = _searched(design.solved, ask, share * design.left, say, workers)
     if any(sheet is None for sheet in found.sheets):
-        raise MeshError(f"{name}: a piece cannot be laid flat; {'; '.join(found.reasons)}")
+        raise MeshError(
+            f"{name}: a piece cannot be laid flat; {'; '.join(map(str, found.reasons))}"
+        )
     panels: list[Panel] = []
     matings: list[Mating] = []
     owner: list[int] = []
@@ -245,14 +229,10 @@ def _parted(name: str, design: _Target, ask: Ask, say: Say, workers: int | None)
     ]
     matings += across(found, moved, owner, panels, rims)
     record = measurements.of_panels(design.mesh, panels, ask, design.allowed)
-    reasons = [
-        *(r for r in found.reasons if "distance between surface and design" not in r),
-        *record["reasons"],
-    ]
     seams = found.opened.seams
     gap = np.linalg.norm(moved[seams[:, 0]] - moved[seams[:, 1]], axis=2).max(initial=0.0)
-    record |= {"pieces": len(found), "strips": strips, "seam_gap": float(gap), "reasons": reasons}
-    return _bent(Made(name, tuple(panels), numbered(matings), record))
+    record |= {"pieces": len(found), "strips": strips, "seam_gap": float(gap)}
+    return _bent(Made(name, tuple(panels), numbered(matings), record, found.reasons))
 
 
 def _ruled_record(design: _Target, result: Result, ask: Ask) -> dict[str, Any]:
@@ -261,10 +241,7 @@ def _ruled_record(design: _Target, result: Result, ask: Ask) -> dict[str, Any]:
         raise MeshError("the solve was ended before there were strips")
     known = ruled.deviation if design.solved.mesh is design.mesh else None
     away = known or ruled.distances(design.mesh)
-    reasons = list(result.reasons)
-    record = measurements.of_pattern(
-        design.mesh, ruled.mesh, ruled.pattern, ask, design.allowed, reasons
-    )
+    record = measurements.of_pattern(design.mesh, ruled.mesh, ruled.pattern, ask, design.allowed)
     return record | {
         "deviation_mean": max(away.there_mean, away.back_mean),
         "deviation_max": max(away.there_max, away.back_max),

@@ -14,6 +14,7 @@ from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.metrics import point_to_surface
 from gso.typing import Array, Ints
+from gso.verdict import Code, Measurement, Reason, compare
 from gso.workshop.panels import Panel
 from gso.workshop.part import signed_area
 
@@ -104,7 +105,7 @@ def marked(
 
 def cut(
     panels: Sequence[Panel], holes: Sequence[ArrayLike], flats: Sequence[Array]
-) -> tuple[list[list[Array]], list[str]]:
+) -> tuple[list[list[Array]], tuple[Reason, ...]]:
     """Carry holes of the surface to the patterns.
 
     Parameters
@@ -118,7 +119,7 @@ def cut(
     -------
     holes : list of list of ndarray (k, 2)
         Those of each panel, clockwise, the first point not repeated.
-    refused : list of str
+    reasons : tuple of Reason
         Why other holes cannot be cut.
     """
     import shapely
@@ -126,22 +127,25 @@ def cut(
     wanted = [replace(p, flat=flat) for p, flat in zip(panels, flats, strict=True)]
     shapes = [shapely.Polygon(p.flat[p.loops[0]], [p.flat[x] for x in p.loops[1:]]) for p in wanted]
     out: list[list[Array]] = [[] for _ in panels]
-    refused = []
+    bad: dict[Code, list[str]] = {
+        Code.HOLE_ACROSS_SEAM: [],
+        Code.HOLE_CROSSES_ITSELF: [],
+        Code.HOLE_OUTSIDE: [],
+    }
     for hole in holes:
         line = _checked(hole, 3)
         number, flat = to_pattern(wanted, line[:-1])
-        panel, ring = panels[number[0]], shapely.Polygon(flat)
-        where = f"the hole at {np.round(line[0], 6).tolist()}"
-        if (number != number[0]).any():
-            other = panels[number[number != number[0]][0]].name
-            refused.append(f"{where} lies across the seam of {panel.name} and {other}; move it")
+        ring, on = shapely.Polygon(flat), dict.fromkeys(panels[k].name for k in number)
+        where = f"at {np.round(line[0], 6).tolist()} ({', '.join(on)})"
+        if len(on) > 1:
+            bad[Code.HOLE_ACROSS_SEAM].append(where)
         elif not ring.is_valid or ring.area <= 0:
-            refused.append(f"{where} crosses itself or has no area")
+            bad[Code.HOLE_CROSSES_ITSELF].append(where)
         elif not shapes[number[0]].contains_properly(ring):
-            refused.append(f"{where} is not inside part {panel.name}; move it inwards")
+            bad[Code.HOLE_OUTSIDE].append(where)
         else:
             out[number[0]].append(flat if signed_area(flat) < 0 else flat[::-1])
-    return out, refused
+    return out, compare({code: Measurement.count("hole", ids) for code, ids in bad.items()}, {})
 
 
 def check_lines(

@@ -1,4 +1,4 @@
-"""What is measured of a made surface, and what is not within its bound."""
+"""What is measured of a made surface and of its panels, and its verdict."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.validation import have_area
 from gso.pattern import Pattern
+from gso.seams.sheets import rectangle
+from gso.verdict import Code, Measurement, Reason, compare, merge
 from gso.workshop.asking import Ask
-from gso.workshop.panels import Panel
+from gso.workshop.panels import Made, Panel
 
 #: Share of the area whose curvature counts, and the curvature, times the diagonal, up to which a
 #: panel is flat.
@@ -32,7 +34,7 @@ def of_panels(design: Mesh, panels: list[Panel], ask: Ask, allowed: float) -> di
     flat = np.concatenate(parametrization.beside([p.flat for p in panels]))
     # Slivers of a small panel may have no area relative to the whole.
     mesh = Mesh(points, table[have_area(table, points) & have_area(table, flat)])
-    return of_pattern(design, mesh, Pattern.whole(mesh, flat), ask, allowed, [])
+    return of_pattern(design, mesh, Pattern.whole(mesh, flat), ask, allowed)
 
 
 def bend_radius(panel: Panel) -> float:
@@ -57,29 +59,14 @@ def of_pattern(
     pattern: Pattern,
     ask: Ask,
     allowed: float | None,
-    reasons: list[str],
 ) -> dict[str, Any]:
-    """Measure a surface and its pattern, and add what is not within its bound to the reasons."""
+    """Measure a surface and its pattern; `allowed` is the largest distance from the design."""
     away = metrics.surface_distance(design, surface)
     sheet = pattern.surface(surface)
     strains = metrics.strains(sheet, pattern.flat)
     far = max(away.there_max, away.back_max)
     overlaps = len(faults.overlaps(sheet, pattern.flat))
     flips = int(metrics.flips(sheet, pattern.flat))
-    if allowed is not None and far > allowed * (1.0 + 1e-6) and not reasons:
-        reasons.append(
-            f"the surface is up to {far:.4g} from the design, more than {allowed:.4g} (in the "
-            "design's unit)"
-        )
-    if strains["strain_max"] > ask.strain and not reasons:
-        reasons.append(
-            f"the strain of the patterns is {100 * strains['strain_max']:.3g} %, more than "
-            f"{100 * ask.strain:.3g} %"
-        )
-    if overlaps and not reasons:
-        reasons.append(f"{overlaps} faces of the patterns overlap")
-    if flips and not reasons:
-        reasons.append(f"{flips} faces of the patterns are inverted")
     return {
         "formulation": ask.formulation,
         "area": metrics.area(surface),
@@ -96,8 +83,36 @@ def of_pattern(
         "inverted": flips,
         "pieces": len(pattern.mesh.boundary_loops),
         "strips": [],
-        "reasons": reasons,
     }
+
+
+def judge(made: Made, ask: Ask) -> tuple[Reason, ...]:
+    """Return why panels are not what was asked for, beside the reasons of their solve."""
+    record, names = made.record, [panel.name for panel in made.panels]
+    sizes = np.array([rectangle(panel.flat)[1] for panel in made.panels])
+    # Strips keep the smallest radius themselves, or say why not.
+    plain = [panel for panel in made.panels if ask.min_radius and not len(panel.bends)]
+    wide, long = (None, None) if ask.max_size is None else sorted(ask.max_size)
+    limits = {
+        Code.DEVIATION: record["allowed"],
+        Code.STRAIN: ask.strain,
+        Code.TOO_LONG: long,
+        Code.TOO_WIDE: wide,
+        Code.BEND_RADIUS: ask.min_radius,
+    }
+    measured = {
+        Code.DEVIATION: Measurement(record["deviation_max"]),
+        Code.STRAIN: Measurement(record["strain_max"]),
+        Code.PATTERN_OVERLAPS: Measurement(record["overlaps"]),
+        Code.PATTERN_INVERTED: Measurement(record["inverted"]),
+        Code.TOO_LONG: Measurement(sizes[:, 0], "part", names),
+        Code.TOO_WIDE: Measurement(sizes[:, 1], "part", names),
+        Code.BEND_RADIUS: Measurement(
+            np.array([bend_radius(panel) for panel in plain]), "part", [p.name for p in plain]
+        ),
+    }
+    # The solve may have had another design in its place, or less room.
+    return merge(made.reasons, compare(measured, limits), decided=(Code.DEVIATION,))
 
 
 def _worst(design: Mesh, surface: Mesh) -> list[float]:

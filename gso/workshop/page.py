@@ -11,6 +11,7 @@ from xml.etree.ElementTree import tostring
 import numpy as np
 
 from gso.io.svg_page import SVGPage
+from gso.workshop.certificate import codes
 from gso.workshop.part import Drawing, Part
 from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import layer_set
@@ -55,7 +56,11 @@ def page(certificate: dict[str, Any], parts: Sequence[Part], sheets: Sequence[Dr
         f'<h1 class="{"good" if good else "bad"}">{title} {said}</h1>',
     ]
     if certificate["reasons"]:
-        lines += ["<ul>", *(f"<li>{escape(r)}</li>" for r in certificate["reasons"]), "</ul>"]
+        lines += [
+            "<ul>",
+            *(f"<li>{escape(r['text'])}</li>" for r in certificate["reasons"]),
+            "</ul>",
+        ]
     lines += [f"<p>{escape(note)}</p>" for note in certificate["notes"]]
     lines += [_designs(certificate["designs"]), _legend()]
     for number, drawing in enumerate(sheets):
@@ -101,10 +106,16 @@ def _designs(designs: Sequence[dict[str, Any]]) -> str:
             _number(None if strain is None else 100 * strain),
             _number(one.get("bend_radius_min")),
             _number(one.get("seam_mismatch_max")),
-            '<span class="bad">no</span>' if one["reasons"] else '<span class="good">yes</span>',
+            _verdict(one["reasons"]),
         ]
         rows.append("<tr>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>")
     return "".join([*rows, "</table>"])
+
+
+def _verdict(reasons: Sequence[dict[str, Any]]) -> str:
+    if not reasons:
+        return '<span class="good">yes</span>'
+    return f'<span class="bad">no: {escape(codes(reasons))}</span>'
 
 
 def _number(value: float | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -14,6 +14,7 @@ from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Bend
 from gso.typing import Array, Ints
+from gso.verdict import Places, Reason
 
 _ARRAYS = ("points", "faces", "flat", "bends", "angles", "radii")
 
@@ -132,22 +133,25 @@ class Made:
     matings : tuple of Mating
     record : dict
         What was measured, JSON-compatible: lengths in the mesh's unit.
+    reasons : tuple of Reason
+        Why it cannot be used as what was asked for; lengths in the mesh's unit.
     """
 
     name: str
     panels: tuple[Panel, ...]
     matings: tuple[Mating, ...]
     record: dict[str, Any]
+    reasons: tuple[Reason, ...] = ()
 
-    @property
-    def reasons(self) -> list[str]:
-        """Why it cannot be used as what was asked for."""
-        return list(self.record.get("reasons", ()))
-
-    def named(self, name: str) -> Made:
-        """Return it with another name, which its panels begin with."""
-        panels = tuple(replace(p, name=name + p.name[len(self.name) :]) for p in self.panels)
-        return replace(self, name=name, panels=panels)
+    def named(self, names: Sequence[str]) -> Made:
+        """Return it with other names of its panels."""
+        panels = tuple(replace(p, name=name) for p, name in zip(self.panels, names, strict=True))
+        new: dict[int | str, str] = {p.name: n for p, n in zip(self.panels, names, strict=True)}
+        reasons = (
+            replace(r, places=Places(r.places.kind, tuple(new.get(x, x) for x in r.places.ids)))
+            for r in self.reasons
+        )
+        return replace(self, panels=panels, reasons=tuple(reasons))
 
     def arrays(self) -> dict[str, Any]:
         """Return panels and seams as arrays by name."""

@@ -12,6 +12,7 @@ from gso.errors import OptionError
 from gso.pattern import Bend
 from gso.seams.sheets import rectangle
 from gso.typing import Array
+from gso.verdict import Reason
 from gso.workshop.finish import Finish
 from gso.workshop.marks import cut, marked
 from gso.workshop.offsets import offset, with_allowance
@@ -66,7 +67,7 @@ class Fitted:
         With patterns in millimetres, for the thickness of the sheet.
     marks, holes : list of list of ndarray (k, 2)
         Those of each panel.
-    refused : list of str
+    reasons : tuple of Reason
         Why other holes cannot be cut.
     """
 
@@ -75,7 +76,7 @@ class Fitted:
     panels: tuple[Panel, ...]
     marks: list[list[Array]]
     holes: list[list[Array]]
-    refused: list[str]
+    reasons: tuple[Reason, ...]
 
 
 def fitted(
@@ -117,8 +118,8 @@ def parts_of(
         A hole cannot be cut.
     """
     own = fitted(made, scale, finish, marks, holes)
-    if own.refused:
-        raise OptionError(own.refused[0])
+    if own.reasons:
+        raise OptionError("; ".join(map(str, own.reasons)))
     return parts_from(own, finish)
 
 

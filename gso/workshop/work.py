@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 
 from gso import cluster, io
 from gso.errors import GSOError, MeshError
+from gso.verdict import Reason
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import digest, plain
 from gso.workshop.designs import Design
@@ -21,7 +23,7 @@ from gso.workshop.making import made
 from gso.workshop.panels import Made
 
 #: Version of the files; those of another one are made again.
-_FORMAT = 2
+_FORMAT = 3
 
 
 def key(design: Design, ask: Ask) -> str:
@@ -33,7 +35,8 @@ def key(design: Design, ask: Ask) -> str:
 
 def store(one: Made, own: str, path: Path) -> None:
     """Write what was made; it replaces the file when it is complete."""
-    record = np.frombuffer(json.dumps([own, plain(one.record)]).encode(), np.uint8)
+    said = [own, plain(one.record), [reason.record() for reason in one.reasons]]
+    record = np.frombuffer(json.dumps(said).encode(), np.uint8)
     with io.replacing(path) as file:
         np.savez_compressed(file, record=record, **one.arrays())
 
@@ -50,8 +53,11 @@ def stored(name: str, own: str, path: Path) -> Made | None:
 
     try:
         data = read_arrays(path.read_bytes())
-        said, record = json.loads(data["record"].tobytes())
-        return Made.from_arrays(name, data, record) if said == own else None
+        said, record, reasons = json.loads(data["record"].tobytes())
+        if said != own:
+            return None
+        made_before = Made.from_arrays(name, data, record)
+        return replace(made_before, reasons=tuple(map(Reason.read, reasons)))
     except (OSError, KeyError, ValueError, MeshError):
         # A file that is missing or damaged is made again.
         return None

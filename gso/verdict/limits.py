@@ -1,21 +1,13 @@
-"""Requirements on a result, and the tolerances and measures they are checked with."""
+"""Limits that a result has to keep beyond those of its task."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
-
-from gso import metrics
-
-#: Relative tolerance of the bounds.
-TIGHT = 1e-6
-#: Relative tolerance of a target curvature.
-TARGET = 0.05
 
 
 @dataclass(frozen=True)
-class Asked:
-    """Requirements on a result beyond those of its task.
+class Limits:
+    """Limits that a result has to keep beyond those of its task.
 
     Attributes
     ----------
@@ -36,15 +28,6 @@ class Asked:
     moved: float = 0.0
 
     @property
-    def limits(self) -> dict[str, float]:
+    def given(self) -> dict[str, float]:
         """The limits that were given, by name."""
-        given = asdict(self)
-        return {k: float(v) for k, v in given.items() if k != "moved" and v is not None}
-
-
-def asked_curvature(surface: Any, *, scale: float | None = None) -> float:
-    """Return the curvature that the developable task is judged by, 1/size^2.
-
-    This is the only place that chooses the function of :mod:`gso.metrics`.
-    """
-    return metrics.loss_gc_worst(surface, scale=scale)
+        return {k: float(v) for k, v in asdict(self).items() if k != "moved" and v is not None}

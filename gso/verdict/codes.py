@@ -1,0 +1,379 @@
+"""Codes of the reasons against results: what each means, its unit, its words, and what to do."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from gso.faults import SHORT
+from gso.status import Status
+
+#: Relative tolerance of the limits.
+TIGHT = 1e-6
+
+
+class Kind(enum.Enum):
+    """What the value and the bound of a reason are; the value is their unit in tables."""
+
+    COUNT = "number"
+    LENGTH = "length"
+    SHARE = "share"
+    ANGLE = "degrees"
+    FACTOR = "1"
+    #: Nothing is measured.
+    NONE = ""
+
+
+@dataclass(frozen=True)
+class CodeInfo:
+    """Description of a code.
+
+    Attributes
+    ----------
+    kind : Kind
+        Kind of value and bound.
+    meaning : str
+        What is measured, and when it counts against a result.
+    sentence : str
+        The reason in words, with ``{value}``, ``{bound}`` and ``{detail}``; places follow.
+    remedy : str
+        What to do about it.
+    limit : float or None
+        The bound where none is given; None: then it is not checked.
+    tolerance : float
+        How far a value may be beyond its bound, relative to it.
+    least : bool
+        Whether the bound is the smallest good value, rather than the largest.
+    """
+
+    kind: Kind
+    meaning: str
+    sentence: str
+    remedy: str
+    limit: float | None = None
+    tolerance: float = TIGHT
+    least: bool = False
+
+
+def _most(
+    value: str,
+    kind: Kind,
+    meaning: str,
+    sentence: str,
+    remedy: str,
+    limit: float | None = None,
+    tolerance: float = TIGHT,
+) -> tuple[str, CodeInfo]:
+    """Describe what may be at most its bound."""
+    return value, CodeInfo(kind, meaning, sentence, remedy, limit, tolerance)
+
+
+def _least(
+    value: str, kind: Kind, meaning: str, sentence: str, remedy: str, limit: float | None = None
+) -> tuple[str, CodeInfo]:
+    """Describe what must be at least its bound."""
+    return value, CodeInfo(kind, meaning, sentence, remedy, limit, least=True)
+
+
+def _fault(value: str, meaning: str, sentence: str, remedy: str) -> tuple[str, CodeInfo]:
+    """Describe what must not occur at all: the number is how often it does."""
+    return _most(value, Kind.COUNT, meaning, sentence, remedy, limit=0.0)
+
+
+def _stop(value: str, meaning: str, sentence: str, remedy: str) -> tuple[str, CodeInfo]:
+    """Describe what is not measured."""
+    return _most(value, Kind.NONE, meaning, sentence, remedy)
+
+
+class Code(str, enum.Enum):
+    """Why a result is not usable as what was asked for, the most severe first.
+
+    First what leaves nothing to judge, then solves that stopped, faults of the surface, faults of
+    the pattern, what a sheet cannot be, and at last limits and budgets that are missed. The
+    description of each is its `info`.
+    """
+
+    info: CodeInfo
+
+    def __new__(cls, value: str, info: CodeInfo) -> Code:
+        code = str.__new__(cls, value)
+        code._value_, code.info = value, info
+        return code
+
+    FAILED = _stop(
+        "failed",
+        "An error ended the work.",
+        "{detail}",
+        "what the message of the error says",
+    )
+    UNFINISHED = _stop(
+        "unfinished",
+        "The run goes on, or was ended before its end.",
+        "the run has not ended",
+        "start it again, and it goes on where it was",
+    )
+    NOT_FINITE = _fault(
+        "not_finite",
+        "Vertices whose coordinates are not finite.",
+        "coordinates are not finite",
+        "solve without a start (x0), or with other options",
+    )
+    CANCELLED = _stop(
+        "cancelled",
+        "The callback stopped the solve.",
+        str(Status.CANCELLED),
+        "let it run to its end",
+    )
+    CONSTRAINTS_MISSED = _stop(
+        "constraints_missed",
+        "A hard constraint is not met.",
+        str(Status.CONSTRAINTS_MISSED),
+        "loosen or drop them",
+    )
+    TARGET_MISSED = _stop(
+        "target_missed",
+        "The search for a bound or a target failed.",
+        str(Status.TARGET_MISSED),
+        "loosen the limits, or cut the design into pieces (gso pieces)",
+    )
+    FOLDED = _fault(
+        "folded",
+        "Faces at edges where the surface turns by more than 120 degrees; not those of the design.",
+        "the surface is folded onto itself",
+        "let it change less (max_deviation), or hold less of it",
+    )
+    CROSSES_ITSELF = _fault(
+        "crosses_itself",
+        "Faces that pass through others; not those of the design.",
+        "the surface passes through itself",
+        "let it change less (max_deviation), or hold less of it",
+    )
+    COLLAPSED = _least(
+        "collapsed",
+        Kind.SHARE,
+        "Length of an edge over that in the design.",
+        "edges of the surface keep {value} of their length, less than {bound}",
+        "let it change less (max_deviation), or mesh it more evenly",
+        limit=SHORT,
+    )
+    NO_PATTERN = _fault(
+        "no_pattern",
+        "Surfaces and pieces without a flat pattern, whose strain is therefore not known.",
+        "there is no flat pattern, so the strain is not known",
+        "cut the surface open (gso.cut) or into pieces (gso pieces)",
+    )
+    PATTERN_INVERTED = _fault(
+        "pattern_inverted",
+        "Faces of the pattern that are inverted, or the pieces that have some.",
+        "the pattern is inverted",
+        "cut the surface into pieces (gso pieces)",
+    )
+    PATTERN_OVERLAPS = _fault(
+        "pattern_overlaps",
+        "Faces of the pattern that lie on others, or the pieces that have some.",
+        "the pattern lies on itself",
+        "cut the surface into pieces (gso pieces)",
+    )
+    PATTERN_COLLAPSED = _least(
+        "pattern_collapsed",
+        Kind.SHARE,
+        "Length of an edge of the pattern over that of the surface.",
+        "edges of the pattern keep {value} of their length, less than {bound}",
+        "cut the surface into pieces (gso pieces)",
+        limit=SHORT,
+    )
+    NOT_FLATTENED = _most(
+        "not_flattened",
+        Kind.SHARE,
+        "Strain with which no pattern fits a face: it is squeezed to a line, doubled or inverted.",
+        "no pattern fits the surface: its lengths would change by {value}",
+        "ask for less change, or mesh it more finely there",
+        limit=0.99,
+    )
+    RULINGS_CROSS = _fault(
+        "rulings_cross",
+        "Pairs of successive rulings that cross.",
+        "pairs of successive rulings that cross: {value}",
+        "allow more strips (strips)",
+    )
+    TOO_THICK = _least(
+        "too_thick",
+        Kind.LENGTH,
+        "Smallest radius of a part's surface; its bound is how far the inner face of the sheet "
+        "is from that surface, half the thickness for parts without bend lines.",
+        "the sheet is too thick to be rolled to a radius of {value}, less than {bound}",
+        "take a thinner sheet, or fold it along its bend lines (--bend-radius)",
+    )
+    NEUTRAL_STRAIN = _most(
+        "neutral_strain",
+        Kind.SHARE,
+        "Strain of the sheet's neutral surface against the pattern of a part without bend lines.",
+        "without bend lines the pattern is that of the design's surface, and the neutral "
+        "surface of the sheet is longer or shorter by up to {value}, more than {bound}",
+        "take --face middle and --k-factor 0.5, or a thinner sheet",
+    )
+    BEND_ANGLE = _most(
+        "bend_angle",
+        Kind.ANGLE,
+        "Largest angle of a bend; its bound is the last one of the bend table.",
+        "bends of up to {value} are beyond the end of the bend table, {bound}",
+        "add larger angles to the table",
+    )
+    BENDS_NEAR = _least(
+        "bends_near",
+        Kind.LENGTH,
+        "Distance of two bends of a part; its bound is the room that both need.",
+        "two bends are {value} apart, and folded they need {bound}",
+        "take a smaller --bend-radius or a thinner sheet",
+    )
+    BENDS_OVERLAP = _fault(
+        "bends_overlap",
+        "Parts whose pattern for the thickness of the sheet crosses itself.",
+        "bends are too near each other for the sheet",
+        "take a thinner sheet",
+    )
+    SEAM_SIDES = _most(
+        "seam_sides",
+        Kind.LENGTH,
+        "Difference of the lengths of a seam's sides that the thickness of the sheet makes; its"
+        " bound is a tenth of the thickness more than what the strain explains.",
+        "the sides of a seam differ by {value} in a sheet of this thickness, more than {bound}",
+        "take --face middle, or a thinner sheet",
+    )
+    HOLE_ACROSS_SEAM = _fault(
+        "hole_across_seam",
+        "Holes that lie on several parts.",
+        "holes lie across a seam",
+        "move them",
+    )
+    HOLE_CROSSES_ITSELF = _fault(
+        "hole_crosses_itself",
+        "Holes whose outline crosses itself or has no area.",
+        "holes cross themselves or have no area",
+        "draw them again",
+    )
+    HOLE_OUTSIDE = _fault(
+        "hole_outside",
+        "Holes that reach the outline of their part.",
+        "holes are not inside their part",
+        "move them inwards",
+    )
+    NOT_NESTED = _stop(
+        "not_nested",
+        "A part does not fit on the sheet.",
+        "{detail}",
+        "what the message says",
+    )
+    DEVIATION = _most(
+        "deviation",
+        Kind.LENGTH,
+        "Largest distance between result and design, in both directions.",
+        "the result is {value} away from the design, more than {bound}",
+        "allow more distance (max_deviation), or more strips or pieces",
+    )
+    FAR = _most(
+        "far",
+        Kind.SHARE,
+        "The same over the diagonal of the design's bounding box, whatever limit was given; the"
+        " bound is 10 % for strips. What constraints ask for is added.",
+        "the result has left the design by {value} of its diagonal, more than {bound}",
+        "cut it into pieces (gso pieces), allow more strips, or hold more of it",
+        limit=0.5,
+    )
+    SEAM_GAP = _most(
+        "seam_gap",
+        Kind.LENGTH,
+        "Largest distance between the two sides of a seam; its bound is max_deviation.",
+        "the sides of seams are up to {value} apart, more than {bound}",
+        "allow more distance (max_deviation), or more strips",
+    )
+    STRAIN = _most(
+        "strain",
+        Kind.SHARE,
+        "Largest strain of the pattern; its bound is 0.5 % where only max_deviation is given.",
+        "the largest strain of the pattern is {value}, more than {bound}",
+        "allow more strain (max_strain), more distance (max_deviation) or narrower necks "
+        "(min_neck), or cut it into pieces (gso pieces)",
+    )
+    TARGET_CURVATURE = _most(
+        "target_curvature",
+        Kind.FACTOR,
+        "Mean absolute curvature, more than 5 % above the target.",
+        "mean |K| is {value}, above the target of {bound}",
+        "raise target_curvature, or cut the design into pieces (gso pieces)",
+        tolerance=0.05,
+    )
+    CURVATURE_ROSE = _most(
+        "curvature_rose",
+        Kind.FACTOR,
+        "Mean absolute curvature, more than 1 % above that of the input.",
+        "mean |K| is {value}, worse than the {bound} of the input",
+        "hold less of it, or take another formulation",
+        tolerance=0.01,
+    )
+    NOTHING_DONE = _most(
+        "nothing_done",
+        Kind.FACTOR,
+        "Mean absolute curvature, less than 1 % below that of the input, which is not developable.",
+        "nothing was done: mean |K| is {value}, as in the input",
+        "hold less of it, allow more distance (max_deviation), or cut it into pieces (gso pieces)",
+        tolerance=-0.01,
+    )
+    ROUGHER = _most(
+        "rougher",
+        Kind.FACTOR,
+        "Roughness over that of the input.",
+        "the result is {value} times as rough as the input",
+        "take another formulation, or hold less of it",
+        limit=1.0,
+        tolerance=0.01,
+    )
+    PIECES = _most(
+        "pieces",
+        Kind.COUNT,
+        "Number of pieces.",
+        "there are {value} pieces, more than {bound}",
+        "allow more pieces (max_pieces), strain or change of shape",
+    )
+    SEAM_LENGTH = _most(
+        "seam_length",
+        Kind.FACTOR,
+        "Length of all seams, over the root of the design's area.",
+        "the seams are {value} times the root of the area long, more than {bound}",
+        "allow longer seams (seam), more strain or change of shape",
+    )
+    NECK = _least(
+        "neck",
+        Kind.LENGTH,
+        "Width of a piece at its narrowest place.",
+        "necks are {value} wide, less than {bound}",
+        "allow narrower necks (min_neck) or more strain (max_strain)",
+    )
+    TOO_SHORT = _least(
+        "too_short",
+        Kind.LENGTH,
+        "Length of a pattern.",
+        "patterns are only {value} long, less than {bound}",
+        "allow shorter pieces (min_size) or more strain (max_strain)",
+    )
+    TOO_LONG = _most(
+        "too_long",
+        Kind.LENGTH,
+        "Length of a pattern; its bound is that of the sheet.",
+        "patterns are up to {value} long, more than the {bound} of the sheet",
+        "take larger sheets, or mesh it more finely",
+    )
+    TOO_WIDE = _most(
+        "too_wide",
+        Kind.LENGTH,
+        "Width of a pattern; its bound is that of the sheet.",
+        "patterns are up to {value} wide, more than the {bound} of the sheet",
+        "take larger sheets, or mesh it more finely",
+    )
+    BEND_RADIUS = _least(
+        "bend_radius",
+        Kind.LENGTH,
+        "Smallest radius that a part is bent to.",
+        "parts are bent to a radius of {value}, less than {bound}",
+        "allow a smaller radius (min_radius) or more distance (max_deviation)",
+    )

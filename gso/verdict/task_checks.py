@@ -1,0 +1,114 @@
+"""Checks that are specific to a task."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gso import metrics
+from gso.mesh import Mesh
+from gso.pattern import Pattern
+from gso.typing import Array
+from gso.verdict.codes import Code
+from gso.verdict.compare import Measurement
+from gso.verdict.limits import Limits
+from gso.verdict.surface_checks import Measured
+
+if TYPE_CHECKING:
+    from gso.result import Result
+
+Bounds = dict[Code, float | None]
+
+#: Distance from the design, relative to the diagonal of its bounding box, beyond which a result is
+#: refused whatever limit was given, and the same for strips, where more of them are the remedy.
+_FAR, _RULED = 0.5, 0.1
+
+
+def developable(result: Result, limits: Limits) -> tuple[Measured, Bounds]:
+    """Measure deviation, strain of the pattern, and curvature."""
+    # Imported here, as it imports scipy.
+    from gso.tasks.developable.options import DEVELOPABLE, Options
+
+    design, mesh = result.design, result.mesh
+    measured, bounds = _away(result, metrics.surface_distance(design, mesh), limits, _FAR)
+    strain, allowed = np.inf, limits.max_strain
+    if allowed is None and limits.max_deviation is not None:
+        allowed = DEVELOPABLE
+    if result.pattern is not None:
+        strains = _strains(mesh, result.pattern)
+        strain = float(strains.max())
+        measured[Code.STRAIN] = Measurement(strain)
+        measured[Code.NOT_FLATTENED] = Measurement(strains, "face", range(len(strains)))
+        bounds[Code.STRAIN] = allowed
+    elif limits.max_strain is not None:
+        measured[Code.NO_PATTERN] = Measurement(1.0)
+    scale = metrics.unit(design)
+    before, after = (metrics.loss_gc_worst(m, scale=scale) for m in (design, mesh))
+    target = limits.target_curvature
+    measured[Code.TARGET_CURVATURE] = curvature = Measurement(after)
+    bounds[Code.TARGET_CURVATURE] = target
+    if limits.moved <= 0 and after > max(Options().developable_below, target or 0.0):
+        measured[Code.CURVATURE_ROSE] = curvature
+        bounds[Code.CURVATURE_ROSE] = before
+        same = after <= (1.0 + Code.CURVATURE_ROSE.info.tolerance) * before
+        if same and strain > DEVELOPABLE:
+            measured[Code.NOTHING_DONE] = curvature
+            bounds[Code.NOTHING_DONE] = before
+    _remember(result, measured, limits)
+    return measured, bounds
+
+
+def ruled(result: Result, limits: Limits) -> tuple[Measured, Bounds]:
+    """Measure deviation and strain of strips, and count rulings that cross."""
+    surface = result.ruled
+    if surface is None:
+        return {}, {}
+    far = surface.deviation or surface.distances(result.design)
+    measured, bounds = _away(result, far, limits, _RULED)
+    measured[Code.RULINGS_CROSS] = Measurement(float(surface.crossed))
+    measured[Code.STRAIN] = Measurement(_strains(result.mesh, surface.pattern).max())
+    bounds[Code.STRAIN] = limits.max_strain
+    _remember(result, measured, limits)
+    return measured, bounds
+
+
+def denoise(result: Result, limits: Limits) -> tuple[Measured, Bounds]:
+    """Measure the roughness over that of the input."""
+    if limits.moved:
+        return {}, {}
+    return {Code.ROUGHER: Measurement(metrics.fairness_ratio(result.design, result.mesh))}, {}
+
+
+def _away(
+    result: Result, far: metrics.Distances, limits: Limits, share: float
+) -> tuple[Measured, Bounds]:
+    """Measure the distance to the design, also as a share of its diagonal."""
+    deviation, diagonal = max(far.there_max, far.back_max), result.design.diagonal
+    # Far from the origin, distances are only known up to the rounding of the coordinates.
+    return {
+        Code.DEVIATION: Measurement(deviation, slack=1e-12 * diagonal),
+        Code.FAR: Measurement(deviation / diagonal),
+    }, {
+        Code.DEVIATION: limits.max_deviation,
+        Code.FAR: share + limits.moved / diagonal,
+    }
+
+
+def _strains(surface: Mesh, pattern: Pattern) -> Array:
+    return np.nan_to_num(metrics.face_strains(pattern.surface(surface), pattern.flat))
+
+
+def _remember(result: Result, measured: Measured, limits: Limits) -> None:
+    """Store the numbers of a verdict in the details of a result."""
+    names = {Code.DEVIATION: "deviation", Code.STRAIN: "strain_max"}
+    found = {name: float(measured[code].value) for code, name in names.items() if code in measured}
+    result.details = {**result.details, "verdict": found | limits.given}
+
+
+#: Checks by task; other tasks only have the checks of surface and pattern.
+TASKS: dict[str, Callable[[Result, Limits], tuple[Measured, Bounds]]] = {
+    "developable": developable,
+    "denoise": denoise,
+}
