@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
-import os
-import platform
-import resource
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
-from importlib.metadata import version
+from multiprocessing import get_context
 from pathlib import Path
+from types import ModuleType
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from tqdm import tqdm
@@ -23,6 +24,8 @@ from gso import linalg, metrics
 
 ROOT = Path(__file__).resolve().parent.parent
 BENCH = ROOT / "bench"
+#: Presets that sections compare.
+PRESETS = ("fast", "balanced", "accurate")
 #: A column of :func:`compared`: heading, key of the rating, and how its values are summarised.
 Column = str | tuple[str, str, Callable[[Sequence[Any]], Any]]
 
@@ -45,6 +48,25 @@ def timed(function: Callable[..., Any], *given: Any, **keywords: Any) -> tuple[A
     return value, time.perf_counter() - start
 
 
+def quietly(function: Callable[..., Any], *given: Any, **keywords: Any) -> Any:
+    """Call a function without warnings: results that are not usable are counted."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return function(*given, **keywords)
+
+
+def apart(function: Callable[..., Any], *given: Any) -> Any:
+    """Call a function in a process of its own, whose memory is the function's."""
+    with get_context("spawn").Pool(1) as pool:
+        return pool.apply(function, given)
+
+
+def example(name: str) -> ModuleType:
+    """Import one of the examples."""
+    sys.path.insert(0, str(ROOT / "examples"))
+    return importlib.import_module(name)
+
+
 def solver(**keywords: Any) -> Callable[[Any], gso.Result]:
     """Return :func:`gso.tno.optimize` with these keywords."""
     return partial(gso.tno.optimize, **keywords)
@@ -54,15 +76,11 @@ def pure(run: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Return a method without the optional linear backends."""
 
     def hidden(case: Any) -> Any:
-        modules = [linalg.backends()[k] for k in ("cholmod", "pardiso")]
-        known = [m.available for m in modules]
-        for module in modules:
-            module.available = lambda: False
-        try:
+        with ExitStack() as stack:
+            for name in ("cholmod", "pardiso"):
+                module = linalg.backends()[name]
+                stack.enter_context(patch.object(module, "available", return_value=False))
             return run(case)
-        finally:
-            for module, available in zip(modules, known, strict=True):
-                module.available = available
 
     return hidden
 
@@ -79,10 +97,11 @@ def compared(
     """Run every method on every case, print a table of summaries, and return it.
 
     Ratings are averaged unless a column says otherwise. The rating "s" is the time of the
-    call, unless `rate` gives another; its column is the median.
+    call, unless `rate` gives another; without a column of it there are the median and the largest.
     """
     asked = [c if isinstance(c, tuple) else (c, c, np.mean) for c in columns]
-    asked += [("median s", "s", np.median), ("max s", "s", np.max)]
+    if not any(key == "s" for _, key, _ in asked):
+        asked += [("median s", "s", np.median), ("max s", "s", np.max)]
     found: dict[str, dict[str, Any]] = {}
     for name, run in runs.items():
         run(cases[0])  # imports and code generation of the first use
@@ -91,9 +110,26 @@ def compared(
             outcome, spent = timed(run, case)
             rows.append({"s": spent, **rate(case, outcome)})
         found[name] = {label: how([row[key] for row in rows]) for label, key, how in asked}
-    labels = [label for label, _, _ in asked]
-    table(title, [head, *labels], [[name, *row.values()] for name, row in found.items()])
-    return found
+    return shown(title, [head], found)
+
+
+def shown(
+    title: str, heads: Sequence[str], rows: Mapping[Any, Mapping[str, Any]]
+) -> dict[str, Any]:
+    """Print a table, and return it.
+
+    Rows are figures by the headings of their columns. A row is named by a text, or by a tuple of
+    texts, which stand below `heads`.
+    """
+    names = [name if isinstance(name, tuple) else (name,) for name in rows]
+    cells = [[*name, *row.values()] for name, row in zip(names, rows.values(), strict=True)]
+    table(title, [*heads, *next(iter(rows.values()), ())], cells)
+    return {", ".join(name): row for name, row in zip(names, rows.values(), strict=True)}
+
+
+def medians(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Return the median of each figure."""
+    return {name: float(np.median([row[name] for row in rows])) for name in rows[0]}
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
@@ -137,28 +173,12 @@ def axes_of(path: str, **labels: str) -> Iterator[Any]:
     figure.savefig(path)
 
 
-def machine() -> dict[str, Any]:
-    """Describe the machine and the versions of packages."""
-    packages = ("numpy", "scipy", "casadi", "libigl", "trimesh")
-    return {
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-        "cores": os.cpu_count(),
-        "packages": {p: version(p) for p in packages},
-        "peak_gb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
-    }
-
-
 def called(section: Callable[..., Any], settings: Mapping[str, str]) -> Any:
     """Call a section with those of the settings, as text, that it has parameters for."""
     kinds = {"int": int, "float": float, "bool": lambda text: text not in ("0", "no", "false")}
     parameters = inspect.signature(section).parameters
-    return section(
-        **{
-            name: kinds.get(parameter.annotation, Path if "Path" in parameter.annotation else str)(
-                settings[name]
-            )
-            for name, parameter in parameters.items()
-            if name in settings
-        }
-    )
+    given = {}
+    for name in parameters.keys() & settings.keys():
+        kind = parameters[name].annotation
+        given[name] = kinds.get(kind, Path if "Path" in kind else str)(settings[name])
+    return section(**given)

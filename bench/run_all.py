@@ -37,13 +37,15 @@ if not any(word.startswith("device=") for word in sys.argv):
 BENCH = Path(__file__).resolve().parent
 sys.path.insert(0, str(BENCH))
 
-from harness import called, machine  # noqa: E402
+from harness import called  # noqa: E402
 from report import build, surfaces, tuning  # noqa: E402
 from report.methods import methods  # noqa: E402
 from report.quality import levels  # noqa: E402
 from report.settings import FULL, QUICK  # noqa: E402
-from report.store import Store  # noqa: E402
+from report.store import Store, machine  # noqa: E402
 from sections import SUBJECTS, sections  # noqa: E402
+
+from gso.cli.progress import share  # noqa: E402
 
 
 def main() -> None:
@@ -62,7 +64,9 @@ def main() -> None:
     if arguments.only:
         _sections(parser, arguments)
         return
-    command = " ".join(["python bench/run_all.py", *(f"--{k}" for k in _asked(arguments))])
+    asked = [f"--{name}" for name in ("quick", "store", "tune") if getattr(arguments, name)]
+    asked += ["--data DIR"] if arguments.data else []
+    command = " ".join(["python bench/run_all.py", *asked])
     if arguments.tune:
         some = _screened(arguments.out, "validation")
         total = sum(len(levels(m.task)) for m in methods().values() if m.candidates)
@@ -98,8 +102,8 @@ def _sections(parser: argparse.ArgumentParser, arguments: argparse.Namespace) ->
             signature = str(inspect.signature(section)).partition(" ->")[0]
             print(f"{name:20s} {(section.__doc__ or '').splitlines()[0]}\n{'':20s} {signature}")
         return
-    chosen = {n: s for n, s in every.items() if n in words or n.partition(".")[0] in words}
-    unknown = [w for w in words if w not in every and not any(n.startswith(f"{w}.") for n in every)]
+    chosen = {n: s for n, s in every.items() if {n, n.partition(".")[0]} & {*words}}
+    unknown = [w for w in words if not any(w in (n, n.partition(".")[0]) for n in chosen)]
     known = {p for s in chosen.values() for p in inspect.signature(s).parameters}
     if unknown or not chosen:
         parser.error(f"no section {', '.join(unknown) or 'named'}; --only list names them")
@@ -118,23 +122,11 @@ def _sections(parser: argparse.ArgumentParser, arguments: argparse.Namespace) ->
         arguments.json.write_text(text + "\n")
 
 
-def _asked(arguments: argparse.Namespace) -> list[str]:
-    asked = [name for name in ("quick", "store", "tune") if getattr(arguments, name)]
-    return [*asked, "data DIR"] if arguments.data else asked
-
-
 def _screened(out: Path, split: str) -> surfaces.Surfaces:
-    with build.bar(100, "screening") as tick:
-        done = 0
-
-        def told(count: int, wanted: int) -> None:
-            nonlocal done
-            percent = 100 * count // wanted
-            if percent > done:
-                tick("surfaces drawn", percent - done)
-                done = percent
-
-        return surfaces.screened(out / "surfaces", split, Store(out), told)
+    with share() as show:
+        return surfaces.screened(
+            out / "surfaces", split, Store(out), lambda k, n: show(k / n, "surfaces drawn")
+        )
 
 
 def _store(name: str, result: dict[str, object]) -> None:

@@ -36,13 +36,13 @@ def keeps_its_borders(design, solve) -> None:
     assert metrics.edge_ratios(design.mesh, result.mesh).min() >= 0.3
 
 
-@pytest.mark.parametrize("design", named(designs.with_holes))
+@pytest.mark.parametrize("design", named(designs.holes))
 def test_holes_and_edges_stay_open(design):
     keeps_its_borders(design, BALANCED)
 
 
 @pytest.mark.parametrize("solve", [ACCURATE, ISOMETRY], ids=["accurate", "isometry"])
-@pytest.mark.parametrize("design", named(designs.with_holes, "dome with an oculus"))
+@pytest.mark.parametrize("design", named(designs.holes, "dome with an oculus"))
 def test_free_vertices_do_not_close_an_oculus(design, solve):
     keeps_its_borders(design, solve)
 
@@ -117,7 +117,7 @@ def test_ratios_and_folds_of_a_folded_sheet():
 
 
 def test_results_say_what_became_of_their_borders():
-    design = designs.with_holes(0)[0]
+    design = designs.holes(0)[0]
     found = gso.tno.optimize(design.mesh).metrics
     assert found["loop_ratio_min"] <= found["loop_ratio_max"]
     assert 0.0 < found["edge_ratio_min"] <= 1.01

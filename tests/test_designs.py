@@ -45,7 +45,7 @@ def test_meshes_come_in_whole_and_of_one_piece(design):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_ten_have_holes(seed):
-    meshes = [d.mesh for d in designs.with_holes(seed)]
+    meshes = [d.mesh for d in designs.holes(seed)]
     assert len(meshes) == 10
     assert sorted(len(m.boundary_loops) for m in meshes) == [2, 2, 2, 2, 2, 3, 4, 5, 5, 10]
     assert sum(m.is_triangles for m in meshes) == 1

@@ -9,28 +9,12 @@ from __future__ import annotations
 
 from designs.base import Design, Symmetry, renumbered
 from designs.curved import curved
-from designs.holes import with_holes
+from designs.holes import holes
 from designs.irregular import irregular
 from designs.planar import planar
 from designs.symmetric import symmetric
 
 #: The functions by the name of their kind.
-KINDS = {
-    "holes": with_holes,
-    "irregular": irregular,
-    "planar": planar,
-    "symmetric": symmetric,
-    "curved": curved,
-}
+KINDS = {make.__name__: make for make in (holes, irregular, planar, symmetric, curved)}
 
-__all__ = [
-    "KINDS",
-    "Design",
-    "Symmetry",
-    "curved",
-    "irregular",
-    "planar",
-    "renumbered",
-    "symmetric",
-    "with_holes",
-]
+__all__ = ["KINDS", "Design", "Symmetry", "renumbered", *KINDS]

@@ -113,6 +113,12 @@ def relaxed(points: Array, faces: Ints, steps: int) -> Array:
     return points
 
 
+def even(points: Array, faces: Ints, n: int) -> tuple[Array, Ints]:
+    """Every quad of a complex cut into n x n, and the vertices inside evened out."""
+    plan, quads = refined(points, faces, n)
+    return relaxed(plan, quads, n), quads
+
+
 def without(points: Array, faces: Ints, gone: NDArray[np.bool_]) -> tuple[Array, Ints]:
     """A mesh without some of its faces, and without the vertices that only they had."""
     used, number = np.unique(faces[~gone], return_inverse=True)
@@ -130,11 +136,6 @@ def ring(points: Array) -> tuple[Array, Ints]:
     ids = np.arange(height * width).reshape(height, width)
     closed = np.c_[ids, ids[:, :1]].ravel()
     return points.reshape(-1, points.shape[-1]), closed[topology.grid_faces(height, width + 1)]
-
-
-def lifted(plan: Array, height: Array) -> Array:
-    """Plan points (n, 2) at a height (n,)."""
-    return np.c_[plan, height]
 
 
 def rolling(plan: Array, rng: np.random.Generator, bow: float, wave: float) -> Array:

@@ -4,26 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import Delaunay
 
 import gso
-from designs.base import Array, Design, lifted, net, ring, rolling, without
+from designs.base import Array, Design, net, ring, rolling, without
 
 
-def with_holes(seed: int = 0) -> list[Design]:
+def holes(seed: int = 0) -> list[Design]:
     """Annuli, perforated saddles, domes and grids with openings; 800 to 3000 faces."""
     rng = np.random.default_rng([1, seed])
-    out = [
+    return [
         Design("annulus, nearly flat", _annulus(rng, 0.0, 0.08)),
         Design("annulus, conical", _annulus(rng, 0.5, 0.06)),
         Design("annulus, wavy", _annulus(rng, 0.1, 0.22)),
+        Design("saddle with 2 holes", _perforated_saddle(rng, 2, 2)),
+        Design("saddle with 4 holes", _perforated_saddle(rng, 2, 4)),
+        Design("saddle with 9 holes", _perforated_saddle(rng, 3, 9)),
+        Design("dome with an oculus", _oculus(rng)),
+        Design("paraboloid with round holes in steps", _stepped_paraboloid(rng)),
+        Design("grid with a rectangular opening", _opening(rng)),
+        Design("triangles with three holes", _triangles(rng)),
     ]
-    for side, count in ((2, 2), (2, 4), (3, 9)):
-        out.append(Design(f"saddle with {count} holes", _perforated_saddle(rng, side, count)))
-    out.append(Design("dome with an oculus", _oculus(rng)))
-    out.append(Design("paraboloid with round holes in steps", _stepped_paraboloid(rng)))
-    out.append(Design("grid with a rectangular opening", _opening(rng)))
-    out.append(Design("triangles with three holes", _triangles(rng)))
-    return out
 
 
 def _annulus(rng: np.random.Generator, slope: float, wave: float) -> gso.Mesh:
@@ -58,7 +59,7 @@ def _perforated_saddle(rng: np.random.Generator, side: int, count: int) -> gso.M
     plan = plan / (0.5 * n) - 1.0
     bow = rng.uniform(0.3, 0.5)
     height = bow * (plan[:, 0] ** 2 - plan[:, 1] ** 2 + rng.uniform(-0.4, 0.4) * plan.prod(axis=1))
-    return gso.Mesh(lifted(plan, height), faces)
+    return gso.Mesh(np.c_[plan, height], faces)
 
 
 def _rounding(offset: Array, half: float, reach: float) -> Array:
@@ -85,10 +86,9 @@ def _stepped_paraboloid(rng: np.random.Generator) -> gso.Mesh:
     plan, faces = net(grid)
     at = plan[faces].mean(axis=1)
     circles = [(-0.45, -0.4, 0.26), (0.4, 0.35, 0.32), (0.5, -0.5, 0.2), (-0.5, 0.5, 0.22)]
-    gone = _inside(at, circles)
-    plan, faces = without(plan, faces, gone)
+    plan, faces = without(plan, faces, _inside(at, circles))
     a, b = rng.uniform(0.25, 0.5, 2)
-    return gso.Mesh(lifted(plan, -a * plan[:, 0] ** 2 - b * plan[:, 1] ** 2), faces)
+    return gso.Mesh(np.c_[plan, -a * plan[:, 0] ** 2 - b * plan[:, 1] ** 2], faces)
 
 
 def _inside(points: Array, circles: list[tuple[float, float, float]]) -> NDArray[np.bool_]:
@@ -102,13 +102,11 @@ def _opening(rng: np.random.Generator) -> gso.Mesh:
     plan, faces = net(np.stack([x, y], axis=-1))
     at = plan[faces].mean(axis=1) - [0.5, -0.3]
     plan, faces = without(plan, faces, (np.abs(at) < [4.0 / 3.0, 0.85]).all(axis=1))
-    return gso.Mesh(lifted(plan, rolling(plan, rng, 0.3, 0.08)), faces)
+    return gso.Mesh(np.c_[plan, rolling(plan, rng, 0.3, 0.08)], faces)
 
 
 def _triangles(rng: np.random.Generator) -> gso.Mesh:
     """Delaunay triangles of a disc with three round holes, over a freeform height."""
-    from scipy.spatial import Delaunay
-
     step = 0.06
     x, y = np.meshgrid(np.arange(-20, 21) * step, np.arange(-23, 24) * step * np.sqrt(0.75))
     x = x + 0.5 * step * (np.arange(47) % 2)[:, None]
@@ -124,4 +122,4 @@ def _triangles(rng: np.random.Generator) -> gso.Mesh:
     plan = np.concatenate([lattice[keep], *rims])
     faces = Delaunay(plan).simplices.astype(np.int64)
     plan, faces = without(plan, faces, _inside(plan[faces].mean(axis=1), circles[1:]))
-    return gso.Mesh(lifted(plan, rolling(plan, rng, 0.35, 0.1)), faces)
+    return gso.Mesh(np.c_[plan, rolling(plan, rng, 0.35, 0.1)], faces)

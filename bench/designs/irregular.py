@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import Delaunay
 
 import gso
-from designs.base import Array, Design, Ints, lifted, refined, relaxed, rolling
+from designs.base import Array, Design, Ints, even, net, refined, rolling, without
 
 
 def irregular(seed: int = 0) -> list[Design]:
@@ -48,16 +49,13 @@ def square_core() -> tuple[Array, Ints]:
 def inset(rows: int, columns: int, cell: tuple[int, int]) -> tuple[Array, Ints]:
     """A lattice in which one quad has a smaller one inside: valences three and five."""
     x, y = np.mgrid[: rows + 1, : columns + 1].astype(float)
-    points = np.stack([x.ravel(), y.ravel()], axis=-1) - [rows / 2.0, columns / 2.0]
-    ids = np.arange(len(points)).reshape(rows + 1, columns + 1)
-    quads = [ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]]
-    faces = np.stack(quads, axis=-1)
-    corners = faces[cell]
+    points, faces = net(np.stack([x, y], axis=-1) - [rows / 2.0, columns / 2.0])
+    place = cell[0] * columns + cell[1]
+    corners = faces[place]
     inner = points[corners].mean(axis=0) + 0.45 * (points[corners] - points[corners].mean(axis=0))
     new = len(points) + np.arange(4)
-    outer = np.delete(faces.reshape(-1, 4), cell[0] * columns + cell[1], axis=0)
-    between = [corners, np.roll(corners, -1), np.roll(new, -1), new]
-    return np.r_[points, inner], np.r_[outer, new[None], np.stack(between, axis=1)]
+    between = np.stack([corners, np.roll(corners, -1), np.roll(new, -1), new], axis=1)
+    return np.r_[points, inner], np.r_[np.delete(faces, place, axis=0), new[None], between]
 
 
 def thirds(points: Array, triangles: Ints) -> tuple[Array, Ints]:
@@ -76,28 +74,23 @@ def _freeform(
     points: Array, faces: Ints, n: int, rng: np.random.Generator, bow: float, wave: float
 ) -> gso.Mesh:
     """A coarse complex refined, evened out, and put at a freeform height."""
-    plan, quads = refined(points, faces, n)
-    plan = relaxed(plan, quads, n)
-    height = rolling(plan, rng, bow, wave)
-    return gso.Mesh(lifted(plan, height), quads)
+    plan, quads = even(points, faces, n)
+    return gso.Mesh(np.c_[plan, rolling(plan, rng, bow, wave)], quads)
 
 
 def _dome(points: Array, faces: Ints, n: int, rng: np.random.Generator) -> gso.Mesh:
     """The same over an ellipsoidal cap."""
-    plan, quads = refined(points, faces, n)
-    plan = relaxed(plan, quads, n)
+    plan, quads = even(points, faces, n)
     a, b = rng.uniform(1.2, 1.5, 2)
     inside = 1.0 - (plan[:, 0] / a) ** 2 - (plan[:, 1] / b) ** 2
-    return gso.Mesh(lifted(plan, 0.8 * np.sqrt(np.maximum(inside, 0.05))), quads)
+    return gso.Mesh(np.c_[plan, 0.8 * np.sqrt(np.maximum(inside, 0.05))], quads)
 
 
 def _t_shape() -> tuple[Array, Ints]:
     """Two arms and a stem of squares; the square where they meet has another one inside."""
     points, faces = inset(5, 3, (2, 2))
     at = points[faces].mean(axis=1)
-    keep = (at[:, 1] > 0.5) | (np.abs(at[:, 0]) < 0.5)
-    used, number = np.unique(faces[keep], return_inverse=True)
-    return points[used], number.reshape(-1, 4)
+    return without(points, faces, (at[:, 1] <= 0.5) & (np.abs(at[:, 0]) >= 0.5))
 
 
 def _y_shape() -> tuple[Array, Ints]:
@@ -119,8 +112,6 @@ def _y_shape() -> tuple[Array, Ints]:
 
 def _scattered(outline: Array, rng: np.random.Generator) -> tuple[Array, Ints]:
     """Delaunay triangles inside an L of three unit squares."""
-    from scipy.spatial import Delaunay
-
     jitter = 0.06 * rng.uniform(-1.0, 1.0, (3, 2))
     inner = np.array([[-0.5, -0.5], [0.45, -0.5], [-0.5, 0.45]]) + jitter
     between = np.array([[0, -1], [-1, 0], [1, -0.5], [-0.5, 1], [0.5, 0.0], [0.0, 0.5]])
@@ -132,8 +123,6 @@ def _scattered(outline: Array, rng: np.random.Generator) -> tuple[Array, Ints]:
 
 def _disc(rng: np.random.Generator, count: int) -> tuple[Array, Ints]:
     """Delaunay triangles of a polygon with some points inside."""
-    from scipy.spatial import Delaunay
-
     angle = 2.0 * np.pi * np.arange(count) / count
     inner = 2.0 * np.pi * (np.arange(count // 2) + rng.uniform()) / (count // 2)
     ring = 0.5 * np.c_[np.cos(inner), np.sin(inner)]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_matrix, identity
+from scipy.sparse.linalg import spsolve
 
 import gso
-from designs.base import Array, Design, Ints, lifted, net, refined, relaxed, ring
+from designs.base import Array, Design, Ints, even, net, ring
 from designs.irregular import inset, star
 
 
@@ -53,18 +55,14 @@ def _revolved(rng: np.random.Generator, angle: Array) -> Array:
 
 def _planarised(points: Array, faces: Ints, n: int, rng: np.random.Generator) -> gso.Mesh:
     """A freeform mesh with irregular vertices, moved as little as makes its quads planar."""
-    plan, quads = refined(points, faces, n)
-    plan = relaxed(plan, quads, n)
+    plan, quads = even(points, faces, n)
     x, y = plan.T
     height = -0.15 * (x * x + rng.uniform(0.7, 1.0) * y * y) / np.abs(plan).max()
-    return gso.Mesh(planarised(lifted(plan, height), quads), quads)
+    return gso.Mesh(planarised(np.c_[plan, height], quads), quads)
 
 
 def planarised(points: Array, quads: Ints) -> Array:
     """Newton's method on the volumes of the quads, each step the shortest one."""
-    from scipy.sparse import csr_matrix, identity
-    from scipy.sparse.linalg import spsolve
-
     m = len(quads)
     for _ in range(30):
         a, b, c = (points[quads[:, k]] - points[quads[:, 0]] for k in (1, 2, 3))

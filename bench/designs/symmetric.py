@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import gso
-from designs.base import Array, Design, Ints, Symmetry, lifted, net, refined, relaxed, ring
+from designs.base import Array, Design, Ints, Symmetry, even, net, ring
 from designs.irregular import square_core, star
 
 MIRROR_X = np.diag([-1.0, 1.0, 1.0])
@@ -29,11 +29,11 @@ def symmetric(seed: int = 0) -> list[Design]:
     def swapped(x: Array, y: Array) -> Array:
         return a * (x * x + y * y) + c * x * y + wave * (np.sin(3.0 * x) + np.sin(3.0 * y))
 
-    grid = _lattice(36)
-    plan, faces = net(grid)
+    t = np.arange(-18, 19) / 18.0
+    plan, faces = net(np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1))
     union, halves = _triangles(plan, faces, True), _triangles(plan, faces, False)
-    core, core_faces = _refined(*square_core(), 17)
-    five, five_faces = _refined(*star(5), 16)
+    core, core_faces = even(*square_core(), 17)
+    five, five_faces = even(*star(5), 16)
     angle = 2.0 * np.pi * np.arange(72) / 72
     radius = np.linspace(0.4, 1.0, 15)[:, None]
     polar = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
@@ -49,16 +49,6 @@ def symmetric(seed: int = 0) -> list[Design]:
         _design("fifth turns, star of five", five, _round(a, wave), five_faces, [_turn(5)]),
         _design("quarter turns, ring", band, lambda *_: waves, band_faces, [_turn(4), MIRROR_X]),
     ]
-
-
-def _lattice(n: int) -> Array:
-    t = np.arange(-n // 2, n // 2 + 1) / (n / 2)
-    return np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1)
-
-
-def _refined(points: Array, faces: Ints, n: int) -> tuple[Array, Ints]:
-    plan, quads = refined(points, faces, n)
-    return relaxed(plan, quads, n), quads
 
 
 def _triangles(plan: Array, faces: Ints, four: bool) -> Ints:
@@ -86,7 +76,7 @@ def _turn(count: int) -> Array:
 
 def _design(name: str, plan: Array, height, faces: Ints, motions: list[Array]) -> Design:
     """A mesh whose vertices are symmetric to rounding, with the images found by place."""
-    points = lifted(plan, height(*plan.T))
+    points = np.c_[plan, height(*plan.T)]
     tree = cKDTree(points)
     images = [tree.query(points @ m.T)[1] for m in motions]
     mesh = gso.Mesh(points, faces)

@@ -7,6 +7,7 @@ squared norm it is.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -78,22 +79,24 @@ def _rooted(loss: Loss, r: Array) -> tuple[Array, Array]:
     same = np.eye(len(r))[:, :, None]
     if isinstance(loss, Squared):
         return r, np.broadcast_to(same, (len(r), *r.shape))
-    if isinstance(loss, Absolute):
-        root = np.sqrt(r * r + loss.eps**2)
-        factor = np.sqrt(2.0 / (root + loss.eps))
-        return r * factor, same * (factor * (1.0 - r * r / (2.0 * root * (root + loss.eps))))
-    if isinstance(loss, Distance):
-        root = np.sqrt((r * r).sum(axis=0) + loss.eps**2)
-        factor = np.sqrt(2.0 * loss.eps / (root + loss.eps))
-        return r * factor, factor * (same - r[:, None] * r / (2.0 * root * (root + loss.eps)))
-    raise TypeError(f"{type(loss).__name__} is no loss that this bench knows as a sum of squares")
+    root, factor = _factor(loss, r, np.sqrt, lambda squares: squares.sum(axis=0))
+    outer = r[:, None] * r * (same if isinstance(loss, Absolute) else 1.0)
+    return r * factor, factor * (same - outer / (2.0 * root * (root + loss.eps)))
+
+
+def _factor(loss: Loss, r: Any, sqrt: Callable[[Any], Any], total: Callable[[Any], Any]) -> Any:
+    """Return the smoothed size of residuals, and the factor that makes squares of them the loss."""
+    if not isinstance(loss, Absolute | Distance):
+        raise TypeError(f"{type(loss).__name__} is no loss that this bench knows as sum of squares")
+    single = isinstance(loss, Absolute)
+    root = sqrt((r * r if single else total(r * r)) + loss.eps**2)
+    return root, sqrt(2.0 * (1.0 if single else loss.eps) / (root + loss.eps))
 
 
 def expressions(problem: Problem) -> tuple[Any, Any]:
     """Return CasADi symbols of the unknowns, and :func:`residuals` as their expression."""
-    import casadi
+    import casadi as ca
 
-    ca: Any = casadi
     variables, quadratic = problem.variables, problem._quadratic
     x = ca.MX.sym("x", variables.size)
     coordinates = x
@@ -107,7 +110,9 @@ def expressions(problem: Problem) -> tuple[Any, Any]:
         )
         point, constants = ca.SX.sym("p", k), ca.SX.sym("c", len(element.constants))
         weight = ca.SX.sym("w")
-        rooted = _rooted_casadi(element.item.loss, one(point, constants))
+        loss, rooted = element.item.loss, one(point, constants)
+        if not isinstance(loss, Squared):
+            rooted *= _factor(loss, rooted, ca.sqrt, ca.sum1)[1]
         each = ca.Function("each", [point, constants, weight], [weight * rooted], {"cse": True})
         gathered = ca.reshape(coordinates[element.gather.T.ravel().tolist()], k, count)
         weights = np.sqrt(element.item.weight * element.weights)[None]
@@ -115,23 +120,9 @@ def expressions(problem: Problem) -> tuple[Any, Any]:
     return x, ca.vertcat(*parts)
 
 
-def _rooted_casadi(loss: Loss, r: Any) -> Any:
-    import casadi
-
-    ca: Any = casadi
-    if isinstance(loss, Squared):
-        return r
-    if isinstance(loss, Absolute):
-        return r * ca.sqrt(2.0 / (ca.sqrt(r * r + loss.eps**2) + loss.eps))
-    if isinstance(loss, Distance):
-        return r * ca.sqrt(2.0 * loss.eps / (ca.sqrt(ca.sumsqr(r) + loss.eps**2) + loss.eps))
-    raise TypeError(f"{type(loss).__name__} is no loss that this bench knows as a sum of squares")
-
-
 def _matrix(sparse: Any) -> Any:
-    import casadi
+    import casadi as ca
 
-    ca: Any = casadi
     columns = sparse.tocsc()
     columns.sort_indices()
     pattern = ca.Sparsity(*columns.shape, columns.indptr.tolist(), columns.indices.tolist())

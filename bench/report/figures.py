@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from harness import BENCH
 from numpy.typing import NDArray
 
 from gso import geometry, metrics
@@ -21,10 +21,8 @@ from gso.plot.heat import Heat, Scale, curvatures, distance, strain
 from gso.plot.view import View
 from report.examples import Example
 from report.method import TASKS
-from report.methods import of
 from report.published import CHOSEN
 from report.quality import Records
-from report.surfaces import BENCH
 from report.timing import METHODS, PHASES, Timing, exponent
 
 Array = NDArray[np.float64]
@@ -44,9 +42,26 @@ _TOP = 99.0
 class Figure:
     """A picture and its caption; without a picture the caption says why there is none."""
 
-    number: str
     caption: str
     path: Path | None = None
+
+
+def drawn(
+    folder: Path,
+    records: Records,
+    times: Sequence[Timing],
+    examples: dict[tuple[str, float], list[Example]],
+) -> dict[str, list[Figure]]:
+    """Draw every figure into a folder, and return them by the names of the report's template."""
+    noisy = [(sigma, some) for (task, sigma), some in examples.items() if task == "denoise"]
+    return {
+        "5": [figure_5(folder)],
+        "6": [figure_6(folder, records)],
+        "7": [*figure_7(folder, examples["developable", 0.0])],
+        "8": [*figure_8(folder, examples["flatten", 0.0])],
+        "9": [figure for sigma, some in noisy for figure in figure_9(folder, sigma, some)],
+        "time": [time_against_size(folder, times), shares(folder, times)],
+    }
 
 
 def intervals(records: Records, metric: str, name: str) -> list[dict[str, float]]:
@@ -66,7 +81,7 @@ def figure_5(folder: Path) -> Figure:
     """Plot loss against parameters of nets of several sizes, from the stored runs."""
     text = "Figure 5: loss of nets supervised on the optimiser's results, against their size"
     if not GRID.exists():
-        return Figure("5", f"{text}. Not run yet: {GRID_COMMAND}")
+        return Figure(f"{text}. Not run yet: {GRID_COMMAND}")
     stored = json.loads(GRID.read_text())
     rows, command = stored["rows"], stored["command"]
     canvas, axes = _canvas(1)
@@ -80,15 +95,23 @@ def figure_5(folder: Path) -> Figure:
     axes[0].set(xlabel="million parameters", ylabel="loss", xscale="log", yscale="log")
     axes[0].legend(fontsize=8)
     text += f"; the line: the paper's choice. Made by {command}"
-    return _written(canvas, folder / "figure-5.png", "5", text)
+    return _written(canvas, folder / "figure-5.png", text)
+
+
+def curves(records: Records) -> dict[str, dict[str, list[dict[str, float]]]]:
+    """Return the curves of figure 6, by metric and method."""
+    known = [name for name in CURVES if ("developable", 0.0, name) in records]
+    return {
+        metric: {name: intervals(records, metric, name) for name in known}
+        for metric in ("K_A_r_worst", "d_H")
+    }
 
 
 def figure_6(folder: Path, records: Records) -> Figure:
     """Plot curvature removed and distance against intervals of the input's curvature."""
     canvas, axes = _canvas(2)
-    for name in (n for n in CURVES if not of("developable", n).absent()):
-        for ax, metric in zip(axes, ("K_A_r_worst", "d_H"), strict=True):
-            found = intervals(records, metric, name)
+    for ax, lines in zip(axes, curves(records).values(), strict=True):
+        for name, found in lines.items():
             label = f"{name}, {sum(f['count'] for f in found):,} surfaces"
             middle = [(f["from"] + f["to"]) / 2 for f in found]
             ax.plot(middle, [f["mean"] for f in found], "o-", markersize=3, label=label)
@@ -96,83 +119,52 @@ def figure_6(folder: Path, records: Records) -> Figure:
     axes[1].set(xlabel="mean |K| of the input", ylabel="d_H %, lower is better")
     axes[0].legend(fontsize=8)
     text = "Figure 6: share of curvature removed, and distance, by the curvature of the input"
-    return _written(canvas, folder / "figure-6.png", "6", text)
+    return _written(canvas, folder / "figure-6.png", text)
 
 
-def figure_7(folder: Path, examples: Iterable[Example]) -> list[Figure]:
+def figure_7(folder: Path, examples: Iterable[Example]) -> Iterator[Figure]:
     """Draw developable surfaces: curvature before and after, and distance."""
-    found = []
     for k, example in enumerate(examples):
-        design = Mesh.from_grid(example.case.surface, weld=False)
-        meshes = [_mesh(design, points) for points in example.results.values()]
-        view = View.of(design)
-        panels = [Panel(view.project(m.vertices), m.faces) for m in (design, *meshes)]
+        design, meshes = _meshes(example)
         size = metrics.unit(design)
-        for panel, heat, mesh in zip(
-            panels, curvatures([design, *meshes]), (design, *meshes), strict=True
-        ):
-            panel.heat, panel.title = heat, f"|K| {metrics.loss_gc_worst(mesh, scale=size):.3f}"
-        for panel, name in zip(panels, ("input", *example.results), strict=True):
-            panel.title = f"{name}: {panel.title}"
-        caption = f"Figure 7: surface {example.number}, Gaussian curvature before and after"
-        found.append(_drawn(panels, folder / f"figure-7-{k}-curvature.png", "7", caption))
-        heats = _shared([distance(design, m) for m in meshes])
-        panels = [
-            Panel(view.project(m.vertices), m.faces, f"{name}: {heat.summary}", heat)
-            for name, m, heat in zip(example.results, meshes, heats, strict=True)
+        every = {"input": design, **meshes}
+        heats = [
+            replace(heat, summary=f"|K| {metrics.loss_gc_worst(mesh, scale=size):.3f}")
+            for heat, mesh in zip(curvatures([*every.values()]), every.values(), strict=True)
         ]
+        caption = f"Figure 7: surface {example.number}, Gaussian curvature before and after"
+        panels = _panels(design, every, heats)
+        yield _drawn(panels, folder / f"figure-7-{k}-curvature.png", caption)
+        panels = _panels(design, meshes, _shared([distance(design, m) for m in meshes.values()]))
         caption = f"Figure 7: surface {example.number}, distance to the input"
-        found.append(_drawn(panels, folder / f"figure-7-{k}-distance.png", "7", caption))
-    return found
+        yield _drawn(panels, folder / f"figure-7-{k}-distance.png", caption)
 
 
-def figure_8(folder: Path, examples: Iterable[Example]) -> list[Figure]:
+def figure_8(folder: Path, examples: Iterable[Example]) -> Iterator[Figure]:
     """Draw flat images: the published isometry defect and the strain of every cell."""
-    found = []
     for k, example in enumerate(examples):
         design = Mesh.from_grid(example.case.surface, weld=False)
         flat = {name: p.reshape(-1, 2) for name, p in example.results.items()}
-        kinds: dict[str, Callable[[Array], Heat]] = {
-            "isometry": partial(_defect, design),
-            "strain": partial(strain, design),
-        }
-        for kind, heat_of in kinds.items():
-            heats = _shared([heat_of(image) for image in flat.values()])
+        for kind, heat_of in (("isometry", _defect), ("strain", strain)):
+            heats = _shared([heat_of(design, image) for image in flat.values()])
             panels = [
-                Panel(
-                    _laid(design, image),
-                    design.faces,
-                    f"{name}: {heat.summary}",
-                    heat,
-                    shaded=False,
-                )
-                for (name, image), heat in zip(flat.items(), heats, strict=True)
+                Panel(_laid(design, x), design.faces, f"{name}\n{h.summary}", h, shaded=False)
+                for (name, x), h in zip(flat.items(), heats, strict=True)
             ]
             caption = f"Figure 8: surface {example.number}, {kind} of the cells"
-            found.append(_drawn(panels, folder / f"figure-8-{k}-{kind}.png", "8", caption))
-    return found
+            yield _drawn(panels, folder / f"figure-8-{k}-{kind}.png", caption)
 
 
-def figure_9(folder: Path, examples: dict[float, list[Example]]) -> list[Figure]:
-    """Draw denoised surfaces at every level: angles of the cells' normals to the clean ones."""
-    found = []
-    for sigma, some in examples.items():
-        for example in some:
-            clean = Mesh.from_grid(example.case.surface, weld=False)
-            view = View.of(clean)
-            noisy = _mesh(clean, example.case.given)
-            panel = Panel(view.project(noisy.vertices), noisy.faces, f"sigma {sigma:.3f}")
-            panel.light = GRAZING
-            meshes = [_mesh(clean, points) for points in example.results.values()]
-            heats = _shared([_angles(clean, m) for m in meshes])
-            panels = [panel] + [
-                Panel(view.project(m.vertices), m.faces, f"{name}: {heat.summary}", heat)
-                for name, m, heat in zip(example.results, meshes, heats, strict=True)
-            ]
-            caption = f"Figure 9: surface {example.number} with noise {sigma:.3f}, and denoised"
-            path = folder / f"figure-9-{sigma:.3f}.png"
-            found.append(_drawn(panels, path, "9", caption))
-    return found
+def figure_9(folder: Path, sigma: float, examples: Iterable[Example]) -> Iterator[Figure]:
+    """Draw surfaces with noise and denoised: angles of the cells' normals to the clean ones."""
+    for example in examples:
+        clean, meshes = _meshes(example)
+        noisy = View.of(clean).project(example.case.given.reshape(-1, 3))
+        heats = _shared([_angles(clean, m) for m in meshes.values()])
+        panels = [Panel(noisy, clean.faces, f"sigma {sigma:.3f}", light=GRAZING)]
+        caption = f"Figure 9: surface {example.number} with noise {sigma:.3f}, and denoised"
+        path = folder / f"figure-9-{sigma:.3f}.png"
+        yield _drawn([*panels, *_panels(clean, meshes, heats)], path, caption)
 
 
 def time_against_size(folder: Path, timings: Sequence[Timing]) -> Figure:
@@ -196,7 +188,7 @@ def time_against_size(folder: Path, timings: Sequence[Timing]) -> Figure:
         ax.minorticks_off()
         ax.legend(fontsize=8)
     text = "Time against size; dotted: one numeric factorisation per iteration, nothing else"
-    return _written(canvas, folder / "time.png", "Time", text)
+    return _written(canvas, folder / "time.png", text)
 
 
 def shares(folder: Path, timings: Sequence[Timing]) -> Figure:
@@ -213,11 +205,23 @@ def shares(folder: Path, timings: Sequence[Timing]) -> Figure:
     axes[0].set_xticks(range(len(some)), labels, rotation=90, fontsize=7)
     axes[0].set(ylabel="% of the time")
     axes[0].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return _written(canvas, folder / "shares.png", "Shares", "Where the time of a solve goes")
+    return _written(canvas, folder / "shares.png", "Where the time of a solve goes")
 
 
-def _mesh(design: Mesh, points: Array) -> Mesh:
-    return design.replaced(points.reshape(-1, 3))
+def _meshes(example: Example) -> tuple[Mesh, dict[str, Mesh]]:
+    """Return the design of an example, and the results by method."""
+    design = Mesh.from_grid(example.case.surface, weld=False)
+    results = example.results.items()
+    return design, {name: design.replaced(points.reshape(-1, 3)) for name, points in results}
+
+
+def _panels(design: Mesh, meshes: dict[str, Mesh], heats: Iterable[Heat]) -> list[Panel]:
+    """Return panels of surfaces, all seen as the design is, with their names and summaries."""
+    view = View.of(design)
+    return [
+        Panel(view.project(mesh.vertices), mesh.faces, f"{name}\n{heat.summary}", heat)
+        for (name, mesh), heat in zip(meshes.items(), heats, strict=True)
+    ]
 
 
 def _defect(design: Mesh, flat: Array) -> Heat:
@@ -251,13 +255,11 @@ def _laid(design: Mesh, flat: Array) -> Array:
     return np.c_[points @ axes.T, np.zeros(len(points))]
 
 
-def _drawn(panels: list[Panel], path: Path, number: str, caption: str) -> Figure:
-    for panel in panels:
-        panel.title = panel.title.replace(": ", "\n", 1)
+def _drawn(panels: list[Panel], path: Path, caption: str) -> Figure:
     figure = draw(panels)
     for ax in figure.axes:
         ax.title.set_fontsize(8)
-    return _written(figure, path, number, caption)
+    return _written(figure, path, caption)
 
 
 def _canvas(count: int, width: float = 0.0) -> tuple[Any, list[Any]]:
@@ -269,7 +271,7 @@ def _canvas(count: int, width: float = 0.0) -> tuple[Any, list[Any]]:
     return canvas, list(np.atleast_1d(canvas.subplots(1, count)))
 
 
-def _written(canvas: Any, path: Path, number: str, caption: str) -> Figure:
+def _written(canvas: Any, path: Path, caption: str) -> Figure:
     path.parent.mkdir(parents=True, exist_ok=True)
     canvas.savefig(path, dpi=90)
-    return Figure(number, caption, path)
+    return Figure(caption, path)

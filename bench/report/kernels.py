@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from unittest.mock import patch
 
 from gso.solver.loops import VARIABLE
 from report import store
@@ -50,13 +51,5 @@ def key(choice: str = "") -> str:
 @contextmanager
 def chosen(choice: str) -> Iterator[None]:
     """Solve with the kernels that a value of the environment variable names; "" changes nothing."""
-    before = os.environ.get(VARIABLE)
-    if choice:
-        os.environ[VARIABLE] = choice
-    try:
+    with patch.dict(os.environ, {VARIABLE: choice} if choice else {}):
         yield
-    finally:
-        if before is not None:
-            os.environ[VARIABLE] = before
-        elif choice:
-            del os.environ[VARIABLE]

@@ -12,8 +12,10 @@ import sys
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -98,37 +100,31 @@ def solve(task: str, method: str, model: str, points: np.ndarray) -> Any:
     if method == "Net":
         return gso.net.predict(points, task=task, model=model)
     if method == "hybrid":
-        from gso import hybrid
-
-        return hybrid.solve(points, task=task, net=model)
+        return gso.hybrid.solve(points, task=task, net=model)
     return gso.tno.optimize(points, task=task, verdict=False)
 
 
 def shares(run: Callable[[], Any]) -> dict[str, Any]:
     """Measure the share of each phase of a solve, and the time of its factorisations alone."""
     clock, stages = Clock(), list[Factored]()
+    analysed = clock.timed("setup", linalg.choose)
 
     def chosen(pattern: linalg.Pattern, name: str | None = None) -> Factored:
         stages.append(Factored(pattern, analysed(pattern, name), clock))
         return stages[-1]
 
-    analysed = clock.timed("setup", linalg.choose)
-    places: list[tuple[Any, str, Callable[..., Any]]] = [
-        (linalg, "choose", chosen),
-        (kernels.Kernel, "__call__", clock.timed("evaluation", kernels.Kernel.__call__)),
-        (problem.Problem, "energy", clock.timed("evaluation", problem.Problem.energy)),
-        (problem.Problem, "linearise", clock.timed("assembly", problem.Problem.linearise)),
-    ]
-    before = [(owner, name, getattr(owner, name)) for owner, name, _ in places]
-    try:
-        for owner, name, function in places:
-            setattr(owner, name, function)
+    with ExitStack() as stack:
+        stack.enter_context(patch.object(linalg, "choose", chosen))
+        for owner, name, phase in (
+            (kernels.Kernel, "__call__", "evaluation"),
+            (problem.Problem, "energy", "evaluation"),
+            (problem.Problem, "linearise", "assembly"),
+        ):
+            function = clock.timed(phase, getattr(owner, name))
+            stack.enter_context(patch.object(owner, name, function))
         start = time.perf_counter()
         result = run()
         total = time.perf_counter() - start
-    finally:
-        for owner, name, function in before:
-            setattr(owner, name, function)
     spent = dict(clock.spent)
     # A net alone returns an array, and all of its time is the net's.
     net = total if isinstance(result, np.ndarray) else result.seconds.get("net")
@@ -144,18 +140,12 @@ def limit(result: Any, stages: list[Factored]) -> dict[str, Any]:
     history = getattr(result, "history", [])
     done = Counter(entry.stage for entry in history if entry.iteration > 0)
     iterations = [done[stage] for stage in sorted({entry.stage for entry in history})]
-    if not stages or len(iterations) != len(stages):
-        return {"limit": None, "factorisations": sum(s.count for s in stages)}
-    seconds, backend = 0.0, ""
-    for count, stage in zip(iterations, stages):
-        if stage.count:
-            fastest, backend = _fastest(stage)
-            seconds += count * fastest
-    return {
-        "limit": seconds,
-        "factorisations": sum(stage.count for stage in stages),
-        "fastest": backend,
-    }
+    found = {"limit": None, "factorisations": sum(stage.count for stage in stages)}
+    if stages and len(iterations) == len(stages):
+        used = [(n, *_fastest(stage)) for n, stage in zip(iterations, stages) if stage.count]
+        found["limit"] = sum(n * seconds for n, seconds, _ in used)
+        found["fastest"] = used[-1][2] if used else ""
+    return found
 
 
 def _fastest(stage: Factored) -> tuple[float, str]:
@@ -198,12 +188,8 @@ def main(
         start = time.perf_counter()
         result = run()
         seconds.append(time.perf_counter() - start)
-    found = {
-        "seconds": seconds,
-        "iterations": getattr(result, "iterations", 0),
-        "backend": getattr(result, "backend", ""),
-        "peak_mb": peak_mb(),
-    }
+    found = {k: getattr(result, k, none) for k, none in (("iterations", 0), ("backend", ""))}
+    found["peak_mb"] = peak_mb()
     last = shares(run)
     return found | last | {"seconds": [*seconds, last["seconds"]]}
 

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,12 @@ TASKS = ("developable", "flatten", "denoise")
 #: Parameters of the peers by task, method and level of noise; made by ``--tune``.
 TUNED = Path(__file__).with_name("tuned.json")
 
+#: Parts of the package that the metrics of a peer's result depend on.
+_MEASURES = ("geometry", "mesh", "metrics", "tasks")
 #: Files that define the inputs and the metrics of the results.
 _MEASURED = tuple(Path(__file__).with_name(name) for name in ("quality.py", "surfaces.py"))
 _CORE = ("numpy", "scipy", "casadi", "libigl", "cvxopt", "pypardiso")
+_TORCH = ("torch", "safetensors")
 
 
 @dataclass(frozen=True)
@@ -65,8 +69,6 @@ class Method:
     candidates : tuple of dict
         Parameters from which the best are chosen, for each level of the noise, on surfaces that
         are not part of the report.
-    files : tuple of Path
-        Source files of the method.
     solver : bool
         Whether the results of a peer depend on the package's solver.
     kernels : bool
@@ -84,7 +86,6 @@ class Method:
     needs: tuple[str, ...] = ()
     net: str = ""
     candidates: tuple[dict[str, Any], ...] = ()
-    files: tuple[Path, ...] = ()
     solver: bool = False
     kernels: bool = False
     refused: str = ""
@@ -115,24 +116,41 @@ class Method:
             return f"with none of {len(self.candidates)} settings better than its input"
         return ""
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Source files: that of the function, and the objective for other solvers."""
+        file = Path(getattr(self.run, "func", self.run).__code__.co_filename)
+        return (file, file.with_name("energy.py")) if self.solver else (file,)
+
     def missing(self) -> list[str]:
         """Return the packages that it needs and that are not installed."""
         return [name for name, found in store.installed(self.needs).items() if not found]
 
     def key(self, sigma: float) -> dict[str, Any]:
         """Return everything that its results depend on."""
+        apart = self.peer and not self.solver
         key = {
             "method": self.name,
             "sigma": sigma,
             "parameters": self.parameters(sigma),
             "packages": store.installed((*_CORE, *self.needs)),
-            "measures": store.measures() if self.peer and not self.solver else store.solver(),
+            "measures": store.package(*_MEASURES) if apart else store.solver(),
             "files": store.source(*self.files, *_MEASURED),
         }
         if self.net:
-            needs = store.installed(("torch", "safetensors"))
-            key |= {"net": _weights(self.net), "code": store.nets(), "needs": needs}
+            needs, code = store.installed(_TORCH), store.package("net", "hybrid")
+            key |= {"net": _weights(self.net), "code": code, "needs": needs}
         return key
+
+
+def combinations(**ranges: Any) -> tuple[dict[str, Any], ...]:
+    """Return parameters for every combination; what is no tuple is the same in all of them.
+
+    >>> combinations(order=3, window=(5, 7))
+    ({'order': 3, 'window': 5}, {'order': 3, 'window': 7})
+    """
+    choices = (values if isinstance(values, tuple) else (values,) for values in ranges.values())
+    return tuple(dict(zip(ranges, chosen, strict=True)) for chosen in product(*choices))
 
 
 def level_name(sigma: float) -> str:
@@ -152,7 +170,7 @@ def tuned() -> dict[str, Any]:
 
 def shipped() -> list[str]:
     """Return the nets that come with the package; none where torch is not installed."""
-    return catalogue.available() if all(store.installed(("torch", "safetensors")).values()) else []
+    return catalogue.available() if all(store.installed(_TORCH).values()) else []
 
 
 def _weights(name: str) -> list[str]:

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import replace
-from functools import cache, partial
-from pathlib import Path
+from functools import cache
 from typing import Any
 
 import gso
-from gso import hybrid
 from gso.net import tasks as net_tasks
 from gso.parametrization import rectangle
 from report.method import TASKS, Method, Solved
 from report.surfaces import Case
 
-_HERE = (Path(__file__),)
 _PEERS = ("peers_flatten", "peers_developable", "peers_denoise")
 #: Tasks that the optimiser solves with kernels; denoising is in closed form.
 KERNELS = ("developable", "flatten")
@@ -30,72 +27,63 @@ def _solved(result: gso.Result) -> Solved:
     return Solved(grid, result.iterations)
 
 
-def _tno(task: str, case: Case, **options: Any) -> Solved:
-    return _solved(gso.tno.optimize(case.given, task=task, verdict=False, **options))
+def _tno(name: str, task: str, note: str = "", pace: str = "fast", **options: Any) -> Method:
+    def run(case: Case) -> Solved:
+        return _solved(gso.tno.optimize(case.given, task=task, verdict=False, **options))
+
+    return Method(name, task, run, pace=pace, note=note, kernels=task in KERNELS)
 
 
-def _net(task: str, case: Case, model: str) -> Solved:
-    return Solved(gso.net.predict(case.given, task=task, model=model, device="cpu"))
+def _net(name: str, task: str, model: str, note: str = "") -> Method:
+    def run(case: Case, model: str) -> Solved:
+        return Solved(gso.net.predict(case.given, task=task, model=model, device="cpu"))
+
+    return Method(name, task, run, net=model, note=note)
 
 
-def _hybrid(task: str, case: Case, model: str) -> Solved:
-    result = hybrid.solve(case.given, task=task, net=model)
-    return replace(_solved(result), more=lambda: {"warm": float(result.warm_start == "net")})
+def _hybrid(task: str) -> Method:
+    def run(case: Case, model: str) -> Solved:
+        result = gso.hybrid.solve(case.given, task=task, net=model)
+        return replace(_solved(result), more=lambda: {"warm": float(result.warm_start == "net")})
+
+    kind, note = net_tasks.get(task), "the default net, then the optimiser"
+    refused = "" if kind.warm_start else "a closed form has no start to improve"
+    kernels = task in KERNELS
+    return Method(
+        "hybrid", task, run, net=kind.default, note=note, kernels=kernels, refused=refused
+    )
 
 
 def _init(case: Case) -> Solved:
     return Solved(rectangle(case.given))
 
 
-def _own() -> list[Method]:
-    def tno(name: str, task: str, pace: str = "fast", note: str = "", **options: Any) -> Method:
-        run = partial(_tno, task, **options)
-        used = task in KERNELS
-        return Method(name, task, run, pace=pace, note=note, files=_HERE, kernels=used)
-
-    def net(name: str, task: str, model: str, note: str = "") -> Method:
-        return Method(name, task, partial(_net, task), net=model, note=note, files=_HERE)
-
-    found = [
-        tno("TNO jiang2020", "developable", "slow", "joint isometry", options="jiang2020"),
-        tno("TNO fast", "developable", options="fast"),
-        tno("TNO balanced", "developable", note="the default"),
-        tno("TNO accurate", "developable", "slow", options="accurate"),
-        net("Net-S", "developable", "net-s"),
-        net("Net-C", "developable", "net-c"),
-        net("Net-CF", "developable", "net-cf"),
-        net("Net", "developable", "developable", "the default net"),
-        Method("Init", "flatten", _init, note="the rectangle nets start from", files=_HERE),
-        tno("TNO jiang2020", "flatten", note="isometry of the faces", options="jiang2020"),
-        tno("TNO lengths", "flatten", note="the published figure", formulation="lengths"),
-        tno("TNO strain", "flatten", note="the default"),
-        net("Net", "flatten", "flatten"),
-        net("Net-W", "flatten", "flatten-w"),
-        net("Net strain", "flatten", "flatten-strain", "the default net"),
-        tno("TNO", "denoise", note="is told nothing of the noise"),
-        net("Net", "denoise", "denoise", "the default net; estimates the noise"),
-    ]
-    for task in TASKS:
-        kind = net_tasks.get(task)
-        found.append(
-            Method(
-                "hybrid",
-                task,
-                partial(_hybrid, task),
-                net=kind.default,
-                note="the default net, then the optimiser",
-                kernels=task in KERNELS,
-                refused="" if kind.warm_start else "a closed form has no start to improve",
-                files=_HERE,
-            )
-        )
-    return found
+METHODS = [
+    _tno("TNO jiang2020", "developable", "joint isometry", "slow", options="jiang2020"),
+    _tno("TNO fast", "developable", options="fast"),
+    _tno("TNO balanced", "developable", "the default"),
+    _tno("TNO accurate", "developable", pace="slow", options="accurate"),
+    _net("Net-S", "developable", "net-s"),
+    _net("Net-C", "developable", "net-c"),
+    _net("Net-CF", "developable", "net-cf"),
+    _net("Net", "developable", "developable", "the default net"),
+    Method("Init", "flatten", _init, note="the rectangle nets start from"),
+    _tno("TNO jiang2020", "flatten", "isometry of the faces", options="jiang2020"),
+    _tno("TNO lengths", "flatten", "the published figure", formulation="lengths"),
+    _tno("TNO strain", "flatten", "the default"),
+    _net("Net", "flatten", "flatten"),
+    _net("Net-W", "flatten", "flatten-w"),
+    _net("Net strain", "flatten", "flatten-strain", "the default net"),
+    _tno("TNO", "denoise", "is told nothing of the noise"),
+    _net("Net", "denoise", "denoise", "the default net; estimates the noise"),
+    *map(_hybrid, TASKS),
+]
 
 
 @cache
 def methods() -> dict[tuple[str, str], Method]:
     """Return every method by task and name."""
-    every = _own()
+    every = [*METHODS]
     for module in _PEERS:
         every += importlib.import_module(f"report.{module}").METHODS
     return {(method.task, method.name): method for method in every}

@@ -1,40 +1,21 @@
-"""The report as Markdown and as one self-contained HTML file."""
+"""The report as Markdown, and the same as one self-contained HTML file."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from report import kernels
 from report.figures import Figure
-from report.sections import HEADINGS, SECTIONS, Row
+from report.published import INPUT
 from report.timing import PHASES, Timing, exponent
-from report.verdict import Loss
+from report.verdict import against_limit
 
-_TEMPLATE = Path(__file__).with_name("page.html")
 _SOURCES = {"paper": "paper", "package": "gso", "peer": "peer"}
-
-
-@dataclass
-class Table:
-    """Cells as text; `kinds` gives the source of each row: paper, package or peer."""
-
-    head: list[str]
-    rows: list[list[str]]
-    kinds: list[str]
-
-
-@dataclass
-class Chapter:
-    """A chapter of the report."""
-
-    title: str
-    text: list[str] = field(default_factory=list)
-    items: list[str] = field(default_factory=list)
-    table: Table | None = None
-    figures: Sequence[Figure] = ()
+Cells = Sequence[str]
 
 
 def number(value: float | None) -> str:
@@ -53,51 +34,61 @@ def duration(seconds: float | None) -> str:
     return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
 
 
-def quality_table(columns: Sequence[str], rows: Sequence[Row]) -> Table:
-    """Return a table of quality and time; times with NumPy kernels only if there are any."""
-    both = any(row.seconds_numpy for row in rows)
-    times = ["time", "10 to 90 %", *(["time, NumPy"] if both else [])]
-    head = ["", "method", *(HEADINGS[c] for c in columns), *times, "iterations"]
-    cells = []
-    for row in rows:
-        # The paper does not publish all figures.
-        blank = "not given" if row.source == "paper" else ""
-        figures = [number(row.figures.get(c)) or blank for c in columns]
-        time = duration(row.seconds.get("median")) or blank
-        spread, again = "", ""
-        if "p10" in row.seconds:
-            low, high, count = (row.seconds[k] for k in ("p10", "p90", "count"))
-            spread = f"{duration(low)} to {duration(high)} of {count:.0f}"
-        if row.seconds_numpy:
-            again = f"{duration(row.seconds_numpy['median'])} of {row.seconds_numpy['count']:.0f}"
-        if row.absent:
-            figures, time = ["–"] * len(columns), row.absent
-        count_text = f"{row.count:,}" if row.count else blank
-        last = [number(row.iterations), count_text, row.note]
-        spent = [time, spread, *([again] if both else [])]
-        cells.append([_SOURCES[row.source], row.name, *figures, *spent, *last])
-    return Table([*head, "surfaces", "note"], cells, [row.source for row in rows])
+def table(head: Cells, rows: Iterable[Cells]) -> str:
+    """Return a table in Markdown.
+
+    >>> print(table(["a", "b"], [["|x|", "1"]]))
+    | a | b |
+    | --- | --- |
+    | \\|x\\| | 1 |
+    """
+    lines = ([cell.replace("|", r"\|") for cell in row] for row in rows)
+    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *lines))
 
 
-def timing_table(timings: Sequence[Timing]) -> Table:
+def quality_table(section: Mapping[str, Any]) -> str:
+    """Return quality and time of a section; times with NumPy kernels only if there are any."""
+    both = any(row["seconds_numpy"] for row in section["rows"])
+    head = ["", "method", *section["headings"], "time", "10 to 90 %"]
+    head += [*(["time, NumPy"] if both else []), "iterations", "surfaces", "note"]
+    return table(head, [_quality(row, section["columns"], both) for row in section["rows"]])
+
+
+def _quality(row: Mapping[str, Any], columns: Cells, both: bool) -> Cells:
+    # The paper does not publish all figures.
+    blank = "not given" if row["source"] == "paper" else ""
+    figures = [number(row["figures"].get(c)) or blank for c in columns]
+    spent, again, spread = row["seconds"], row["seconds_numpy"], ""
+    time = duration(spent.get("median")) or blank
+    if "p10" in spent:
+        spread = f"{duration(spent['p10'])} to {duration(spent['p90'])} of {spent['count']:.0f}"
+    if row["absent"]:
+        figures, time = ["–"] * len(columns), row["absent"]
+    times = [time, spread]
+    if both:
+        times.append(f"{duration(again['median'])} of {again['count']:.0f}" if again else "")
+    count = f"{row['count']:,}" if row["count"] else blank
+    last = [number(row["iterations"]), count, row["note"]]
+    return [_SOURCES[row["source"]], row["name"], *figures, *times, *last]
+
+
+def timing_table(timings: Iterable[Timing]) -> str:
     """Return a table of time against size."""
     head = ["task", "method", "grid", "median", "fastest", "slowest", "solves", "iterations"]
     head += ["peak MB", *(f"{p} %" for p in PHASES), "limit", "time / limit", "backend"]
     rows = []
     for t in timings:
-        grid = f"{t.size} x {t.size}"
-        if t.absent:
-            rows.append([t.task, t.method, grid, t.absent] + [""] * (len(head) - 4))
-            continue
-        spread = [duration(v) for v in (t.median, min(t.seconds), max(t.seconds))]
-        parts = [f"{100.0 * t.shares[p]:.0f}" if p in t.shares else "" for p in PHASES]
-        bound = [duration(t.limit), number(t.median / t.limit) if t.limit else "", t.backend]
-        done = [str(len(t.seconds)), str(t.iterations or "")]
-        rows.append([t.task, t.method, grid, *spread, *done, f"{t.peak_mb:.0f}", *parts, *bound])
-    return Table(head, rows, ["package"] * len(rows))
+        row = [t.task, t.method, f"{t.size} x {t.size}", t.absent]
+        if t.seconds:
+            row[3:] = [duration(v) for v in (t.median, min(t.seconds), max(t.seconds))]
+            row += [str(len(t.seconds)), str(t.iterations or ""), f"{t.peak_mb:.0f}"]
+            row += [f"{100.0 * t.shares[p]:.0f}" if p in t.shares else "" for p in PHASES]
+            row += [duration(t.limit), number(t.median / t.limit) if t.limit else "", t.backend]
+        rows.append(row + [""] * (len(head) - len(row)))
+    return table(head, rows)
 
 
-def exponents(timings: Sequence[Timing]) -> list[str]:
+def exponents(timings: Iterable[Timing]) -> list[str]:
     """Return the fitted exponents as sentences."""
     groups: dict[tuple[str, str], list[Timing]] = {}
     for t in timings:
@@ -109,44 +100,50 @@ def exponents(timings: Sequence[Timing]) -> list[str]:
     ]
 
 
-def loss_items(losses: Sequence[Loss]) -> list[str]:
-    """Return the losses as sentences."""
-    titles = {section.name: section.title for section in SECTIONS}
-    return [f"{titles[loss.section]}. {loss}" for loss in losses]
-
-
-def markdown(title: str, chapters: Sequence[Chapter], folder: Path) -> str:
+def markdown(
+    title: str,
+    result: dict[str, Any],
+    times: Iterable[Timing],
+    figures: dict[str, list[Figure]],
+    folder: Path,
+) -> str:
     """Return the report as Markdown; paths of pictures are relative to the folder."""
-    parts = [f"# {title}"]
-    for chapter in chapters:
-        parts.append(f"## {chapter.title}")
-        parts += chapter.text
-        if chapter.items:
-            parts.append("\n".join(f"- {item}" for item in chapter.items))
-        if chapter.table is not None:
-            parts.append(_markdown_table(chapter.table))
-        for figure in chapter.figures:
-            if figure.path is not None:
-                place = figure.path.relative_to(folder).as_posix()
-                parts.append(f"![{figure.caption}]({place})")
-            parts.append(f"*{figure.caption}*")
-    return "\n\n".join(parts) + "\n"
+    packages = ", ".join(f"{k} {v}" for k, v in result["machine"]["packages"].items() if v)
+    context = {"title": title, "result": result, "times": times, "figures": figures}
+    context |= {"folder": folder, "packages": packages, "input": INPUT, "kernels": kernels}
+    context |= {"quality_table": quality_table, "timing_table": timing_table}
+    text = _template("page.md", context | {"limits": against_limit(times)})
+    blocks = re.split(r"\n\s*\n", text.strip())
+    # A paragraph has one line; lists and tables have one for each item.
+    return "\n\n".join(b if b[:2] in ("- ", "| ") else " ".join(b.split()) for b in blocks) + "\n"
 
 
-def _markdown_table(table: Table) -> str:
-    rows = [table.head, ["---"] * len(table.head), *table.rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", r"\|") for cell in r) + " |" for r in rows)
+def html(text: str, folder: Path) -> str:
+    """Return the report, Markdown, as one HTML file with embedded pictures of the folder."""
+    (_, title), *blocks = [_block(block, folder) for block in text.strip().split("\n\n")]
+    chapters = [content for mark, content in blocks if mark == "##"]
+    return _template("page.html", {"title": title, "chapters": chapters, "blocks": blocks})
 
 
-def html(title: str, chapters: Sequence[Chapter]) -> str:
-    """Return the report as one HTML file with embedded pictures."""
-    from jinja2 import Environment
+def _block(block: str, folder: Path) -> tuple[str, Any]:
+    """Return the mark at the start of a block of Markdown, and its content."""
+    mark, _, content = block.partition(" ")
+    if mark in ("#", "##"):
+        return mark, content
+    if mark == "-":
+        return mark, [line[2:] for line in block.splitlines()]
+    if mark == "|":
+        head, _, *rows = (line[2:-2].split(" | ") for line in block.splitlines())
+        return mark, [[cell.replace(r"\|", "|") for cell in row] for row in (head, *rows)]
+    if picture := re.fullmatch(r"!\[(.*)\]\((.*)\)", block):
+        data = base64.b64encode((folder / picture[2]).read_bytes()).decode()
+        return "!", (picture[1], f"data:image/png;base64,{data}")
+    return ("*", block[1:-1]) if block[0] == block[-1] == "*" else ("", block)
 
-    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["embedded"] = _embedded
-    template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
-    return template.render(title=title, chapters=chapters)
 
+def _template(name: str, context: dict[str, Any]) -> str:
+    from jinja2 import Environment, FileSystemLoader, select_autoescape
 
-def _embedded(path: Any) -> str:
-    return "data:image/png;base64," + base64.b64encode(Path(path).read_bytes()).decode()
+    loader, escaped = FileSystemLoader(Path(__file__).parent), select_autoescape()
+    found = Environment(loader=loader, autoescape=escaped, trim_blocks=True, lstrip_blocks=True)
+    return found.get_template(name).render(context)

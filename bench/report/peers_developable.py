@@ -8,8 +8,7 @@ along the design's normals, and the start is the design itself, without the coar
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+from functools import partial
 
 import numpy as np
 
@@ -20,7 +19,8 @@ from gso.solver import minimise
 from gso.solver.problem import Problem
 from report import energy
 from report.energy import last_problem
-from report.method import Array, Method, Solved
+from report.method import Array, Method, Solved, combinations
+from report.peers_denoise import meshlab
 from report.surfaces import Case
 
 #: Relative decrease of the objective at which each solver stops, and most iterations of each.
@@ -39,14 +39,35 @@ def _whole(case: Case) -> Solved:
     return Solved(np.asarray(result.grid), result.iterations, left)
 
 
-def _own(points: Array, problem: Problem, x: Array) -> tuple[Array, int, float]:
-    found = minimise(
-        problem, x, iterations=ITERATIONS, tolerance=TOLERANCE, method="levenberg-marquardt"
-    )
-    return _placed(points, problem, found.x), found.iterations, found.energy
+def _from_the_design(
+    solve: Callable[[Problem, Array], tuple[Array, int]],
+) -> Callable[[Case], Solved]:
+    """Return a solver of the problem as one of cases, in the frame of the design."""
+
+    def run(case: Case) -> Solved:
+        problem, start = last_problem(case.given, "developable", "balanced")
+        x, iterations = solve(problem, start)
+        frame = Canonical(Mesh.from_grid(case.given, weld=False))
+        at = frame.back("surface", problem.variables.points(x).reshape(-1, 3))
+        points = frame.frame.to_user(at).reshape(case.given.shape)
+        return Solved(
+            points,
+            iterations,
+            lambda: {"objective_ratio": problem.energy(x) / problem.energy(start)},
+        )
+
+    return run
 
 
-def _least_squares(points: Array, problem: Problem, x: Array) -> tuple[Array, int, float]:
+@_from_the_design
+def _own(problem: Problem, x: Array) -> tuple[Array, int]:
+    given = {"iterations": ITERATIONS, "tolerance": TOLERANCE, "method": "levenberg-marquardt"}
+    found = minimise(problem, x, **given)
+    return found.x, found.iterations
+
+
+@_from_the_design
+def _least_squares(problem: Problem, x: Array) -> tuple[Array, int]:
     from scipy.optimize import least_squares
 
     found = least_squares(
@@ -60,13 +81,13 @@ def _least_squares(points: Array, problem: Problem, x: Array) -> tuple[Array, in
         gtol=1e-12,
         max_nfev=ITERATIONS,
     )
-    return _placed(points, problem, found.x), int(found.nfev), problem.energy(found.x)
+    return found.x, int(found.nfev)
 
 
-def _ipopt(points: Array, problem: Problem, x: Array) -> tuple[Array, int, float]:
-    import casadi
+@_from_the_design
+def _ipopt(problem: Problem, x: Array) -> tuple[Array, int]:
+    import casadi as ca
 
-    ca: Any = casadi
     unknowns, value = energy.expressions(problem)
     slope = ca.jacobian(value, unknowns)
     factor, none = ca.MX.sym("lam_f"), ca.MX.sym("none", 0)
@@ -83,79 +104,35 @@ def _ipopt(points: Array, problem: Problem, x: Array) -> tuple[Array, int, float
     }
     aim = {"x": unknowns, "f": 0.5 * ca.sumsqr(value)}
     solver = ca.nlpsol("solver", "ipopt", aim, options)
-    at = np.asarray(solver(x0=x)["x"]).ravel()
-    return _placed(points, problem, at), solver.stats()["iter_count"], problem.energy(at)
-
-
-def _placed(points: Array, problem: Problem, x: Array) -> Array:
-    """Convert unknowns to a grid in the frame of the design."""
-    frame = Canonical(Mesh.from_grid(points, weld=False))
-    at = frame.back("surface", problem.variables.points(x).reshape(-1, 3))
-    return frame.frame.to_user(at).reshape(points.shape)
-
-
-def _from_the_design(
-    solve: Callable[[Array, Problem, Array], tuple[Array, int, float]],
-) -> Callable[[Case], Solved]:
-    def run(case: Case) -> Solved:
-        problem, x = last_problem(case.given, "developable", "balanced")
-        points, iterations, left = solve(case.given, problem, x)
-        return Solved(points, iterations, lambda: {"objective_ratio": left / problem.energy(x)})
-
-    return run
+    return np.asarray(solver(x0=x)["x"]).ravel(), solver.stats()["iter_count"]
 
 
 def _same(name: str, run: Callable[[Case], Solved], note: str, kernels: bool = True) -> Method:
-    return Method(
-        name,
-        "developable",
-        run,
-        peer=name in SAME_ENERGY[2:],
-        pace="peer",
-        note=note,
-        files=(Path(__file__), Path(energy.__file__)),
-        solver=True,
-        kernels=kernels,
-    )
-
-
-def _meshlab(case: Case, **parameters: float) -> Solved:
-    import pymeshlab
-
-    work = pymeshlab.MeshSet()
-    work.add_mesh(pymeshlab.Mesh(case.mesh.vertices, case.mesh.triangles.astype(np.int32)))
-    work.apply_filter(
-        "apply_coord_developability_of_mesh", edgeflips=False, edgecollapses=False, **parameters
-    )
-    return Solved(work.current_mesh().vertex_matrix().reshape(case.given.shape))
+    kind = {"peer": name in SAME_ENERGY[2:], "pace": "peer", "solver": True, "kernels": kernels}
+    return Method(name, "developable", run, note=note, **kind)
 
 
 METHODS = [
     _same(SAME_ENERGY[0], _whole, "coarse grids first"),
-    _same(SAME_ENERGY[1], _from_the_design(_own), "on the one grid, from the design"),
+    _same(SAME_ENERGY[1], _own, "on the one grid, from the design"),
     _same(
         SAME_ENERGY[2],
-        _from_the_design(_least_squares),
+        _least_squares,
         "SciPy: trust region, LSMR, the same Jacobian",
     ),
     _same(
         SAME_ENERGY[3],
-        _from_the_design(_ipopt),
+        _ipopt,
         "CasADi's expressions of the same terms, Gauss-Newton matrix; time with building them",
         kernels=False,
     ),
     Method(
         "MeshLab developability",
         "developable",
-        _meshlab,
+        partial(meshlab, "developability_of_mesh", edgeflips=False, edgecollapses=False),
         peer=True,
         note="Stein et al. 2018, of hinges; tuned",
         needs=("pymeshlab",),
-        candidates=tuple(
-            {"maxfunevals": count, "stepsize": step}
-            for count in (10, 50, 200)
-            for step in (1e-4, 1e-3, 1e-2)
-        ),
-        files=(Path(__file__),),
+        candidates=combinations(maxfunevals=(10, 50, 200), stepsize=(1e-4, 1e-3, 1e-2)),
     ),
 ]

@@ -7,7 +7,6 @@ the figures of the tables.
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
@@ -96,7 +95,7 @@ def _peer(name: str, map_of: Callable[[Mesh], Array], note: str, pace: str = "fa
         flat = map_of(case.mesh)
         return Solved(flat.reshape(*case.given.shape[:2], 2))
 
-    return Method(name, "flatten", run, peer=True, pace=pace, note=note, files=(Path(__file__),))
+    return Method(name, "flatten", run, peer=True, pace=pace, note=note)
 
 
 METHODS = [

@@ -84,27 +84,22 @@ def levels(task: str) -> tuple[float, ...]:
 
 def blocks(settings: Settings, surfaces: Surfaces) -> Iterator[Block]:
     """Yield everything that is to be measured."""
-    for task in TASKS:
-        for sigma in levels(task):
-            for method in (m for m in methods().values() if m.task == task):
-                if method.absent():
-                    continue
-                count = min(settings.counts[method.pace], len(surfaces))
-                timed = min(settings.timed, count)
-                whole = partial(Block, task, method.name, sigma, surfaces)
-                for start, stop in _parts(0, timed, _BLOCKS[method.pace]):
-                    yield whole(start, stop, True)
-                if method.kernels and kernels.compiled():
-                    again = min(settings.numpy.get(method.pace, 0), timed)
-                    for start, stop in _parts(0, again, _BLOCKS[method.pace]):
-                        yield whole(start, stop, True, numpy=True)
-                for start, stop in _parts(timed, count, _UNTIMED):
-                    yield whole(start, stop, False)
-
-
-def _parts(start: int, stop: int, size: int) -> list[tuple[int, int]]:
-    """Cut a range into parts of a size; the last may be smaller."""
-    return [(k, min(k + size, stop)) for k in range(start, stop, size)]
+    for method in sorted(methods().values(), key=lambda m: TASKS.index(m.task)):
+        if method.absent():
+            continue
+        count = min(settings.counts[method.pace], len(surfaces))
+        timed, size = min(settings.timed, count), _BLOCKS[method.pace]
+        both = method.kernels and kernels.compiled()
+        again = min(settings.numpy.get(method.pace, 0) if both else 0, timed)
+        for sigma in levels(method.task):
+            whole = partial(Block, method.task, method.name, sigma, surfaces)
+            for begin, end, step, kind in (
+                (0, timed, size, (True,)),
+                (0, again, size, (True, True)),
+                (timed, count, _UNTIMED, (False,)),
+            ):
+                for start in range(begin, end, step):
+                    yield whole(start, min(start + step, end), *kind)
 
 
 def measured(settings: Settings, surfaces: Surfaces, kept: Store, tick: Tick) -> Records:
@@ -152,27 +147,20 @@ _warm: set[tuple[str, str, bool]] = set()
 
 def measure(block: Block) -> list[Record]:
     """Measure the surfaces of a block."""
-    method = block.method
+    method, cases = block.method, partial(block.surfaces.case, sigma=block.sigma)
     with warnings.catch_warnings(), blas_threads(1), kernels.chosen(block.choice):
         warnings.simplefilter("ignore", ConvergenceWarning)
         if block.timed and (block.task, block.name, block.numpy) not in _warm:
-            _prepare(block)
+            _prepare(method, cases(block.start), block.numpy)
             _warm.add((block.task, block.name, block.numpy))
-        found = [
-            _record(method, block.surfaces.case(k, block.sigma))
-            for k in range(block.start, block.stop)
-        ]
+        found = [_record(method, cases(k)) for k in range(block.start, block.stop)]
     return found if block.timed else [record | {"seconds": None} for record in found]
 
 
-def _prepare(block: Block) -> None:
+def _prepare(method: Method, case: Case, numpy: bool) -> None:
     """Solve untimed for the work of the first use: imports, kernels, a net's weights."""
-    method, case = block.method, block.surfaces.case(block.start, block.sigma)
-    if method.pace == "fast":
-        _record(method, case)
-        return
-    _record(method, case.small)
-    if method.kernels and not block.numpy:
+    _record(method, case if method.pace == "fast" else case.small)
+    if method.pace != "fast" and method.kernels and not numpy:
         # Of the small case the kernels are not compiled, unless that is chosen.
         with kernels.chosen(kernels.NUMBA if kernels.compiled() else ""):
             _record(method, case.small)
@@ -204,21 +192,12 @@ def figures(task: str, case: Case, result: Array) -> dict[str, float]:
     from those without noise, in percent of the diagonal.
     """
     if task == "denoise":
-        return _denoised(case, result)
+        noisy, theta = (metrics.normal_angle(case.surface, x) for x in (case.given, result))
+        rate, off = 100.0 * (noisy - theta) / noisy, metrics.displacement(case.surface, result)[0]
+        return {"theta": theta, "theta_noisy": noisy, "rate": rate, "off": off}
     mesh = Mesh.from_grid(case.surface, weld=False)
     module, scale = tasks.get(task), metrics.unit(mesh)
     if task == "flatten":
         found = module.metrics(mesh, None, result.reshape(-1, 2), scale)
         return found | {"unflipped": float(found["flipped_cells"] == 0)}
     return module.metrics(mesh, mesh.replaced(result.reshape(-1, 3)), None, scale)
-
-
-def _denoised(case: Case, result: Array) -> dict[str, float]:
-    """Compare with the surface without noise, which the task's own metrics do not have."""
-    noisy, theta = (metrics.normal_angle(case.surface, x) for x in (case.given, result))
-    return {
-        "theta": theta,
-        "theta_noisy": noisy,
-        "rate": 100.0 * (noisy - theta) / noisy,
-        "off": metrics.displacement(case.surface, result)[0],
-    }

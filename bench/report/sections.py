@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -96,18 +96,20 @@ class Section:
         The paper's rows.
     only : tuple of str
         Names of its methods; empty for all methods of the task that are in no other section.
-    default : str
-        The method that the others are compared with.
     """
 
     name: str
     title: str
     task: str
     columns: tuple[str, ...]
-    published: dict[str, dict[str, float]]
+    published: dict[str, dict[str, float]] = field(default_factory=dict)
     sigma: float = 0.0
     only: tuple[str, ...] = ()
-    default: str = ""
+
+    @property
+    def default(self) -> str:
+        """The method that the others are compared with."""
+        return self.only[0] if self.only else DEFAULT[self.task]
 
     @property
     def main(self) -> str:
@@ -132,61 +134,23 @@ class Section:
 
 
 #: The published metrics use one triangulation of the quads, the others both.
-_DEVELOPABLE = (
-    "loss_gc",
-    "loss_gc_worst",
-    "loss_gc_half",
-    "K_A_r",
-    "K_A_r_worst",
-    "d_H",
-    "fairness_ratio",
-)
+_PUBLISHED = ("loss_gc", "loss_gc_worst", "loss_gc_half", "K_A_r", "K_A_r_worst", "d_H")
+_SAME = ("objective_ratio", *_PUBLISHED, "fairness_ratio")
+_SURFACES = (*_PUBLISHED, "fairness_ratio", "distance_mean")
+_FLAT = ("loss_iso_cell", "strain_mean", "strain_p99", "edge_length_error", "flipped_cells")
+
+
+def _denoised(sigma: float) -> Section:
+    name, title = f"denoise-{sigma:.3f}", f"Table 3: denoised surfaces, sigma {sigma:.3f}"
+    columns = (*GIVEN, "theta", "rate", "off")
+    return Section(name, title, "denoise", columns, {"Net": TABLE_3[sigma]}, sigma)
+
 
 SECTIONS = (
-    Section(
-        "developable",
-        "Table 1: developable surfaces",
-        "developable",
-        (*_DEVELOPABLE, "distance_mean"),
-        TABLE_1,
-        default=DEFAULT["developable"],
-    ),
-    Section(
-        "energy",
-        "The same objective, other solvers",
-        "developable",
-        ("objective_ratio", *_DEVELOPABLE),
-        {},
-        only=SAME_ENERGY,
-        default=SAME_ENERGY[0],
-    ),
-    Section(
-        "flatten",
-        "Table 2: flat images",
-        "flatten",
-        (
-            "loss_iso_cell",
-            "strain_mean",
-            "strain_p99",
-            "edge_length_error",
-            "flipped_cells",
-            "unflipped",
-        ),
-        TABLE_2,
-        default=DEFAULT["flatten"],
-    ),
-    *(
-        Section(
-            f"denoise-{level:.3f}",
-            f"Table 3: denoised surfaces, sigma {level:.3f}",
-            "denoise",
-            ("theta_noisy", "theta", "rate", "off"),
-            {"Net": TABLE_3[level]},
-            sigma=level,
-            default=DEFAULT["denoise"],
-        )
-        for level in LEVELS
-    ),
+    Section("developable", "Table 1: developable surfaces", "developable", _SURFACES, TABLE_1),
+    Section("energy", "The same objective, other solvers", "developable", _SAME, only=SAME_ENERGY),
+    Section("flatten", "Table 2: flat images", "flatten", (*_FLAT, "unflipped"), TABLE_2),
+    *map(_denoised, LEVELS),
 )
 
 
@@ -206,37 +170,28 @@ def rows(section: Section, records: Records) -> list[Row]:
         own = {k: v for k, v in figures.items() if k != "seconds"}
         seconds = {"median": figures["seconds"]} if "seconds" in figures else {}
         found.append(Row(name, "paper", figures=own, seconds=seconds))
-    counts = []
-    for method in section.methods:
-        given = section.of(records, method)
-        found.append(_row(section, method, given))
-        counts.append(len(given))
+    given = {method.name: section.of(records, method) for method in section.methods}
+    found += [_row(method, given[method.name]) for method in section.methods]
     default = next(m for m in section.methods if m.name == section.default)
-    whole = section.of(records, default)
-    for count in sorted({n for n in counts if 0 < n < len(whole)}, reverse=True):
-        row = _row(section, default, whole[:count])
-        row.name, row.note = f"{default.name}, first {count}", "to compare with rows of as many"
-        found.append(row)
+    whole = given[default.name]
+    for count in sorted({n for n in map(len, given.values()) if 0 < n < len(whole)}, reverse=True):
+        name, note = f"{default.name}, first {count}", "to compare with rows of as many"
+        found.append(replace(_row(default, whole[:count]), name=name, note=note))
     return found
 
 
-def _row(section: Section, method: Method, given: list[Record]) -> Row:
-    row = Row(method.name, "peer" if method.peer else "package", note=method.note)
-    row.absent = method.absent()
+def _row(method: Method, given: list[Record]) -> Row:
     good = [record for record in given if "error" not in record]
-    if given and not good:
-        row.absent = f"failed: {given[0]['error']}"
+    row = Row(method.name, "peer" if method.peer else "package", len(good), note=method.note)
     if not good:
+        row.absent = f"failed: {given[0]['error']}" if given else method.absent()
         return row
-    row.count = len(good)
-    names = good[0]["figures"]
-    row.figures = {k: float(np.mean([r["figures"][k] for r in good])) for k in names}
-    row.seconds = spread([r["seconds"] for r in good if r["seconds"] is not None])
-    again = [r.get("seconds_numpy") for r in good]
-    row.seconds_numpy = spread([s for s in again if s is not None])
+    row.figures = {k: float(np.mean([r["figures"][k] for r in good])) for k in good[0]["figures"]}
+    row.seconds = _spread([r["seconds"] for r in good])
+    row.seconds_numpy = _spread([r.get("seconds_numpy") for r in good])
     if good[0]["iterations"] is not None:
         row.iterations = float(np.mean([r["iterations"] for r in good]))
-    if "warm" in names:
+    if "warm" in row.figures:
         row.note += f"; the net's start was used on {row.figures['warm']:.0%}"
     if len(good) < len(given):
         errors = next(r["error"] for r in given if "error" in r)
@@ -244,9 +199,10 @@ def _row(section: Section, method: Method, given: list[Record]) -> Row:
     return row
 
 
-def spread(seconds: list[float]) -> dict[str, Any]:
+def _spread(seconds: list[float | None]) -> dict[str, Any]:
     """Return the median, 10th and 90th percentile and number of times; {} for no times."""
-    if not seconds:
+    known = [s for s in seconds if s is not None]
+    if not known:
         return {}
-    low, middle, high = np.percentile(seconds, (10, 50, 90))
-    return {"median": float(middle), "p10": float(low), "p90": float(high), "count": len(seconds)}
+    low, middle, high = np.percentile(known, (10, 50, 90))
+    return {"median": float(middle), "p10": float(low), "p90": float(high), "count": len(known)}

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import ast
 import hashlib
-import io
 import json
 import os
 import platform
+import resource
 import zipfile
 from collections.abc import Callable, Iterable
 from functools import lru_cache
@@ -27,8 +27,9 @@ from gso.io import replacing
 PACKAGE = Path(gso.__file__).parent
 #: Parts of the package that do not affect the optimiser's figures.
 _ASIDE = ("cli", "dataset", "hybrid", "io", "net", "plot", "rulings")
-#: Parts that the metrics of a peer's result depend on.
-_MEASURES = ("geometry", "mesh", "metrics", "tasks")
+#: Packages whose versions are reported.
+_PACKAGES = ("numpy", "scipy", "casadi", "libigl", "trimesh", "gso", "numba", "cvxopt")
+_PACKAGES += ("pypardiso", "torch", "matplotlib", "pymeshlab", "vtk")
 
 
 class Store:
@@ -56,9 +57,7 @@ class Store:
 
     def keep(self, name: str, key: dict[str, Any], value: Any) -> None:
         """Write a piece atomically."""
-        path = self._path(name, key, ".json")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as file:
+        with replacing(self._path(name, key, ".json")) as file:
             file.write(json.dumps({"key": key, "value": value}).encode())
 
     def value(self, name: str, key: dict[str, Any], make: Callable[[], Any]) -> Any:
@@ -79,15 +78,14 @@ class Store:
                 return dict(data)
         except (OSError, ValueError, EOFError, zipfile.BadZipFile):
             found = make()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        memory = io.BytesIO()
-        np.savez(memory, **found)  # type: ignore[arg-type]
         with replacing(path) as file:
-            file.write(memory.getvalue())
+            np.savez(file, **found)  # type: ignore[arg-type]
         return found
 
     def _path(self, name: str, key: dict[str, Any], suffix: str) -> Path:
-        return self.folder / f"{name}-{digest(key)}{suffix}"
+        path = self.folder / f"{name}-{digest(key)}{suffix}"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path
 
 
 def digest(key: Any) -> str:
@@ -96,49 +94,25 @@ def digest(key: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-@lru_cache(maxsize=1)
 def solver() -> str:
     """Digest of the code that the optimiser's results and all metrics depend on."""
-    aside = set(_present(_ASIDE))
-    return _content(
-        path
-        for path in PACKAGE.rglob("*.py")
-        if path not in aside and not aside & set(path.parents)
-    )
+    parts = {path.relative_to(PACKAGE).parts[0] for path in PACKAGE.rglob("*.py")}
+    return package(*sorted(parts.difference(_ASIDE)))
 
 
-@lru_cache(maxsize=1)
-def measures() -> str:
-    """Digest of the code that all metrics depend on."""
-    return _content(
-        path
-        for place in _present(_MEASURES)
-        for path in ([place] if place.is_file() else place.rglob("*.py"))
-    )
-
-
-@lru_cache(maxsize=1)
-def nets() -> str:
-    """Digest of the code of nets and warm starts, without the optimiser's."""
-    return _content(path for place in _present(("net", "hybrid")) for path in place.rglob("*.py"))
+@lru_cache(maxsize=8)
+def package(*names: str) -> str:
+    """Digest of files and folders of the package; an error if one is gone, or was renamed."""
+    places = [PACKAGE / name for name in names]
+    found = [[place] if place.is_file() else [*place.rglob("*.py")] for place in places]
+    if not all(found):
+        raise FileNotFoundError(f"{PACKAGE} does not have all of {names}")
+    return source(*(path for some in found for path in some))
 
 
 @lru_cache(maxsize=32)
 def source(*paths: Path) -> str:
     """Digest of some files."""
-    return _content(paths)
-
-
-def _present(names: Iterable[str]) -> list[Path]:
-    """Return paths of the package; raise if one is missing, or it would drop out of a digest."""
-    places = [PACKAGE / name for name in names]
-    for place in places:
-        if not place.exists():
-            raise FileNotFoundError(f"{place}: gone; name in {__file__} what it became")
-    return places
-
-
-def _content(paths: Iterable[Path]) -> str:
     content = hashlib.sha256()
     for path in sorted(paths):
         content.update(_code(path))
@@ -151,9 +125,8 @@ def _code(path: Path) -> bytes:
         return path.read_bytes()
     tree = ast.parse(path.read_bytes())
     for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(
-            node
-        ):
+        documented = isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+        if documented and ast.get_docstring(node):
             node.body = node.body[1:]
     return ast.dump(tree).encode()
 
@@ -169,6 +142,18 @@ def _version(name: str) -> str:
         return version(name)
     except PackageNotFoundError:
         return ""
+
+
+def machine() -> dict[str, Any]:
+    """Describe the machine and the versions of packages."""
+    return {
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+        "cores": os.cpu_count(),
+        "packages": installed(_PACKAGES),
+        "peak_gb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
+        "processor": processor(),
+    }
 
 
 @lru_cache(maxsize=1)

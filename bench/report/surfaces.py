@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
+import harness
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,8 +35,6 @@ Tick = Callable[[int, int], None]
 
 #: Splits that are drawn again from the seed.
 _SCREENED = ("validation", "test", "hard")
-
-BENCH = Path(__file__).resolve().parents[1]
 
 
 @dataclass(frozen=True)
@@ -118,11 +117,16 @@ def written(folder: Path, name: str, points: Any, unit_noise: Any) -> Surfaces:
     noise = np.ascontiguousarray(unit_noise, np.float32)
     sums = [hashlib.sha256(array.tobytes()).hexdigest() for array in (content, noise)]
     home = folder / digest([name, content.shape, *sums])
+    return _completed(name, home, surface=lambda: content, noise=lambda: noise)
+
+
+def _completed(name: str, home: Path, **arrays: Callable[[], Array]) -> Surfaces:
+    """Write the arrays that a folder does not have yet."""
     home.mkdir(parents=True, exist_ok=True)
-    for file, array in (("surface.npy", content), ("noise.npy", noise)):
-        if not (home / file).exists():
-            with replacing(home / file) as stream:
-                np.save(stream, array)
+    for file, array in arrays.items():
+        if not (home / f"{file}.npy").exists():
+            with replacing(home / f"{file}.npy") as stream:
+                np.save(stream, array())
     return Surfaces(name, home)
 
 
@@ -131,8 +135,7 @@ def reference(folder: Path, count: int | None = None, size: int = 64) -> Surface
 
     Surfaces are resampled if `size` is not 64.
     """
-    with np.load(BENCH / "data" / "bench24.npz") as data:
-        points, unit = (data[k][:count].astype(float) for k in ("surfaces", "unit_noise"))
+    points, unit = (np.stack(some[:count]) for some in harness.reference())
     if size != points.shape[1]:
         points = np.stack([resample(p, size, size) for p in points])
         unit = unit[:, :size, :size]
@@ -152,15 +155,12 @@ def screened(folder: Path, split: str, store: Store, tick: Tick | None = None) -
 
     ids = store.arrays("surfaces/draws", key | {"split": _SCREENED}, draws)[split].tolist()
     name = f"{split} split of seed {recipe.seed}, {len(ids):,} surfaces"
-    home = folder / digest(key)
-    if (home / "surface.npy").exists() and (home / "noise.npy").exists():
-        return Surfaces(name, home)
-    home.mkdir(parents=True, exist_ok=True)
-    with replacing(home / "surface.npy") as stream:
-        np.save(stream, sampled(recipe, split, tuple(ids)))
-    with replacing(home / "noise.npy") as stream:
-        np.save(stream, noises.draw(recipe.seed, ids, recipe.size))
-    return Surfaces(name, home)
+    return _completed(
+        name,
+        folder / digest(key),
+        surface=lambda: sampled(recipe, split, tuple(ids)),
+        noise=lambda: noises.draw(recipe.seed, ids, recipe.size),
+    )
 
 
 def opened(folder: Path, path: Path, name: str = "test") -> Surfaces:
@@ -171,6 +171,5 @@ def opened(folder: Path, path: Path, name: str = "test") -> Surfaces:
     if name == "test" and "noise" not in split.arrays:
         raise DatasetError(f"{path}: its test split has no noise; give a set of gso dataset build")
     noise = split["noise"][:] if name == "test" else np.zeros_like(points)
-    home = written(folder, f"{name} split of {path.name}", points, noise).folder
     source = f"seed {whole.manifest['recipe']['seed']}" if whole.manifest else path.name
-    return Surfaces(f"{name} split of {source}, {len(split):,} surfaces", home)
+    return written(folder, f"{name} split of {source}, {len(split):,} surfaces", points, noise)

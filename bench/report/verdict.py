@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -99,58 +99,47 @@ def losses(records: Records) -> list[Loss]:
 def _winners(section: Section, metric: str, records: Records) -> Iterator[Winner]:
     own = {m.name: section.of(records, m) for m in section.methods if not m.peer}
     default = own[section.default]
-    for name, figures in section.published.items():
-        if metric in figures and name not in _STARTS:
-            yield from _against(section, metric, f"the paper's {name}", figures[metric], own)
-    for method in section.methods:
+    # A figure, the surfaces that it is of, if they are known, and what to say against it.
+    found: list[tuple[str, float, list[int] | None, str]] = [
+        (f"the paper's {name}", figures[metric], None, "")
+        for name, figures in section.published.items()
+        if metric in figures and name not in _STARTS
+    ]
+    for method in (m for m in section.methods if m.peer):
         given = section.of(records, method)
         pairs = enumerate(zip(given, default, strict=False))
         where = [k for k, (a, b) in pairs if "error" not in a and "error" not in b]
-        if not method.peer or not where:
-            continue
-        theirs = _mean(given, where, metric)
+        theirs = _mean(given, where, metric) if where else None
         if theirs is None:
             continue
-        central, ours = _mean(given, where, section.main), _mean(default, where, section.main)
-        worse = central is not None and ours is not None and _better(section.main, ours, central)
-        but = f"{HEADINGS[section.main]} {central:.3g} against {ours:.3g}" if worse else ""
-        for winner in _against(section, metric, method.name, theirs, own, where):
-            yield replace(winner, but=but)
+        main, ours = (_mean(some, where, section.main) for some in (given, default))
+        worse = main is not None and ours is not None and _better(section.main, ours, main)
+        but = f"{HEADINGS[section.main]} {main:.3g} against {ours:.3g}" if worse else ""
+        found.append((method.name, theirs, where, but))
+    for name, theirs, where, but in found:
+        means = {k: _mean(r, where, metric) for k, r in own.items()}
+        ours = means[section.default]
+        if ours is None or not _better(metric, theirs, ours):
+            continue
+        known = {k: v for k, v in means.items() if v is not None and k not in _STARTS}
+        best = min(known, key=lambda k: known[k] if _lower(metric) else -known[k])
+        yield Winner(name, theirs, ours, known[best], best, len(where or ()), but)
 
 
-def _against(
-    section: Section,
-    metric: str,
-    name: str,
-    theirs: float,
-    own: dict[str, list[Record]],
-    where: list[int] | None = None,
-) -> Iterator[Winner]:
-    """Yield a winner if `theirs` is better than the default.
-
-    The package's means are over the surfaces `where`, or over all that each method has.
-    """
-
-    def mean(given: list[Record]) -> float | None:
-        return _mean(given, list(range(len(given))) if where is None else where, metric)
-
-    ours = mean(own[section.default])
-    if ours is None or not _better(metric, theirs, ours):
-        return
-    means = {k: mean(r) for k, r in own.items() if k not in _STARTS}
-    known = {k: v for k, v in means.items() if v is not None}
-    sign = 1.0 if metric == TIME or lower_is_better(metric) else -1.0
-    best = min(known, key=lambda k: sign * known[k])
-    yield Winner(name, theirs, ours, known[best], best, len(where or ()))
+def _lower(metric: str) -> bool:
+    return metric == TIME or lower_is_better(metric)
 
 
 def _better(metric: str, theirs: float, ours: float) -> bool:
-    lower = metric == TIME or lower_is_better(metric)
-    return theirs < ours if lower else theirs > ours
+    return theirs < ours if _lower(metric) else theirs > ours
 
 
-def _mean(records: list[Record], where: list[int], metric: str) -> float | None:
-    """Return the mean over some surfaces (of times the median); None if a figure is missing."""
+def _mean(records: list[Record], where: list[int] | None, metric: str) -> float | None:
+    """Return the mean over some surfaces or all (of times the median).
+
+    There is none if a figure is missing.
+    """
+    where = list(range(len(records))) if where is None else where
     if not records or (metric != TIME and max(where) >= len(records)):
         return None
     some = [records[k] for k in where if k < len(records) and "error" not in records[k]]

@@ -4,25 +4,11 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 #: Files with sections; each lists them as ``SECTIONS``.
-SUBJECTS = (
-    "tno",
-    "cost",
-    "speed",
-    "batch",
-    "large",
-    "jiang",
-    "session",
-    "hybrid",
-    "net",
-    "borders",
-    "dataset",
-    "ruled",
-    "pieces",
-    "workshop",
-)
+SUBJECTS = tuple(sorted(path.stem for path in Path(__file__).parent.glob("[a-z]*.py")))
 
 
 def sections(subjects: Iterable[str] = SUBJECTS) -> dict[str, Callable[..., dict[str, Any]]]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import resource
+import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
-from harness import table, timed
+from harness import shown, timed
 
 import gso
 from gso.dataset import bezier
@@ -35,32 +37,24 @@ def batches(n: int = 256, device: str = "cpu", seed: int = 31) -> dict[str, Any]
     def batch(task: str, points: np.ndarray) -> np.ndarray:
         return _energies(gso.tno.optimize_batch(points, task=task, device=device))
 
-    out, rows = {}, []
+    rows = {}
     for task in ("developable", "flatten"):
         # Kernels are printed and compiled at first use.
         many(task, designs[:2]), batch(task, designs[:2])
         (reference, usual), cpu = _measured(many, task, designs)
         (energies, seconds), cpu_batch = _measured(batch, task, designs)
-        shaken = many(task, stretched)
-        off, natural = (_off(e, reference) for e in (energies, shaken))
-        out[task] = {
+        shaken = _off(many(task, stretched), reference)
+        rows[task] = {
             "s, processes": usual,
             "s, batch": seconds,
             "ratio": seconds / usual,
             "of CPU time": cpu_batch / cpu,
-            "median difference %": 100.0 * float(np.median(off)),
-            "largest %": 100.0 * float(off.max()),
-            "over 1 %": int((off > _OTHER).sum()),
-            "over 1 %, stretched": int((natural > _OTHER).sum()),
+            **_differences(energies, reference),
+            "over 1 %": int((_off(energies, reference) > _OTHER).sum()),
+            "over 1 %, stretched": int((shaken > _OTHER).sum()),
         }
-        rows.append([task, *out[task].values()])
-    table(
-        f"{n} surfaces 64 x 64: a batch on {device!r}, and {workers} processes; energies "
-        "relative to the latter's",
-        ["task", *out["flatten"]],
-        rows,
-    )
-    return out
+    title = f"{n} surfaces 64 x 64: a batch on {device!r}, and {workers} processes; energies "
+    return shown(title + "relative to the latter's", ["task"], rows)
 
 
 def device(
@@ -71,44 +65,41 @@ def device(
     The energies of some of them are compared with those of single solves on the processor.
     """
     designs = np.stack([s.sample(64) for s in bezier.generate(n, seed=seed)])
-    out, rows = {}, []
-    (ready, _), begun = timed(lambda: (gso.tno.BatchWorkers(workers or None), 0))
-    with ready:
+    rows = {}
+    begun = time.perf_counter()
+    with gso.tno.BatchWorkers(workers or None) as ready:
         for task in ("developable", "flatten"):
-
-            def batch(points: np.ndarray, task: str = task) -> list[Any]:
-                return gso.tno.optimize_batch(points, task=task, device=device, workers=ready)
-
+            batch = partial(gso.tno.optimize_batch, task=task, device=device, workers=ready)
             # The workers import the package and print kernels at first use.
-            _, first = timed(batch, designs[: 2 * len(ready)])
+            begun = begun or time.perf_counter()
+            batch(designs[: 2 * len(ready)])
+            first, begun = time.perf_counter() - begun, 0.0
             found, seconds = timed(batch, designs)
             again, second = timed(batch, designs)
             single = [gso.tno.optimize(p, task=task, verdict=False) for p in designs[:compared]]
-            off = _off(_energies(found[:compared]), _energies(single))
-            out[task] = {
-                "first call, s": begun + first,
+            rows[task] = {
+                "first call, s": first,
                 "ms a surface": 1e3 * min(seconds, second) / n,
                 "of them set-up": _mean(again, "setup"),
                 "evaluation": _mean(again, "evaluate"),
                 "factorisation": _mean(again, "factor"),
                 "line search": _mean(again, "search"),
-                "median difference %": 100.0 * float(np.median(off)),
-                "largest %": 100.0 * float(off.max()),
+                **_differences(_energies(found[:compared]), _energies(single)),
             }
-            rows.append([task, *out[task].values()])
-            begun = 0.0
-    table(
+    title = (
         f"{n} surfaces 64 x 64 on {device!r}, planned by {workers or 'all'} processes; set-up is "
-        "that of the processes, which work at the same time",
-        ["task", *out["flatten"]],
-        rows,
     )
-    return out
+    return shown(title + "that of the processes, which work at the same time", ["task"], rows)
 
 
 def _mean(results: list[Any], phase: str) -> float:
     """Return the mean of a phase, ms."""
     return 1e3 * float(np.mean([r.seconds.get(phase, 0.0) for r in results]))
+
+
+def _differences(energies: np.ndarray, reference: np.ndarray) -> dict[str, float]:
+    off = 100.0 * _off(energies, reference)
+    return {"median difference %": float(np.median(off)), "largest %": float(off.max())}
 
 
 def _measured(function: Callable[..., Any], *given: Any) -> tuple[tuple[Any, float], float]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import designs
 from designs import KINDS
-from harness import progress, solver, table, timed
+from harness import progress, shown, solver, timed
 
 import gso
 from gso import metrics
@@ -43,16 +43,14 @@ def _figures(design: designs.Design, after: gso.Mesh) -> dict[str, Any]:
 def borders(kind: str = "", preset: str = "balanced", seed: int = 0) -> dict[str, Any]:
     """Measure one kind of designs or all; the preset may also be "isometry"."""
     keywords = {"formulation": preset} if preset == "isometry" else {"options": preset}
-    out: dict[str, dict[str, Any]] = {}
+    out: dict[str, Any] = {}
     for name in [kind] if kind else KINDS:
         found = {}
         for design in progress(KINDS[name](seed), f"{name} {preset}"):
             result, spent = timed(solver(**keywords), design.mesh)
             found[design.name] = _figures(design, result.mesh) | {"s": spent}
-        rows = [[design, *row.values()] for design, row in found.items()]
-        labels = list(next(iter(found.values())))
-        table(f"{name}, {preset}, seed {seed}", ["design", *labels], rows)
-        out |= {f"{name} {design}": row for design, row in found.items()}
+        rows = shown(f"{name}, {preset}, seed {seed}", ["design"], found)
+        out |= {f"{name} {design}": row for design, row in rows.items()}
     loops = [row[k] for row in out.values() for k in ("loops", "to")]
     print(f"\nof {len(out)} designs: loops {min(loops):.3f} to {max(loops):.3f}, ", end="")
     print(f"edges from {min(row['edges'] for row in out.values()):.3f}")

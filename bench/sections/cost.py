@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from typing import Any
 
 import numpy as np
-from harness import ROOT, progress, reference, table, timed
+from harness import PRESETS, ROOT, apart, progress, reference, shown, solver, timed
 from report.energy import last_problem
+from report.measure import peak_mb
 
 import gso
 from gso import linalg, metrics
 from gso.dataset import bezier
-from sections.tno import PRESETS
 
 
 def breakdown() -> dict[str, Any]:
@@ -26,11 +26,11 @@ def breakdown() -> dict[str, Any]:
     def milliseconds(function: Any, *given: Any, repeats: int = 15) -> float:
         return 1e3 * float(np.median([timed(function, *given)[1] for _ in range(repeats)]))
 
-    out = {}
-    for task, options, name in (
-        ("developable", "balanced", "normal offsets"),
-        ("developable", "accurate", "free vertices"),
-        ("flatten", "balanced", "flat image"),
+    rows = {}
+    for name, task, options in (
+        ("normal offsets", "developable", "balanced"),
+        ("free vertices", "developable", "accurate"),
+        ("flat image", "flatten", "balanced"),
     ):
         problem, x = last_problem(surface, task, options)
         values = problem.linearise(x)[2]
@@ -42,15 +42,13 @@ def breakdown() -> dict[str, Any]:
             with linalg.blas_threads(1):
                 chosen.factor(values)
                 row[f"factor {backend}"] = milliseconds(chosen.factor, values, repeats=5)
-        out[name] = row
-    rows = [[name, *row.values()] for name, row in out.items()]
-    table("One iteration at 64 x 64, milliseconds", ["unknowns", *out["flat image"]], rows)
-    return out
+        rows[name] = row
+    return shown("One iteration at 64 x 64, milliseconds", ["unknowns"], rows)
 
 
 def sizes() -> dict[str, Any]:
     """Measure larger grids: time per vertex relative to 64 x 64, and peak memory."""
-    out: dict[str, dict[str, float]] = {}
+    rows: dict[str, dict[str, float]] = {}
     for task, preset, sides in (
         ("developable", "balanced", (64, 256, 512)),
         ("developable", "accurate", (64, 256)),
@@ -58,31 +56,21 @@ def sizes() -> dict[str, Any]:
     ):
         base = None
         for size in progress(sides, f"{task} {preset}"):
-            code = (
-                "import time, resource, json, gso\n"
-                "from gso.dataset import bezier\n"
-                "b = bezier.generate(1, seed=77)[0]\n"
-                f"gso.tno.optimize(b.sample(64), task={task!r}, options={preset!r})\n"
-                f"p = b.sample({size})\n"
-                "s = []\n"
-                f"for _ in range({5 if size == 64 else 1}):\n"
-                "    t = time.perf_counter()\n"
-                f"    r = gso.tno.optimize(p, task={task!r}, options={preset!r})\n"
-                "    s.append(time.perf_counter() - t)\n"
-                "peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
-                "print(json.dumps([sorted(s)[len(s) // 2], peak]))\n"
-            )
-            done = subprocess.run(
-                [sys.executable, "-c", code], capture_output=True, text=True, check=True
-            )
-            seconds, peak = json.loads(done.stdout)
+            seconds, peak = apart(_grid, task, preset, size)
             each = 1e6 * seconds / size**2
             base = base or each
-            row = {"s": seconds, "us / vertex": each, "against 64": each / base}
-            out[f"{task} {preset} {size}"] = row | {"peak GB": peak / 1e6}
-    rows = [[name, *row.values()] for name, row in out.items()]
-    table("Size", ["solve", "s", "us / vertex", "against 64", "peak GB"], rows)
-    return out
+            row = {"s": seconds, "us / vertex": each, "against 64": each / base, "peak GB": peak}
+            rows[f"{task} {preset} {size}"] = row
+    return shown("Size", ["solve"], rows)
+
+
+def _grid(task: str, preset: str, size: int) -> tuple[float, float]:
+    """Return the median seconds of solving a grid, and the peak memory of the process, GB."""
+    shape, solve = bezier.generate(1, seed=77)[0], solver(task=task, options=preset)
+    solve(shape.sample(64))
+    points = shape.sample(size)
+    spent = [timed(solve, points)[1] for _ in range(5 if size == 64 else 1)]
+    return float(np.median(spent)), 1e-3 * peak_mb()
 
 
 def components() -> dict[str, Any]:
@@ -126,65 +114,51 @@ def components() -> dict[str, Any]:
             for part, s in zip(parts, shifts, strict=True)
         ]
 
-    here = [0.0, 0.0, 0.0]
-    beside = [[3.0 * size * k, 0.0, 0.0] for k in range(8)]
+    here, beside = [0.0, 0.0, 0.0], [[3.0 * size * k, 0.0, 0.0] for k in range(8)]
+    far = [100.0 * size, 0.0, 0.0]
     cases = {
-        "100 m away": [here, [1e5, 0.0, 0.0]],
-        "duplicated": [here, here],
-        "eight": beside,
-        "100 sizes": [here, [100.0 * size, 0.0, 0.0]],
+        "100 m away": ([here, [1e5, 0.0, 0.0]], 0.0),
+        "duplicated": ([here, here], 0.0),
+        "eight": (beside, 0.0),
+        "100 sizes": ([here, far], 0.0),
+        "moved alone": ([far], 0.0),
+        "1e-12 noise": ([here], noise),
     }
-    rows, out = [], {}
+    rows: dict[str, dict[str, Any]] = {}
     for wanted in progress(asked, "components"):
         alone = solved([here], 0.0, wanted)[0]
-        shaken = solved([here], noise, wanted)[0]
-        flat = alone.shape[1] == 2
-        figures: list[Any] = []
-        for number, shifts in enumerate(cases.values()):
-            found = solved(shifts, 0.0, wanted)
-            if number == 0:
-                for points in (alone, found[0]):
-                    far = "-" if flat else np.linalg.norm(points - panel.vertices, axis=1).max()
-                    figures.append(far)
-            figures.append(max(float(np.abs(p - alone).max()) for p in found) / size)
-        own = solved([[100.0 * size, 0.0, 0.0]], 0.0, wanted)[0]
-        figures += [float(np.abs(p - alone).max()) / size for p in (own, shaken)]
-        rows.append([" ".join(wanted), *figures])
-        out[rows[-1][0]] = figures
-    table(
+        found = {name: solved(*case, wanted) for name, case in cases.items()}
+        row = {"alone": alone, "with copy": found["100 m away"][0]}
+        for name, points in row.items():
+            off = points - panel.vertices if points.shape[1] == 3 else None
+            row[name] = "-" if off is None else np.linalg.norm(off, axis=1).max()
+        for name, copies in found.items():
+            row[name] = max(float(np.abs(points - alone).max()) for points in copies) / size
+        rows[" ".join(wanted)] = row
+    title = (
         "A panel of 4 m and copies of it: largest displacement in mm, alone and with a copy 100 m "
-        "away;\n  then the largest difference to the panel alone, in sizes",
-        ["task", "alone", "with copy", *cases, "moved alone", "1e-12 noise"],
-        rows,
     )
-    return out
+    return shown(
+        title + "away;\n  then the largest difference to the panel alone, in sizes", ["task"], rows
+    )
 
 
 def startup() -> dict[str, Any]:
     """Time a new process that solves the panel, and `import gso`."""
 
-    def median(command: list[str], repeats: int = 5) -> float:
-        runs = [
-            timed(lambda: subprocess.run(command, check=True, capture_output=True))[1]
-            for _ in range(repeats)
-        ]
-        return float(np.median(runs))
+    def median(*words: str) -> float:
+        run = partial(subprocess.run, check=True, capture_output=True)
+        return float(np.median([timed(run, [sys.executable, *words])[1] for _ in range(5)]))
 
     with tempfile.TemporaryDirectory() as folder:
         panel = str(ROOT / "examples" / "panel.obj")
-        cold = median([sys.executable, "-m", "gso", "optimize", panel, "-o", f"{folder}/out.obj"])
-    more = median([sys.executable, "-c", "import numpy, gso"]) - median(
-        [sys.executable, "-c", "import numpy"]
-    )
-    table(
-        "Start-up",
-        ["what", "median s", "at most"],
-        [
-            ["gso optimize panel.obj -o out.obj, cold", cold, 2.0],
-            ["import gso over import numpy", more, 0.1],
-        ],
-    )
-    return {"cold": cold, "import": more}
+        cold = median("-m", "gso", "optimize", panel, "-o", f"{folder}/out.obj")
+    more = median("-c", "import numpy, gso") - median("-c", "import numpy")
+    rows = {
+        "gso optimize panel.obj -o out.obj, cold": {"median s": cold, "at most": 2.0},
+        "import gso over import numpy": {"median s": more, "at most": 0.1},
+    }
+    return shown("Start-up", ["what"], rows)
 
 
 SECTIONS = (breakdown, sizes, components, startup)

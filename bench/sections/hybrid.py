@@ -6,23 +6,21 @@ the seed, or read from a set (``data=DIR``).
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable
 from contextlib import closing
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from harness import BENCH, axes_of, progress
-from harness import timed as clocked
+from harness import BENCH, PRESETS, axes_of, progress, quietly, shown, timed
 from report.store import Store
 from report.surfaces import Surfaces, opened, screened
 
 import gso
 from gso import hybrid
 from gso.hierarchy import resample
-from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.net import tasks as net_tasks
 from gso.net.catalogue import available
@@ -39,21 +37,18 @@ CASES = {
 }
 #: Numbers of iterations at which the curve of the section "anytime" has points.
 POINTS = (0, 1, 2, 3, 4, 6, 8, 12, 18, 24)
-#: Vertices along the sides of the section "sizes", and the presets compared there.
-SIZES, PRESETS = (32, 64, 128, 256), ("balanced", "accurate")
+#: Vertices along the sides of the section "sizes".
+SIZES = (32, 64, 128, 256)
 #: Share by which the sections "guard" and "general" stretch designs along x, to measure how much
 #: the cold solves of two practically equal designs differ.
 STRETCH = 1e-6
-_STRETCHED = f"cold, its input stretched by {STRETCH:g}"
 #: Side of the hole in general meshes, as a share of the mesh's side; every other mesh has no hole.
 HOLES = (0.0, 0.15)
 
 
-def timed(function: Callable[..., Any], *given: Any, **keywords: Any) -> tuple[Any, float]:
+def milliseconds(function: Callable[..., Any], *given: Any, **keywords: Any) -> tuple[Any, float]:
     """Call a function and return its result and the milliseconds."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", gso.ConvergenceWarning)
-        value, seconds = clocked(function, *given, **keywords)
+    value, seconds = timed(quietly, function, *given, **keywords)
     return value, 1e3 * seconds
 
 
@@ -98,8 +93,8 @@ def compared(
 
 
 def _solved(task: str, keywords: dict[str, Any], stretched: bool, design: Any) -> dict[str, float]:
-    cold, slow = timed(optimize, design, task=task, **keywords)
-    warm, quick = timed(hybrid.solve, design, task=task, **keywords)
+    cold, slow = milliseconds(optimize, design, task=task, **keywords)
+    warm, quick = milliseconds(hybrid.solve, design, task=task, **keywords)
     least = max(energy(cold), 1e-300)
     found = {
         "cold": slow,
@@ -109,83 +104,68 @@ def _solved(task: str, keywords: dict[str, Any], stretched: bool, design: Any) -
         "energy": energy(warm) / least,
     }
     if stretched:
-        mesh = as_mesh(design)
+        mesh = gso.as_mesh(design)
         near = mesh.replaced(mesh.vertices * [1.0 + STRETCH, 1.0, 1.0])
-        again, _ = timed(optimize, near, task=task, **keywords)
+        again, _ = milliseconds(optimize, near, task=task, **keywords)
         found["stretched"] = energy(again) / least
     return found
 
 
-def ratios(energies: np.ndarray) -> str:
+def ratios(energies: np.ndarray) -> dict[str, float]:
     """Summarise energies relative to the cold solve's."""
-    shares = ", ".join(f"{(energies <= most).mean():.2%} <= {most}" for most in (1.01, 1.05))
-    return f"median {np.median(energies):.4f}, {shares}, worst {energies.max():.4f}"
+    shares = {f"% <= {most}": 100.0 * float((energies <= most).mean()) for most in (1.01, 1.05)}
+    return {"energy": float(np.median(energies)), **shares, "worst": float(energies.max())}
 
 
-def costs(found: dict[str, np.ndarray]) -> str:
+def costs(found: dict[str, np.ndarray]) -> dict[str, float]:
     """Summarise times and energies, cold and hybrid."""
-    share = np.median(found["hybrid"] / found["cold"])
-    return (
-        f"cold {np.median(found['cold']):6.0f}  hybrid {np.median(found['hybrid']):6.0f} "
-        f"(net {np.median(found['net']):.0f})  {share:.2f} of the time; "
-        f"started {found['started'].mean():.0%}; energy {ratios(found['energy'])}"
-    )
-
-
-def summary(found: dict[str, np.ndarray]) -> dict[str, float]:
-    """Return the medians."""
-    return {name: float(np.median(values)) for name, values in found.items()}
+    times = {f"{k} ms": float(np.median(found[k])) for k in ("cold", "hybrid", "net")}
+    share = float(np.median(found["hybrid"] / found["cold"]))
+    started = 100.0 * float(found["started"].mean())
+    return times | {"of the time": share, "started %": started, **ratios(found["energy"])}
 
 
 def speed(n: int = 64, data: Path | None = None) -> dict[str, Any]:
     """Print time and energy of the same surfaces, cold and from the net's result."""
     chosen = first(split("test", data), n)
-    out = {}
-    print(
-        f"\nSpeed: medians over {len(chosen)} surfaces, milliseconds; energies over the cold ones"
-    )
+    rows: dict[Any, dict[str, Any]] = {}
     for name, (task, keywords) in CASES.items():
         if net_tasks.get(task).default not in available(task):
-            print(f"  {name:10s} no net comes with the package")
+            print(f"{name}: no net comes with the package")
             continue
         compared(chosen[:2], task, keywords)  # imports and code generation of the first use
-        found = compared(progress(chosen, name), task, keywords)
-        print(f"  {name:10s} {costs(found)}", flush=True)
-        out[name] = summary(found)
-    denoised = [timed(optimize, p, task="denoise")[1] for p in chosen]
-    print(f"  denoise    cold {np.median(denoised):6.0f}, in closed form: no start can help")
-    return out
+        rows[name] = costs(compared(progress(chosen, name), task, keywords))
+    cold = float(np.median([milliseconds(optimize, p, task="denoise")[1] for p in chosen]))
+    blank = dict.fromkeys(next(iter(rows.values()), ()), "")
+    rows["denoise, in closed form: no start can help"] = blank | {"cold ms": cold}
+    title = f"Speed: medians over {len(chosen)} surfaces; energies over the cold ones"
+    return shown(title, ["case"], rows)
 
 
 def sizes(n: int = 4, data: Path | None = None) -> dict[str, Any]:
     """Print time and energy on other sizes, which ``gso.hybrid.time_model`` was chosen from."""
-    chosen = first(split("test", data), n)
-    out = {}
-    print(f"\nSizes: medians over {len(chosen)} surfaces, milliseconds, PyTorch loaded before")
-    for side in SIZES:
+    chosen, rows = first(split("test", data), n), {}
+    for side, preset in product(SIZES, PRESETS[1:]):
         grids = [resample(np.asarray(p, float), side, side) for p in chosen]
-        for preset in PRESETS:
-            keywords = {"options": preset}
-            timed(hybrid.solve, grids[0], **keywords)
-            found = compared(progress(grids, f"{side} {preset}"), "developable", keywords)
-            print(f"  {side:4d} x {side:<4d} {preset:9s} {costs(found)}", flush=True)
-            out[f"{side} {preset}"] = summary(found)
-    return out
+        quietly(hybrid.solve, grids[0], options=preset)
+        shown_grids = progress(grids, f"{side} {preset}")
+        found = compared(shown_grids, "developable", {"options": preset})
+        rows[f"{side} x {side}", preset] = costs(found)
+    title = f"Sizes: medians over {len(chosen)} surfaces, PyTorch loaded before"
+    return shown(title, ["grid", "preset"], rows)
 
 
 def guard(n: int = 0, data: Path | None = None) -> dict[str, Any]:
     """Print energies relative to the cold solve's, "balanced", on the splits test and hard."""
-    out = {}
-    print("\nGuard: energy of the hybrid solve over that of the cold one, balanced")
+    rows = {}
     for name in ("test", "hard"):
         some = split(name, data)
         total = min(n or len(some), len(some))
         designs = (some[k] for k in progress(range(total), name))
         found = compared(designs, "developable", {}, workers=None, stretched=True)
-        print(f"  {name:6s} {total:5d} surfaces: {ratios(found['energy'])}")
-        print(f"  {_STRETCHED}: {ratios(found['stretched'])}", flush=True)
-        out[name] = summary(found)
-    return out
+        rows |= _against_chance(f"{name}, {total} surfaces", found)
+    title = "Guard: energy of the hybrid solve over that of the cold one, balanced"
+    return shown(title, ["surfaces", "solve"], rows)
 
 
 def general(n: int = 32, data: Path | None = None) -> dict[str, Any]:
@@ -193,10 +173,19 @@ def general(n: int = 32, data: Path | None = None) -> dict[str, Any]:
     chosen = first(split("test", data), n)
     meshes = [patch(p, HOLES[k % len(HOLES)], seed=k) for k, p in enumerate(chosen)]
     found = compared(progress(meshes, "general"), "developable", {}, stretched=True)
-    print(f"\nGeneral meshes: {len(meshes)}, triangulated in random order, half with a hole")
-    print(f"  started {found['started'].mean():.0%}; energy {ratios(found['energy'])}")
-    print(f"  {_STRETCHED}: {ratios(found['stretched'])}")
-    return summary(found)
+    rows = _against_chance(f"{len(meshes)} meshes", found)
+    title = "General meshes, triangulated in random order, half with a hole"
+    return shown(title, ["meshes", "solve"], rows)
+
+
+def _against_chance(name: str, found: dict[str, np.ndarray]) -> dict[Any, dict[str, float]]:
+    """Return rows of the hybrid solves, and of the cold ones of stretched designs."""
+    started = {"started %": 100.0 * float(found["started"].mean())}
+    stretched = f"cold, its input stretched by {STRETCH:g}"
+    return {
+        (name, "hybrid"): started | ratios(found["energy"]),
+        (name, stretched): {"started %": ""} | ratios(found["stretched"]),
+    }
 
 
 def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:
@@ -215,30 +204,30 @@ def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:
 
 def anytime(n: int = 16, data: Path | None = None, plot: str = "anytime.png") -> dict[str, Any]:
     """Plot energy relative to the cold solve's against time, for solves that are stopped early."""
-    curves: dict[str, list[tuple[float, float]]] = {"TNO": [], "hybrid": []}
     chosen = first(split("test", data), n)
-    final = [energy(timed(optimize, p)[0]) for p in progress(chosen, "anytime")]
-    for most in progress(POINTS, "anytime"):
-        for name, points in curves.items():
-            rows = []
-            for p, last in zip(chosen, final, strict=True):
-                if name == "TNO":
-                    result, spent = timed(optimize, p, x0=Start(None, iterations=most))
-                else:
-                    result, spent = timed(hybrid.solve, p, polish=most or False)
-                rows.append((spent, energy(result) / last))
-            points.append(tuple(np.median(rows, axis=0)))
-    print(f"\nAnytime: medians over {len(chosen)} surfaces; energy over that of the cold solve")
-    for name, points in curves.items():
-        print(f"  {name:7s}" + "  ".join(f"{e:.3g} in {t:.0f} ms" for t, e in points))
-    print(f"  the net alone is the first point of the hybrid; see {plot}")
-    with axes_of(
-        plot, xlabel="milliseconds for one surface", ylabel="energy / that of the cold solve"
-    ) as axes:
-        for name, points in curves.items():
+    final = [energy(milliseconds(optimize, p)[0]) for p in progress(chosen, "anytime")]
+    solves = {
+        "TNO": lambda p, most: optimize(p, x0=Start(None, iterations=most)),
+        "hybrid": lambda p, most: hybrid.solve(p, polish=most or False),
+    }
+    rows: dict[Any, dict[str, float]] = {}
+    for name, solve in solves.items():
+        for most in progress(POINTS, "anytime"):
+            done = [milliseconds(solve, p, most) for p in chosen]
+            relative = [
+                energy(result) / last for (result, _), last in zip(done, final, strict=True)
+            ]
+            middle = float(np.median([spent for _, spent in done]))
+            rows[name, str(most)] = {"ms": middle, "energy": float(np.median(relative))}
+    labels = {"xlabel": "milliseconds for one surface", "ylabel": "energy / that of the cold solve"}
+    with axes_of(plot, **labels) as axes:
+        for name in solves:
+            points = [[*row.values()] for (solve, _), row in rows.items() if solve == name]
             axes.plot(*np.array(points).T, marker=".", label=name)
-        axes.plot(*curves["hybrid"][0], "o", color="black", label="net alone")
-    return curves
+        axes.plot(*rows["hybrid", "0"].values(), "o", color="black", label="net alone")
+    title = f"Anytime: medians over {len(chosen)} surfaces; energy over that of the cold solve; "
+    title += f"the net alone is the hybrid's first point; see {plot}"
+    return shown(title, ["solve", "iterations"], rows)
 
 
 SECTIONS = (speed, sizes, guard, general, anytime)

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
-from harness import compared, progress, quality, reference, solver, table
+from harness import PRESETS, compared, progress, quality, reference, shown, solver
 from report.peers_flatten import lscm
 
 import gso
 from gso import metrics
 from gso.dataset import bezier
 from gso.mesh import Mesh
+from sections.session import frames
 
-PRESETS = ("fast", "balanced", "accurate")
 #: Frames of a drag.
 FRAMES = 40
 
@@ -96,21 +97,16 @@ def tradeoff() -> dict[str, Any]:
 
 def interactive() -> dict[str, Any]:
     """Measure frames per second while handles are dragged, and the lag of the surface."""
-    rows, out = [], {}
+    rows = {}
     for name, drag in _drags().items():
         for steps in (1, 2):
-            figures = _dragged(*drag, steps)
-            rows.append([name, str(steps), *figures.values()])
-            out[f"{name}, {steps}"] = figures
-    columns = ["task", "iterations", "frames / s", "slowest, ms", "lag %", "lag / frame", "backend"]
-    columns += ["analyses"]
-    table(
+            rows[name, str(steps)] = _dragged(*drag, steps)
+    return shown(
         "Dragging (aim: 10 frames / s). Lag: largest distance from the settled surface, percent "
         "of its diagonal, and relative to what the handle moves in a frame",
-        columns,
+        ["task", "iterations"],
         rows,
     )
-    return out
 
 
 def _drags() -> dict[str, tuple[gso.tno.Session, Any, Any]]:
@@ -131,56 +127,31 @@ def _drags() -> dict[str, tuple[gso.tno.Session, Any, Any]]:
     ):
         mesh = Mesh.from_grid(curved.sample(size))
         p, grid = mesh.vertices, mesh.grid_index
-        corners = [grid[a, b].ravel() for a in (_HEAD, _TAIL) for b in (_HEAD, _TAIL)]
+        # Rows or columns of the grid in a corner.
+        ends = (slice(0, 3), slice(-3, None))
+        corners = [grid[a, b].ravel() for a in ends for b in ends]
         ids = np.concatenate(corners)
-        session = gso.tno.Session(
-            mesh,
-            task=task,
-            formulation=formulation,
-            constraints=[gso.Handle(ids, p[ids], weight=weight)],
-        )
-        along = p[grid[0, 0]] - p[grid[-1, -1]]
-        way = reach * (along + np.linalg.norm(along) * _normal(mesh))
-        moved = np.isin(ids, corners[3])[:, None]
+        held = [gso.Handle(ids, p[ids], weight=weight)]
+        session = gso.tno.Session(mesh, task=task, formulation=formulation, constraints=held)
+        along, normal = p[grid[0, 0]] - p[grid[-1, -1]], metrics.face_normals(mesh).mean(axis=0)
+        way = reach * (along + np.linalg.norm(along) * normal / np.linalg.norm(normal))
+        way = np.isin(ids, corners[3])[:, None] * way
         name = f"{task}, {formulation}, {size} x {size}, a corner"
-        found[name] = session, ids, _straight(p[ids], moved * way)
+        found[name] = session, ids, lambda share, start=p[ids], way=way: start + share * way
     return found
-
-
-#: Rows or columns of the grid in a corner.
-_HEAD, _TAIL = slice(0, 3), slice(-3, None)
-
-
-def _straight(start: np.ndarray, way: np.ndarray) -> Callable[[float], np.ndarray]:
-    return lambda share: start + share * way
-
-
-def _normal(mesh: Mesh) -> np.ndarray:
-    mean = metrics.face_normals(mesh).mean(axis=0)
-    return mean / np.linalg.norm(mean)
 
 
 def _dragged(session: gso.tno.Session, ids: Any, place: Any, steps: int) -> dict[str, Any]:
     """Settle a session at the start, drag its handles to the end, and measure."""
     session.move(ids, place(0.0))
     session.settle()
-    seconds = []
-    for k in progress(range(1, FRAMES + 1), "drag"):
-        start = time.perf_counter()
-        session.move(ids, place(k / FRAMES))
-        vertices = session.step(steps)
-        seconds.append(time.perf_counter() - start)
+    ways = progress(range(1, FRAMES + 1), "drag")
+    speed, vertices = frames(session, ids, (place(k / FRAMES) for k in ways), steps)
     moved = np.linalg.norm(place(1.0) - place(1.0 - 1.0 / FRAMES), axis=1).max()
     result = session.settle()
     lag = np.linalg.norm(result.mesh.vertices - vertices, axis=1).max()
-    return {
-        "fps": 1.0 / float(np.median(seconds)),
-        "slowest": 1e3 * max(seconds),
-        "lag": 100.0 * lag / result.design.diagonal,
-        "lag_frames": lag / moved,
-        "backend": result.backend,
-        "analyses": float(session.analyses),
-    }
+    lags = {"lag %": 100.0 * lag / result.design.diagonal, "lag / frame": lag / moved}
+    return speed | lags | {"backend": result.backend, "analyses": float(session.analyses)}
 
 
 def bend() -> dict[str, Any]:
@@ -196,32 +167,21 @@ def bend() -> dict[str, Any]:
             "iterations": float(result.iterations),
         }
 
-    def rolled_up(preset: str) -> Callable[[Any], gso.Result]:
-        def run(given: tuple[np.ndarray, ...]) -> gso.Result:
-            points, ids, wanted = given
-            handles = [gso.Handle(ids, wanted[ids])]
-            return gso.tno.optimize(points, task="bend", options=preset, constraints=handles)
-
-        return run
+    def rolled_up(given: tuple[np.ndarray, ...], preset: str) -> gso.Result:
+        points, ids, wanted = given
+        handles = [gso.Handle(ids, wanted[ids])]
+        return gso.tno.optimize(points, task="bend", options=preset, constraints=handles)
 
     found = {}
-    for size in (32, 64):
+    for size, turn in product((32, 64), (0.5, 1.0, 1.6)):
         points = sheet(size)
         ids = np.r_[: 2 * size, size * (size - 2) : size * size]
-        for turn in (0.5, 1.0, 1.6):
-            wanted = rolled(points.reshape(-1, 3), turn * np.pi)
-            name = f"{size} x {size}, {turn * 180:.0f} degrees"
-            found |= compared(
-                f"A sheet rolled up, {name}; the handles are on a smooth cylinder, whose chords "
-                "are shorter",
-                {
-                    f"{name}, {preset}": rolled_up(preset)
-                    for preset in ("fast", "balanced", "accurate")
-                },
-                [(points, ids, wanted)],
-                rated,
-                ["edges", "strain max", "loss_gc", "from cylinder", "iterations"],
-            )
+        case = (points, ids, rolled(points.reshape(-1, 3), turn * np.pi))
+        name = f"{size} x {size}, {turn * 180:.0f} degrees"
+        title = f"A sheet rolled up, {name}; the handles are on a smooth cylinder, whose chords "
+        runs = {f"{name}, {preset}": partial(rolled_up, preset=preset) for preset in PRESETS}
+        columns = ["edges", "strain max", "loss_gc", "from cylinder", "iterations"]
+        found |= compared(title + "are shorter", runs, [case], rated, columns)
     return found
 
 

@@ -7,15 +7,15 @@ gives the energy to compare with: the ratio is at most 1.01 where nothing is los
 
 from __future__ import annotations
 
-import resource
-import sys
 import time
 from dataclasses import replace
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
-from harness import progress, table
+from designs.base import refined
+from designs.irregular import star
+from harness import apart, progress, shown
+from report.measure import peak_mb
 
 import gso
 from gso.tasks.developable import levels
@@ -29,25 +29,12 @@ SHAPES = {
 }
 
 
-def star(shape: str, side: int, valence: int = 5) -> gso.Mesh:
-    """Make a mesh of patches of side x side quads around a vertex of a given valence."""
-    t = np.linspace(0, 1, side + 1)
-    u, v = (x[..., None] for x in np.meshgrid(t, t, indexing="ij"))
-    ids = np.arange((side + 1) ** 2).reshape(side + 1, side + 1)
-    quads = np.stack([ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]], axis=-1)
-    points, faces = [], []
-    for k in range(valence):
-        turn = 2 * np.pi * (k + np.array([0, 0.5, 1])) / valence
-        a, b, c = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-        points.append((u * (1 - v) * a + v * (1 - u) * c + 1.15 * u * v * b).reshape(-1, 2))
-        faces.append(quads.reshape(-1, 4) + k * ids.size)
-    flat = np.concatenate(points)
-    _, first, inverse = np.unique(
-        np.round(flat * 1e7).astype(int), axis=0, return_index=True, return_inverse=True
-    )
-    x, y = flat[first].T
-    plane = np.stack([x, y, SHAPES[shape](x, y)], axis=1)
-    return gso.Mesh(plane, inverse.ravel()[np.concatenate(faces)])
+def patches(shape: str, side: int) -> gso.Mesh:
+    """Make a mesh of five patches of side x side quads around a vertex."""
+    turn, (_, faces) = np.pi * np.arange(10) / 5, star(5)
+    rim = np.where(np.arange(10) % 2, 1.15, 1.0) * [np.cos(turn), np.sin(turn)]
+    plan, quads = refined(np.c_[np.zeros(2), rim].T, faces, side)
+    return gso.Mesh(np.c_[plan, SHAPES[shape](*plan.T)], quads)
 
 
 def _constraints(kind: str, mesh: gso.Mesh) -> list[Any]:
@@ -77,56 +64,45 @@ def _solved(design: tuple[str, int], kind: str, full: bool) -> dict[str, float]:
         x, y = np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side), indexing="ij")
         mesh = gso.Mesh.from_grid(np.dstack([x, y, 0.3 * np.cos(2 * x) * np.cos(1.5 * y)]))
     else:
-        mesh = star(shape, side)
-    options = Options()
+        mesh = patches(shape, side)
+    options, constraints = Options(), _constraints(kind, mesh)
     if full:
         options = replace(options, coarse_vertices=10**9)
         levels._SHORT = 10**9
     start = time.process_time()
-    result = gso.tno.optimize(
-        mesh, options=options, constraints=_constraints(kind, mesh), verdict=False
-    )
-    spent = time.process_time() - start
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (
-        1024.0 if sys.platform != "darwin" else 1024.0**2
-    )
+    result = gso.tno.optimize(mesh, options=options, constraints=constraints, verdict=False)
     return {
         "vertices": len(mesh.vertices),
-        "s": spent,
-        "MB": peak,
+        "s": time.process_time() - start,
+        "MB": peak_mb(),
         "energy": sum(result.energy.values()),
         "|K|": result.metrics["loss_gc_worst"],
     }
 
 
-def _measured(design: tuple[str, int], kind: str, full: bool) -> dict[str, float]:
-    """Solve one design in a process of its own."""
-    with get_context("spawn").Pool(1) as pool:
-        return pool.apply(_solved, (design, kind, full))
-
-
 def _compared(title: str, cases: list[tuple[tuple[str, int], str]], checked: int) -> dict[str, Any]:
     """Measure cases, with the full solve where the side of the design is at most `checked`."""
-    out: dict[str, dict[str, float]] = {}
+    rows = {}
     for design, kind in progress(cases, title):
-        row = _measured(design, kind, False)
-        full = _measured(design, kind, True) if design[1] <= checked else None
-        row["full s"] = full["s"] if full else np.nan
-        row["energy ratio"] = row["energy"] / full["energy"] if full else np.nan
-        row["full |K|"] = full["|K|"] if full else np.nan
-        out[f"{design[0]} {design[1]} {kind}".strip()] = row
-    rows = [[name, *row.values()] for name, row in out.items()]
-    table(title, ["design", *next(iter(out.values()))], rows)
-    return out
+        row = apart(_solved, design, kind, False)
+        none = dict.fromkeys(("s", "energy", "|K|"), np.nan)
+        full = apart(_solved, design, kind, True) if design[1] <= checked else none
+        ratio = row["energy"] / full["energy"]
+        more = {"full s": full["s"], "energy ratio": ratio, "full |K|": full["|K|"]}
+        rows[f"{design[0]} {design[1]} {kind}".strip()] = row | more
+    return shown(title, ["design"], rows)
+
+
+def _stars(title: str, kind: str, side: int, checked: int) -> dict[str, Any]:
+    sizes = sorted({min(checked, side), side})
+    return _compared(title, [((shape, k), kind) for shape in SHAPES for k in sizes], checked)
 
 
 def general(side: int = 200, checked: int = 64) -> dict[str, Any]:
     """Measure quad meshes of 5 side^2 faces, and smaller ones against the full solve."""
-    sizes = sorted({min(checked, side), side})
-    cases = [((shape, k), "") for shape in SHAPES for k in sizes]
-    out = _compared("Quad meshes with an irregular vertex", cases, checked)
-    if len(sizes) > 1:
-        small, large = (out[f"waves {k}"] for k in sizes)
+    out = _stars("Quad meshes with an irregular vertex", "", side, checked)
+    if side > checked:
+        small, large = (out[f"waves {k}"] for k in (checked, side))
         grown = np.log(large["vertices"] / small["vertices"])
         print(f"\nexponent of the time: {np.log(large['s'] / small['s']) / grown:.2f}")
     return out
@@ -134,23 +110,13 @@ def general(side: int = 200, checked: int = 64) -> dict[str, Any]:
 
 def framed(side: int = 200, checked: int = 110) -> dict[str, Any]:
     """Measure the same with a fixed boundary."""
-    sizes = sorted({min(checked, side), side})
-    cases = [((shape, k), "FixedBoundary") for shape in SHAPES for k in sizes]
-    return _compared("Quad meshes with a fixed boundary", cases, checked)
+    return _stars("Quad meshes with a fixed boundary", "FixedBoundary", side, checked)
 
 
 def constrained(side: int = 128) -> dict[str, Any]:
     """Measure a grid under constraints of every kind."""
-    kinds = (
-        "FixedBoundary",
-        "Handle",
-        "OnCurve",
-        "SlidingBoundary",
-        "SymmetryPlane",
-        "PlanarFaces",
-        "FixedLengths",
-    )
-    cases = [(("grid", side), kind) for kind in kinds]
+    kinds = ("FixedBoundary", "Handle", "OnCurve", "SlidingBoundary", "SymmetryPlane")
+    cases = [(("grid", side), kind) for kind in (*kinds, "PlanarFaces", "FixedLengths")]
     return _compared(f"Grid {side} x {side} under constraints", cases, side)
 
 

@@ -10,12 +10,12 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from harness import axes_of, progress, timed
+from harness import axes_of, progress, shown, timed
 from report.published import NETS, TABLE_3
 
 from gso import dataset, net
@@ -28,16 +28,8 @@ from gso.net.training.config import from_dict
 from gso.net.training.training_curves import read
 from gso.net.training.training_run import CHECKPOINT
 
-OTHERS = (
-    "enneper",
-    "monkey_saddle",
-    "catenoid",
-    "helicoid",
-    "sphere",
-    "torus",
-    "teapot",
-    "terrain",
-)
+#: Splits that are no windows of other surfaces.
+MAIN = ("train", "validation", "test", "hard")
 #: Array that denoising is timed on.
 TIMED = f"noisy_{LEVELS[1]:.3f}"
 #: Figure 5: blocks per level, channels, surfaces, epochs.
@@ -65,10 +57,8 @@ def over(task: str, model: Any, split: Any, array: str, count: int) -> dict[str,
     total = min(len(split), count or len(split))
     for k in progress(range(0, total, 32), f"{model or 'default'} {split.name} {array}"):
         block = slice(k, min(k + 32, total))
-        clean = split["surface"][block]
-        given = clean if array == "surface" else split[array][block]
-        results = net.predict(given, task=task, model=model)
-        rows += [figures(a, b) for a, b in zip(clean, results, strict=True)]
+        results = net.predict(split[array][block], task=task, model=model)
+        rows += [figures(a, b) for a, b in zip(split["surface"][block], results, strict=True)]
     return {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
 
 
@@ -110,10 +100,9 @@ def rows(
         if noisy:
             published = {f"theta_{s:g}": row["theta"] for s, row in TABLE_3.items()}
         print(line(Path(name).stem, found, published), flush=True)
-        elsewhere = {}
-        for other in (o for o in OTHERS if others and not noisy and o in opened):
-            figures = measured(task, name, opened[other], n)
-            elsewhere[other] = counted(figures, opened[other], n)
+        others_of = [s for s in opened if s not in MAIN] if others and not noisy else []
+        elsewhere = {s: measured(task, name, opened[s], n) for s in others_of}
+        for other, figures in elsewhere.items():
             print(line(f"  {other}", figures, {}), flush=True)
         out[name] = found
         if cards:
@@ -122,7 +111,9 @@ def rows(
             card = catalogue.read_card(path)
             card[f"test{of}"] = counted(found, opened["test"], n)
             if elsewhere:
-                card[f"other splits{of}"] = elsewhere
+                card[f"other splits{of}"] = {
+                    s: counted(figures, opened[s], n) for s, figures in elsewhere.items()
+                }
             weights.write_card(path.with_suffix(".json"), card)
     return out
 
@@ -134,17 +125,22 @@ def counted(found: dict[str, float], split: Any, most: int) -> dict[str, float]:
 
 def rounding(data: Path, run: Path, n: int = 0) -> dict[str, Any]:
     """Print the change of every metric when the net of a run is stored in half precision."""
-    split, out = dataset.open(data)["test"], {}
+    split = dataset.open(data)["test"]
     with tempfile.TemporaryDirectory() as folder:
         exact = weights.load(run / "model.safetensors")
         checkpoint.load(run / CHECKPOINT, exact, exact, [])
         halved = Path(folder) / "half.safetensors"
         weights.save(exact, halved)
         one, other = (measured(exact.task, m, split, n) for m in (exact, halved))
-    for name, value in one.items():
-        out[name] = change = abs(other[name] - value) / max(abs(value), 1e-12)
-        print(f"{name:18s} {value:.6g}  in half precision {other[name]:.6g}  {change:.2%}")
-    return out
+    rows = {
+        name: {
+            "exact": x,
+            "half": other[name],
+            "change %": 100.0 * abs(other[name] - x) / max(abs(x), 1e-12),
+        }
+        for name, x in one.items()
+    }
+    return shown("Metrics of the net of the run, and in half precision", ["metric"], rows)
 
 
 def curve(plot: str = "curves.png") -> dict[str, Any]:
@@ -158,11 +154,6 @@ def curve(plot: str = "curves.png") -> dict[str, Any]:
     return {}
 
 
-def _told(show: Any, name: str, report: Any) -> None:
-    """Show the progress of training one of the nets."""
-    show(report.progress, f"{name}: {report.left / 60:.0f} min left, loss {report.loss:.4g}")
-
-
 def grid(data: Path, file: Path, stride: int = 1) -> dict[str, Any]:
     """Train the nets of figure 5: several sizes, supervised on the optimiser's results (hours).
 
@@ -171,51 +162,51 @@ def grid(data: Path, file: Path, stride: int = 1) -> dict[str, Any]:
     Nets that are already in the file are not trained again. An interrupted net resumes from its
     run, in a folder beside the file.
     """
-    path = file
-    record = json.loads(path.read_text()) if path.exists() else {"stride": stride, "rows": []}
+    record = json.loads(file.read_text()) if file.exists() else {"stride": stride, "rows": []}
     if record["stride"] != stride:
-        raise SystemExit(f"{path} was begun with stride= {record['stride']}")
-    table = record["rows"]
-    done = {(row["blocks"], row["channels"]) for row in table}
-    for blocks in BLOCKS:
-        for channels in CHANNELS:
-            if (blocks, channels) in done:
-                continue
-            config = from_dict(
-                {
-                    "name": f"nb{blocks}-nc{channels}",
-                    "task": "developable",
-                    "augment": "none",
-                    "steps": EPOCHS * SURFACES // 20,
-                    "limit": SURFACES,
-                    "model": {"kind": "gsonet", "channels": channels, "blocks": blocks},
-                    "phase": [{"loss": "label", "batch": 20, "rate": 1e-3, "stride": stride}],
-                    "validate_every": 1e9,
-                }
-            )
-            run = path.with_suffix("") / config.name
-            with share() as show:
-                shown = partial(_told, show, config.name)
-                card = net.train(config, data, run, show=shown)
-            losses = [r["loss"] for r in read(run) if "loss" in r]
-            row = {
-                "blocks": blocks,
-                "channels": channels,
-                "parameters": card["parameters"],
-                "loss": float(np.mean(losses[-5:])),
-                "hours": card["hours"],
-            }
-            if stride == 1:
-                row |= card["validation"]
-            table.append(row)
-            print(line(config.name, {k: v for k, v in row.items() if k[0] != "b"}, {}), flush=True)
-            record["command"] = (
-                f"python bench/run_all.py --only net.grid data=DIR file={path} stride={stride}"
-            )
-            with replacing(path) as stream:
-                stream.write((json.dumps(record, indent=1) + "\n").encode())
-            shutil.rmtree(run)
+        raise SystemExit(f"{file} was begun with stride= {record['stride']}")
+    command = f"python bench/run_all.py --only net.grid data=DIR file={file} stride={stride}"
+    done = {(row["blocks"], row["channels"]) for row in record["rows"]}
+    for blocks, channels in product(BLOCKS, CHANNELS):
+        if (blocks, channels) in done:
+            continue
+        row = _trained(blocks, channels, stride, data, file.with_suffix(""))
+        record["rows"].append(row)
+        record["command"] = command
+        with replacing(file) as stream:
+            stream.write((json.dumps(record, indent=1) + "\n").encode())
     return record
+
+
+def _trained(blocks: int, channels: int, stride: int, data: Path, folder: Path) -> dict[str, Any]:
+    """Train one net in a folder, which is removed then, and return its row."""
+    phase = {"loss": "label", "batch": 20, "rate": 1e-3, "stride": stride}
+    config = from_dict(
+        {
+            "name": f"nb{blocks}-nc{channels}",
+            "task": "developable",
+            "augment": "none",
+            "steps": EPOCHS * SURFACES // 20,
+            "limit": SURFACES,
+            "model": {"kind": "gsonet", "channels": channels, "blocks": blocks},
+            "phase": [phase],
+            "validate_every": 1e9,
+        }
+    )
+    run = folder / config.name
+    with share() as show:
+
+        def told(report: Any) -> None:
+            left = f"{report.left / 60:.0f} min left, loss {report.loss:.4g}"
+            show(report.progress, f"{config.name}: {left}")
+
+        card = net.train(config, data, run, show=told)
+    losses = [r["loss"] for r in read(run) if "loss" in r]
+    row = {"parameters": card["parameters"], "loss": float(np.mean(losses[-5:]))}
+    row |= {"hours": card["hours"], **(card["validation"] if stride == 1 else {})}
+    print(line(config.name, row, {}), flush=True)
+    shutil.rmtree(run)
+    return {"blocks": blocks, "channels": channels, **row}
 
 
 SECTIONS = (rows, rounding, curve, grid)

@@ -8,16 +8,14 @@ NAME_vertices, NAME_faces) the designs of ``examples/whole.py`` are cut.
 
 from __future__ import annotations
 
-import sys
-import time
-import warnings
+import importlib.util
 from typing import Any
 
 import numpy as np
-from harness import ROOT, progress, reference, table
+from harness import example, medians, progress, quietly, reference, shown, timed
 
 import gso
-from gso import metrics
+from gso import faults, metrics
 from gso.components import split
 from gso.mesh import Mesh
 
@@ -26,201 +24,137 @@ _JOINT = 2e-4
 _AWAY = (3.0, 2.0)
 #: Strain up to which pieces are cut before they become ruled.
 _WHOLE = 1e-3
+_Rows = dict[Any, dict[str, Any]]
 
 
 def as_is(shapes: str = "", strain: str = "0.01") -> dict[str, Any]:
     """Cut designs whose shape does not change, with darts and without."""
-    rows, out = [], {}
-    for name, mesh in progress(list(_shapes(shapes).items()), "as is"):
-        for darts in (True, False):
-            found = _timed(mesh, max_strain=float(strain), darts=darts)
-            rows.append(_row(name, "darts" if darts else "no darts", mesh, found))
-            out[f"{name}, {'darts' if darts else 'no darts'}"] = found.metrics
-    table(f"as they are, strain {strain}", _COLUMNS, rows)
-    return out
+    rows: _Rows = {}
+    for name, mesh in _shapes(shapes, "as is"):
+        for how, darts in (("darts", True), ("no darts", False)):
+            rows[name, how] = _figures(mesh, max_strain=float(strain), darts=darts)
+    return shown(f"as they are, strain {strain}", ["design", ""], rows)
 
 
 def joint(shapes: str = "") -> dict[str, Any]:
     """Cut designs whose shape may change, and solve all pieces together."""
-    rows, out = [], {}
-    for name, mesh in progress(list(_shapes(shapes).items()), "joint"):
+    rows: _Rows = {}
+    for name, mesh in _shapes(shapes, "joint"):
         for share in _AWAY:
             far = 0.01 * share * mesh.diagonal
-            found = _timed(mesh, max_strain=_JOINT, max_deviation=far)
-            rows.append(_row(name, f"{share:g} %", mesh, found))
-            out[f"{name}, {share:g} %"] = found.metrics
-    table(f"shape may change, strain {_JOINT}", _COLUMNS, rows)
-    return out
+            rows[name, f"{share:g} %"] = _figures(mesh, max_strain=_JOINT, max_deviation=far)
+    return shown(f"shape may change, strain {_JOINT}", ["design", ""], rows)
 
 
 def ruled(shapes: str = "") -> dict[str, Any]:
     """Cut designs without darts, and make every piece of exactly ruled strips."""
-    rows, out = [], {}
-    for name, mesh in progress(list(_shapes(shapes).items()), "ruled"):
-        allowed = 0.01 * _AWAY[0] * mesh.diagonal
-        found = _timed(mesh, max_strain=_WHOLE, max_deviation=allowed, darts=False)
-        clock = time.perf_counter()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            # The seams on the design itself, from which distances count.
-            own = gso.cut(mesh, found.edges)
-            result = gso.tno.optimize(own, formulation="ruled", max_deviation=allowed)
-        seconds = time.perf_counter() - clock
-        percent = 100.0 / mesh.diagonal
+    rows: _Rows = {}
+    for name, mesh in _shapes(shapes, "ruled"):
+        allowed, percent = 0.01 * _AWAY[0] * mesh.diagonal, 100.0 / mesh.diagonal
+        asked = {"max_strain": _WHOLE, "max_deviation": allowed, "darts": False}
+        found = quietly(gso.pieces, mesh, **asked)
+        # The seams on the design itself, from which distances count.
+        own, cutting = timed(gso.cut, mesh, found.edges)
+        strips = {"formulation": "ruled", "max_deviation": allowed}
+        result, seconds = timed(quietly, gso.tno.optimize, own, **strips)
         away = result.ruled.deviation
-        out[name] = {
+        rows[name] = {
             "pieces": len(found),
             "strips": result.ruled.strips,
-            "mean": percent * away.there_mean,
-            "max": percent * max(away.there_max, away.back_max),
-            "gap": percent * result.details["seam_gap"],
+            "mean %": percent * away.there_mean,
+            "max %": percent * max(away.there_max, away.back_max),
+            "gap at seams %": percent * result.details["seam_gap"],
             "strain": result.metrics["strain_max"],
             "usable": result.usable,
-            "seconds": seconds,
+            "s": cutting + seconds,
         }
-        rows.append([name, *out[name].values()])
-    columns = ["design", "pieces", "strips", "mean %", "max %", "gap at seams %", "strain"]
-    table(f"exactly ruled, within {_AWAY[0]:g} %", [*columns, "usable", "s"], rows)
-    return out
+    return shown(f"exactly ruled, within {_AWAY[0]:g} %", ["design"], rows)
 
 
 def uncut(shapes: str = "") -> dict[str, Any]:
     """Compare pieces with the same design made developable without cuts, and with xatlas."""
-    rows, out = [], {}
-    for name, mesh in progress(list(_shapes(shapes).items()), "uncut"):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            result = gso.tno.optimize(mesh)
-        away = metrics.surface_distance(mesh, result.mesh)
-        percent = 100.0 / mesh.diagonal
-        strain = result.metrics.get("strain_p99", np.nan)
-        rows.append(
-            [name, "uncut", 1, 0.0, strain, percent * away.there_mean, percent * away.there_max]
-        )
-        out[name] = {"strain_p99": strain, "mean": percent * away.there_mean}
-        found = _timed(mesh, max_strain=0.01, darts=False)
-        rows.append(
-            [name, "as is", len(found), found.seam_length, found.metrics["strain_p99"], 0, 0]
-        )
-        charts = _xatlas(mesh)
-        if charts is not None:
-            rows.append([name, "xatlas", *charts, 0, 0])
-    columns = ["design", "", "pieces", "seam", "p99", "mean %", "max %"]
-    table("against no cuts, and against xatlas", columns, rows)
-    return out
+    rows: _Rows = {}
+    for name, mesh in _shapes(shapes, "uncut"):
+        result = quietly(gso.tno.optimize, mesh)
+        away, percent = metrics.surface_distance(mesh, result.mesh), 100.0 / mesh.diagonal
+        found = quietly(gso.pieces, mesh, max_strain=0.01, darts=False)
+        kinds = {
+            "uncut": (1, 0.0, result.metrics.get("strain_p99", np.nan)),
+            "as is": (len(found), found.seam_length, found.metrics["strain_p99"]),
+        }
+        if importlib.util.find_spec("xatlas"):
+            kinds["xatlas"] = _xatlas(mesh)
+        for kind, figures in kinds.items():
+            row = dict(zip(("pieces", "seam", "p99"), figures, strict=True))
+            rows[name, kind] = row | {"mean %": 0, "max %": 0}
+        rows[name, "uncut"]["mean %"] = percent * away.there_mean
+        rows[name, "uncut"]["max %"] = percent * away.there_max
+    return shown("against no cuts, and against xatlas", ["design", ""], rows)
 
 
 def minimax() -> dict[str, Any]:
     """Compare the flatten formulations "strain" and "minimax" on the reference surfaces."""
-    ratios = []
+    names, ratios = {"p99": "strain_p99", "max": "strain_max", "mean": "strain_mean"}, []
     for surface in progress(reference()[0], "minimax"):
-        found = []
-        for formulation in ("strain", "minimax"):
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                result = gso.tno.optimize(
-                    surface,
-                    task="flatten",
-                    formulation=formulation,
-                    verdict=False,
-                )
-            found.append([result.metrics[k] for k in ("strain_p99", "strain_max", "strain_mean")])
-        ratios.append(np.array(found[1]) / np.array(found[0]))
-    middle = np.median(ratios, axis=0)
-    table("minimax over strain, medians", ["p99", "max", "mean"], [middle.tolist()])
-    return {"ratios": np.array(ratios).tolist()}
+        asked = {"task": "flatten", "verdict": False}
+        strain, least = (
+            quietly(gso.tno.optimize, surface, formulation=f, **asked).metrics
+            for f in ("strain", "minimax")
+        )
+        ratios.append({name: least[key] / strain[key] for name, key in names.items()})
+    return shown("minimax over strain, medians", ["surfaces"], {str(len(ratios)): medians(ratios)})
 
 
 def times() -> dict[str, Any]:
     """Time the search on spheres of growing size."""
-    rows, out = [], {}
+    rows: _Rows = {}
     for count in (2_500, 10_000, 50_000):
         mesh = _ball(count // 2)
-        row: list[Any] = [len(mesh.faces)]
-        for given in ({}, {"darts": False}, {"max_deviation": 0.06}):
-            found = _timed(mesh, max_strain=0.01, **given)
-            row += [found.seconds, len(found)]
-        clock = time.perf_counter()
-        pieces = gso.cut(mesh, found.edges) if len(found.edges) else gso.cut(mesh, [])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            gso.tno.optimize(pieces, verdict=False)
-        row.append(time.perf_counter() - clock)
-        rows.append(row)
-        out[str(len(mesh.faces))] = row
-    columns = [
-        "triangles",
-        "darts s",
-        "n",
-        "no darts s",
-        "n",
-        "changed s",
-        "n",
-        "one joint solve s",
-    ]
-    table("times", columns, rows)
-    return out
+        asked = {"darts": {}, "no darts": {"darts": False}, "changed": {"max_deviation": 0.06}}
+        found = {k: quietly(gso.pieces, mesh, max_strain=0.01, **v) for k, v in asked.items()}
+        row = {
+            f"{k} {what}": x
+            for k, v in found.items()
+            for what, x in (("s", v.seconds), ("n", len(v)))
+        }
+        _, row["one joint solve s"] = timed(
+            quietly, gso.tno.optimize, found["no darts"], verdict=False
+        )
+        rows[str(len(mesh.faces))] = row
+    return shown("times", ["triangles"], rows)
 
 
-_COLUMNS = [
-    "design",
-    "",
-    "pieces",
-    "seam",
-    "p99",
-    "neck",
-    "mean %",
-    "max %",
-    "fold ratio",
-    "largest",
-    "planarity",
-    "overlaps",
-    "usable",
-    "s",
-]
-
-
-def _timed(mesh: Mesh, **given: Any) -> Any:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return gso.pieces(mesh, **given)
-
-
-def _row(name: str, how: str, mesh: Mesh, found: Any) -> list[Any]:
-    from gso import faults
-
-    known = found.metrics
-    percent = 100.0 / mesh.diagonal
-    overlaps = sum(int(faults.overlaps(s.mesh, s.flat).size) for s in found.sheets if s is not None)
+def _figures(mesh: Mesh, **given: Any) -> dict[str, Any]:
+    found = quietly(gso.pieces, mesh, **given)
+    known, percent = found.metrics, 100.0 / mesh.diagonal
     before = known.get("dihedral_mean_before", np.nan)
-    return [
-        name,
-        how,
-        len(found),
-        found.seam_length,
-        known["strain_p99"],
-        known["neck_share"],
-        percent * known.get("deviation_mean", 0.0),
-        percent * known.get("deviation_max", 0.0),
-        known.get("dihedral_mean", np.nan) / before,
-        known.get("dihedral_max", np.nan),
-        known.get("nonplanarity_max", np.nan),
-        overlaps,
-        "yes" if found.usable else "no",
-        found.seconds,
-    ]
+    return {
+        "pieces": len(found),
+        "seam": found.seam_length,
+        "p99": known["strain_p99"],
+        "neck": known["neck_share"],
+        "mean %": percent * known.get("deviation_mean", 0.0),
+        "max %": percent * known.get("deviation_max", 0.0),
+        "fold ratio": known.get("dihedral_mean", np.nan) / before,
+        "largest": known.get("dihedral_max", np.nan),
+        "planarity": known.get("nonplanarity_max", np.nan),
+        "overlaps": sum(
+            int(faults.overlaps(s.mesh, s.flat).size) for s in found.sheets if s is not None
+        ),
+        "usable": "yes" if found.usable else "no",
+        "s": found.seconds,
+    }
 
 
-def _shapes(path: str) -> dict[str, Mesh]:
-    """Read the designs of a file, or make those of the examples."""
+def _shapes(path: str, text: str) -> Any:
+    """Yield the designs of a file, or those of the examples, by name."""
     if path:
         with np.load(path) as data:
             names = [k.removesuffix("_vertices") for k in data.files if k.endswith("_vertices")]
-            return {n: Mesh(data[f"{n}_vertices"], data[f"{n}_faces"]) for n in names}
-    sys.path.insert(0, str(ROOT / "examples"))
-    import whole
-
-    return {name: Mesh(*make()) for name, make in whole.DESIGNS.items()}
+            found = {n: Mesh(data[f"{n}_vertices"], data[f"{n}_faces"]) for n in names}
+    else:
+        found = {name: Mesh(*make()) for name, make in example("whole").DESIGNS.items()}
+    return progress(list(found.items()), text)
 
 
 def _ball(count: int) -> Mesh:
@@ -234,12 +168,10 @@ def _ball(count: int) -> Mesh:
     return Mesh(points, ConvexHull(points).simplices)
 
 
-def _xatlas(mesh: Mesh) -> tuple[int, float, float] | None:
-    """Return charts, seam and strain of xatlas at its lowest distortion; None without it."""
-    try:
-        import xatlas
-    except ImportError:
-        return None
+def _xatlas(mesh: Mesh) -> tuple[int, float, float]:
+    """Return charts, seam and strain of xatlas at its lowest distortion."""
+    import xatlas
+
     atlas = xatlas.Atlas()
     atlas.add_mesh(mesh.vertices.astype(np.float32), mesh.triangles.astype(np.uint32))
     options = xatlas.ChartOptions()
@@ -257,14 +189,12 @@ def _xatlas(mesh: Mesh) -> tuple[int, float, float] | None:
         image = metrics.area(part.mesh, own)
         own = own * np.sqrt(part.area / image)
         strain = max(strain, metrics.strains(part.mesh, own)["strain_p99"])
-    loops = opened.boundary_loops
-    length = sum(
-        float(np.linalg.norm(np.diff(opened.vertices[np.r_[x, x[:1]]], axis=0), axis=1).sum())
-        for x in loops
-    )
-    rim = sum(
-        float(np.linalg.norm(np.diff(mesh.vertices[np.r_[x, x[:1]]], axis=0), axis=1).sum())
-        for x in mesh.boundary_loops
+    length, rim = (
+        sum(
+            float(np.linalg.norm(m.vertices[x] - m.vertices[np.roll(x, 1)], axis=1).sum())
+            for x in m.boundary_loops
+        )
+        for m in (opened, mesh)
     )
     seam = 0.5 * (length - rim) / np.sqrt(metrics.area(mesh))
     return int(atlas.chart_count), seam, strain

@@ -8,17 +8,16 @@ faces, in degrees: neither distance nor strain sees a surface that is crumpled.
 
 from __future__ import annotations
 
-import sys
-import warnings
+from functools import partial
 from typing import Any
 
 import numpy as np
-from harness import ROOT, progress, reference, table, timed
+from designs import analytic
+from harness import ROOT, compared, example, progress, quietly, reference, shown, timed
 
 import gso
 from gso import metrics
 from gso.dataset import bezier
-from sections import analytic
 
 #: Options by the name of the row.
 STRIPS = {
@@ -28,171 +27,128 @@ STRIPS = {
 }
 #: Curvature up to which surfaces of another seed are used.
 _MOST = 0.9
+_quantile = partial(np.quantile, q=0.9)
 
 
 def strips(seed: str = "", start: str = "design", count: int = 24) -> dict[str, Any]:
     """Measure numbers of strips; with a seed on other surfaces of the same recipe."""
-    surfaces = _others(int(seed), count) if seed else _references()
-    out = {}
-    rows = []
-    for number, settings in STRIPS.items():
-        options = gso.RuledOptions(starts=tuple(start.split("+")), **settings)
-        found = [_measured(s, options) for s in progress(surfaces, f"strips: {number}")]
-        every = {k: np.array([f[k] for f in found]) for k in found[0]}
-        out[number] = {k: v.tolist() for k, v in every.items()}
-        far, fold = every["max"], every["fold"]
-        rows.append(
-            [
-                number,
-                np.median(every["mean"]),
-                np.median(far),
-                np.quantile(far, 0.9),
-                far.max(),
-                int((every["crossed"] > 0).sum()),
-                np.median(fold),
-                np.quantile(fold, 0.9),
-                int(every["usable"].sum()),
-                np.median(every["s"]),
-            ]
-        )
+    surfaces = _surfaces(seed, count)
     columns = [
-        "strips",
-        "mean %",
-        "max %",
-        "90 %",
-        "worst",
-        "crossed",
-        "fold",
-        "90 %",
-        "usable",
-        "s",
+        *(("mean %", "mean %", np.median), ("max %", "max %", np.median)),
+        *(("max 90 %", "max %", _quantile), ("worst", "max %", np.max)),
+        *(("crossed", "crossed", np.count_nonzero), ("fold", "fold", np.median)),
+        *(("fold 90 %", "fold", _quantile), ("usable", "usable", sum), ("s", "s", np.median)),
     ]
-    table(f"{len(surfaces)} surfaces, starts {start}", columns, rows)
-    return out
+    runs = {number: _solver(start, **settings) for number, settings in STRIPS.items()}
+    title = f"{len(surfaces)} surfaces, starts {start}"
+    return compared(title, runs, surfaces, _rated, columns, head="strips")
 
 
 def cad(seed: str = "", count: int = 24) -> dict[str, Any]:
     """Measure smooth strips: how torsal they are, and their distance from the planar faces."""
-    surfaces = _others(int(seed), count) if seed else _references()
-    out, rows = {}, []
-    for number in ("1", "tree", "4"):
-        found = []
-        for surface in progress(surfaces, f"smooth strips: {number}"):
-            options = gso.RuledOptions(starts=("design",), **STRIPS[number])
-            result = _optimised(surface, options=options)
-            strips, seconds = timed(gso.smooth_strips, result.ruled, result.design)
-            percent = 100.0 / result.design.diagonal
-            far = [percent * x for x in strips.distances]
-            faces = sum(len(p.faces) for p in strips.patches)
-            found.append([strips.turning, strips.kink, strips.is_torsal, *far, faces, seconds])
-        every = np.array(found, float)
-        out[number] = every.tolist()
-        turn, lean, torsal, mean, largest, faces, seconds = every.T
-        row = [np.median(turn), turn.max(), int((lean <= 0.1).sum()), int(torsal.sum())]
-        rows.append([number, *row, *(np.median(x) for x in (mean, largest, faces, seconds))])
-    columns = ["strips", "turn deg", "worst", "no break", "torsal", "mean %", "max %", "faces", "s"]
-    table(f"Smooth strips of {len(surfaces)} surfaces", columns, rows)
-    return out
+    surfaces = _surfaces(seed, count)
+
+    def rated(_: Any, result: gso.Result) -> dict[str, float]:
+        found, seconds = timed(gso.smooth_strips, result.ruled, result.design)
+        mean, largest = (100.0 / result.design.diagonal * x for x in found.distances)
+        flat = {"turn": found.turning, "no break": found.kink <= 0.1, "torsal": found.is_torsal}
+        faces = sum(len(p.faces) for p in found.patches)
+        return flat | {"mean %": mean, "max %": largest, "faces": faces, "s": seconds}
+
+    columns = [
+        *(("turn deg", "turn", np.median), ("worst", "turn", np.max)),
+        *((name, name, sum) for name in ("no break", "torsal")),
+        *((name, name, np.median) for name in ("mean %", "max %", "faces", "s")),
+    ]
+    runs = {number: _solver("design", **STRIPS[number]) for number in ("1", "tree", "4")}
+    title = f"Smooth strips of {len(surfaces)} surfaces"
+    return compared(title, runs, surfaces, rated, columns, head="strips")
 
 
-def _references() -> list[Any]:
-    return [*reference()[0], gso.load(ROOT / "examples" / "panel.obj")]
-
-
-def _others(seed: int, count: int) -> list[Any]:
-    every = (shape.sample() for shape in bezier.generate(4 * count, seed=seed))
+def _surfaces(seed: str = "", count: int = 24) -> list[Any]:
+    """Return the references and the panel, or surfaces of another seed."""
+    if not seed:
+        return [*reference()[0], gso.load(ROOT / "examples" / "panel.obj")]
+    every = (shape.sample() for shape in bezier.generate(4 * count, seed=int(seed)))
     return [points for points in every if metrics.loss_gc(points) <= _MOST][:count]
 
 
-def _optimised(surface: Any, **given: Any) -> gso.Result:
-    """Optimise without warnings: results that are not usable are counted."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", gso.ConvergenceWarning)
-        return gso.tno.optimize(surface, **given)
+def _solver(start: str, **settings: Any) -> Any:
+    options = gso.RuledOptions(starts=tuple(start.split("+")), **settings)
+    return partial(quietly, gso.tno.optimize, options=options)
 
 
-def _measured(surface: Any, options: gso.RuledOptions) -> dict[str, float]:
-    result = _optimised(surface, options=options)
+def _rated(_: Any, result: gso.Result) -> dict[str, float]:
     found = result.metrics
     return {
-        "mean": found["distance_mean"],
-        "max": found["distance_max"],
+        "mean %": found["distance_mean"],
+        "max %": found["distance_max"],
         "crossed": found["rulings_crossed"],
         "fold": found["fold_max"],
-        "usable": float(result.usable),
+        "usable": int(result.usable),
         "s": result.seconds["strips"],
     }
 
 
 def convergence() -> dict[str, Any]:
     """Compare the rulings of known surfaces, sampled four times as finely as they are many."""
-    out, rows = {}, []
+    rows: dict[Any, dict[str, Any]] = {}
     for name, make in analytic.SURFACES.items():
         for count in (17, 33, 65):
             known = make(4 * count)
             options = gso.RuledOptions(rulings=count, starts=("design",))
             result = gso.tno.optimize(known.points, options=options)
-            size = result.design.diagonal
-            off = known.distance(result.ruled.samples()[0]).max() / size
-            back = metrics.point_to_surface(result.design.vertices, result.mesh).max() / size
+            percent = 100.0 / result.design.diagonal
             a, b = result.mesh.vertices[result.rulings.edges].transpose(1, 0, 2)
             length = np.linalg.norm(b - a, axis=1)
             true = known.ruling(0.5 * (a + b))
             sine = np.linalg.norm(np.cross(b - a, true), axis=1) / length
             angle = np.degrees(np.arcsin(np.clip(sine, 0.0, 1.0)))
             long = angle[length > 0.5 * length.max()]
-            row = [100 * off, 100 * back, np.median(long), long.max(), angle.max()]
-            out[f"{name}, {count}"] = row
-            rows.append([name, count, *row, str(result.usable)])
-    columns = [
-        "surface",
-        "rulings",
-        "off %",
-        "back %",
-        "median deg",
-        "long deg",
-        "all deg",
-        "usable",
-    ]
-    table("Known surfaces", columns, rows)
-    return out
+            back = metrics.point_to_surface(result.design.vertices, result.mesh)
+            rows[name, str(count)] = {
+                "off %": percent * known.distance(result.ruled.samples()[0]).max(),
+                "back %": percent * back.max(),
+                "median deg": np.median(long),
+                "long deg": long.max(),
+                "all deg": angle.max(),
+                "usable": str(result.usable),
+            }
+    return shown("Known surfaces", ["surface", "rulings"], rows)
 
 
 def bounds(seed: str = "", start: str = "design", count: int = 24) -> dict[str, Any]:
     """Measure the numbers of strips that hold bounds on the deviation."""
-    surfaces = _others(int(seed), count) if seed else _references()
-    out, rows = {}, []
-    options = gso.RuledOptions(strips="auto", starts=tuple(start.split("+")))
+    surfaces, rows = _surfaces(seed, count), {}
     for percent in (2.0, 1.0, 0.5):
         numbers, refused, seconds = [], [], []
         for surface in progress(surfaces, f"{percent} %"):
-            mesh = surface if isinstance(surface, gso.Mesh) else gso.Mesh.from_grid(surface)
+            mesh = gso.as_mesh(surface)
             most = 0.01 * percent * mesh.diagonal
-            result = _optimised(mesh, options=options, max_deviation=most)
+            result = _solver(start, strips="auto")(mesh, max_deviation=most)
             seconds.append(result.seconds["strips"])
             if result.usable:
                 numbers.append(result.ruled.strips)
             else:
                 refused.append(result.metrics["distance_max"])
-        out[str(percent)] = {"strips": numbers, "refused": refused, "s": seconds}
-        found = " ".join(map(str, sorted(numbers)))
-        best = " ".join(f"{far:.2f}" for far in sorted(refused))
-        rows.append([f"{percent} %", len(refused), best, found, np.median(seconds), max(seconds)])
-    columns = ["bound", "refused", "their best %", "numbers of strips", "median s", "max s"]
-    table(f"{len(surfaces)} surfaces, starts {start}", columns, rows)
-    return out
+        rows[f"{percent} %"] = {
+            "refused": len(refused),
+            "their best %": " ".join(f"{far:.2f}" for far in sorted(refused)),
+            "numbers of strips": " ".join(map(str, sorted(numbers))),
+            "median s": np.median(seconds),
+            "max s": max(seconds),
+        }
+    return shown(f"{len(surfaces)} surfaces, starts {start}", ["bound"], rows)
 
 
 def general(start: str = "design") -> dict[str, Any]:
     """Measure meshes from practice: teapot patches, irregular quads, triangles, a hole."""
-    sys.path.insert(0, str(ROOT / "examples"))
-    import irregular
-    import teapot
-
+    irregular, teapot = example("irregular"), example("teapot")
     panel = gso.load(ROOT / "examples" / "panel.obj")
     order = np.random.default_rng(5).permutation(len(panel.vertices))
     middle = panel.vertices[panel.faces].mean(axis=1)
     away = np.linalg.norm(middle - middle.mean(axis=0), axis=1)
+    u, v = np.meshgrid(*[np.linspace(-0.5, 0.5, 33)] * 2, indexing="ij")
     cases = {
         "panel": panel,
         "panel, triangles": gso.Mesh(panel.vertices[order], np.argsort(order)[panel.triangles]),
@@ -200,25 +156,20 @@ def general(start: str = "design") -> dict[str, Any]:
         "irregular quads": gso.Mesh(*irregular.disk()),
         "irregular, hole": gso.Mesh(*irregular.disk_with_hole()),
         "strip of triangles": gso.Mesh(*irregular.with_hole()),
-        "sphere cap": _cap(),
+        "sphere cap": np.dstack([np.sin(u) * np.cos(v), np.sin(v), np.cos(u) * np.cos(v)]),
         **{f"teapot {k}": teapot.patch(k, 33) for k in range(len(teapot.patches(2)))},
     }
-    out, rows = {}, []
+    rows: dict[Any, dict[str, Any]] = {}
     for name, case in progress(cases.items(), "meshes"):
         for number in (1, 4):
-            options = gso.RuledOptions(strips=number, starts=tuple(start.split("+")))
             try:
-                row = _measured(case, options)
+                row = _rated(case, _solver(start, strips=number)(case))
             except gso.GSOError as error:
-                rows.append([name, number, "refused", str(error)[:60], "", "", ""])
-                continue
-            out[f"{name}, {number}"] = row
-            rows.append(
-                [name, number, *(row[k] for k in ("mean", "max", "crossed", "usable", "s"))]
-            )
-    columns = ["mesh", "strips", "mean %", "max %", "crossed", "usable", "s"]
-    table("Meshes from practice", columns, rows)
-    return out
+                row = {"mean %": "refused", "max %": str(error)[:60], "crossed": ""}
+                row |= {"usable": "", "s": ""}
+            row.pop("fold", None)
+            rows[name, str(number)] = row
+    return shown("Meshes from practice", ["mesh", "strips"], rows)
 
 
 def peers() -> dict[str, Any]:
@@ -227,38 +178,27 @@ def peers() -> dict[str, Any]:
     No other installable package makes strips of planar faces near a surface; those that there are
     flatten, or need rulings that are given.
     """
-    methods = {
-        "curvature": {},
-        "isometry": {"formulation": "isometry"},
-        **{f"ruled, {name}": {"options": gso.RuledOptions(**o)} for name, o in STRIPS.items()},
-    }
-    out, rows = {}, []
-    for name, given in methods.items():
-        found = []
-        for surface in progress(_references(), name):
-            result, spent = timed(_optimised, surface, **given)
-            m = result.metrics
-            wobble = 0.0
-            if result.ruled is None:
-                wobble = gso.rulings.trace(result.mesh).straightness.mean()
-            strain = m.get("strain_max", np.nan)
-            row = (m["distance_mean"], m["distance_max"], strain, wobble, result.usable, spent)
-            found.append(row)
-        every = np.array(found, float)
-        mean, far, strain, wobble, usable, seconds = every.T
-        row = [np.median(mean), np.median(far), np.quantile(far, 0.9), 100 * np.nanmedian(strain)]
-        row += [100 * np.median(wobble), int(usable.sum()), np.median(seconds)]
-        out[name] = row
-        rows.append([name, *row])
-    columns = ["method", "mean %", "max %", "90 %", "strain %", "off straight %", "usable", "s"]
-    table("Largest strain of the pattern, and how far rulings are off straight", columns, rows)
-    return out
+    methods = {"curvature": {}, "isometry": {"formulation": "isometry"}}
+    methods |= {f"ruled, {k}": {"options": gso.RuledOptions(**o)} for k, o in STRIPS.items()}
+    runs = {name: partial(quietly, gso.tno.optimize, **given) for name, given in methods.items()}
 
+    def rated(_: Any, result: gso.Result) -> dict[str, Any]:
+        wobble = 0.0
+        if result.ruled is None:
+            wobble = gso.rulings.trace(result.mesh).straightness.mean()
+        mean, far = (result.metrics[k] for k in ("distance_mean", "distance_max"))
+        found = {"mean %": mean, "max %": far, "off straight %": 100 * wobble}
+        strain = 100 * result.metrics.get("strain_max", np.nan)
+        return found | {"strain %": strain, "usable": int(result.usable)}
 
-def _cap(n: int = 33, angle: float = 0.5) -> np.ndarray:
-    """Return a square piece of a sphere around its pole."""
-    u, v = np.meshgrid(*[np.linspace(-angle, angle, n)] * 2, indexing="ij")
-    return np.stack([np.sin(u) * np.cos(v), np.sin(v), np.cos(u) * np.cos(v)], axis=-1)
+    columns = [
+        *((name, name, np.median) for name in ("mean %", "max %")),
+        *(("90 %", "max %", _quantile), ("strain %", "strain %", np.nanmedian)),
+        ("off straight %", "off straight %", np.median),
+        *(("usable", "usable", sum), ("s", "s", np.median)),
+    ]
+    title = "Largest strain of the pattern, and how far rulings are off straight"
+    return compared(title, runs, _surfaces(), rated, columns)
 
 
 SECTIONS = (strips, convergence, bounds, general, peers, cad)

@@ -8,10 +8,11 @@ the design with the same constraints, in percent above it.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from harness import progress, table
+from harness import medians, progress, shown
 
 import gso
 from gso.dataset import bezier
@@ -27,7 +28,7 @@ _UP, _INWARDS = 0.04, 0.02
 
 def drags(n: int = 64, count: int = 16) -> dict[str, Any]:
     """Drag a corner of each of several surfaces, the opposite border fixed."""
-    out, rows = {}, []
+    rows = {}
     for task in TASKS:
         found = []
         for surface in progress(bezier.generate(count, seed=77), " ".join(task)):
@@ -36,29 +37,35 @@ def drags(n: int = 64, count: int = 16) -> dict[str, Any]:
             corner, inwards = ids[-1, -1], v[ids[0, 0]] - v[ids[-1, -1]]
             way = _INWARDS * inwards + _UP * mesh.diagonal * vertex_normals(mesh)[corner]
             found.append(_dragged(mesh, task, [gso.Fixed(ids[0])], corner, way))
-        middle = {name: float(np.median([f[name] for f in found])) for name in found[0]}
-        rows.append([*task, *middle.values(), float(max(f["settled"] for f in found))])
-        out[" ".join(task)] = middle
+        worst = float(max(f["settled %"] for f in found))
+        rows[task] = medians(found) | {"worst settled %": worst}
     title = f"A corner dragged, the opposite border fixed, {n} x {n}, medians of {count} surfaces"
-    table(title, ["task", "formulation", *_COLUMNS, "worst settled %"], rows)
-    return out
+    return shown(title, ["task", "formulation"], rows)
 
 
 def kinds(n: int = 64) -> dict[str, Any]:
     """Drag the middle of a symmetric surface, one border fixed, under each kind of constraint."""
-    out, rows = {}, []
+    rows = {}
     for task in TASKS:
         for name, (mesh, more, middle) in progress(_constrained(n).items(), " ".join(task)):
             way = _UP * mesh.diagonal * vertex_normals(mesh)[middle]
-            found = _dragged(mesh, task, more, middle, way)
-            rows.append([*task, name, *found.values()])
-            out[" ".join((*task, name))] = found
+            rows[(*task, name)] = _dragged(mesh, task, more, middle, way)
     title = f"The middle dragged under each kind of constraint, {n} x {n}"
-    table(title, ["task", "formulation", "constraint", *_COLUMNS], rows)
-    return out
+    return shown(title, ["task", "formulation", "constraint"], rows)
 
 
-_COLUMNS = ["frames / s", "slowest, ms", "at rest %", "settled %"]
+def frames(
+    session: gso.tno.Session, ids: Any, places: Iterable[np.ndarray], steps: int = 1
+) -> tuple[dict[str, float], np.ndarray]:
+    """Move vertices from place to place, a frame each; return the speed, and all vertices then."""
+    seconds = []
+    for place in places:
+        start = time.perf_counter()
+        session.move(ids, place)
+        vertices = session.step(steps)
+        seconds.append(time.perf_counter() - start)
+    median, slowest = float(np.median(seconds)), 1e3 * max(seconds)
+    return {"frames / s": 1.0 / median, "slowest, ms": slowest}, vertices
 
 
 def _constrained(n: int) -> dict[str, tuple[Mesh, list[Any], int]]:
@@ -82,16 +89,14 @@ def _constrained(n: int) -> dict[str, tuple[Mesh, list[Any], int]]:
     }
     out = {name: (mesh, [held, *own], middle) for name, own in more.items()}
     out["FixedBoundary"] = mesh, [gso.FixedBoundary()], middle
-    halves = [Mesh.from_grid(part) for part in (grid[:, : n // 2], grid[:, n // 2 - 1 :])]
-    joined = gso.Mesh(
-        np.concatenate([half.vertices for half in halves]),
-        np.concatenate([halves[0].faces, halves[1].faces + len(halves[0].vertices)]),
-    )
-    left = np.arange(n * (n // 2)).reshape(n, -1)
-    right = len(halves[0].vertices) + np.arange(len(halves[1].vertices)).reshape(n, -1)
-    seam = gso.Glue(np.stack([left[:, -1], right[:, 0]], axis=1))
-    border = gso.Fixed(np.r_[left[0], right[0]])
-    out["Glue"] = joined, [border, seam], int(right[n // 2, n // 4])
+    left, right = (Mesh.from_grid(part) for part in (grid[:, : n // 2], grid[:, n // 2 - 1 :]))
+    count = len(left.vertices)
+    faces = np.concatenate([left.faces, right.faces + count])
+    joined = gso.Mesh(np.concatenate([left.vertices, right.vertices]), faces)
+    one, other = left.grid_index, count + right.grid_index
+    seam = gso.Glue(np.stack([one[:, -1], other[:, 0]], axis=1))
+    border = gso.Fixed(np.r_[one[0], other[0]])
+    out["Glue"] = joined, [border, seam], int(other[n // 2, n // 4])
     return out
 
 
@@ -106,24 +111,15 @@ def _dragged(
     asked: dict[str, Any] = {"task": task[0], "formulation": task[1]}
     session = gso.tno.Session(mesh, **asked, constraints=[*more, gso.Handle([vertex], at(0.0))])
     session.settle()
-    seconds = []
-    for k in range(1, FRAMES + 1):
-        start = time.perf_counter()
-        session.move([vertex], at(k / FRAMES))
-        session.step()
-        seconds.append(time.perf_counter() - start)
+    speed, _ = frames(session, [vertex], (at(k / FRAMES) for k in range(1, FRAMES + 1)))
     for _ in range(RESTING):
         session.step()
     resting = session.result()
     settled = session.settle()
     cold = gso.tno.optimize(mesh, **asked, constraints=[*more, gso.Handle([vertex], at(1.0))])
     own, last, first = (sum(r.energy.values()) for r in (cold, resting, settled))
-    return {
-        "fps": 1.0 / float(np.median(seconds)),
-        "slowest": 1e3 * max(seconds),
-        "resting": 100.0 * (last / own - 1.0),
-        "settled": 100.0 * (first / own - 1.0),
-    }
+    rest, settled = (100.0 * (energy / own - 1.0) for energy in (last, first))
+    return speed | {"at rest %": rest, "settled %": settled}
 
 
 SECTIONS = (drags, kinds)

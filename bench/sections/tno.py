@@ -6,11 +6,11 @@ were tuned on surfaces of other seeds.
 
 from __future__ import annotations
 
-import sys
+from functools import partial
 from typing import Any
 
 import numpy as np
-from harness import ROOT, compared, pure, quality, reference, solver
+from harness import PRESETS, compared, example, pure, quality, reference, solver
 from report.peers_flatten import arap
 
 import gso
@@ -18,7 +18,6 @@ from gso import metrics
 from gso.dataset import bezier
 from gso.pipeline.lay_flat import strains_of
 
-PRESETS = ("fast", "balanced", "accurate")
 PURE = "pure SciPy"
 #: Largest acceptable angle of denoised surfaces, by the standard deviation of the noise.
 FLOORS = {0.001: 0.30, 0.005: 0.82, 0.010: 1.30, 0.015: 1.70}
@@ -37,34 +36,24 @@ def developable() -> dict[str, Any]:
     """Measure the three presets, and `balanced` without the optional backends."""
     surfaces, _ = reference()
     runs = {preset: solver(options=preset) for preset in PRESETS}
+    runs |= {f"balanced, {PURE}": pure(runs["balanced"])}
     columns = ["loss_gc", "other split", "worse", "every 2nd", "K_A-r worse", "d_H %", "fairness"]
-    strains = [
-        ("strain %", "strain", np.median),
-        ("90th", "strain", lambda x: np.percentile(x, 90)),
-        ("backend", "backend", lambda x: x[-1]),
-    ]
+    high = partial(np.percentile, q=90)
+    strains = [("strain %", "strain", np.median), ("90th", "strain", high)]
+    columns = [*columns, *strains, ("backend", "backend", lambda x: x[-1])]
     curved = np.mean([metrics.loss_gc(s) for s in surfaces])
-    found = compared(
-        f"Developable, 24 surfaces, mean input loss_gc {curved:.3f}",
-        runs | {f"balanced, {PURE}": pure(runs["balanced"])},
-        surfaces,
-        _rated,
-        [*columns, *strains],
-        head="preset",
-    )
-    given = [strains_of(gso.Mesh.from_grid(s))["strain_max"] for s in surfaces]
-    print(
-        "  strain: the largest of each result's pattern, median and 90th percentile; of the", end=""
-    )
-    print(f" input {100.0 * np.median(given):.3g} %")
+    title = f"Developable, 24 surfaces, mean input loss_gc {curved:.3f}"
+    found = compared(title, runs, surfaces, _rated, columns, head="preset")
+    given = np.median([strains_of(gso.Mesh.from_grid(s))["strain_max"] for s in surfaces])
+    print("  strain: the largest of each result's pattern, median and 90th percentile; ", end="")
+    print(f"of the input {100.0 * given:.3g} %")
     return found
 
 
 def _flat(surface: Any, outcome: Any) -> dict[str, float]:
     """Rate a flat image, (H, W, 2) or (n, 2), or a result with one."""
-    flat = outcome
-    if isinstance(outcome, gso.Result):
-        flat = outcome.flat if outcome.flat_grid is None else outcome.flat_grid
+    result = isinstance(outcome, gso.Result)
+    flat = (outcome.flat if outcome.flat_grid is None else outcome.flat_grid) if result else outcome
     grid = isinstance(surface, np.ndarray)
     strains = metrics.principal_strains(surface, flat)
     return {
@@ -80,18 +69,12 @@ def flatten() -> dict[str, Any]:
     """Measure two formulations, and libigl's ARAP in the same run."""
     runs = {f: solver(task="flatten", formulation=f) for f in ("strain", "lengths")}
     runs["libigl ARAP, 100"] = lambda p: arap(gso.Mesh.from_grid(p)).reshape(*p.shape[:2], 2)
-    return compared(
-        "Flatten, 24 surfaces (floors: strain 0.0093 0.0353 0.0053 no flips; "
-        "lengths 2.6e-5 1.7e-5 no flips; 0.15 s)",
-        runs | {f"strain, {PURE}": pure(runs["strain"])},
-        reference()[0],
-        _flat,
-        [
-            *("iso-cell", ("median", "iso-cell", np.median), "strain", "p99", "edges"),
-            ("flipped", "flipped", np.sum),
-        ],
-        head="formulation",
-    )
+    runs[f"strain, {PURE}"] = pure(runs["strain"])
+    columns = ["iso-cell", ("median", "iso-cell", np.median), "strain", "p99", "edges"]
+    columns += [("flipped", "flipped", np.sum)]
+    title = "Flatten, 24 surfaces (floors: strain 0.0093 0.0353 0.0053 no flips; "
+    title += "lengths 2.6e-5 1.7e-5 no flips; 0.15 s)"
+    return compared(title, runs, reference()[0], _flat, columns, head="formulation")
 
 
 def denoise() -> dict[str, Any]:
@@ -116,19 +99,17 @@ def denoise() -> dict[str, Any]:
 
 def resolution() -> dict[str, Any]:
     """Solve the same surfaces at three resolutions with the same weights."""
-    shapes = bezier.generate(24, seed=77)
-    found = {}
+    shapes, found = bezier.generate(24, seed=77), {}
     for preset, count in (("balanced", 24), ("accurate", 8)):
+
+        def solved(shape: Any, size: int, options: str = preset) -> gso.Result:
+            return gso.tno.optimize(shape.sample(size), options=options)
+
         found |= compared(
             f"One set of weights, {count} surfaces of seed 77",
-            {
-                f"{preset} {size}": lambda s, n=size, o=preset: gso.tno.optimize(
-                    s.sample(n), options=o
-                )
-                for size in (32, 64, 128)
-            },
+            {f"{preset} {size}": partial(solved, size=size) for size in (32, 64, 128)},
             shapes[:count],
-            lambda shape, result: quality(result.design.grid, result.grid),
+            lambda _, result: quality(result.design.grid, result.grid),
             ["loss_gc", "worse", "K_A-r", "d_H %", "fairness"],
             head="grid",
         )
@@ -137,87 +118,60 @@ def resolution() -> dict[str, Any]:
 
 def questions() -> dict[str, Any]:
     """Measure the limits `max_deviation` and `target_curvature`."""
-    surfaces, _ = reference()
-    meshes = [gso.Mesh.from_grid(s) for s in surfaces]
+    meshes = [gso.Mesh.from_grid(s) for s in reference()[0]]
+
+    def bounded(mesh: gso.Mesh, share: float) -> tuple[float, gso.Result]:
+        return share, gso.tno.optimize(mesh, max_deviation=share * mesh.diagonal)
 
     def within(mesh: gso.Mesh, outcome: tuple[float, gso.Result]) -> dict[str, float]:
         share, result = outcome
-        bound = share * mesh.diagonal
-        reach = metrics.point_to_surface(result.mesh.vertices, mesh).max() / bound
-        both = 0.01 * result.metrics["distance_max"] / share
+        far = metrics.point_to_surface(result.mesh.vertices, mesh).max()
+        reach, both = far / (share * mesh.diagonal), 0.01 * result.metrics["distance_max"] / share
         curvature = result.metrics["loss_gc_worst"]
         return {"kept": reach <= 1 + 1e-6, "worse": curvature, "reach": reach, "both": both}
 
-    found = compared(
-        "max_deviation, share of the diagonal",
-        {
-            f"within {share:.2%}": lambda m, s=share: (
-                s,
-                gso.tno.optimize(m, max_deviation=s * m.diagonal),
-            )
-            for share in (0.0025, 0.005, 0.01)
-        },
-        meshes,
-        within,
-        [
-            *(("kept on", "kept", np.sum), "worse"),
-            *(("largest / bound", "reach", np.max), ("both ways", "both", np.max)),
-        ],
-        head="bound",
-    )
+    runs = {f"within {share:.2%}": partial(bounded, share=share) for share in (0.0025, 0.005, 0.01)}
+    columns = [("kept on", "kept", np.sum), "worse", ("largest / bound", "reach", np.max)]
+    columns += [("both ways", "both", np.max)]
+    title = "max_deviation, share of the diagonal"
+    found = compared(title, runs, meshes, within, columns, head="bound")
     presets = {id(m): [gso.tno.optimize(m, options=p).metrics for p in PRESETS] for m in meshes}
 
+    def aimed(mesh: gso.Mesh, target: float) -> tuple[float, gso.Result]:
+        return target, gso.tno.optimize(mesh, target_curvature=target)
+
     def reached(mesh: gso.Mesh, outcome: tuple[float, gso.Result]) -> dict[str, float]:
-        target, result = outcome
-        m = result.metrics
+        target, m = outcome[0], outcome[1].metrics
         others = [p["d_H"] for p in presets[id(mesh)] if p["loss_gc_worst"] <= target]
         met = m["loss_gc_worst"] <= 1.05 * target
         return {"met": met, "closest": m["d_H"] <= min(others, default=np.inf), "d_H %": m["d_H"]}
 
-    return found | compared(
-        "target_curvature; closest: no preset that meets it has a smaller mean distance",
-        {
-            f"target {target}": lambda m, t=target: (
-                t,
-                gso.tno.optimize(m, target_curvature=t),
-            )
-            for target in (0.05, 0.02)
-        },
-        meshes,
-        reached,
-        [("met on", "met", np.sum), ("closest on", "closest", np.sum), "d_H %"],
-        head="target",
-    )
+    runs = {f"target {target}": partial(aimed, target=target) for target in (0.05, 0.02)}
+    columns = [("met on", "met", np.sum), ("closest on", "closest", np.sum), "d_H %"]
+    title = "target_curvature; closest: no preset that meets it has a smaller mean distance"
+    return found | compared(title, runs, meshes, reached, columns, head="target")
 
 
 def general() -> dict[str, Any]:
     """Flatten and make developable meshes that are not grids."""
-    sys.path.insert(0, str(ROOT / "examples"))
-    import irregular
-    import teapot
-
-    grid = gso.Mesh.from_grid(teapot.patch(4, 33))
+    irregular = example("irregular")
+    grid = gso.Mesh.from_grid(example("teapot").patch(4, 33))
     order = np.random.default_rng(5).permutation(len(grid.vertices))
     patch = gso.Mesh(grid.vertices[order], np.argsort(order)[grid.triangles])
     disk, hole = (gso.Mesh(*made()) for made in (irregular.disk, irregular.disk_with_hole))
     found = {}
     for name, mesh in (("teapot patch, triangles", patch), ("quads with a hole", hole)):
-        found |= compared(
-            f"Flatten, {name}",
-            {f"{name}, strain": solver(task="flatten"), f"{name}, libigl ARAP": arap},
-            [mesh],
-            _flat,
-            ["strain", "p99", "edges", "flipped"],
-        )
+        runs = {f"{name}, strain": solver(task="flatten"), f"{name}, libigl ARAP": arap}
+        columns = ["strain", "p99", "edges", "flipped"]
+        found |= compared(f"Flatten, {name}", runs, [mesh], _flat, columns)
     for name, mesh in (("quads, irregular", disk), ("quads with a hole", hole)):
-        shown = ("loss_gc_worst_before", "loss_gc_worst", "K_A_r_worst", "d_H", "distance_max")
-        bound = 0.01 * mesh.diagonal
+        bound = solver(max_deviation=0.01 * mesh.diagonal)
         found |= compared(
             f"Developable, {name}",
-            {name: solver(), f"{name}, within 1 %": solver(max_deviation=bound)},
+            {name: solver(), f"{name}, within 1 %": bound},
             [mesh],
             lambda _, result: result.metrics,
-            shown,
+            ["loss_gc_worst_before", "loss_gc_worst", "K_A_r_worst", "d_H", "distance_max"],
         )
     return found
 

@@ -6,21 +6,17 @@ The designs are the teapot's 32 patches, a hemisphere of 12 gores, the terrain, 
 
 from __future__ import annotations
 
-import shutil
-import sys
 import tempfile
-import time
-import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from harness import ROOT, progress, table
+from harness import example, progress, quietly, shown, timed
 
 import gso
 from gso.mesh import Mesh
 
-#: Sheet for each set, its unit, and the allowed distance in per cent.
+#: Unit of each set, sheet, and the allowed distance in per cent.
 _SETS = {
     "teapot": ("dm", (2000.0, 1000.0), 1.0),
     "hemisphere": ("mm", (2000.0, 1000.0), 1.0),
@@ -31,64 +27,40 @@ _SETS = {
 
 def fabricate(names: str = ",".join(_SETS), seconds: str = "30") -> dict[str, Any]:
     """Make sets of designs, with two processes."""
-    rows, out = [], {}
+    rows = {}
     for name in progress(names.split(","), "fabricate"):
         unit, sheet, share = _SETS[name]
-        folder = Path(tempfile.mkdtemp())
-        designs = _designs(name, folder)
-        clock = time.perf_counter()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            job = gso.fabricate(
-                designs,
-                folder,
-                keep_groups=name == "hemisphere",
-                unit=unit,
-                max_deviation=f"{share}%",
-                sheet=sheet,
-                seconds=float(seconds),
-                workers=2,
-            )
-        took = time.perf_counter() - clock
-        shutil.rmtree(folder)
+        asked = {"unit": unit, "sheet": sheet, "max_deviation": f"{share}%", "workers": 2}
+        asked |= {"keep_groups": name == "hemisphere", "seconds": float(seconds)}
+        with tempfile.TemporaryDirectory() as folder:
+            designs = _designs(name, Path(folder))
+            job, took = timed(quietly, gso.fabricate, designs, folder, **asked)
         own = job.certificate["designs"]
         made = [one for one in own if "parts" in one]
-        out[name] = {
+        rows[name] = {
             "designs": sum(len(one["copies"]) for one in own),
             "distinct": len(own),
             "parts": job.certificate["parts"],
-            "mean": 100.0 * max(d["deviation_mean"] / d["diagonal"] for d in made),
-            "max": 100.0 * max(d["deviation_max"] / d["diagonal"] for d in made),
-            "p99": max(d["strain_p99"] for d in made),
-            "mismatch": max(d["seam_mismatch_max"] for d in made),
+            "mean %": 100.0 * max(d["deviation_mean"] / d["diagonal"] for d in made),
+            "max %": 100.0 * max(d["deviation_max"] / d["diagonal"] for d in made),
+            "strain (99 %)": max(d["strain_p99"] for d in made),
+            "mismatch mm": max(d["seam_mismatch_max"] for d in made),
             "density": job.certificate.get("nesting", {}).get("density", np.nan),
             "refused": sum(bool(d["reasons"]) for d in own),
-            "seconds": took,
+            "s": took,
         }
-        rows.append([name, *out[name].values()])
-    columns = ["set", "designs", "distinct", "parts", "mean %", "max %", "strain (99 %)"]
-    table("fabricate", [*columns, "mismatch mm", "density", "refused", "s"], rows)
-    return out
+    return shown("fabricate", ["set"], rows)
 
 
 def _designs(name: str, folder: Path) -> list[Mesh | Path]:
-    sys.path.insert(0, str(ROOT / "examples"))
+    if name == "hemisphere":
+        example("gores").write(folder / "gores.obj")
+        return [folder / "gores.obj"]
+    module = example(name)
     if name == "teapot":
-        import teapot
-
-        return [gso.as_mesh(teapot.patch(k, 17)) for k in range(teapot.PATCH_COUNT)]
-    if name == "facade":
-        import facade
-
-        return [gso.as_mesh(grid) for grid in facade.panels()]
-    if name == "terrain":
-        import terrain
-
-        return [gso.as_mesh(terrain.terrain())]
-    import gores
-
-    gores.write(folder / "gores.obj")
-    return [folder / "gores.obj"]
+        return [gso.as_mesh(module.patch(k, 17)) for k in range(module.PATCH_COUNT)]
+    grids = module.panels() if name == "facade" else [module.terrain()]
+    return [gso.as_mesh(grid) for grid in grids]
 
 
 SECTIONS = (fabricate,)
