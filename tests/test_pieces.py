@@ -351,7 +351,6 @@ def test_what_is_no_surface_is_refused():
         ({"min_neck": "wide"}, "min_neck"),
         ({"along": [[0, 99]]}, "0-99"),
         ({"avoid": [999]}, "face 999"),
-        ({"max_strian": 1}, "max_strain"),
     ],
 )
 def test_bad_wishes_are_named(given, said):
