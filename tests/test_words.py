@@ -67,7 +67,9 @@ def test_options_of_a_command_have_the_defaults_of_its_function(command):
     for param in COMMANDS[command].params:
         if param.name in SHARED and param.name in given:
             default = param.get_default(click.Context(COMMANDS[command]))
-            assert default == given[param.name], param.name
+            # Click has a value of its own for options without a default.
+            plain = isinstance(default, bool | int | float | str)
+            assert (default if plain else None) == given[param.name], param.name
 
 
 def test_every_spelling_of_a_length_is_one_length():

@@ -81,8 +81,10 @@ min_radius = click.option(
 max_strips = click.option(
     "--max-strips",
     metavar="N",
-    type=click.IntRange(1),
-    help="Largest number of strips side by side of one piece; 64 by default.",
+    type=click.IntRange(1, 64),
+    default=64,
+    show_default=True,
+    help="Largest number of strips side by side of one piece.",
 )
 sheet = click.option(
     "--sheet",

@@ -41,7 +41,7 @@ class Ask:
     formulation: str = "ruled"
     max_deviation: Length = "1%"
     max_strain: float | None = None
-    max_strips: int = 8
+    max_strips: int = 64
     darts: bool = False
     max_size: tuple[float, float] | None = None
     min_radius: float | None = None

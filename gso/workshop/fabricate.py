@@ -77,7 +77,7 @@ def fabricate(
     formulation: str = "ruled",
     max_deviation: Length | None = None,
     max_strain: Strain | None = None,
-    max_strips: int = 8,
+    max_strips: int = 64,
     darts: bool = False,
     keep_groups: bool = False,
     min_radius: Length | None = None,
