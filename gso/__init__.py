@@ -13,7 +13,19 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     # The same names for type checkers and editors; they are imported at first use.
-    from gso import constraints, dataset, hybrid, io, metrics, net, plot, rulings, seams, tno
+    from gso import (
+        constraints,
+        dataset,
+        executors,
+        hybrid,
+        io,
+        metrics,
+        net,
+        plot,
+        rulings,
+        seams,
+        tno,
+    )
     from gso import verdict as verdict
     from gso.constraints import (
         Fixed,
@@ -95,6 +107,7 @@ __all__ = [
     "constraints",
     "cut",
     "dataset",
+    "executors",
     "fabricate",
     "fit_spline",
     "hybrid",

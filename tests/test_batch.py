@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from functools import partial
-from threading import Lock
 
 import numpy as np
 import pytest
@@ -16,6 +14,7 @@ from gso import tasks
 from gso.constraints import Compiled
 from gso.dataset import bezier
 from gso.energy import registry
+from gso.executors import SERIAL, ProcessExecutor
 from gso.linalg.base import Pattern
 from gso.pipeline.normalise import Canonical
 from gso.solver import kernels
@@ -28,17 +27,11 @@ torch = pytest.importorskip("torch")
 
 from gso.linalg import banded as lapack  # noqa: E402
 from gso.solver.directions import GaussNewton  # noqa: E402
-from gso.tno.batched import (  # noqa: E402
-    batch_steps,
-    cholesky,
-    device,
-    exchange,
-    many,
-    stage_groups,
-)
+from gso.tno.batched import batch_steps, cholesky, device, many, stage_groups  # noqa: E402
 from gso.tno.batched import tensor_kernels as on_tensors  # noqa: E402
 from gso.tno.batched.batch_problem import Problem as Batch  # noqa: E402
 from gso.tno.batched.batches import asked, solve_batch  # noqa: E402
+from gso.tno.batched.device_executor import DeviceExecutor, minimise_elsewhere  # noqa: E402
 from gso.tno.batched.gathered import TooLarge, Unbatchable, gather  # noqa: E402
 from gso.tno.batched.many import solve_all  # noqa: E402
 from gso.tno.batched.sums import Sums  # noqa: E402
@@ -474,8 +467,9 @@ def test_a_batch_is_halved_where_memory_is_short(designs, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def two_workers():
-    with gso.tno.BatchWorkers(2) as ready:
+def processes():
+    """With a device two of them plan at a time."""
+    with ProcessExecutor(4) as ready:
         yield ready
 
 
@@ -483,12 +477,13 @@ def on_cpu(parts):
     return device.solve(parts, "cpu")
 
 
-def by_workers(ready, some, task, together=on_cpu, most=100):
+def by_workers(processes, some, task, together=on_cpu, most=100):
     found = {}
-    pieces, work = list(some[:, None]), partial(solve_batch, asked(task))
-    for done in ready.spread(work, pieces, together, most=most, enough=1.0):
-        assert done.error is None
-        found[done.index] = done.value[0]
+    work = partial(solve_batch, asked(task), minimise=minimise_elsewhere)
+    with DeviceExecutor(processes, together, most=most, enough=1.0) as ready:
+        for done in ready.as_completed(work, list(some[:, None])):
+            assert done.error is None
+            found[done.index] = done.result[0]
     return [found[k] for k in range(len(some))]
 
 
@@ -505,108 +500,90 @@ def counting(sizes, most=100):
 
 
 @pytest.mark.parametrize("task", ["developable", "flatten"])
-def test_workers_plan_and_this_process_minimises(task, designs, two_workers):
+def test_workers_plan_and_this_process_minimises(task, designs, processes):
     some = np.concatenate([designs, 1.5 * designs[:1], [odd_ones()["flat"]]])
     sizes = []
     wanted = gso.tno.optimize_batch(some, task=task, workers=0)
     for _ in range(2):
-        found = by_workers(two_workers, some, task, counting(sizes))
+        found = by_workers(processes, some, task, counting(sizes))
         np.testing.assert_allclose(energies(found), energies(wanted), rtol=1e-6, atol=1e-18)
         assert [f.status for f in found] == [w.status for w in wanted]
     assert max(sizes) >= 2
-    assert len(two_workers) == 2
 
 
-def test_workers_share_a_device_with_little_memory(designs, two_workers):
+def test_workers_share_a_device_with_little_memory(designs, processes):
     sizes = []
-    found = by_workers(two_workers, designs, "flatten", counting(sizes, 1))
+    found = by_workers(processes, designs, "flatten", counting(sizes, 1))
     assert max(sizes) > 1
     wanted = gso.tno.optimize_batch(designs, task="flatten", workers=0)
     np.testing.assert_allclose(energies(found), energies(wanted), rtol=1e-6)
 
 
-def test_most_surfaces_of_a_device(designs, two_workers):
+def test_most_surfaces_of_a_device(designs, processes):
     sizes = []
-    by_workers(two_workers, designs, "flatten", counting(sizes), most=1)
+    by_workers(processes, designs, "flatten", counting(sizes), most=1)
     assert max(sizes) == 1
 
 
-def test_a_worker_that_dies_loses_nothing(designs, two_workers):
+def test_a_worker_that_dies_loses_nothing(designs, processes):
     killed = []
 
     def together(parts):
         if not killed:
-            killed.append(next(iter(two_workers._processes.values())))
+            killed.append(next(iter(processes._processes.values())))
             killed[0].kill()
             killed[0].join()
         return on_cpu(parts)
 
-    found = by_workers(two_workers, designs, "flatten", together)
+    found = by_workers(processes, designs, "flatten", together)
     wanted = gso.tno.optimize_batch(designs, task="flatten", workers=0)
     np.testing.assert_allclose(energies(found), energies(wanted), rtol=1e-6)
 
 
-def die_of_two(piece, *, minimise):
-    if piece == 2:
-        os._exit(1)
-    return 10 * piece
-
-
-def thread_of(piece, *, minimise):
-    return Lock()
-
-
-def test_a_piece_that_ends_its_worker_has_an_error(two_workers):
-    done = {d.index: d for d in two_workers.spread(die_of_two, range(6))}
-    assert {k: d.value for k, d in done.items() if d.error is None} == {
-        k: 10 * k for k in (0, 1, 3, 4, 5)
-    }
-    assert "the worker process died" in done[2].error
-
-
-def test_a_value_that_cannot_be_sent(two_workers):
-    done = next(two_workers.spread(thread_of, [0]))
-    assert "pickle" in done.error
-
-
-def test_workers_are_ready_after_an_error(designs, two_workers):
+def test_workers_are_ready_after_an_error(designs, processes):
     def broken(parts):
         raise RuntimeError("the device is gone")
 
     with pytest.raises(RuntimeError, match="the device is gone"):
-        by_workers(two_workers, designs, "flatten", broken)
-    assert len(by_workers(two_workers, designs[:1], "flatten")) == 1
+        by_workers(processes, designs, "flatten", broken)
+    assert len(by_workers(processes, designs[:1], "flatten")) == 1
 
 
-def test_workers_are_ready_after_results_that_nobody_wanted(two_workers):
-    some = two_workers.spread(die_of_two, [0, 1, 3])
-    next(some)
-    with pytest.raises(gso.OptionError, match="busy"):
-        next(two_workers.spread(die_of_two, [4]))
-    some.close()
-    assert [d.value for d in two_workers.spread(die_of_two, [4])] == [40]
+def test_workers_are_ready_after_results_that_nobody_wanted(designs, processes):
+    work = partial(solve_batch, asked("flatten"), minimise=minimise_elsewhere)
+    with DeviceExecutor(processes, on_cpu) as ready:
+        some = ready.as_completed(work, list(designs[:, None]))
+        next(some)
+        some.close()
+    assert len(by_workers(processes, designs[:1], "flatten")) == 1
 
 
-def test_workers_that_are_closed(designs):
-    ready = gso.tno.BatchWorkers(1)
-    ready.close()
-    with pytest.raises(gso.OptionError, match="closed"):
-        gso.tno.optimize_batch(designs, workers=ready)
+def test_an_executor_that_is_closed(designs):
+    ready = ProcessExecutor(1)
+    ready.shutdown()
+    for there in ("cpu", "cuda"):
+        with pytest.raises(gso.OptionError, match="closed"):
+            list(solve_all(asked("flatten", device=there), list(designs), executor=ready))
 
 
-@pytest.mark.parametrize("count", [0, -1, 1.5, "two"])
-def test_a_number_of_workers_that_cannot_be(count):
-    with pytest.raises(gso.OptionError, match="whole number of 1 or more"):
-        gso.tno.BatchWorkers(count)
+def test_an_executor_without_processes_of_this_machine(designs):
+    with pytest.raises(gso.OptionError, match="give a ProcessExecutor"):
+        list(solve_all(asked("flatten", device="cuda"), list(designs), executor=SERIAL))
 
 
-def test_workers_of_a_processor_stay_for_the_next_batch(designs, two_workers):
+@pytest.mark.parametrize("count", [-1, 1.5, "two"])
+def test_a_number_of_workers_that_cannot_be(count, designs):
+    with pytest.raises(gso.OptionError, match="whole number of 0 or more"):
+        gso.tno.optimize_batch(designs, workers=count)
+
+
+def test_workers_of_a_processor_stay_for_the_next_batch(designs, processes):
     wanted = gso.tno.optimize_batch(designs, task="flatten", workers=0)
     before = set()
     for _ in range(2):
-        found = gso.tno.optimize_batch(designs, task="flatten", workers=two_workers)
+        found = gso.tno.optimize_batch(designs, task="flatten", executor=processes)
         np.testing.assert_allclose(energies(found), energies(wanted), rtol=1e-9)
-        now = {process.pid for process in two_workers._processes.values()}
+        now = {process.pid for process in processes._processes.values()}
         assert before <= now
         before = now
 
@@ -627,49 +604,20 @@ def graphics(monkeypatch):
 
 
 @pytest.mark.parametrize("workers", [0, 1, "ready"])
-def test_on_a_device(workers, designs, graphics, two_workers):
-    workers = two_workers if workers == "ready" else workers
-    found = gso.tno.optimize_batch(designs, task="flatten", device="cuda", workers=workers)
+def test_on_a_device(workers, designs, graphics, processes):
+    own = {"executor": processes} if workers == "ready" else {"workers": workers}
+    found = gso.tno.optimize_batch(designs, task="flatten", device="cuda", **own)
     wanted = gso.tno.optimize_batch(designs, task="flatten", workers=0)
     np.testing.assert_allclose(energies(found), energies(wanted), rtol=1e-6)
     assert max(graphics) > 1
     assert "cuda" in found[0].backend
 
 
-def test_large_grids_are_planned_one_by_one(designs, graphics, two_workers, monkeypatch):
+def test_large_grids_are_planned_one_by_one(designs, graphics, processes, monkeypatch):
     monkeypatch.setattr(many, "_VERTICES", SIZE * SIZE)
     monkeypatch.setattr(many, "_MOST", 2 * SIZE * SIZE)
-    gso.tno.optimize_batch(designs, task="flatten", device="cuda", workers=two_workers)
+    gso.tno.optimize_batch(designs, task="flatten", device="cuda", executor=processes)
     assert max(graphics) <= 2
-
-
-@pytest.mark.parametrize("shared", [True, False])
-@pytest.mark.parametrize("size", [0, 3, 200_000])
-def test_exchange_of_arrays(size, shared, monkeypatch):
-    from multiprocessing import Pipe
-    from threading import Thread
-
-    if not shared:
-        monkeypatch.delattr(os, "memfd_create", raising=False)
-    here, there = Pipe()
-    value = {"a": np.arange(float(size)), "b": np.arange(2 * size)[::2], "c": "text"}
-    value["a"].flags.writeable = False
-    handles = len(os.listdir("/proc/self/fd")) if os.path.exists("/proc/self/fd") else 0
-    for _ in range(3):
-        sender = Thread(target=exchange.send, args=(here, value))
-        sender.start()
-        found = exchange.receive(there)
-        sender.join()
-        assert found["c"] == "text"
-        assert found["b"].flags.writeable
-        for name in "ab":
-            np.testing.assert_array_equal(found[name], value[name])
-    if handles:
-        assert len(os.listdir("/proc/self/fd")) == handles
-    here.close()
-    with pytest.raises(exchange.Ended):
-        exchange.receive(there)
-    there.close()
 
 
 def test_what_fails_in_a_batch_is_solved_alone(designs, monkeypatch):

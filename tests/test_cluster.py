@@ -40,6 +40,16 @@ def test_a_batch_is_the_same_though_a_worker_is_killed(cluster):
 
 
 @pytest.mark.slow
+def test_a_cluster_serves_several_calls(cluster):
+    with gso.executors.DaskExecutor(cluster.scheduler_address) as executor:
+        assert executor.workers == 2
+        assert executor.map(abs, [-1, 2, -3]) == [1, 2, 3]
+        for _ in range(2):
+            items = list(gso.tno.optimize_many([saddle(5)] * 3, task="denoise", executor=executor))
+            assert sorted(item.index for item in items if item.ok) == [0, 1, 2]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["tno", "auto"])
 def test_the_command_solves_on_a_cluster(cluster, tmp_path, monkeypatch, method):
     monkeypatch.chdir(tmp_path)
@@ -57,7 +67,7 @@ def test_the_command_solves_on_a_cluster(cluster, tmp_path, monkeypatch, method)
 
 
 def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
-    monkeypatch.setattr("gso.cluster.PATIENCE", 0.5)
+    monkeypatch.setattr("gso.executors.dask.PATIENCE", 0.5)
     with pytest.raises(SchedulerError, match="no Dask scheduler answers at tcp:"):
         list(gso.tno.optimize_many([saddle(5)], scheduler="tcp://127.0.0.1:9"))
 

@@ -281,10 +281,11 @@ def test_scripts_without_a_guard_and_workers_of_a_batch(tmp_path, monkeypatch):
     script = tmp_path / "script.py"
     script.write_text(
         "import numpy as np, gso\n"
+        "from gso.executors import base\n"
         "from gso.pipeline import component_solves\n"
         "print('once')\n"
         "component_solves._WORTH = 0\n"
-        "component_solves.processors = lambda: 2\n"
+        "base.processors = lambda: 2\n"
         "u, v = np.meshgrid(*2 * [np.linspace(-1, 1, 9)], indexing='ij')\n"
         "one = gso.Mesh.from_grid(np.stack([u, v, 0.3 * u * v], axis=-1))\n"
         "two = one.replaced(one.vertices * [1, 1, 2] + 9)\n"
@@ -298,9 +299,9 @@ def test_scripts_without_a_guard_and_workers_of_a_batch(tmp_path, monkeypatch):
     assert done.stdout.split() == ["once", "True"]
     monkeypatch.setattr(solving, "_WORTH", 0)
     assert solving._paying([9]) == 0
-    monkeypatch.setattr(solving, "processors", lambda: 2)
+    monkeypatch.setattr("gso.executors.base.processors", lambda: 2)
     assert solving._paying([9, 9, 9]) == 2
-    monkeypatch.setattr(solving, "parent_process", lambda: object())
+    monkeypatch.setattr("gso.executors.base.parent_process", lambda: object())
     assert solving._paying([9, 9, 9]) == 0
 
 

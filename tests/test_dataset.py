@@ -535,7 +535,7 @@ class TestSurvival:
 
     def test_a_scheduler_that_is_not_there_is_reported(self, tmp_path, monkeypatch):
         pytest.importorskip("distributed")
-        monkeypatch.setattr("gso.cluster.PATIENCE", 0.5)
+        monkeypatch.setattr("gso.executors.dask.PATIENCE", 0.5)
         with pytest.raises(DatasetError, match="no Dask scheduler answers at tcp:"):
             dataset.build(tmp_path, QUICK, scheduler="tcp://127.0.0.1:9")
 

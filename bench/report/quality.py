@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -13,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso import metrics, parallel, tasks
+from gso import metrics, tasks
 from gso.dataset.noise import LEVELS
 from gso.errors import ConvergenceWarning
+from gso.executors import open_executor
 from gso.linalg import blas_threads
 from gso.mesh import Mesh
 from report import kernels, store
@@ -117,12 +117,12 @@ def measured(settings: Settings, surfaces: Surfaces, kept: Store, tick: Tick) ->
             tick(block.name, len(there))
     for timed, workers in ((True, min(settings.workers, 1)), (False, settings.workers)):
         missing = [b for b in every if b not in found and b.timed is timed]
-        with closing(parallel.spread(measure, missing, workers=workers)) as results:
-            for done in results:
+        with open_executor(workers, main=True) as executor:
+            for done in executor.as_completed(measure, missing):
                 block = missing[done.index]
                 if done.error is None:
-                    kept.keep(block.place, block.key, done.value)
-                    found[block] = done.value
+                    kept.keep(block.place, block.key, done.result)
+                    found[block] = done.result
                 else:
                     found[block] = [{"error": done.error}] * (block.stop - block.start)
                 tick(block.name, block.stop - block.start)

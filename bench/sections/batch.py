@@ -13,7 +13,8 @@ from harness import shown, timed
 
 import gso
 from gso.dataset import bezier
-from gso.parallel import processors
+from gso.executors import ProcessExecutor
+from gso.executors.base import processors
 
 #: Relative change of one axis by which the natural sensitivity of a solve is measured.
 _STRETCH = 1e-6
@@ -67,12 +68,12 @@ def device(
     designs = np.stack([s.sample(64) for s in bezier.generate(n, seed=seed)])
     rows = {}
     begun = time.perf_counter()
-    with gso.tno.BatchWorkers(workers or None) as ready:
+    with ProcessExecutor(2 * (workers or processors())) as ready:
         for task in ("developable", "flatten"):
-            batch = partial(gso.tno.optimize_batch, task=task, device=device, workers=ready)
+            batch = partial(gso.tno.optimize_batch, task=task, device=device, executor=ready)
             # The workers import the package and print kernels at first use.
             begun = begun or time.perf_counter()
-            batch(designs[: 2 * len(ready)])
+            batch(designs[: ready.workers])
             first, begun = time.perf_counter() - begun, 0.0
             found, seconds = timed(batch, designs)
             again, second = timed(batch, designs)

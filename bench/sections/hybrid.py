@@ -7,7 +7,6 @@ the seed, or read from a set (``data=DIR``).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from contextlib import closing
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -20,11 +19,11 @@ from report.surfaces import Surfaces, opened, screened
 
 import gso
 from gso import hybrid
+from gso.executors import open_executor
 from gso.hierarchy import resample
 from gso.mesh import Mesh
 from gso.net import tasks as net_tasks
 from gso.net.catalogue import available
-from gso.parallel import spread
 from gso.tno import Start, optimize
 
 #: Cases that are compared: task and keywords.
@@ -84,11 +83,11 @@ def compared(
     """
     rows = []
     solved = partial(_solved, task, keywords, stretched)
-    with closing(spread(solved, designs, workers=workers)) as results:
-        for done in results:
+    with open_executor(workers, main=True) as executor:
+        for done in executor.as_completed(solved, designs):
             if done.error is not None:
                 raise SystemExit(f"design {done.index}: {done.error}")
-            rows.append(done.value)
+            rows.append(done.result)
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 

@@ -37,10 +37,9 @@ def many(
     for out, picture in zip(outs, pictures, strict=True):
         job.check(out, picture)
     if workers is None:
-        from gso.parallel import processors
+        from gso.executors.base import useful_workers
 
-        workers = min(processors(), len(files))
-        workers = workers if workers > 1 else 0  # with one worker, use this process
+        workers = useful_workers(len(files))
     records: dict[int, dict[str, Any]] = {}
     with progress.files(len(files)) as bar, report.status_only():
         for item in job.solve_many(files, workers, scheduler):

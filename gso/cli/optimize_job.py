@@ -12,8 +12,8 @@ from gso.errors import OptionError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+    from gso.executors import Item
     from gso.result import Result
-    from gso.tno.optimize_many import Item
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Job:
 
     def solve_many(
         self, files: Iterable[str], workers: int | None, scheduler: str | None = None
-    ) -> Iterator[Item]:
+    ) -> Iterator[Item[Result]]:
         """Optimise many surfaces in parallel."""
         read = source if scheduler is None else here
         meshes = (read(file, self.weld) for file in files)

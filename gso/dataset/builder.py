@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from gso import cluster
 from gso.dataset import hdf, manifest, shard
 from gso.dataset.claim import claimed
 from gso.dataset.labels import KINDS, REFERENCES
@@ -27,9 +26,9 @@ from gso.dataset.screen import Selection, select
 from gso.dataset.store import Dataset
 from gso.dataset.summary import summarise
 from gso.errors import DatasetError, MeshError, OptionError
+from gso.executors import Executor, open_executor
 from gso.io import replacing
 from gso.linalg import blas_threads
-from gso.parallel import Done
 from gso.spelling import choices
 
 _OTHER_RECIPE = "give its own options, or another folder"
@@ -37,8 +36,6 @@ _OTHER_VERSIONS = "install what it was begun with, or build in another folder"
 
 #: Progress callback: (name of the counted items, number done, total number).
 Tick = Callable[[str, int, int], None]
-#: Makes files, and yields them as they are finished.
-Spread = Callable[[Callable[..., bytes], Sequence[shard.Task]], Generator[Done, None, None]]
 
 
 def build(
@@ -135,9 +132,13 @@ def build(
         everything = list(tasks(recipe, selection, wanted))
         for part in (shard.LABELS, *REFERENCES):
             todo = [task for task in everything if task.part == part]
-            work = partial(shard.make, recipe, versions(device), device=device)
-            ways = _spreading(workers, scheduler, device, recipe, part)
-            _make(place, work, todo, set(bad), ways, tick)
+            # References are made one by one, without a device.
+            own = device if part == shard.LABELS else None
+            with _opened(workers, scheduler, own, recipe.size) as (executor, elsewhere):
+                work = partial(
+                    shard.make, recipe, versions(device), device=device, elsewhere=elsewhere
+                )
+                _make(place, work, todo, set(bad), executor, tick)
         with _kept():
             record = _listed(place, record, recipe, everything, wanted, selection.drawn)
             record["summary"] = summarise(Dataset(place, record))
@@ -231,7 +232,7 @@ def _make(
     work: Callable[[shard.Task], bytes],
     todo: list[shard.Task],
     bad: set[str],
-    spread: Spread,
+    executor: Executor,
     tick: Tick | None,
 ) -> None:
     """Make the files that are missing or damaged."""
@@ -244,21 +245,20 @@ def _make(
     what = f"surfaces with {missing[0].part}" if reference else "surfaces labelled"
     if tick is not None:
         tick(what, done, total)
-    with closing(spread(work, missing)) as results:
-        for result in results:
-            task = missing[result.index]
-            if result.error is not None:
-                raise DatasetError(
-                    f"{task.name}: {result.error}; {done} of {total} {what}, which are kept"
-                )
-            with _kept(f"; {done} of {total} {what}"):
-                path = place / task.name
-                path.parent.mkdir(exist_ok=True)
-                with replacing(path) as file:
-                    file.write(result.value)
-            done += len(task.ids)
-            if tick is not None:
-                tick(what, done, total)
+    for made in executor.as_completed(work, missing):
+        task = missing[made.index]
+        if made.result is None:
+            raise DatasetError(
+                f"{task.name}: {made.error}; {done} of {total} {what}, which are kept"
+            )
+        with _kept(f"; {done} of {total} {what}"):
+            path = place / task.name
+            path.parent.mkdir(exist_ok=True)
+            with replacing(path) as file:
+                file.write(made.result)
+        done += len(task.ids)
+        if tick is not None:
+            tick(what, done, total)
 
 
 def _check_device(device: str) -> None:
@@ -268,31 +268,20 @@ def _check_device(device: str) -> None:
     checked(device)
 
 
-def _spreading(
-    workers: int | None, scheduler: str | None, device: str | None, recipe: Recipe, part: str
-) -> Spread:
-    """Return how work is spread over processes."""
-    # References are made one by one, without a device.
-    here = part != shard.LABELS or device is None or device.startswith("cpu")
-    if scheduler is not None or workers == 0 or here:
-        return partial(cluster.either, workers=workers, scheduler=scheduler)
-    return partial(_on_device, str(device), workers, recipe.size**2)
+@contextmanager
+def _opened(
+    workers: int | None, scheduler: str | None, device: str | None, size: int
+) -> Iterator[tuple[Executor, bool]]:
+    """Open what makes files, and tell whether this process minimises for it."""
+    if scheduler is not None or workers == 0 or device is None or device.startswith("cpu"):
+        with open_executor(workers, scheduler, main=True) as executor:
+            yield executor, False
+        return
+    from gso.tno.batched.many import planners
 
-
-def _on_device(
-    device: str,
-    workers: int | None,
-    vertices: int,
-    work: Callable[..., bytes],
-    missing: Sequence[shard.Task],
-) -> Generator[Done, None, None]:
-    """Make files in worker processes, for which this one minimises on a graphics processor."""
-    from gso.tno.batched.many import in_batches
-    from gso.tno.batched.workers import BatchWorkers
-
-    with BatchWorkers(workers) as ready:
-        # They are at different labels.
-        yield from in_batches(ready, work, missing, device, vertices, enough=0.25)
+    # They are at different labels.
+    with planners(device, size**2, workers, enough=0.25) as executor:
+        yield executor, True
 
 
 def _intact(place: Path, task: shard.Task) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from functools import partial
 
 import numpy as np
@@ -11,6 +10,8 @@ from numpy.typing import NDArray
 
 from gso.dataset import bezier
 from gso.errors import DatasetError
+from gso.executors import open_executor
+from gso.executors.base import processors
 
 #: Smallest number of surfaces for which starting worker processes pays off.
 _MANY = 4096
@@ -42,19 +43,17 @@ def draw_many(
     >>> draw_many([(2, 7), (1, 8)], 16).shape
     (3, 16, 16, 3)
     """
-    from gso import parallel
-
     counts = [count for count, _ in pieces]
     ends = np.cumsum(counts, dtype=int)
     drawn = np.empty((sum(counts), size, size, 3), np.float32)
-    workers = 0 if len(drawn) < _MANY else parallel.processors()
+    workers = 0 if len(drawn) < _MANY else processors()
     ready = 0
     work = partial(_sampled, size=size)
-    with closing(parallel.spread(work, pieces, workers=workers)) as results:
-        for done in results:
+    with open_executor(workers) as executor:
+        for done in executor.as_completed(work, pieces):
             if done.error is not None:
                 raise DatasetError(f"surfaces of seed {pieces[done.index][1]}: {done.error}")
-            drawn[ends[done.index] - counts[done.index] : ends[done.index]] = done.value
+            drawn[ends[done.index] - counts[done.index] : ends[done.index]] = done.result
             ready += counts[done.index]
             if tick is not None:
                 tick(ready)

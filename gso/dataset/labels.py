@@ -107,7 +107,7 @@ def solve(kind: str, points: Array) -> Label:
 
 
 def solve_many(
-    kind: str, points: Array, device: str | None = None, minimise: Any = None
+    kind: str, points: Array, device: str | None = None, elsewhere: bool = False
 ) -> list[Label]:
     """Label surfaces (B, H, W, 3) of the unit ball.
 
@@ -119,8 +119,9 @@ def solve_many(
     device : str, optional
         Where to solve them in batches, for the kinds in :data:`BATCHED`; one by one when not
         given.
-    minimise : callable, optional
-        Minimises stages there for this process, see :class:`gso.tno.BatchWorkers`.
+    elsewhere : bool
+        Whether this is a worker for which another process minimises there, see
+        :class:`gso.tno.batched.device_executor.DeviceExecutor`.
 
     Raises
     ------
@@ -136,15 +137,17 @@ def solve_many(
     what = asked(device=device, **KINDS[kind].arguments)
     designs: list[Mesh | GSOError] = [_or_error(Mesh.from_grid, p, weld=False) for p in points]
     good = [d for d in designs if isinstance(d, Mesh)]
-    if minimise is None:
+    if elsewhere:
+        from gso.tno.batched.device_executor import minimise_elsewhere
+
+        results = iter(solve_batch(what, good, minimise_elsewhere))
+    else:
         # PyTorch is not loaded where another process minimises.
         from gso.tno.batched.device import checked
         from gso.tno.batched.many import solve_all
 
         checked(device)
         results = solve_all(what, good)
-    else:
-        results = iter(solve_batch(what, good, minimise))
     found = [next(results) if isinstance(d, Mesh) else d for d in designs]
     labels = [_or_error(_labelled, kind, f) if isinstance(f, Result) else f for f in found]
     return [x if isinstance(x, Label) else _failed(kind, points.shape[1]) for x in labels]

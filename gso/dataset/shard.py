@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -62,7 +61,7 @@ def make(
     task: Task,
     *,
     device: str | None = None,
-    minimise: Any = None,
+    elsewhere: bool = False,
 ) -> bytes:
     """Make the content of a file.
 
@@ -76,8 +75,8 @@ def make(
         The file to make.
     device : str, optional
         Where to solve its surfaces in batches; one by one when not given.
-    minimise : callable, optional
-        Minimises stages there for this process.
+    elsewhere : bool
+        Whether another process minimises there for this one.
 
     Raises
     ------
@@ -95,7 +94,7 @@ def make(
     with _alone, blas_threads(1):
         points = surfaces(recipe, task.split, task.ids)
         if task.part != LABELS:
-            return pack(_labelled(task.part, points, device, minimise))
+            return pack(_labelled(task.part, points, device, elsewhere))
         screened = points
         if recipe.size != screen.SIZE:
             screened = surfaces(recipe, task.split, task.ids, screen.SIZE)
@@ -107,7 +106,7 @@ def make(
         if task.split == noise.SPLIT:
             arrays["noise"] = noise.draw(recipe.seed, task.ids, recipe.size)
         for kind in recipe.labels:
-            arrays |= _labelled(kind, points, device, minimise)
+            arrays |= _labelled(kind, points, device, elsewhere)
         return pack(arrays)
 
 
@@ -119,9 +118,11 @@ def surfaces(recipe: Recipe, split: str, ids: tuple[int, ...], size: int | None 
     return bezier.sample_many([screen.surface(recipe.seed, k) for k in ids], size)
 
 
-def _labelled(kind: str, points: Array, device: str | None, minimise: Any) -> dict[str, np.ndarray]:
+def _labelled(
+    kind: str, points: Array, device: str | None, elsewhere: bool
+) -> dict[str, np.ndarray]:
     """Label the surfaces of a file; return arrays, metrics and statuses of a kind of label."""
-    found = labels.solve_many(kind, points, device, minimise)
+    found = labels.solve_many(kind, points, device, elsewhere)
     # Single precision changes no metric of the labels by more than a thousandth. References
     # need double precision: their surface and flat image are isometric to a few parts in 1e6.
     dtype = np.float64 if kind in labels.REFERENCES else np.float32

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import closing
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from inspect import signature
@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from gso import cluster, parametrization, tasks
+from gso import parametrization, tasks
 from gso.components import Component, several
 from gso.constraints import Compiled, compile_constraints, listed
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
+from gso.executors import Executor, Item, open_executor
 from gso.hybrid.time_model import net_saves_time
 from gso.hybrid.warm_start import Prediction, predictions
 from gso.mesh import Mesh
@@ -28,7 +29,6 @@ from gso.pipeline.normalise import Canonical
 from gso.result import Result
 from gso.status import Status
 from gso.tno import Start, check, optimize
-from gso.tno.optimize_many import Item
 from gso.typing import Array
 
 #: Surfaces that are read and predicted together.
@@ -138,8 +138,9 @@ def solve_many(
     sparing: bool = False,
     workers: int | None = None,
     scheduler: str | None = None,
+    executor: Executor | None = None,
     **keywords: Any,
-) -> Iterator[Item]:
+) -> Iterator[Item[Result]]:
     """Solve many surfaces: predictions in batches, then :func:`solve` in parallel processes.
 
     Parameters
@@ -152,6 +153,8 @@ def solve_many(
         Number of worker processes; the number of cores when not given, 0 to solve in this one.
     scheduler : str, optional
         Address of a Dask scheduler whose workers solve instead; predictions are made here.
+    executor : Executor, optional
+        Solves instead, and stays open for other calls: :class:`gso.executors.ProcessExecutor`.
 
     Yields
     ------
@@ -172,9 +175,9 @@ def solve_many(
     passes, alone = _passes(polish), polish is False
     ask = partial(predictions, task=task, net=net, passes=passes, alone=alone)
     started = _started(meshes, worth, ask)
-    with closing(cluster.either(work, started, workers=workers, scheduler=scheduler)) as results:
-        for done in results:
-            yield Item(done.index, done.value, done.error)
+    own = nullcontext(executor) if executor else open_executor(workers, scheduler, main=True)
+    with own as ready:
+        yield from ready.as_completed(work, started)
 
 
 def _pieces(design: Mesh, task: str, sparing: bool, keywords: dict[str, Any]) -> list[Component]:

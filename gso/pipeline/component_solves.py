@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from dataclasses import replace
 from functools import partial
-from multiprocessing import parent_process
 
 import numpy as np
 
 from gso.components import Component, labels, split
 from gso.constraints import Compiled
 from gso.errors import GSOError
+from gso.executors import open_executor
+from gso.executors.base import useful_workers
 from gso.mesh import Mesh
-from gso.parallel import processors, spread
 from gso.pipeline.component_results import renumbered, together
 from gso.pipeline.job import Job
 from gso.pipeline.normalise import given_points
@@ -173,14 +172,8 @@ def _named(one: Solve, k: int, count: int, job: Job, callback: Callback | None) 
 
 
 def _paying(sizes: Sequence[int]) -> int:
-    """Return the number of worker processes that saves time for components of these sizes.
-
-    It is 0 inside a worker process.
-    """
-    if parent_process() is not None or sum(sizes) - max(sizes) < _WORTH:
-        return 0
-    workers = min(processors(), len(sizes))
-    return workers if workers > 1 else 0
+    """Return the number of worker processes that saves time for components of these sizes."""
+    return 0 if sum(sizes) - max(sizes) < _WORTH else useful_workers(len(sizes))
 
 
 def _piece(one: Solve, count: int, numbered: tuple[int, Job]) -> Result | GSOError:
@@ -197,24 +190,19 @@ def _spread(
     """Solve in worker processes; omit components whose worker died or that were not reached."""
     # The largest first, so that no large one runs alone at the end.
     order = sorted(chosen, key=lambda k: -len(jobs[k].design.vertices))
-    work = spread(
-        partial(_piece, one, len(jobs)),
-        ((k, jobs[k]) for k in order),
-        workers=workers,
-        caller=False,
-    )
+    work, items = partial(_piece, one, len(jobs)), ((k, jobs[k]) for k in order)
     found: dict[int, Result] = {}
     failed: dict[int, GSOError] = {}
-    with closing(work) as results:
-        for place, done in enumerate(results):
+    with open_executor(workers) as executor:
+        for place, done in enumerate(executor.as_completed(work, items)):
             k = order[done.index]
-            if isinstance(done.value, GSOError):
-                failed[k] = done.value
-            elif done.value is not None:
-                found[k] = done.value
-                if watch is not None and done.value.history:
+            if isinstance(done.result, GSOError):
+                failed[k] = done.result
+            elif done.result is not None:
+                found[k] = done.result
+                if watch is not None and done.result.history:
                     watch.place = place
-                    if not watch(done.value.history[-1]):
+                    if not watch(done.result.history[-1]):
                         break
     if failed:
         raise failed[min(failed)]

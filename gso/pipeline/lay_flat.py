@@ -7,8 +7,8 @@ import numpy as np
 from gso import components, metrics, parametrization
 from gso.constraints import Compiled
 from gso.errors import MeshError
+from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh
-from gso.parallel import Each, here
 from gso.pattern import Pattern
 from gso.pipeline.normalise import Canonical
 from gso.pipeline.run import Run
@@ -80,14 +80,14 @@ def lay_out(
     return found
 
 
-def strains_of(surface: Mesh, each: Each = here) -> dict[str, float]:
+def strains_of(surface: Mesh, executor: Executor = SERIAL) -> dict[str, float]:
     """Return mean, 99th percentile and largest strain of a surface's pattern; empty without.
 
     Parameters
     ----------
     surface : Mesh
-    each : callable
-        What :func:`gso.parallel.helpers` gives, to lay out components in several processes.
+    executor : Executor
+        Lays out components; the result does not depend on it.
     """
     label = components.labels(surface)
     count = min(_GROUPS if len(label) >= _LARGE else 1, int(label.max()) + 1)
@@ -101,7 +101,7 @@ def strains_of(surface: Mesh, each: Each = here) -> dict[str, float]:
         group[k] = filled.argmin()
         filled[group[k]] += sizes[k]
     parts = components.split(surface, group[label])
-    patterns = each(lay_out, [part.mesh for part in parts])
+    patterns = executor.map(lay_out, [part.mesh for part in parts])
     flat = np.zeros((len(surface.vertices), 2))
     for part, pattern in zip(parts, patterns, strict=True):
         if pattern is None:

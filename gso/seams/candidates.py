@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from gso.cut_pieces import Piece, Pieces
-from gso.parallel import Each, here
+from gso.executors import SERIAL, Executor
 from gso.seams.cutting import cut
 from gso.seams.disks import opening
 from gso.seams.kinds import Edges
@@ -160,7 +160,7 @@ def measured(
     most: tuple[float, float] | None = None,
     say: Said | None = None,
     limit: float = np.inf,
-    each: Each = here,
+    executor: Executor = SERIAL,
 ) -> Candidate:
     """Lay pieces flat, and cut those that overlap themselves or are larger than a sheet.
 
@@ -175,16 +175,16 @@ def measured(
         Called with what is being done.
     limit : float
         Strain from which on a piece is enough to give up: the others then have no pattern.
-    each : callable
-        What :func:`gso.parallel.helpers` gives, to lay pieces flat in several processes.
+    executor : Executor
+        Lays pieces flat; the result does not depend on it.
     """
     known: dict[bytes, Sheet | None] = {}
     for _ in range(_ROUNDS):
-        if each is not here and limit == np.inf:
+        if executor.workers and limit == np.inf:
             todo = {_identity(p): p.mesh for p in pieces if _identity(p) not in known}
             if say is not None:
                 say(f"patterns of {len(todo)} pieces")
-            known |= zip(todo, each(flattened, list(todo.values())), strict=True)
+            known |= zip(todo, executor.map(flattened, list(todo.values())), strict=True)
         sheets: list[Sheet | None] = []
         for number, piece in enumerate(pieces):
             name = _identity(piece)

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
+from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
-from gso.parallel import Each, here
 from gso.quantities import Length, as_length, millimetres
 from gso.typing import Array
 from gso.verdict import Code
@@ -38,7 +38,7 @@ class Wishes:
     min_size: float | None
     max_size: tuple[float, float] | None
     say: Callable[[str], None]
-    each: Each = here
+    executor: Executor = SERIAL
 
     def __post_init__(self) -> None:
         if self.seam is not None and not _positive(self.seam):

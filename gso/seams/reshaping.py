@@ -71,7 +71,7 @@ def reshaped(ground: Ground, wishes: Wishes) -> tuple[Candidate, Result | None]:
     best = _with_straight_seams(ground, best, wishes, allowed)
     shape = best.pieces
     surface = ground.moved(shape.design)
-    found = measured(surface, shape, wishes.max_size, wishes.say, each=wishes.each)
+    found = measured(surface, shape, wishes.max_size, wishes.say, executor=wishes.executor)
     if wishes.darts and found.strain <= wishes.max_strain:
         found = joined(surface, found, wishes.max_strain, neck_of(ground, wishes), wishes)
     return found, best.result
@@ -143,7 +143,7 @@ def _attempt(
         far = max(away.there_max, away.back_max) / allowed
         strained = uneven = 0.0
         if far <= _HOPELESS:
-            strains = strains_of(result.mesh, wishes.each)
+            strains = strains_of(result.mesh, wishes.executor)
             strained = strains.get("strain_max", np.inf) / strain
         if far <= 1.0:
             folds = len(faults.folded(shape.design)) if sound else 0

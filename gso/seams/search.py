@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 
 from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning, OptionError
+from gso.executors import open_executor
+from gso.executors.base import processors
 from gso.mesh import Mesh
-from gso.parallel import helpers
 from gso.pipeline.solve import Asked, check, solve_mesh
 from gso.pipeline.start import Start
 from gso.quantities import Length, Strain, as_length, as_strain
@@ -182,8 +183,10 @@ def pieces(
             found = _as_is(ground, aim)
             out = packed(found, None, ground, wishes)
         else:
-            with helpers(workers) as each:
-                out = packed(*reshaped(ground, replace(aim, each=each)), ground, wishes)
+            # This process does its share.
+            others = max((processors() if workers is None else workers) - 1, 0)
+            with open_executor(others) as executor:
+                out = packed(*reshaped(ground, replace(aim, executor=executor)), ground, wishes)
     if said:
         notes.append(said)
     return replace(out, notes=(*out.notes, *notes), seconds=time.perf_counter() - clock)

@@ -7,22 +7,19 @@ from gso.tno.optimize import check, optimize
 from gso.tno.optimize_many import optimize_many
 from gso.tno.session import Session
 
-#: The names in :data:`_BATCHED` are not among them, as they need PyTorch.
+#: ``optimize_batch`` is not among them, as it needs PyTorch.
 __all__ = ["Session", "Start", "check", "optimize", "optimize_many"]
-
-#: Names that are imported on first use, and their modules.
-_BATCHED = {"optimize_batch": "optimize_batch", "BatchWorkers": "workers"}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _BATCHED:
+    if name != "optimize_batch":
         raise AttributeError(f"module 'gso.tno' has no attribute {name!r}")
     from importlib import import_module
 
-    value = getattr(import_module(f"gso.tno.batched.{_BATCHED[name]}"), name)
+    value = import_module("gso.tno.batched.optimize_batch").optimize_batch
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted([*__all__, *_BATCHED])
+    return sorted([*__all__, "optimize_batch"])

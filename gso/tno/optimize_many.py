@@ -3,29 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from contextlib import closing
-from dataclasses import dataclass
+from contextlib import nullcontext
 from functools import partial
 from inspect import signature
 from typing import Any
 
-from gso import cluster
+from gso.executors import Executor, Item, open_executor
 from gso.result import Result
 from gso.tno.optimize import optimize
-
-
-@dataclass(frozen=True)
-class Item:
-    """One surface of a batch: its place in the input, and its result or its error."""
-
-    index: int
-    result: Result | None
-    error: str | None = None
-
-    @property
-    def ok(self) -> bool:
-        """Whether there is a result."""
-        return self.result is not None
 
 
 def _one(keywords: dict[str, Any], mesh: Any) -> Result:
@@ -39,8 +24,9 @@ def optimize_many(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
+    executor: Executor | None = None,
     **keywords: Any,
-) -> Iterator[Item]:
+) -> Iterator[Item[Result]]:
     """Optimise many surfaces in parallel processes, and yield results as they finish.
 
     Parameters
@@ -52,6 +38,8 @@ def optimize_many(
         Number of worker processes; the number of cores when not given, 0 to solve in this one.
     scheduler : str, optional
         Address of a Dask scheduler, such as ``tcp://host:8786``, whose workers solve instead.
+    executor : Executor, optional
+        Solves instead, and stays open for other calls: :class:`gso.executors.ProcessExecutor`.
     **keywords
         Passed to :func:`gso.tno.optimize`; a `callback` is ignored.
 
@@ -73,8 +61,6 @@ def optimize_many(
     if isinstance(keywords.get("constraints"), Iterator):
         # The first surface would exhaust the iterator.
         keywords["constraints"] = list(keywords["constraints"])
-    work = partial(_one, keywords)
-    spread = cluster.either(work, meshes, workers=workers, scheduler=scheduler)
-    with closing(spread) as results:
-        for done in results:
-            yield Item(done.index, done.value, done.error)
+    own = nullcontext(executor) if executor else open_executor(workers, scheduler, main=True)
+    with own as ready:
+        yield from ready.as_completed(partial(_one, keywords), meshes)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -12,8 +11,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree as Points
 
-from gso import decimation, parallel, parametrization
+from gso import decimation, parametrization
 from gso.errors import ConvergenceWarning, GSOError, MeshError
+from gso.executors import open_executor
 from gso.io.raw_surface import welded
 from gso.mesh import Mesh
 from gso.result import Result
@@ -259,9 +259,9 @@ def _strips(
     # Starting processes takes as long as a few strips.
     workers = workers if len(meshes) >= _MANY else 0
     work = partial(_strip, ask, left)
-    with closing(parallel.spread(work, meshes, workers=workers, caller=False)) as results:
-        for count, done in enumerate(results, start=1):
-            out[done.index] = done.value
+    with open_executor(workers) as executor:
+        for count, done in enumerate(executor.as_completed(work, meshes), start=1):
+            out[done.index] = done.result
             say(f"{name}: strip {count} of {len(meshes)}")
     return out
 

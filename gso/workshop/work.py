@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
@@ -13,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gso import cluster, io
+from gso import io
 from gso.errors import GSOError, MeshError
+from gso.executors import open_executor
 from gso.verdict import Reason
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import digest, plain
@@ -102,11 +102,10 @@ def made_all(
         return found, failed
     work = partial(work_on, ask, str(folder.resolve()))
     items = (designs[k] for k in todo)
-    spread = cluster.either(work, items, workers=workers, scheduler=scheduler, caller=False)
     total = len(found) + len(todo)
     say(f"designs: {len(found)} of {total}")
-    with closing(spread) as results:
-        for done in results:
+    with open_executor(workers, scheduler) as executor:
+        for done in executor.as_completed(work, items):
             k = todo[done.index]
             if done.error is not None:
                 failed[k] = done.error

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, contextmanager, nullcontext
 from functools import partial
-from multiprocessing import parent_process
 from typing import Any
 
 import numpy as np
 import torch
 
-from gso.errors import GSOError
-from gso.parallel import Done, processors
+from gso.errors import GSOError, OptionError
+from gso.executors import Executor, Item, ProcessExecutor, open_executor
+from gso.executors.base import processors, useful_workers
 from gso.result import Result
 from gso.tno.batched import device
 from gso.tno.batched.batches import Asked, solve_batch
+from gso.tno.batched.device_executor import DeviceExecutor, minimise_elsewhere
 from gso.tno.batched.gathered import Gathered, Solved
-from gso.tno.batched.workers import BatchWorkers
 
 #: Surfaces solved together on a processor.
 _BATCH = 16
@@ -32,83 +32,86 @@ _ENOUGH, _GPU_ENOUGH = 4, 256
 
 
 def solve_all(
-    asked: Asked, designs: Sequence[Any], workers: int | BatchWorkers | None = 0
+    asked: Asked,
+    designs: Sequence[Any],
+    workers: int | None = 0,
+    executor: Executor | None = None,
 ) -> Iterator[Result | GSOError]:
     """Solve grids of one size, arrays (H, W, 3) or meshes; yield results or errors in order."""
-    if not len(designs):
+    count = len(designs)
+    if not count:
         return
-    if asked.device.partition(":")[0] != "cpu":
-        yield from _on_device(asked, designs, workers)
-        return
-    if workers is None:
-        workers = _useful_workers(-(-len(designs) // _BATCH), _ENOUGH)
-    if workers == 0:
-        for k in range(0, len(designs), _BATCH):
-            yield from _batch(asked, designs[k : k + _BATCH])
-        return
-    count = len(workers) if isinstance(workers, BatchWorkers) else workers
-    # Smaller pieces where they leave no process without work.
-    share = -(-len(designs) // (count * -(-len(designs) // (_BATCH * count))))
-    pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
-    own = nullcontext(workers) if isinstance(workers, BatchWorkers) else BatchWorkers(count)
-    with own as ready:
-        yield from _in_order(ready.spread(partial(_measured, asked), pieces), share)
-
-
-def _on_device(
-    asked: Asked, designs: Sequence[Any], workers: int | BatchWorkers | None
-) -> Iterator[Result | GSOError]:
-    """Solve designs on a graphics processor, planned by this process or by workers."""
     vertices = max(np.size(getattr(designs[0], "vertices", designs[0])) // 3, 1)
-    most = max(_VERTICES // vertices, 1)
-    if workers is None:
-        workers = _useful_workers(len(designs), _GPU_ENOUGH)
-    if workers == 0:
+    here = _on_processor(asked.device)
+    most = _BATCH if here else max(_VERTICES // vertices, 1)
+    if executor is None and workers is None:
+        parts, enough = (-(-count // most), _ENOUGH) if here else (count, _GPU_ENOUGH)
+        workers = useful_workers(parts) if parts >= enough else 0
+    if executor is None and workers == 0:
         together = min(most, _GPU_BATCH)
-        for k in range(0, len(designs), together):
+        for k in range(0, count, together):
             yield from _batch(asked, designs[k : k + together])
-        return
-    own = BatchWorkers(workers) if isinstance(workers, int) else nullcontext(workers)
-    with own as ready:
-        # Two for each process: while some are minimised, others are planned.
-        share = min(-(-len(designs) // (2 * len(ready))), _SHARE, most)
-        pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
-        work = partial(solve_batch, asked)
-        yield from _in_order(in_batches(ready, work, pieces, asked.device, vertices), share)
+    elif here:
+        with nullcontext(executor) if executor else open_executor(workers) as ready:
+            # Smaller pieces where they leave no process without work.
+            own = max(ready.workers, 1)
+            share = -(-count // (own * -(-count // (most * own))))
+            pieces = [designs[k : k + share] for k in range(0, count, share)]
+            yield from _in_order(ready.as_completed(partial(_measured, asked), pieces), share)
+    else:
+        with planners(asked.device, vertices, workers, executor) as ready:
+            share = min(-(-count // ready.workers), _SHARE, most)
+            pieces = [designs[k : k + share] for k in range(0, count, share)]
+            work = partial(solve_batch, asked, minimise=minimise_elsewhere)
+            yield from _in_order(ready.as_completed(work, pieces), share)
 
 
-def in_batches(
-    workers: BatchWorkers,
-    function: Callable[..., Any],
-    pieces: Sequence[Any],
+@contextmanager
+def planners(
     where: str,
     vertices: int,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    *,
     enough: float = 0.5,
-) -> Generator[Done, None, None]:
-    """Apply a function to pieces in processes, while this one minimises for them on a device.
+) -> Iterator[DeviceExecutor]:
+    """Open an executor for which this process minimises on a device.
 
     Parameters
     ----------
-    workers, function, pieces, enough
-        As for :meth:`BatchWorkers.spread`.
     where : str
         The device.
     vertices : int
         Number of vertices of a surface.
+    workers : int, optional
+        Number of processes that work at a time; as many more wait for the device meanwhile.
+    executor : ProcessExecutor, optional
+        Processes to use instead.
+    enough : float
+        As for :class:`DeviceExecutor`.
     """
+    processes = executor or ProcessExecutor(2 * (workers or processors()))
+    if not isinstance(processes, ProcessExecutor):
+        raise OptionError("a graphics processor needs worker processes: give a ProcessExecutor")
     together, most = partial(device.solve, device=where), max(_MOST // vertices, 1)
-    return workers.spread(function, pieces, together, most=most, enough=enough)
+    with (
+        nullcontext() if executor else processes,
+        DeviceExecutor(processes, together, most=most, enough=enough) as ready,
+    ):
+        yield ready
 
 
-def _in_order(results: Generator[Done, None, None], share: int) -> Iterator[Result | GSOError]:
+def _in_order(
+    results: Generator[Item[list[Result | GSOError]], None, None], share: int
+) -> Iterator[Result | GSOError]:
     """Yield the results of pieces of `share` surfaces, which finish in any order."""
-    done: dict[int, Any] = {}
+    done: dict[int, list[Result | GSOError]] = {}
     shown = 0
     with closing(results):
         for one in results:
-            if one.error is not None:
+            if one.result is None:
                 raise GSOError(f"surfaces from {one.index * share} on: {one.error}")
-            done[one.index] = one.value
+            done[one.index] = one.result
             while shown in done:
                 yield from done.pop(shown)
                 shown += 1
@@ -124,7 +127,7 @@ def _minimised(where: str, gathered: Gathered) -> Solved:
     return device.solve([gathered], where)[0]
 
 
-def _measured(asked: Asked, designs: Sequence[Any], *, minimise: Any) -> list[Result | GSOError]:
+def _measured(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
     """Solve designs in a worker process, by itself, and compute their metrics there."""
     found = _batch(asked, designs)
     for result in found:
@@ -133,18 +136,15 @@ def _measured(asked: Asked, designs: Sequence[Any], *, minimise: Any) -> list[Re
     return found
 
 
-def _useful_workers(pieces: int, enough: int) -> int:
-    """Return the number of worker processes that saves time, 0 inside a worker process."""
-    if parent_process() is not None or pieces < enough:
-        return 0
-    return min(processors(), pieces)
+def _on_processor(where: str) -> bool:
+    return where.partition(":")[0] == "cpu"
 
 
 @contextmanager
 def _one_thread(where: str) -> Iterator[None]:
     """Use one thread on a processor: worker processes use the others."""
     before = torch.get_num_threads()
-    if where.partition(":")[0] == "cpu":
+    if _on_processor(where):
         torch.set_num_threads(1)
     try:
         yield

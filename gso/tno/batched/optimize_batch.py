@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import torch
 
-from gso.errors import GSOError, MeshError, OptionError
+from gso.errors import GSOError, MeshError
+from gso.executors import Executor
+from gso.executors.base import check_workers
 from gso.result import Result
 from gso.tno.batched import batches
 from gso.tno.batched import device as devices
 from gso.tno.batched.many import solve_all
-from gso.tno.batched.workers import BatchWorkers
 from gso.typing import Array
 
 
@@ -24,7 +25,8 @@ def optimize_batch(
     formulation: str | None = None,
     options: Any = None,
     device: str = "cpu",
-    workers: int | BatchWorkers | None = None,
+    workers: int | None = None,
+    executor: Executor | None = None,
     verdict: bool = False,
 ) -> list[Result]:
     """Make many grids of one size developable, or flatten them, in batches on PyTorch tensors.
@@ -49,10 +51,13 @@ def optimize_batch(
         backend and the number of threads in it are not used.
     device : str
         PyTorch's name of the device: "cpu", "cuda", "cuda:1" ...
-    workers : int or BatchWorkers, optional
-        Number of worker processes; as many as save time when not given, 0 for none. Those of a
-        :class:`gso.tno.BatchWorkers` are started once for many calls. On a processor workers
-        solve whole batches. With a graphics processor they plan, and this process minimises.
+    workers : int, optional
+        Number of processes that work at a time; as many as save time when not given, 0 for this
+        one alone. On a processor workers solve whole batches. With a graphics processor they plan,
+        and this process minimises; as many more wait for it meanwhile.
+    executor : Executor, optional
+        Works instead, and stays open for other calls: :class:`gso.executors.ProcessExecutor`. With
+        a graphics processor it needs two processes for each that works at a time.
     verdict : bool
         Judge the results, and flatten developable ones to measure their strain. This is done
         surface by surface on the processor.
@@ -80,17 +85,12 @@ def optimize_batch(
     >>> [r.metrics["loss_gc"] < r.metrics["loss_gc_before"] for r in results]
     [True, True]
     """
-    if not isinstance(workers, int | BatchWorkers | None) or (
-        isinstance(workers, int) and workers < 0
-    ):
-        raise OptionError(
-            f"workers is {workers!r}; it must be a whole number of 0 or more, or BatchWorkers"
-        )
+    check_workers(workers)
     designs = _designs(points)
     devices.checked(device)
     asked = batches.asked(task, formulation, options, device, verdict)
     out: list[Result] = []
-    for index, found in enumerate(solve_all(asked, list(designs), workers)):
+    for index, found in enumerate(solve_all(asked, list(designs), workers, executor)):
         if isinstance(found, GSOError):
             raise type(found)(f"surface {index}: {found}")
         out.append(found)
