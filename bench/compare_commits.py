@@ -65,19 +65,15 @@ def terms() -> Entries:
     x, y = np.meshgrid(np.linspace(-1, 1, 6), np.linspace(-1, 1, 7), indexing="ij")
     mesh = gso.Mesh.from_grid(np.stack([x, y, 0.3 * x * y + 0.1 * x**3], axis=-1))
     random = np.random.default_rng(0)
+    sizes = {"surface": 3, "flat": 2, "scale": 1}
     for name, module in registry.items():
         for k, term in enumerate(module.examples(mesh)):
-            dims = [
-                {"surface": 3, "flat": 2, "scale": 1}[b]
-                for b, i in term.stencil
-                for _ in range(i.shape[1])
-            ]
+            dims = [sizes[block] for block, ids in term.stencil for _ in range(ids.shape[1])]
             at = 0.5 + 0.1 * random.normal(size=(sum(dims), term.count))
             constants = term.constants if term.constants.size else np.empty((0, term.count))
             run = kernels.kernel(term.residual, tuple(dims), len(constants), True)
-            value, slope = run(at, constants)
-            yield f"{name} {k}/residual", value
-            yield f"{name} {k}/jacobian", slope
+            for what, value in zip(("residual", "jacobian"), run(at, constants), strict=True):
+                yield f"{name} {k}/{what}", value
 
 
 def developable() -> Entries:
@@ -109,10 +105,10 @@ def denoise() -> Entries:
 def constraints() -> Entries:
     """Every kind of constraint, bounds, splines, sessions, and meshes that are no grids."""
     u, v = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
-    saddle = np.stack([u, v, 0.3 * u * v], axis=-1)
-    mesh = gso.Mesh.from_grid(saddle)
+    mesh = gso.Mesh.from_grid(np.stack([u, v, 0.3 * u * v], axis=-1))
     lifted, rim = mesh.vertices[[0]] + np.array([0.0, 0.0, 0.1]), np.arange(17)
     line = np.stack([np.linspace(-1.2, 1.2, 30), np.full(30, 1.0), np.linspace(-0.4, 0.4, 30)], 1)
+    lengths = [gso.FixedLengths(np.stack([rim[:-1], rim[1:]], axis=1))]
     kinds: dict[str, list[Any]] = {
         "fixed": [gso.Fixed([0, 16, 288])],
         "boundary": [gso.FixedBoundary()],
@@ -122,13 +118,14 @@ def constraints() -> Entries:
         "sliding": [gso.SlidingBoundary()],
         "symmetry": [gso.SymmetryPlane([0, 0, 0], [1, -1, 0])],
         "planar": [gso.PlanarFaces()],
-        "lengths": [gso.FixedLengths(np.stack([rim[:-1], rim[1:]], axis=1))],
+        "lengths": lengths,
     }
-    for name, given in kinds.items():
-        yield from of_result(name, gso.tno.optimize(mesh, constraints=given))
-    pinned = [gso.Fixed([0]), gso.FixedLengths(np.stack([rim[:-1], rim[1:]], axis=1))]
-    yield from of_result("flat", gso.tno.optimize(mesh, task="flatten", constraints=pinned[1:]))
-    bounds: dict[str, dict[str, Any]] = {
+    far = mesh.vertices[[288]] + [-0.2, -0.2, 0.0]
+    glued = [gso.Fixed([0]), gso.Handle([288], far + np.array([0.0, 0.0, 0.2]))]
+    asked: dict[str, dict[str, Any]] = {
+        **{name: {"constraints": given} for name, given in kinds.items()},
+        "flat": {"task": "flatten", "constraints": lengths},
+        "bend": {"task": "bend", "constraints": glued},
         "deviation": {"max_deviation": 0.05},
         "strain": {"max_strain": 0.01},
         "target": {"target_curvature": 0.05},
@@ -137,31 +134,25 @@ def constraints() -> Entries:
         "free": {"options": gso.DevelopableOptions(variables="free")},
         "warm": {"x0": mesh.vertices * [1.0, 1.0, 0.8]},
     }
-    for name, keywords in bounds.items():
+    for name, keywords in asked.items():
         yield from of_result(name, gso.tno.optimize(mesh, **keywords))
     triangles = gso.Mesh(mesh.vertices, mesh.triangles)
     yield from of_result("triangles", gso.tno.optimize(triangles))
-    two = gso.Mesh(
-        np.concatenate([mesh.vertices, 2 * mesh.vertices + [9, 0, 0]]),
-        np.concatenate([mesh.faces, mesh.faces + len(mesh.vertices)]),
-    )
+    points = np.concatenate([mesh.vertices, 2 * mesh.vertices + [9, 0, 0]])
+    two = gso.Mesh(points, np.concatenate([mesh.faces, mesh.faces + len(mesh.vertices)]))
     yield from of_result("two", gso.tno.optimize(two))
-    glued = [gso.Fixed([0]), gso.Handle([288], mesh.vertices[[288]] + [-0.2, -0.2, 0.2])]
-    yield from of_result("bend", gso.tno.optimize(mesh, task="bend", constraints=glued))
     session = gso.tno.Session(mesh, constraints=glued)
     for height in (0.3, 0.4):
-        session.move([288], mesh.vertices[[288]] + [-0.2, -0.2, height])
+        session.move([288], far + np.array([0.0, 0.0, height]))
         yield f"session {height}/vertices", session.step(2)
     yield from of_result("session", session.settle())
 
 
 def nets() -> Entries:
     """Predictions of the shipped nets, and hybrid solves."""
-    for task in ("developable", "flatten", "denoise"):
-        for k, points in enumerate(surfaces(3)):
-            grid = gso.net.predict(points, task=task)
-            yield f"{task} net {k}/points", np.asarray(grid)
     for k, points in enumerate(surfaces(3)):
+        for task in ("developable", "flatten", "denoise"):
+            yield f"{task} net {k}/points", np.asarray(gso.net.predict(points, task=task))
         yield from of_result(f"hybrid {k}", gso.hybrid.solve(points))
 
 
@@ -192,9 +183,8 @@ def compare(old: str, new: str) -> int:
         far = [(difference(before[n], after[n]), n) for n in names]
         over = sorted((d, n) for d, n in far if d > limit)[::-1]
         same = sum(d == 0 for d, _ in far)
-        print(
-            f"{group}: {len(names)} entries, {same} equal, {len(over)} above {limit:g}, {lost} lost"
-        )
+        differ = f"{same} equal, {len(over)} above {limit:g}, {lost} lost"
+        print(f"{group}: {len(names)} entries, {differ}")
         for d, n in over[:8]:
             print(f"    {d:9.2e}  {n}")
         bad += len(over) + lost

@@ -26,8 +26,9 @@ ROOT = Path(__file__).resolve().parent.parent
 BENCH = ROOT / "bench"
 #: Presets that sections compare.
 PRESETS = ("fast", "balanced", "accurate")
-#: A column of :func:`compared`: heading, key of the rating, and how its values are summarised.
-Column = str | tuple[str, str, Callable[[Sequence[Any]], Any]]
+#: A column of :func:`compared`: heading, key of the rating if it is another, and how its values
+#: are summarised if not by their mean.
+Column = str | tuple[Any, ...]
 
 
 def reference() -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -46,6 +47,11 @@ def timed(function: Callable[..., Any], *given: Any, **keywords: Any) -> tuple[A
     start = time.perf_counter()
     value = function(*given, **keywords)
     return value, time.perf_counter() - start
+
+
+def energy(result: gso.Result) -> float:
+    """Return the final value of the objective."""
+    return sum(result.energy.values())
 
 
 def quietly(function: Callable[..., Any], *given: Any, **keywords: Any) -> Any:
@@ -99,7 +105,8 @@ def compared(
     Ratings are averaged unless a column says otherwise. The rating "s" is the time of the
     call, unless `rate` gives another; without a column of it there are the median and the largest.
     """
-    asked = [c if isinstance(c, tuple) else (c, c, np.mean) for c in columns]
+    given = [c if isinstance(c, tuple) else (c, np.mean) for c in columns]
+    asked = [c if len(c) == 3 else (c[0], *c) for c in given]
     if not any(key == "s" for _, key, _ in asked):
         asked += [("median s", "s", np.median), ("max s", "s", np.max)]
     found: dict[str, dict[str, Any]] = {}
@@ -161,12 +168,10 @@ def quality(before: np.ndarray, after: np.ndarray) -> dict[str, float]:
 @contextmanager
 def axes_of(path: str, **labels: str) -> Iterator[Any]:
     """Yield axes to draw on, and write the picture."""
-    import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(figsize=(7, 4.5), constrained_layout=True)
+    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    axes = figure.subplots()
     yield axes
     axes.set(yscale="log", **labels)
     axes.legend()

@@ -71,7 +71,7 @@ def main() -> None:
         some = _screened(arguments.out, "validation")
         total = sum(len(levels(m.task)) for m in methods().values() if m.candidates)
         with build.bar(total, "tuning") as tick:
-            tuning.write(tuning.tuned(some, Store(arguments.out), command, tick))
+            tuning.tune(some, Store(arguments.out), command, tick)
         return
     settings = QUICK if arguments.quick else FULL
     folder = arguments.out / "surfaces"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gso.dataset import bezier
-from gso.mesh import Mesh
+from gso.mesh import Mesh, topology
 from gso.mesh.topology import reverse
 from gso.verdict import Code, Reason
 
@@ -56,6 +56,27 @@ def shuffled(mesh: Mesh, seed: int = 0) -> Mesh:
     order = rng.permutation(len(mesh.vertices))
     new = np.argsort(order)
     return Mesh(mesh.vertices[order], new[mesh.faces][rng.permutation(len(mesh.faces))])
+
+
+def renumbered(mesh: Mesh, seed: int) -> tuple[Mesh, np.ndarray]:
+    """The same mesh with vertices and faces in random order and other first corners.
+
+    Returns
+    -------
+    mesh : Mesh
+    new : ndarray of int, (n,)
+        Number of each vertex now: ``copy.vertices[new]`` are the vertices of `mesh`.
+    """
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(mesh.vertices))
+    new = np.argsort(order)
+    faces = mesh.faces[rng.permutation(len(mesh.faces))]
+    size = np.where(topology.are_quads(faces), 4, 3)
+    corner = np.arange(faces.shape[1])
+    turn = rng.integers(0, 4, len(faces))
+    pick = np.where(corner < size[:, None], (corner + turn[:, None]) % size[:, None], corner)
+    turned = np.take_along_axis(faces, pick, axis=1)
+    return Mesh(mesh.vertices[order], np.where(turned < 0, -1, new[turned])), new
 
 
 def meshes() -> dict[str, Mesh]:

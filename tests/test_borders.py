@@ -13,7 +13,7 @@ import gso
 from gso import metrics
 from gso.energy import elongation
 from gso.mesh.normals import vertex_normals
-from tests.conftest import meshes, rotation
+from tests.conftest import meshes, renumbered, rotation
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 
@@ -78,7 +78,7 @@ def test_elongation_is_free_between_its_bounds_and_grows_beyond(mesh):
 
 def test_elongation_has_nothing_to_do_with_numbering():
     mesh = designs.irregular(0)[0].mesh
-    copy, new = designs.renumbered(mesh, 7)
+    copy, new = renumbered(mesh, 7)
     points = mesh.vertices * [0.5, 1.0, 1.3]
     other = np.empty_like(points)
     other[new] = points
@@ -97,7 +97,7 @@ def test_normals_are_as_symmetric_as_the_surface(design):
 
 @pytest.mark.parametrize("mesh", [pytest.param(m, id=k) for k, m in meshes().items()])
 def test_normals_do_not_depend_on_numbering(mesh):
-    copy, new = designs.renumbered(mesh, 2)
+    copy, new = renumbered(mesh, 2)
     here, there = vertex_normals(mesh), vertex_normals(copy)[new]
     there *= np.sign((here[0] * there[0]).sum())
     np.testing.assert_allclose(there, here, atol=1e-12)

@@ -14,6 +14,7 @@ import designs
 from designs import KINDS
 
 from gso import metrics
+from tests.conftest import renumbered
 
 SEEDS = (0, 1)
 
@@ -93,7 +94,7 @@ def test_one_triangulation_is_symmetric_of_some_of_them(seed):
 
 @pytest.mark.parametrize("design", every("holes", "irregular"))
 def test_renumbered_copies_are_the_same_mesh(design):
-    copy, new = designs.renumbered(design.mesh, 3)
+    copy, new = renumbered(design.mesh, 3)
     np.testing.assert_array_equal(copy.vertices[new], design.mesh.vertices)
     here, there = (
         np.unique(np.sort(f, axis=1), axis=0) for f in (new[design.mesh.faces], copy.faces)

@@ -7,7 +7,7 @@ Lengths have no unit; the designs are between 2 and 30 across.
 
 from __future__ import annotations
 
-from designs.base import Design, Symmetry, renumbered
+from designs.base import Design, Symmetry
 from designs.curved import curved
 from designs.holes import holes
 from designs.irregular import irregular
@@ -17,4 +17,4 @@ from designs.symmetric import symmetric
 #: The functions by the name of their kind.
 KINDS = {make.__name__: make for make in (holes, irregular, planar, symmetric, curved)}
 
-__all__ = ["KINDS", "Design", "Symmetry", "renumbered", *KINDS]
+__all__ = ["KINDS", "Design", "Symmetry", *KINDS]

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 import gso
 from gso.mesh import topology
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from gso.typing import Array, Flags, Ints
 
 
 @dataclass(frozen=True)
@@ -50,27 +47,6 @@ class Design:
             for s in self.symmetries
         ]
         return float(max(gaps, default=0.0) / self.mesh.diagonal)
-
-
-def renumbered(mesh: gso.Mesh, seed: int) -> tuple[gso.Mesh, Ints]:
-    """The same mesh with vertices and faces in random order and other first corners.
-
-    Returns
-    -------
-    mesh : Mesh
-    new : ndarray of int, (n,)
-        Number of each vertex now: ``copy.vertices[new]`` are the vertices of `mesh`.
-    """
-    rng = np.random.default_rng(seed)
-    order = rng.permutation(len(mesh.vertices))
-    new = np.argsort(order)
-    faces = mesh.faces[rng.permutation(len(mesh.faces))]
-    size = np.where(topology.are_quads(faces), 4, 3)
-    corner = np.arange(faces.shape[1])
-    turn = rng.integers(0, 4, len(faces))
-    pick = np.where(corner < size[:, None], (corner + turn[:, None]) % size[:, None], corner)
-    turned = np.take_along_axis(faces, pick, axis=1)
-    return gso.Mesh(mesh.vertices[order], np.where(turned < 0, -1, new[turned])), new
 
 
 def refined(points: Array, faces: Ints, n: int) -> tuple[Array, Ints]:
@@ -119,10 +95,16 @@ def even(points: Array, faces: Ints, n: int) -> tuple[Array, Ints]:
     return relaxed(plan, quads, n), quads
 
 
-def without(points: Array, faces: Ints, gone: NDArray[np.bool_]) -> tuple[Array, Ints]:
+def without(points: Array, faces: Ints, gone: Flags) -> tuple[Array, Ints]:
     """A mesh without some of its faces, and without the vertices that only they had."""
     used, number = np.unique(faces[~gone], return_inverse=True)
     return points[used], number.reshape(-1, faces.shape[1])
+
+
+def shuffled(points: Array, faces: Ints, rng: np.random.Generator) -> tuple[Array, Ints]:
+    """The same mesh with its vertices in random order."""
+    order = rng.permutation(len(points))
+    return points[order], np.argsort(order)[faces]
 
 
 def net(points: Array) -> tuple[Array, Ints]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import gso
-from designs.base import Array, Design
+from designs.base import Design
+from gso.typing import Array
 
 
 def curved(seed: int = 0) -> list[Design]:

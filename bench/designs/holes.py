@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 import gso
-from designs.base import Array, Design, net, ring, rolling, without
+from designs.base import Design, net, ring, rolling, without
+from gso.typing import Array, Flags
 
 
 def holes(seed: int = 0) -> list[Design]:
@@ -91,7 +91,7 @@ def _stepped_paraboloid(rng: np.random.Generator) -> gso.Mesh:
     return gso.Mesh(np.c_[plan, -a * plan[:, 0] ** 2 - b * plan[:, 1] ** 2], faces)
 
 
-def _inside(points: Array, circles: list[tuple[float, float, float]]) -> NDArray[np.bool_]:
+def _inside(points: Array, circles: list[tuple[float, float, float]]) -> Flags:
     """Which plan points lie in one of the circles (x, y, radius)."""
     return np.any([np.hypot(*(points - c[:2]).T) < c[2] for c in np.array(circles)], axis=0)
 

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 import gso
-from designs.base import Array, Design, Ints, even, net, refined, rolling, without
+from designs.base import Design, even, net, refined, rolling, without
+from gso.typing import Array, Ints
 
 
 def irregular(seed: int = 0) -> list[Design]:

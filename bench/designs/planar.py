@@ -7,8 +7,9 @@ from scipy.sparse import csr_matrix, identity
 from scipy.sparse.linalg import spsolve
 
 import gso
-from designs.base import Array, Design, Ints, even, net, ring
+from designs.base import Design, even, net, ring
 from designs.irregular import inset, star
+from gso.typing import Array, Ints
 
 
 def planar(seed: int = 0) -> list[Design]:

@@ -6,8 +6,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import gso
-from designs.base import Array, Design, Ints, Symmetry, even, net, ring
+from designs.base import Design, Symmetry, even, net, ring
 from designs.irregular import square_core, star
+from gso.typing import Array, Ints
 
 MIRROR_X = np.diag([-1.0, 1.0, 1.0])
 MIRROR_Y = np.diag([1.0, -1.0, 1.0])

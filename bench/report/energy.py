@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import tasks
 from gso.constraints import Compiled
@@ -21,8 +20,7 @@ from gso.pipeline.normalise import Canonical
 from gso.solver.kernels import casadi_function
 from gso.solver.problem import Problem
 from gso.tasks.base import Request
-
-Array = NDArray[np.float64]
+from gso.typing import Array
 
 
 def last_problem(points: np.ndarray, task: str, options: str) -> tuple[Any, np.ndarray]:

@@ -50,13 +50,12 @@ def solved(
 ) -> dict[tuple[str, float], list[Example]]:
     """Solve the examples, by task and level of the noise."""
     found: dict[tuple[str, float], list[Example]] = {}
-    numbers = chosen(settings, surfaces)
     with warnings.catch_warnings(), blas_threads(1):
         warnings.simplefilter("ignore", ConvergenceWarning)
         for task in TASKS:
+            # The figure of denoising shows one surface, with a row for each level.
+            some = chosen(settings, surfaces)[: 1 if task == "denoise" else None]
             for sigma in levels(task):
-                # The figure of denoising shows one surface, with a row for each level.
-                some = numbers[:1] if task == "denoise" else numbers
                 found[task, sigma] = [_example(surfaces, k, task, sigma, kept) for k in some]
             tick(task)
     return found
@@ -64,15 +63,13 @@ def solved(
 
 def _example(surfaces: Surfaces, k: int, task: str, sigma: float, kept: Store) -> Example:
     example = Example(surfaces.case(k, sigma), k)
-    for name in DRAWN[task]:
-        method = of(task, name)
-        if method.absent():
-            continue
-        place = f"examples/{task}-{name}-{level_name(sigma)}".replace(" ", "-")
-        key = method.key(sigma) | {"surfaces": surfaces.key, "number": k}
-        arrays = kept.arrays(place, key, partial(_points, method, example.case))
-        if arrays["points"].size:
-            example.results[name] = arrays["points"]
+    methods = {name: of(task, name) for name in DRAWN[task]}
+    for name, method in methods.items():
+        if not method.absent():
+            place = f"examples/{task}-{name}-{level_name(sigma)}".replace(" ", "-")
+            key = method.key(sigma) | {"surfaces": surfaces.key, "number": k}
+            points = kept.arrays(place, key, partial(_points, method, example.case))["points"]
+            example.results |= {name: points} if points.size else {}
     return example
 
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from harness import BENCH
-from numpy.typing import NDArray
 
 from gso import geometry, metrics
 from gso.dataset.screen import CURVATURE
@@ -19,19 +18,15 @@ from gso.mesh import Mesh
 from gso.plot.draw import GRAZING, Panel, draw
 from gso.plot.heat import Heat, Scale, curvatures, distance, strain
 from gso.plot.view import View
+from gso.typing import Array
 from report.examples import Example
 from report.method import TASKS
 from report.published import CHOSEN
 from report.quality import Records
 from report.timing import METHODS, PHASES, Timing, exponent
 
-Array = NDArray[np.float64]
-
-#: The file with the runs of figure 5, and the command that writes it.
+#: The file with the runs of figure 5.
 GRID = BENCH / "data" / "architecture_grid.json"
-GRID_COMMAND = (
-    "python bench/run_all.py --only net.grid data=DIR file=bench/data/architecture_grid.json"
-)
 #: Methods of figure 6.
 CURVES = ("TNO jiang2020", "TNO balanced", "Net-S", "Net-C", "Net-CF", "Net", "hybrid")
 #: Percentile of all values that is the upper end of a colour scale shared by several panels.
@@ -40,10 +35,10 @@ _TOP = 99.0
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture and its caption; without a picture the caption says why there is none."""
+    """A picture and its caption."""
 
     caption: str
-    path: Path | None = None
+    path: Path
 
 
 def drawn(
@@ -80,8 +75,6 @@ def intervals(records: Records, metric: str, name: str) -> list[dict[str, float]
 def figure_5(folder: Path) -> Figure:
     """Plot loss against parameters of nets of several sizes, from the stored runs."""
     text = "Figure 5: loss of nets supervised on the optimiser's results, against their size"
-    if not GRID.exists():
-        return Figure(f"{text}. Not run yet: {GRID_COMMAND}")
     stored = json.loads(GRID.read_text())
     rows, command = stored["rows"], stored["command"]
     canvas, axes = _canvas(1)
@@ -263,11 +256,9 @@ def _drawn(panels: list[Panel], path: Path, caption: str) -> Figure:
 
 
 def _canvas(count: int, width: float = 0.0) -> tuple[Any, list[Any]]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Canvas
 
     canvas = Canvas(figsize=(width or 4.5 * count, 3.6), dpi=110, layout="constrained")
-    FigureCanvasAgg(canvas)
     return canvas, list(np.atleast_1d(canvas.subplots(1, count)))
 
 

@@ -10,14 +10,10 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gso.net import catalogue
+from gso.typing import Array
 from report import store
 from report.surfaces import Case
-
-Array = NDArray[np.float64]
 
 TASKS = ("developable", "flatten", "denoise")
 #: Parameters of the peers by task, method and level of noise; made by ``--tune``.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -90,12 +91,9 @@ def timing_table(timings: Iterable[Timing]) -> str:
 
 def exponents(timings: Iterable[Timing]) -> list[str]:
     """Return the fitted exponents as sentences."""
-    groups: dict[tuple[str, str], list[Timing]] = {}
-    for t in timings:
-        groups.setdefault((t.task, t.method), []).append(t)
     return [
         f"{task} {method}: time grows as the number of vertices to the power {power:.2f}"
-        for (task, method), some in groups.items()
+        for (task, method), some in groupby(timings, key=lambda t: (t.task, t.method))
         if (power := exponent(some)) is not None
     ]
 

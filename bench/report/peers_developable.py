@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+import harness
 import numpy as np
 
 import gso
@@ -25,6 +26,7 @@ from report.surfaces import Case
 
 #: Relative decrease of the objective at which each solver stops, and most iterations of each.
 TOLERANCE, ITERATIONS = 1e-5, 50
+_PROBLEM = ("developable", "balanced")
 #: Names of the rows that compare the solvers.
 SAME_ENERGY = ("balanced, all of it", "Levenberg-Marquardt of gso", "least_squares", "IPOPT")
 
@@ -33,8 +35,7 @@ def _whole(case: Case) -> Solved:
     result = gso.tno.optimize(case.given, verdict=False)
 
     def left() -> dict[str, float]:
-        problem, x = last_problem(case.given, "developable", "balanced")
-        return {"objective_ratio": sum(result.energy.values()) / problem.energy(x)}
+        return _ratio(harness.energy(result), *last_problem(case.given, *_PROBLEM))
 
     return Solved(np.asarray(result.grid), result.iterations, left)
 
@@ -45,18 +46,18 @@ def _from_the_design(
     """Return a solver of the problem as one of cases, in the frame of the design."""
 
     def run(case: Case) -> Solved:
-        problem, start = last_problem(case.given, "developable", "balanced")
+        problem, start = last_problem(case.given, *_PROBLEM)
         x, iterations = solve(problem, start)
         frame = Canonical(Mesh.from_grid(case.given, weld=False))
         at = frame.back("surface", problem.variables.points(x).reshape(-1, 3))
         points = frame.frame.to_user(at).reshape(case.given.shape)
-        return Solved(
-            points,
-            iterations,
-            lambda: {"objective_ratio": problem.energy(x) / problem.energy(start)},
-        )
+        return Solved(points, iterations, lambda: _ratio(problem.energy(x), problem, start))
 
     return run
+
+
+def _ratio(energy: float, problem: Problem, start: Array) -> dict[str, float]:
+    return {"objective_ratio": energy / problem.energy(start)}
 
 
 @_from_the_design
@@ -70,17 +71,9 @@ def _own(problem: Problem, x: Array) -> tuple[Array, int]:
 def _least_squares(problem: Problem, x: Array) -> tuple[Array, int]:
     from scipy.optimize import least_squares
 
-    found = least_squares(
-        lambda at: energy.residuals(problem, at),
-        x,
-        lambda at: energy.jacobian(problem, at),
-        tr_solver="lsmr",
-        x_scale="jac",
-        ftol=TOLERANCE,
-        xtol=1e-12,
-        gtol=1e-12,
-        max_nfev=ITERATIONS,
-    )
+    residuals, jacobian = (partial(f, problem) for f in (energy.residuals, energy.jacobian))
+    stop = {"ftol": TOLERANCE, "xtol": 1e-12, "gtol": 1e-12, "max_nfev": ITERATIONS}
+    found = least_squares(residuals, x, jacobian, tr_solver="lsmr", x_scale="jac", **stop)
     return found.x, int(found.nfev)
 
 
@@ -93,15 +86,9 @@ def _ipopt(problem: Problem, x: Array) -> tuple[Array, int]:
     factor, none = ca.MX.sym("lam_f"), ca.MX.sym("none", 0)
     matrix = ca.triu(factor * ca.mtimes(slope.T, slope))
     hessian = ca.Function("hessian", [unknowns, none, factor, none], [matrix])
-    options = {
-        "hess_lag": hessian,
-        "print_time": False,
-        "ipopt.print_level": 0,
-        "ipopt.sb": "yes",
-        "ipopt.max_iter": ITERATIONS,
-        "ipopt.acceptable_tol": 1e-5,
-        "ipopt.acceptable_obj_change_tol": TOLERANCE,
-    }
+    options = {"hess_lag": hessian, "print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+    options |= {"ipopt.max_iter": ITERATIONS, "ipopt.acceptable_tol": 1e-5}
+    options |= {"ipopt.acceptable_obj_change_tol": TOLERANCE}
     aim = {"x": unknowns, "f": 0.5 * ca.sumsqr(value)}
     solver = ca.nlpsol("solver", "ipopt", aim, options)
     return np.asarray(solver(x0=x)["x"]).ravel(), solver.stats()["iter_count"]
@@ -115,11 +102,7 @@ def _same(name: str, run: Callable[[Case], Solved], note: str, kernels: bool = T
 METHODS = [
     _same(SAME_ENERGY[0], _whole, "coarse grids first"),
     _same(SAME_ENERGY[1], _own, "on the one grid, from the design"),
-    _same(
-        SAME_ENERGY[2],
-        _least_squares,
-        "SciPy: trust region, LSMR, the same Jacobian",
-    ),
+    _same(SAME_ENERGY[2], _least_squares, "SciPy: trust region, LSMR, the same Jacobian"),
     _same(
         SAME_ENERGY[3],
         _ipopt,

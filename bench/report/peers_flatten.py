@@ -59,22 +59,15 @@ def slim(mesh: Mesh, iterations: int = SLIM_ITERATIONS) -> Array:
     v, f, start = harmonic(mesh)
     energy = igl.MappingEnergyType.SYMMETRIC_DIRICHLET
     nobody, nowhere = np.empty(0, np.int32), np.empty((0, 2), order="F")
-    data = igl.slim_precompute(
-        np.asfortranarray(v),
-        np.asfortranarray(f.astype(np.int32)),
-        np.asfortranarray(start),
-        energy,
-        nobody,
-        nowhere,
-        0.0,
-    )
+    arrays = map(np.asfortranarray, (v, f.astype(np.int32), start))
+    data = igl.slim_precompute(*arrays, energy, nobody, nowhere, 0.0)
     return np.asarray(igl.slim_solve(data, iterations))[:, :2]
 
 
 def lscm(mesh: Mesh) -> Array:
     """Compute a least-squares conformal map (Levy et al. 2002), (n, 2).
 
-    Two boundary vertices that are far apart are fixed.
+    Two boundary vertices that are far apart are fixed; the map is scaled to equal area.
     """
     import igl
 
@@ -83,11 +76,8 @@ def lscm(mesh: Mesh) -> Array:
     far = int(np.linalg.norm(p - p[0], axis=1).argmax())
     pins = np.array([[0.0, 0.0], [np.linalg.norm(p[far] - p[0]), 0.0]])
     held = np.array([loop[0], loop[far]])
-    return igl.lscm(mesh.vertices.copy(), mesh.triangles.copy(), held, pins)[0]
-
-
-def _lscm(mesh: Mesh) -> Array:
-    return scaled(np.asarray(mesh.vertices), np.asarray(mesh.triangles), lscm(mesh))
+    v, f = mesh.vertices.copy(), mesh.triangles.copy()
+    return scaled(v, f, igl.lscm(v, f, held, pins)[0])
 
 
 def _peer(name: str, map_of: Callable[[Mesh], Array], note: str, pace: str = "fast") -> Method:
@@ -99,7 +89,7 @@ def _peer(name: str, map_of: Callable[[Mesh], Array], note: str, pace: str = "fa
 
 
 METHODS = [
-    _peer("libigl LSCM", _lscm, "conformal, scaled to the surface's area"),
+    _peer("libigl LSCM", lscm, "conformal, scaled to the surface's area"),
     _peer("libigl ARAP", arap, f"{ARAP_ITERATIONS} iterations"),
     _peer("libigl SLIM", slim, f"{SLIM_ITERATIONS} iterations", "slow"),
 ]

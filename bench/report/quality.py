@@ -10,7 +10,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import metrics, tasks
 from gso.dataset.noise import LEVELS
@@ -18,6 +17,7 @@ from gso.errors import ConvergenceWarning
 from gso.executors import open_executor
 from gso.linalg import blas_threads
 from gso.mesh import Mesh
+from gso.typing import Array
 from report import kernels, store
 from report.method import TASKS, Method, level_name
 from report.methods import methods, of
@@ -25,7 +25,6 @@ from report.settings import Settings
 from report.store import Store
 from report.surfaces import Case, Surfaces
 
-Array = NDArray[np.float64]
 #: The record of a method on a surface: figures, seconds, iterations, or an error; seconds with
 #: NumPy kernels, too, where they were measured.
 Record = dict[str, Any]

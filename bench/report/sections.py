@@ -27,9 +27,8 @@ HEADINGS = {
     "fairness_ratio": "fairness out/in",
     "loss_iso_cell": "loss_iso-cell",
     "strain_mean": "strain",
-    "strain_p99": "strain p99",
+    **{name: name.replace("_", " ") for name in ("strain_p99", "flipped_cells")},
     "edge_length_error": "edge error",
-    "flipped_cells": "flipped cells",
     "unflipped": "without flips",
     "theta_noisy": "theta noisy °",
     "theta": "theta °",
@@ -40,7 +39,7 @@ HEADINGS = {
 #: Columns that describe the input.
 GIVEN = ("theta_noisy",)
 #: Whether lower is better, for metrics that are not in :data:`gso.metrics.INFO`.
-_LOWER = {"unflipped": False, "rate": False, "off": True, "objective_ratio": True}
+_LOWER = {"unflipped": False, "rate": False, "off": True, "objective_ratio": True, "seconds": True}
 
 
 @dataclass

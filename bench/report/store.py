@@ -159,10 +159,7 @@ def machine() -> dict[str, Any]:
 @lru_cache(maxsize=1)
 def processor() -> str:
     """Return the name of the processor and the number of cores."""
-    name = platform.processor() or platform.machine()
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        lines = []
+    about, name = Path("/proc/cpuinfo"), platform.processor() or platform.machine()
+    lines = about.read_text().splitlines() if about.exists() else []
     name = next((line.split(":")[1].strip() for line in lines if line[:10] == "model name"), name)
     return f"{name}, {os.cpu_count()} cores"

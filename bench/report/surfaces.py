@@ -15,7 +15,6 @@ from typing import Any
 
 import harness
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import dataset
 from gso.dataset import noise as noises
@@ -28,9 +27,9 @@ from gso.hierarchy import resample
 from gso.io import replacing
 from gso.linalg import blas_threads
 from gso.mesh import Mesh
+from gso.typing import Array
 from report.store import Store, digest
 
-Array = NDArray[np.float64]
 Tick = Callable[[int, int], None]
 
 #: Splits that are drawn again from the seed.

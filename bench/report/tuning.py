@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import copy
 import json
-import warnings
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
+from harness import quietly
 
 from gso import metrics
 from report import store
-from report.method import TUNED, Array, Method, level_name
-from report.method import tuned as before
+from report.method import TUNED, Array, Method, level_name, tuned
 from report.methods import methods
 from report.quality import levels
 from report.store import Store
@@ -31,11 +30,9 @@ _LESS = 0.999
 COUNT = 8
 
 
-def tuned(
-    surfaces: Surfaces, kept: Store, command: str, tick: Callable[..., None]
-) -> dict[str, Any]:
-    """Choose parameters by task, method and level of the noise, for ``tuned.json``."""
-    values: dict[str, Any] = copy.deepcopy(before())
+def tune(surfaces: Surfaces, kept: Store, command: str, tick: Callable[..., None]) -> None:
+    """Choose parameters by task, method and level of the noise, and write ``tuned.json``."""
+    values: dict[str, Any] = copy.deepcopy(tuned())
     count = min(COUNT, len(surfaces))
     for method in (m for m in methods().values() if m.candidates and not m.missing()):
         for sigma in levels(method.task):
@@ -50,11 +47,7 @@ def tuned(
             best = partial(_best, method, surfaces, count, sigma)
             own[level_name(sigma)] = kept.value(place, key, best)
             tick(f"{method.name} {level_name(sigma)}")
-    return {"command": command, "surfaces": f"first {count}, {surfaces.name}", "values": values}
-
-
-def write(found: dict[str, Any]) -> None:
-    """Replace the parameters in the repository."""
+    found = {"command": command, "surfaces": f"first {count}, {surfaces.name}", "values": values}
     TUNED.write_text(json.dumps(found, indent=1) + "\n")
 
 
@@ -64,16 +57,10 @@ def _best(method: Method, surfaces: Surfaces, count: int, sigma: float) -> dict[
     untouched = np.mean([_SCORE[method.task](case, case.given) for case in cases])
     scores = []
     for parameters in method.candidates:
-        found = []
-        for case in cases:
-            with warnings.catch_warnings():
-                # SciPy's splines warn where they could not smooth as much as requested.
-                warnings.simplefilter("ignore")
-                points = method.run(case, **parameters).points
-            if not np.isfinite(points).all():
-                found = [np.inf]
-                break
-            found.append(_SCORE[method.task](case, points))
-        scores.append(np.mean(found))
+        # SciPy's splines warn where they could not smooth as much as requested.
+        results = [quietly(method.run, case, **parameters).points for case in cases]
+        finite = all(np.isfinite(points).all() for points in results)
+        found = [_SCORE[method.task](case, p) for case, p in zip(cases, results) if finite]
+        scores.append(np.mean(found) if finite else np.inf)
     worth = min(scores) < _LESS * untouched
     return method.candidates[int(np.argmin(scores))] if worth else None

@@ -122,16 +122,12 @@ def _winners(section: Section, metric: str, records: Records) -> Iterator[Winner
         if ours is None or not _better(metric, theirs, ours):
             continue
         known = {k: v for k, v in means.items() if v is not None and k not in _STARTS}
-        best = min(known, key=lambda k: known[k] if _lower(metric) else -known[k])
+        best = min(known, key=lambda k: known[k] if lower_is_better(metric) else -known[k])
         yield Winner(name, theirs, ours, known[best], best, len(where or ()), but)
 
 
-def _lower(metric: str) -> bool:
-    return metric == TIME or lower_is_better(metric)
-
-
 def _better(metric: str, theirs: float, ours: float) -> bool:
-    return theirs < ours if _lower(metric) else theirs > ours
+    return theirs < ours if lower_is_better(metric) else theirs > ours
 
 
 def _mean(records: list[Record], where: list[int] | None, metric: str) -> float | None:

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from harness import shown, timed
+from harness import energy, shown, timed
 
 import gso
 from gso.dataset import bezier
@@ -29,14 +29,12 @@ def batches(n: int = 256, device: str = "cpu", seed: int = 31) -> dict[str, Any]
     workers = processors()
 
     def many(task: str, points: np.ndarray) -> np.ndarray:
-        found = {
-            item.index: item.result
-            for item in gso.tno.optimize_many(points, task=task, workers=workers, verdict=False)
-        }
-        return _energies([found[k] for k in range(len(points))])
+        every = gso.tno.optimize_many(points, task=task, workers=workers, verdict=False)
+        found = {item.index: energy(item.result) for item in every}
+        return np.array([found[k] for k in range(len(points))])
 
     def batch(task: str, points: np.ndarray) -> np.ndarray:
-        return _energies(gso.tno.optimize_batch(points, task=task, device=device))
+        return np.array([*map(energy, gso.tno.optimize_batch(points, task=task, device=device))])
 
     rows = {}
     for task in ("developable", "flatten"):
@@ -85,7 +83,7 @@ def device(
                 "evaluation": _mean(again, "evaluate"),
                 "factorisation": _mean(again, "factor"),
                 "line search": _mean(again, "search"),
-                **_differences(_energies(found[:compared]), _energies(single)),
+                **_differences(*(np.array([*map(energy, x)]) for x in (found[:compared], single))),
             }
     title = (
         f"{n} surfaces 64 x 64 on {device!r}, planned by {workers or 'all'} processes; set-up is "
@@ -115,10 +113,6 @@ def _measured(function: Callable[..., Any], *given: Any) -> tuple[tuple[Any, flo
 
     before = spent()
     return timed(function, *given), spent() - before
-
-
-def _energies(results: list[Any]) -> np.ndarray:
-    return np.array([sum(result.energy.values()) for result in results])
 
 
 def _off(energies: np.ndarray, reference: np.ndarray) -> np.ndarray:

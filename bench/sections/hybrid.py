@@ -6,14 +6,15 @@ the seed, or read from a set (``data=DIR``).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from harness import BENCH, PRESETS, axes_of, progress, quietly, shown, timed
+from designs.base import shuffled, without
+from harness import BENCH, PRESETS, axes_of, energy, progress, quietly, shown, timed
 from report.store import Store
 from report.surfaces import Surfaces, opened, screened
 
@@ -45,12 +46,6 @@ STRETCH = 1e-6
 HOLES = (0.0, 0.15)
 
 
-def milliseconds(function: Callable[..., Any], *given: Any, **keywords: Any) -> tuple[Any, float]:
-    """Call a function and return its result and the milliseconds."""
-    value, seconds = timed(quietly, function, *given, **keywords)
-    return value, 1e3 * seconds
-
-
 def split(name: str, data: Path | None) -> Surfaces:
     """Return a split of a set, or of the set of the published size."""
     out = BENCH / "out"
@@ -59,14 +54,10 @@ def split(name: str, data: Path | None) -> Surfaces:
     return opened(out / "surfaces", data, name)
 
 
-def first(surfaces: Surfaces, count: int) -> list[np.ndarray]:
-    """Return the first surfaces of a split."""
+def first(count: int, data: Path | None) -> list[np.ndarray]:
+    """Return the first surfaces of the test split."""
+    surfaces = split("test", data)
     return [surfaces[k] for k in range(min(count, len(surfaces)))]
-
-
-def energy(result: gso.Result) -> float:
-    """Return the final value of the objective."""
-    return sum(result.energy.values())
 
 
 def compared(
@@ -76,7 +67,7 @@ def compared(
     workers: int | None = 0,
     stretched: bool = False,
 ) -> dict[str, np.ndarray]:
-    """Solve every design cold and hybrid: milliseconds, energies, and which used the net's start.
+    """Solve every design cold and hybrid: seconds, energies, and which used the net's start.
 
     Times are meaningful with ``workers=0`` only. With `stretched`, the energies of cold solves of
     the stretched designs are included; they show how much such minima differ by chance.
@@ -92,20 +83,20 @@ def compared(
 
 
 def _solved(task: str, keywords: dict[str, Any], stretched: bool, design: Any) -> dict[str, float]:
-    cold, slow = milliseconds(optimize, design, task=task, **keywords)
-    warm, quick = milliseconds(hybrid.solve, design, task=task, **keywords)
+    cold, slow = timed(quietly, optimize, design, task=task, **keywords)
+    warm, quick = timed(quietly, hybrid.solve, design, task=task, **keywords)
     least = max(energy(cold), 1e-300)
     found = {
         "cold": slow,
         "hybrid": quick,
-        "net": 1e3 * warm.seconds["net"],
+        "net": warm.seconds["net"],
         "started": warm.warm_start == "net",
         "energy": energy(warm) / least,
     }
     if stretched:
         mesh = gso.as_mesh(design)
         near = mesh.replaced(mesh.vertices * [1.0 + STRETCH, 1.0, 1.0])
-        again, _ = milliseconds(optimize, near, task=task, **keywords)
+        again, _ = timed(quietly, optimize, near, task=task, **keywords)
         found["stretched"] = energy(again) / least
     return found
 
@@ -118,7 +109,7 @@ def ratios(energies: np.ndarray) -> dict[str, float]:
 
 def costs(found: dict[str, np.ndarray]) -> dict[str, float]:
     """Summarise times and energies, cold and hybrid."""
-    times = {f"{k} ms": float(np.median(found[k])) for k in ("cold", "hybrid", "net")}
+    times = {f"{k} ms": 1e3 * float(np.median(found[k])) for k in ("cold", "hybrid", "net")}
     share = float(np.median(found["hybrid"] / found["cold"]))
     started = 100.0 * float(found["started"].mean())
     return times | {"of the time": share, "started %": started, **ratios(found["energy"])}
@@ -126,7 +117,7 @@ def costs(found: dict[str, np.ndarray]) -> dict[str, float]:
 
 def speed(n: int = 64, data: Path | None = None) -> dict[str, Any]:
     """Print time and energy of the same surfaces, cold and from the net's result."""
-    chosen = first(split("test", data), n)
+    chosen = first(n, data)
     rows: dict[Any, dict[str, Any]] = {}
     for name, (task, keywords) in CASES.items():
         if net_tasks.get(task).default not in available(task):
@@ -134,16 +125,16 @@ def speed(n: int = 64, data: Path | None = None) -> dict[str, Any]:
             continue
         compared(chosen[:2], task, keywords)  # imports and code generation of the first use
         rows[name] = costs(compared(progress(chosen, name), task, keywords))
-    cold = float(np.median([milliseconds(optimize, p, task="denoise")[1] for p in chosen]))
+    cold = float(np.median([timed(quietly, optimize, p, task="denoise")[1] for p in chosen]))
     blank = dict.fromkeys(next(iter(rows.values()), ()), "")
-    rows["denoise, in closed form: no start can help"] = blank | {"cold ms": cold}
+    rows["denoise, in closed form: no start can help"] = blank | {"cold ms": 1e3 * cold}
     title = f"Speed: medians over {len(chosen)} surfaces; energies over the cold ones"
     return shown(title, ["case"], rows)
 
 
 def sizes(n: int = 4, data: Path | None = None) -> dict[str, Any]:
     """Print time and energy on other sizes, which ``gso.hybrid.time_model`` was chosen from."""
-    chosen, rows = first(split("test", data), n), {}
+    chosen, rows = first(n, data), {}
     for side, preset in product(SIZES, PRESETS[1:]):
         grids = [resample(np.asarray(p, float), side, side) for p in chosen]
         quietly(hybrid.solve, grids[0], options=preset)
@@ -169,7 +160,7 @@ def guard(n: int = 0, data: Path | None = None) -> dict[str, Any]:
 
 def general(n: int = 32, data: Path | None = None) -> dict[str, Any]:
     """Print energies on triangulated patches in random order, half of them with a hole."""
-    chosen = first(split("test", data), n)
+    chosen = first(n, data)
     meshes = [patch(p, HOLES[k % len(HOLES)], seed=k) for k, p in enumerate(chosen)]
     found = compared(progress(meshes, "general"), "developable", {}, stretched=True)
     rows = _against_chance(f"{len(meshes)} meshes", found)
@@ -189,22 +180,18 @@ def _against_chance(name: str, found: dict[str, np.ndarray]) -> dict[Any, dict[s
 
 def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:
     """Return a grid as triangles in random order, with a hole in its middle."""
-    whole = Mesh.from_grid(grid)
+    whole, rng = Mesh.from_grid(grid), np.random.default_rng(seed)
     sides = (np.linspace(-1, 1, n) for n in grid.shape[:2])
     at = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
-    middle = at.reshape(-1, 2)[whole.triangles].mean(axis=1)
-    faces = whole.triangles[np.abs(middle).max(axis=1) >= hole]
-    rng = np.random.default_rng(seed)
-    used = rng.permutation(np.unique(faces))
-    new = np.empty(len(whole.vertices), int)
-    new[used] = np.arange(len(used))
-    return Mesh(whole.vertices[used], new[faces][rng.permutation(len(faces))])
+    middle = np.abs(at.reshape(-1, 2)[whole.triangles].mean(axis=1)).max(axis=1)
+    points, faces = shuffled(*without(whole.vertices, whole.triangles, middle < hole), rng)
+    return Mesh(points, faces[rng.permutation(len(faces))])
 
 
 def anytime(n: int = 16, data: Path | None = None, plot: str = "anytime.png") -> dict[str, Any]:
     """Plot energy relative to the cold solve's against time, for solves that are stopped early."""
-    chosen = first(split("test", data), n)
-    final = [energy(milliseconds(optimize, p)[0]) for p in progress(chosen, "anytime")]
+    chosen = first(n, data)
+    final = [energy(timed(quietly, optimize, p)[0]) for p in progress(chosen, "anytime")]
     solves = {
         "TNO": lambda p, most: optimize(p, x0=Start(None, iterations=most)),
         "hybrid": lambda p, most: hybrid.solve(p, polish=most or False),
@@ -212,11 +199,11 @@ def anytime(n: int = 16, data: Path | None = None, plot: str = "anytime.png") ->
     rows: dict[Any, dict[str, float]] = {}
     for name, solve in solves.items():
         for most in progress(POINTS, "anytime"):
-            done = [milliseconds(solve, p, most) for p in chosen]
+            done = [timed(quietly, solve, p, most) for p in chosen]
             relative = [
                 energy(result) / last for (result, _), last in zip(done, final, strict=True)
             ]
-            middle = float(np.median([spent for _, spent in done]))
+            middle = 1e3 * float(np.median([spent for _, spent in done]))
             rows[name, str(most)] = {"ms": middle, "energy": float(np.median(relative))}
     labels = {"xlabel": "milliseconds for one surface", "ylabel": "energy / that of the cold solve"}
     with axes_of(plot, **labels) as axes:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from designs.base import refined
 from designs.irregular import star
-from harness import apart, progress, shown
+from harness import apart, energy, progress, shown
 from report.measure import peak_mb
 
 import gso
@@ -75,7 +75,7 @@ def _solved(design: tuple[str, int], kind: str, full: bool) -> dict[str, float]:
         "vertices": len(mesh.vertices),
         "s": time.process_time() - start,
         "MB": peak_mb(),
-        "energy": sum(result.energy.values()),
+        "energy": energy(result),
         "|K|": result.metrics["loss_gc_worst"],
     }
 

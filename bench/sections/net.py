@@ -21,6 +21,7 @@ from report.published import NETS, TABLE_3
 from gso import dataset, net
 from gso.cli.progress import share
 from gso.dataset.noise import LEVELS
+from gso.dataset.shapes import NAMES
 from gso.io import replacing
 from gso.net import catalogue, tasks, weights
 from gso.net.training import checkpoint
@@ -28,8 +29,6 @@ from gso.net.training.config import from_dict
 from gso.net.training.training_curves import read
 from gso.net.training.training_run import CHECKPOINT
 
-#: Splits that are no windows of other surfaces.
-MAIN = ("train", "validation", "test", "hard")
 #: Array that denoising is timed on.
 TIMED = f"noisy_{LEVELS[1]:.3f}"
 #: Figure 5: blocks per level, channels, surfaces, epochs.
@@ -100,9 +99,10 @@ def rows(
         if noisy:
             published = {f"theta_{s:g}": row["theta"] for s, row in TABLE_3.items()}
         print(line(Path(name).stem, found, published), flush=True)
-        others_of = [s for s in opened if s not in MAIN] if others and not noisy else []
-        elsewhere = {s: measured(task, name, opened[s], n) for s in others_of}
-        for other, figures in elsewhere.items():
+        elsewhere = {}
+        for other in (o for o in NAMES if others and not noisy and o in opened):
+            figures = measured(task, name, opened[other], n)
+            elsewhere[other] = counted(figures, opened[other], n)
             print(line(f"  {other}", figures, {}), flush=True)
         out[name] = found
         if cards:
@@ -111,9 +111,7 @@ def rows(
             card = catalogue.read_card(path)
             card[f"test{of}"] = counted(found, opened["test"], n)
             if elsewhere:
-                card[f"other splits{of}"] = {
-                    s: counted(figures, opened[s], n) for s, figures in elsewhere.items()
-                }
+                card[f"other splits{of}"] = elsewhere
             weights.write_card(path.with_suffix(".json"), card)
     return out
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from designs import analytic
+from designs.base import shuffled
 from harness import ROOT, compared, example, progress, quietly, reference, shown, timed
 
 import gso
@@ -20,11 +21,7 @@ from gso import metrics
 from gso.dataset import bezier
 
 #: Options by the name of the row.
-STRIPS = {
-    "1": {"strips": 1},
-    "tree": {"flats": True},
-    **{str(k): {"strips": k} for k in (2, 4, 8)},
-}
+STRIPS = {"1": {"strips": 1}, "tree": {"flats": True}, **{str(k): {"strips": k} for k in (2, 4, 8)}}
 #: Curvature up to which surfaces of another seed are used.
 _MOST = 0.9
 _quantile = partial(np.quantile, q=0.9)
@@ -33,12 +30,9 @@ _quantile = partial(np.quantile, q=0.9)
 def strips(seed: str = "", start: str = "design", count: int = 24) -> dict[str, Any]:
     """Measure numbers of strips; with a seed on other surfaces of the same recipe."""
     surfaces = _surfaces(seed, count)
-    columns = [
-        *(("mean %", "mean %", np.median), ("max %", "max %", np.median)),
-        *(("max 90 %", "max %", _quantile), ("worst", "max %", np.max)),
-        *(("crossed", "crossed", np.count_nonzero), ("fold", "fold", np.median)),
-        *(("fold 90 %", "fold", _quantile), ("usable", "usable", sum), ("s", "s", np.median)),
-    ]
+    columns = [("mean %", np.median), ("max %", np.median), ("max 90 %", "max %", _quantile)]
+    columns += [("worst", "max %", np.max), ("crossed", np.count_nonzero), ("fold", np.median)]
+    columns += [("fold 90 %", "fold", _quantile), ("usable", sum), ("s", np.median)]
     runs = {number: _solver(start, **settings) for number, settings in STRIPS.items()}
     title = f"{len(surfaces)} surfaces, starts {start}"
     return compared(title, runs, surfaces, _rated, columns, head="strips")
@@ -51,15 +45,12 @@ def cad(seed: str = "", count: int = 24) -> dict[str, Any]:
     def rated(_: Any, result: gso.Result) -> dict[str, float]:
         found, seconds = timed(gso.smooth_strips, result.ruled, result.design)
         mean, largest = (100.0 / result.design.diagonal * x for x in found.distances)
-        flat = {"turn": found.turning, "no break": found.kink <= 0.1, "torsal": found.is_torsal}
+        flat = {"turn deg": found.turning, "no break": found.kink <= 0.1, "torsal": found.is_torsal}
         faces = sum(len(p.faces) for p in found.patches)
         return flat | {"mean %": mean, "max %": largest, "faces": faces, "s": seconds}
 
-    columns = [
-        *(("turn deg", "turn", np.median), ("worst", "turn", np.max)),
-        *((name, name, sum) for name in ("no break", "torsal")),
-        *((name, name, np.median) for name in ("mean %", "max %", "faces", "s")),
-    ]
+    columns = [("turn deg", np.median), ("worst", "turn deg", np.max), ("no break", sum)]
+    columns += [("torsal", sum), *((k, np.median) for k in ("mean %", "max %", "faces", "s"))]
     runs = {number: _solver("design", **STRIPS[number]) for number in ("1", "tree", "4")}
     title = f"Smooth strips of {len(surfaces)} surfaces"
     return compared(title, runs, surfaces, rated, columns, head="strips")
@@ -145,13 +136,13 @@ def general(start: str = "design") -> dict[str, Any]:
     """Measure meshes from practice: teapot patches, irregular quads, triangles, a hole."""
     irregular, teapot = example("irregular"), example("teapot")
     panel = gso.load(ROOT / "examples" / "panel.obj")
-    order = np.random.default_rng(5).permutation(len(panel.vertices))
+    triangles = shuffled(panel.vertices, panel.triangles, np.random.default_rng(5))
     middle = panel.vertices[panel.faces].mean(axis=1)
     away = np.linalg.norm(middle - middle.mean(axis=0), axis=1)
     u, v = np.meshgrid(*[np.linspace(-0.5, 0.5, 33)] * 2, indexing="ij")
     cases = {
         "panel": panel,
-        "panel, triangles": gso.Mesh(panel.vertices[order], np.argsort(order)[panel.triangles]),
+        "panel, triangles": gso.Mesh(*triangles),
         "panel with a hole": gso.Mesh(panel.vertices, panel.faces[away > 0.2 * away.max()]),
         "irregular quads": gso.Mesh(*irregular.disk()),
         "irregular, hole": gso.Mesh(*irregular.disk_with_hole()),
@@ -191,12 +182,9 @@ def peers() -> dict[str, Any]:
         strain = 100 * result.metrics.get("strain_max", np.nan)
         return found | {"strain %": strain, "usable": int(result.usable)}
 
-    columns = [
-        *((name, name, np.median) for name in ("mean %", "max %")),
-        *(("90 %", "max %", _quantile), ("strain %", "strain %", np.nanmedian)),
-        ("off straight %", "off straight %", np.median),
-        *(("usable", "usable", sum), ("s", "s", np.median)),
-    ]
+    columns = [("mean %", np.median), ("max %", np.median), ("90 %", "max %", _quantile)]
+    columns += [("strain %", np.nanmedian), ("off straight %", np.median)]
+    columns += [("usable", sum), ("s", np.median)]
     title = "Largest strain of the pattern, and how far rulings are off straight"
     return compared(title, runs, _surfaces(), rated, columns)
 

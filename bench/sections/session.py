@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from harness import medians, progress, shown
+from harness import energy, medians, progress, shown
 
 import gso
 from gso.dataset import bezier
@@ -117,8 +117,8 @@ def _dragged(
     resting = session.result()
     settled = session.settle()
     cold = gso.tno.optimize(mesh, **asked, constraints=[*more, gso.Handle([vertex], at(1.0))])
-    own, last, first = (sum(r.energy.values()) for r in (cold, resting, settled))
-    rest, settled = (100.0 * (energy / own - 1.0) for energy in (last, first))
+    own, last, first = map(energy, (cold, resting, settled))
+    rest, settled = (100.0 * (value / own - 1.0) for value in (last, first))
     return speed | {"at rest %": rest, "settled %": settled}
 
 
