@@ -103,8 +103,7 @@ def _facts(mesh: Mesh) -> list[tuple[str, str]]:
 
     used = mesh.used
     points = mesh.vertices[used]
-    a, b = mesh.edges.T
-    length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
+    length = mesh.edge_lengths
     loops = [str(len(loop)) for loop in mesh.boundary_loops]
     rows = [
         ("kind", _kind(mesh)),

@@ -89,8 +89,7 @@ def _found(subject: Subject, point: Array, normal: Array, tolerance: float | Non
     ids = np.flatnonzero(mesh.used)
     v = mesh.vertices[ids]
     if tolerance is None:
-        a, b = mesh.edges.T
-        tolerance = _TOLERANCE * np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1).mean()
+        tolerance = _TOLERANCE * mesh.edge_lengths.mean()
     else:
         tolerance = subject.positive(tolerance, "tolerance")
     away, partner = cKDTree(v).query(v - 2.0 * np.outer((v - point) @ normal, normal))

@@ -39,8 +39,7 @@ def build(mesh: Mesh) -> Term:
 
     Boundary edges have a narrower range, which also preserves the lengths of boundary loops.
     """
-    a, b = mesh.edges.T
-    length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
+    length = mesh.edge_lengths
     count = len(length)
     measured = length > 1e-9 * length.mean()
     low, high = np.where(mesh.boundary_edges, np.transpose([BOUNDARY]), np.transpose([INSIDE]))

@@ -54,8 +54,7 @@ def differences(mesh: Mesh) -> tuple[Ints, Array]:
         stencil = np.concatenate([rows, cols])
     else:
         stencil = topology.polyline_triples(mesh.half_edges, mesh.faces)
-        a, b = mesh.edges.T
-        h2 = (np.linalg.norm(v[a] - v[b], axis=1) ** 2).mean()
+        h2 = (mesh.edge_lengths**2).mean()
         scale = np.full(len(stencil), 1.0 / h2)
     return stencil, np.array([[1.0], [-2.0], [1.0]]) * scale
 

@@ -100,9 +100,7 @@ def _unit(mesh: Mesh, ids: Ints) -> Mesh:
     points = mesh.frame.to_unit(mesh.vertices)
     if len(ids) == len(points):
         return mesh.replaced(points)
-    new = np.zeros(len(points), np.int64)
-    new[ids] = np.arange(len(ids))
-    return Mesh(points[ids], np.where(mesh.faces < 0, -1, new[mesh.faces]))
+    return mesh.replaced(points).restricted(ids)[0]
 
 
 def _filled(mesh: Mesh, outer: Ints) -> Mesh:

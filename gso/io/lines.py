@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import count
 from os import PathLike
 from typing import Any
 
@@ -45,14 +45,13 @@ def save_lines(lines: Sequence[Any], path: str | PathLike[str]) -> None:
     l 3 4 5
     """
     check_writable(path, (".obj",))
-    points = [polyline(line, number, 3) for number, line in enumerate(lines)]
-    ends = np.cumsum([0, *map(len, points)]).tolist()
+    points = [polyline(line, k, 3) for k, line in enumerate(lines)]
+    number = count(1)
     with replacing(path) as file:
         for line in points:
             write_rows(file, "v %.17g %.17g %.17g\n", line)
-        for first, last in pairwise(ends):
-            text = "l " + " ".join(map(str, range(first + 1, last + 1))) + "\n"
-            file.write(text.encode("ascii"))
+        for line in points:
+            file.write(f"l {' '.join(str(next(number)) for _ in line)}\n".encode("ascii"))
 
 
 def polyline(line: Any, number: int, dimension: int) -> Array:

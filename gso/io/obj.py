@@ -66,12 +66,11 @@ def _vertices(words: Words, v: Ints) -> Array:
         row = v[(count < 3).argmax()]
         words.fail_row(row, f"a vertex needs three numbers, not {words.count[row] - 1}")
     first = words.first[v] + 1
-    points = words.floats((first[:, None] + np.arange(3)).ravel()).reshape(-1, 3)
+    points = words.points(first)
     weighted = np.flatnonzero(count == 4)
     if weighted.size:
         weight = words.floats(first[weighted] + 3)
-        if (weight == 0).any():
-            words.fail_row(v[weighted[(weight == 0).argmax()]], "a vertex has the weight 0")
+        words.refuse(v[weighted], weight == 0, "a vertex has the weight 0")
         with np.errstate(over="ignore"):
             points[weighted] /= weight[:, None]
     return points
@@ -116,10 +115,8 @@ def _texture(
         return None, None, ()
     try:
         width = words.count[vt] - 1
-        least, most = int(width.min()), int(width.max())
-        if not 1 <= least <= most <= 3:
-            row = vt[((width < 1) | (width > 3)).argmax()]
-            words.fail_row(row, "texture coordinates are one to three numbers")
+        most = int(width.max())
+        words.refuse(vt, (width < 1) | (width > 3), "texture coordinates are one to three numbers")
         texture = np.zeros((vt.size, most))
         inside = np.arange(most) < width[:, None]
         texture[inside] = words.floats(ranges(words.first[vt] + 1, width))

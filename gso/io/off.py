@@ -42,7 +42,7 @@ def read(data: bytes) -> Surface:
     for letters in re.findall(rb"ST|C|N", head[1]):
         widths = [w + more for w in widths for more in _MORE[letters]]
     v, f, size = _found(words, body, n, m, widths)
-    points = words.floats((v[:, None] + np.arange(3)).ravel()).reshape(-1, 3)
+    points = words.points(v)
     corner = ranges(f + 1, size)
     index = words.ints(corner)
     outside = (index < 0) | (index >= n)
@@ -95,8 +95,8 @@ def _found(words: Words, body: int, n: int, m: int, widths: list[int]) -> tuple[
         # Of several consistent readings, prefer one whose corner indices are valid.
         v, walk = next((x for x in whole if _inside(words, x[1], n)), whole[0])
         return v, walk.faces, walk.size
-    if lined and (words.count[rows[:n]] < 3).any():
-        words.fail_row(rows[(words.count[rows[:n]] < 3).argmax()], "a vertex needs three numbers")
+    if lined:
+        words.refuse(rows[:n], words.count[rows[:n]] < 3, "a vertex needs three numbers")
     if not walks:
         _fail_counts(words, body, n, m, "ends before the last vertex")
     # Line breaks locate the faces if there are enough lines.

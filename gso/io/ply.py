@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, field
-from typing import BinaryIO
+from dataclasses import dataclass
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,7 @@ _CORNERS = ("vertex_indices", "vertex_index")
 _HEADER_BYTES = 1 << 20
 
 
-@dataclass(frozen=True)
-class _Property:
+class _Property(NamedTuple):
     name: str
     kind: str
     count_kind: str | None = None
@@ -35,7 +34,7 @@ class _Property:
 class _Element:
     name: str
     count: int
-    properties: list[_Property] = field(default_factory=list)
+    properties: list[_Property]
 
     @property
     def least_bytes(self) -> int:
@@ -50,8 +49,7 @@ class _Element:
         raise MeshError(f"the element {self.name!r} of the PLY header has no {names[0]!r}")
 
 
-@dataclass
-class _Header:
+class _Header(NamedTuple):
     order: str | None
     """Byte order, or None for ascii."""
     elements: list[_Element]
@@ -109,7 +107,7 @@ def _header(data: bytes) -> _Header:
                         kind
                     ]
                 case ["element", name, count] if count.isdecimal():
-                    elements.append(_Element(name, int(count)))
+                    elements.append(_Element(name, int(count), []))
                 case ["property", "list", count_kind, kind, name] if _KINDS[count_kind][0] != "f":
                     elements[-1].properties.append(
                         _Property(name, _KINDS[kind], _KINDS[count_kind])
@@ -150,9 +148,9 @@ def _read_text(data: bytes, header: _Header) -> tuple[Array, Ints, Ints]:
             width = len(element.properties)
             if any(p.count_kind for p in element.properties):
                 raise MeshError("vertices with lists are not read from PLY text; write it binary")
-            if (size != width).any():
-                row = rows[(size != width).argmax()]
-                words.fail_row(row, f"a vertex has {words.count[row]} numbers instead of {width}")
+            wrong = size != width
+            said = f"a vertex has {size[wrong.argmax()]} numbers instead of {width}"
+            words.refuse(rows, wrong, said)
             columns = np.array([element.column(c, lists=False) for c in "xyz"])
             order = np.argsort(columns)
             found = words.floats((first[:, None] + columns[order]).ravel()).reshape(-1, 3)
@@ -164,13 +162,10 @@ def _read_text(data: bytes, header: _Header) -> tuple[Array, Ints, Ints]:
                 raise MeshError(
                     "faces with other lists before their corners are not read from text"
                 )
-            short = size <= at
-            if short.any():
-                words.fail_row(rows[short.argmax()], "a face has no corners")
+            words.refuse(rows, size <= at, "a face has no corners")
             count = words.ints(first + at)
             short = (count < 0) | (count > size - at - 1)
-            if short.any():
-                words.fail_row(rows[short.argmax()], "a face has fewer numbers than it announces")
+            words.refuse(rows, short, "a face has fewer numbers than it announces")
             corners = words.ints(ranges(first + at + 1, count))
     return points, corners, count
 

@@ -48,11 +48,8 @@ def _read_text(data: bytes) -> np.ndarray:
             f"the STL file has {begun} times 'facet', {ended} times 'endfacet' and {rows.size} "
             "vertices, or no 'endsolid'; it is cut off"
         )
-    short = words.count[rows] != 4
-    if short.any():
-        words.fail_row(rows[short.argmax()], "a vertex needs three numbers")
-    numbers = (words.first[rows][:, None] + np.arange(1, 4)).ravel()
-    return words.floats(numbers).reshape(-1, 3, 3)
+    words.refuse(rows, words.count[rows] != 4, "a vertex needs three numbers")
+    return words.points(words.first[rows] + 1).reshape(-1, 3, 3)
 
 
 def write(mesh: Mesh, file: BinaryIO) -> None:

@@ -90,6 +90,10 @@ class Words:
             self.fail(words[bad], f"{self.quote(words[bad])} is not a finite number")
         return values
 
+    def points(self, words: Ints) -> Array:
+        """Parse three finite numbers from each of the given words on, which ascend, (n, 3)."""
+        return self.floats((words[:, None] + np.arange(3)).ravel()).reshape(-1, 3)
+
     def ints(self, words: Ints, *, until: bytes = b"") -> Ints:
         """Parse integers in the given words, each up to the character `until`."""
         start, stop = self.start[words], self.stop[words]
@@ -168,6 +172,11 @@ class Words:
         """Raise a MeshError that names the line of a word."""
         line = self._first_line + self._data.count(b"\n", 0, int(self.start[word]))
         raise MeshError(f"line {line}: {message}")
+
+    def refuse(self, rows: Ints, bad: NDArray[np.bool_], message: str) -> None:
+        """Raise a MeshError that names the line of the first bad row, if there is one."""
+        if bad.any():
+            self.fail_row(rows[bad.argmax()], message)
 
     def fail_row(self, row: int | np.integer, message: str) -> NoReturn:
         """Raise a MeshError that names the line of a row."""

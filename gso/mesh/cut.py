@@ -135,8 +135,7 @@ def joining(mesh: Mesh, loops: Sequence[Ints]) -> Ints:
     """
     from scipy.sparse.csgraph import dijkstra
 
-    n, (a, b) = len(mesh.vertices), mesh.edges.T
-    length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
+    n, (a, b), length = len(mesh.vertices), mesh.edges.T, mesh.edge_lengths
     others = mesh.half_edges.boundary_vertex.copy()
     others[np.concatenate(loops)] = False
     # Penalty on edges that touch other loops: any path that avoids them is shorter.

@@ -199,6 +199,12 @@ class Mesh:
         """Edges of the faces, each once, (e, 2)."""
         return topology.edges(self.half_edges)
 
+    @property
+    def edge_lengths(self) -> Array:
+        """Length of each of :attr:`edges`, (e,)."""
+        a, b = self.edges.T
+        return np.asarray(np.linalg.norm(self.vertices[a] - self.vertices[b], axis=1))
+
     @cached_property
     def boundary_edges(self) -> NDArray[np.bool_]:
         """Mask over :attr:`edges`: boundary edges."""
@@ -213,6 +219,16 @@ class Mesh:
     def components(self) -> Ints:
         """Component number of each vertex, (n,)."""
         return topology.label_components(len(self.vertices), *self.edges.T)
+
+    def restricted(self, ids: Ints) -> tuple[Mesh, Ints]:
+        """Return the mesh of whole components, given by their vertices, ascending.
+
+        Also return the new number of each vertex, (n,); -1 for those of other components.
+        """
+        new = np.full(len(self.vertices), -1)
+        new[ids] = np.arange(len(ids))
+        faces = self.faces[new[self.faces[:, 0]] >= 0]
+        return Mesh(self.vertices[ids], np.where(faces < 0, -1, new[faces])), new
 
     @property
     def seams(self) -> NDArray[np.bool_]:

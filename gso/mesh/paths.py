@@ -31,8 +31,7 @@ class Paths:
 
     def __init__(self, mesh: Mesh, factor: Array | None = None):
         self.ends = mesh.edges
-        a, b = self.ends.T
-        self.length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
+        self.length = mesh.edge_lengths
         self.cost = self.length if factor is None else self.length * factor
         self.count = len(mesh.vertices)
         self._plain = self._graph(self.length)

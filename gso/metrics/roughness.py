@@ -22,8 +22,7 @@ def nonplanarity(surface: Any) -> Array:
     """
     mesh = mesh_of(surface)
     v = mesh.vertices
-    a, b = mesh.edges.T
-    length = np.linalg.norm(v[a] - v[b], axis=1).mean()
+    length = mesh.edge_lengths.mean()
     corners = (components(v[c]) for c in cells_of(mesh).T)
     with np.errstate(invalid="ignore", divide="ignore"):
         gap = np.abs(np.asarray(geometry.diagonal_distance(*corners)))

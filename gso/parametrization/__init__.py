@@ -2,7 +2,7 @@
 
 from gso.parametrization.alignment import align, settle
 from gso.parametrization.arap import Relaxed, relax, strain_level
-from gso.parametrization.embedding import embed, embeddings, flattens, parts, spanned
+from gso.parametrization.embedding import embeddings, flattens, parts, spanned
 from gso.parametrization.initial import begin, flips, given, oriented_triangles, refine, strain
 from gso.parametrization.opening import Opened, by_rows, opened, turning
 from gso.parametrization.packing import beside, closest_motion, place, upright
@@ -16,7 +16,6 @@ __all__ = [
     "beside",
     "by_rows",
     "closest_motion",
-    "embed",
     "embeddings",
     "flattens",
     "flips",

@@ -12,14 +12,6 @@ from gso.parametrization.arap import strain_level
 from gso.typing import Array, Ints
 
 
-def embed(mesh: Mesh, triangles: Ints, oriented: Ints) -> Array:
-    """Compute the least strained image (n, 2) of :func:`embeddings`.
-
-    Parameters and errors are the same.
-    """
-    return embeddings(mesh, triangles, oriented)[0]
-
-
 def embeddings(mesh: Mesh, triangles: Ints, oriented: Ints) -> list[Array]:
     """Compute plane images (n, 2) of a mesh, the least strained first; components may overlap.
 
@@ -50,9 +42,7 @@ def embeddings(mesh: Mesh, triangles: Ints, oriented: Ints) -> list[Array]:
     """
     found = []
     for ids in parts(mesh):
-        local = np.full(len(mesh.vertices), -1)
-        local[ids] = np.arange(len(ids))
-        part = _part(mesh, ids)
+        part, local = mesh.restricted(ids)
         _check(part, int(ids[0]))
         own = (local[t[local[t[:, 0]] >= 0]] for t in (triangles, oriented))
         found.append((ids, _embed(part, *own)))
@@ -71,17 +61,10 @@ def flattens(mesh: Mesh) -> bool:
     """
     try:
         for ids in parts(mesh):
-            _check(_part(mesh, ids), int(ids[0]))
+            _check(mesh.restricted(ids)[0], int(ids[0]))
     except MeshError:
         return False
     return True
-
-
-def _part(mesh: Mesh, ids: Ints) -> Mesh:
-    local = np.full(len(mesh.vertices), -1)
-    local[ids] = np.arange(len(ids))
-    faces = mesh.faces[local[mesh.faces[:, 0]] >= 0]
-    return Mesh(mesh.vertices[ids], np.where(faces < 0, -1, local[faces]))
 
 
 def parts(mesh: Mesh) -> list[Ints]:

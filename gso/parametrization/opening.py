@@ -148,10 +148,7 @@ def _tried(mesh: Mesh, ids: Ints, edges: Ints, iterations: int) -> tuple[float, 
 
     Returns its root-mean-square strain, and whether it overlaps itself.
     """
-    local = np.full(len(mesh.vertices), -1)
-    local[ids] = np.arange(len(ids))
-    faces = mesh.faces[local[mesh.faces[:, 0]] >= 0]
-    part = Mesh(mesh.vertices[ids], np.where(faces < 0, -1, local[faces]))
+    part, local = mesh.restricted(ids)
     ready, _ = by_rows(cut(part, local[edges]).mesh)
     start = begin(ready, iterations=iterations, doubtful=_SMALL)
     return start.level, bool(overlaps(ready, start.flat).size)

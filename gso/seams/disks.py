@@ -39,7 +39,7 @@ def opening(mesh: Mesh, factor: Array | None = None) -> Ints:
     [[7, 15], [15, 23]]
     """
     n, ends, he = len(mesh.vertices), mesh.edges, mesh.half_edges
-    length = np.linalg.norm(mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]], axis=1)
+    length = mesh.edge_lengths
     length = np.maximum(length if factor is None else length * factor, 1e-300)
     sources = _sources(mesh)
     # The boundary of each component counts as one vertex.

@@ -94,8 +94,7 @@ class Path(Seam):
             raise OptionError(f"a path has {len(ids)} vertices; it needs two or more")
         stops = np.r_[ids, ids[:1]] if self.closed else ids
         a, b = mesh.edges.T
-        length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
-        graph = edge_graph(len(mesh.vertices), a, b, length)
+        graph = edge_graph(len(mesh.vertices), a, b, mesh.edge_lengths)
         starts = np.unique(stops[:-1])
         away, before = dijkstra(graph, directed=False, indices=starts, return_predecessors=True)
         out = []
@@ -137,8 +136,7 @@ class Slice(Seam):
         height = self._heights(mesh)
         faces = mesh.faces
         if not mesh.is_triangles:
-            a, b = mesh.edges.T
-            step = float(np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1).mean())
+            step = float(mesh.edge_lengths.mean())
             own = np.where(faces >= 0, height[faces], height[faces[:, :1]])
             below = np.asarray((own < -step).all(axis=1))
             above = np.asarray((own > step).all(axis=1))

@@ -31,8 +31,7 @@ def mirror_of(mesh: Mesh) -> Ints:
     used = np.flatnonzero(mesh.used)
     points = mesh.vertices[used] - mesh.vertices[used].mean(axis=0)
     _, axes = np.linalg.eigh(points.T @ points)
-    a, b = mesh.edges.T
-    length = float(np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1).mean())
+    (a, b), length = mesh.edges.T, float(mesh.edge_lengths.mean())
     worst, crossed = np.inf, False
     # Diagonal planes matter where two principal axes are equal, as on a square.
     diagonals = [np.array(d) / np.sqrt(2.0) for d in _DIAGONALS]

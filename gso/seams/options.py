@@ -94,9 +94,7 @@ def as_sheet(sheet: Sequence[Length] | None, unit: str) -> tuple[float, float] |
 
 def too_large(mesh: Mesh, sheet: tuple[float, float]) -> bool:
     """Tell whether an edge is longer than the diagonal of a sheet, so that no cut helps."""
-    a, b = mesh.edges.T
-    longest = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1).max(initial=0.0)
-    return bool(longest > np.hypot(*sheet))
+    return bool(mesh.edge_lengths.max(initial=0.0) > np.hypot(*sheet))
 
 
 def prices(mesh: Mesh, along: ArrayLike | None, avoid: ArrayLike | None) -> Array | None:

@@ -129,8 +129,7 @@ def _along_rows(mesh: Mesh, ends: Array, start: int, goal: int) -> Ints | None:
     way = ends[1] - ends[0]
     along = np.clip((middle - ends[0]) @ way / max(float(way @ way), 1e-300), 0.0, 1.0)
     far = np.linalg.norm(middle - ends[0] - along[:, None] * way, axis=1)
-    a, b = mesh.edges.T
-    step = float(np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1).mean())
+    step = float(mesh.edge_lengths.mean())
     return _path(mesh, start, goal, 1.0 + (far / step) ** 2)
 
 

@@ -67,22 +67,17 @@ class Family:
         theta, mix = np.linalg.eigh(tridiagonal)
         self.eigenvalues = (1 / np.clip(theta, 1e-14, 1.0) - 1) / shift
         self.first = mix[:, 0, :]
-        self.shares = self.first**2
         self.mix, self.basis, self.length, self.count = mix, np.stack(basis), length, count
-        self.shift = shift
-
-    @property
-    def weights(self) -> Array:
-        """Weights around the shift; far ones are just accurate enough to move the shift there."""
-        return self.shift * 10**REACH
+        # Far ones are just accurate enough to move the shift there.
+        self.weights = shift * 10**REACH
 
     def removed(self) -> tuple[Array, Array]:
         """Compute the sum of squared residuals, and the trace of I - H, for each weight."""
         share = self.weights[:, None, None] * self.eigenvalues
         share = share / (1 + share)
-        energy = self.shares[:3] * self.length[:3, None] ** 2
+        energy = (self.first[:3] * self.length[:3, None]) ** 2
         residual = (share[:, :3] ** 2 * energy).sum(axis=(1, 2))
-        trace = (share[:, 3:] * self.shares[3:]).sum(axis=(1, 2)) * (self.count / PROBES)
+        trace = (share[:, 3:] * self.first[3:] ** 2).sum(axis=(1, 2)) * (self.count / PROBES)
         return residual, trace
 
     def smooth(self, weight: float) -> Array:

@@ -81,14 +81,12 @@ class Spectrum:
         Squared lengths of the coefficient vectors.
     floor : float
         Variance below which noise cannot be distinguished from rounding.
-    components : int
-        Components of a coefficient vector.
     """
 
-    def __init__(self, energy: Array, floor: float = 0.0, components: int = 3):
+    def __init__(self, energy: Array, floor: float = 0.0):
         (a, na, ci), (b, nb, cj) = bins(energy.shape[0]), bins(energy.shape[1])
         pooled = np.add.reduceat(np.add.reduceat(energy, a, axis=0), b, axis=1)
-        count = components * na[:, None] * nb
+        count = 3 * na[:, None] * nb
         self.keep = (ci[:, None] + cj > 1).ravel()
         self.count = count.ravel()[self.keep]
         self.energy = pooled.ravel()[self.keep] + self.count * max(floor, 1e-200)
