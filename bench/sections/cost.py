@@ -172,9 +172,7 @@ def startup() -> dict[str, Any]:
 
     with tempfile.TemporaryDirectory() as folder:
         panel = str(ROOT / "examples" / "panel.obj")
-        cold = median(
-            [sys.executable, "-m", "gso", "optimize", panel, "-o", f"{folder}/out.obj"]
-        )
+        cold = median([sys.executable, "-m", "gso", "optimize", panel, "-o", f"{folder}/out.obj"])
     more = median([sys.executable, "-c", "import numpy, gso"]) - median(
         [sys.executable, "-c", "import numpy"]
     )
