@@ -21,6 +21,7 @@ from typing import Any
 
 from gso import Options, metrics, tasks
 from gso.net import catalogue
+from gso.verdict import Code
 
 ROOT = Path(__file__).resolve().parents[1]
 #: Files with tables.
@@ -31,7 +32,8 @@ RESULTS = ROOT / "bench" / "data" / "results.json"
 
 def tables() -> dict[str, str]:
     """Every table by name."""
-    found = {"metrics": metric_table(), "options": option_table(Options, shared={})}
+    found = {"metrics": metric_table(), "reasons": reason_table()}
+    found["options"] = option_table(Options, shared={})
     shared = {f.name: f.default for f in fields(Options)}
     for task in tasks.names():
         module = tasks.get(task)
@@ -54,6 +56,20 @@ def metric_table() -> str:
         for name, info in metrics.INFO.items()
     ]
     return list_table(("Metric", "Unit", "Better", "Meaning"), rows, (22, 12, 10, 56))
+
+
+def reason_table() -> str:
+    """Codes of reasons, the units of their numbers, what they mean, and what to do."""
+    rows = []
+    for code in Code:
+        info = code.info
+        limit = "" if info.limit is None else f"{info.limit:g}"
+        meaning, remedy = (
+            prose(text[0].upper() + text[1:]) for text in (info.meaning, info.remedy)
+        )
+        rows.append((f"``{code.name}``", info.kind.value, limit, meaning, remedy))
+    head = ("Code", "Unit", "Bound", "Meaning", "What to do")
+    return list_table(head, rows, (22, 8, 6, 36, 28))
 
 
 def option_table(options: type[Options], shared: Mapping[str, object]) -> str:

@@ -131,9 +131,9 @@ def test_tables_are_up_to_date(monkeypatch):
     assert tables.replaced(pages) == pages, "run python docs/tables.py"
 
 
-def test_tables_name_every_metric_and_setting():
+def test_tables_name_every_metric_reason_and_setting():
     text = REFERENCE.read_text()
-    for name in gso.metrics.INFO:
+    for name in (*gso.metrics.INFO, *gso.verdict.Code.__members__):
         assert f"* - ``{name}``\n" in text
     for options in (gso.DevelopableOptions, gso.FlattenOptions, gso.DenoiseOptions):
         for name in (field.name for field in fields(options)):
