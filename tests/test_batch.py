@@ -12,15 +12,14 @@ import numpy as np
 import pytest
 
 import gso
-from gso import tasks
 from gso.constraints import Compiled
 from gso.dataset import bezier
 from gso.energy import registry
 from gso.linalg.base import Pattern
-from gso.pipeline.normalise import Canonical
+from gso.pipeline.case import Case
 from gso.solver import kernels
 from gso.solver.problem import Problem
-from gso.tasks.base import Request
+from gso.tasks.request import check
 from gso.unknowns.base import DIMENSIONS
 from tests.conftest import cylinder, meshes, saddle
 
@@ -38,7 +37,7 @@ from gso.tno.batched import (  # noqa: E402
 )
 from gso.tno.batched import tensor_kernels as on_tensors  # noqa: E402
 from gso.tno.batched.batch_problem import Problem as Batch  # noqa: E402
-from gso.tno.batched.batches import asked, solve_batch  # noqa: E402
+from gso.tno.batched.batches import check_batch, solve_batch  # noqa: E402
 from gso.tno.batched.gathered import TooLarge, Unbatchable, gather  # noqa: E402
 from gso.tno.batched.many import solve_all  # noqa: E402
 from gso.tno.batched.sums import Sums  # noqa: E402
@@ -62,12 +61,10 @@ def designs():
 
 
 def planned(task, points, **request):
-    module = tasks.get(task)
-    mesh = Canonical(gso.Mesh.from_grid(points)).mesh
-    formulation, kind = tasks.choose(module, request.pop("formulation", None), None)
-    options = kind.coerce(request.pop("options", None))
-    analysis = tasks.analyse(module, mesh, Compiled(flat=task == "flatten"))
-    return module.plan(analysis, Request(options, formulation, **request))
+    case = Case(
+        check(task, **request), gso.Mesh.from_grid(points), Compiled(flat=task == "flatten")
+    )
+    return case.task.plan(case.analysis, case.solver_request)
 
 
 def bump(n, height):
@@ -493,7 +490,7 @@ def on_cpu(parts):
 
 def by_workers(ready, some, task, together=on_cpu, most=100):
     found = {}
-    pieces, work = list(some[:, None]), partial(solve_batch, asked(task))
+    pieces, work = list(some[:, None]), partial(solve_batch, check_batch(task))
     for done in ready.spread(work, pieces, together, most=most, enough=1.0):
         assert done.error is None
         found[done.index] = done.value[0]
@@ -694,5 +691,5 @@ def test_what_fails_in_a_batch_is_solved_alone(designs, monkeypatch):
 def test_solved_yields_errors_in_place(designs):
     bad = designs.copy()
     bad[1] = 0.5
-    found = list(solve_all(asked("flatten"), bad))
+    found = list(solve_all(check_batch("flatten"), bad))
     assert [isinstance(one, gso.MeshError) for one in found] == [False, True, False, False]

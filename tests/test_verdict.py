@@ -15,10 +15,11 @@ from gso import metrics
 from gso.cli import main
 from gso.dataset import bezier
 from gso.mesh import Mesh
-from gso.pipeline.judgement import judged
+from gso.pipeline.judgement import add_verdict
 from gso.pipeline.lay_flat import largest_strain, lay_out
 from gso.status import Status
-from gso.verdict import Asked, headline, judge
+from gso.tasks.request import Limits
+from gso.verdict import headline, judge
 from tests.conftest import cylinder, saddle, shuffled
 
 pytestmark = pytest.mark.filterwarnings("ignore::gso.ConvergenceWarning")
@@ -34,9 +35,9 @@ def result_of(design, after, task="developable", **more):
     return gso.Result(task, "", design, mesh, **more)
 
 
-def tried(design, after, task="developable", asked=None, **more):
+def tried(design, after, task="developable", limits=Limits(), violation=0.0, **more):  # noqa: B008
     with np.errstate(all="raise", under="ignore"):
-        return judged(result_of(design, after, task, **more), asked or Asked())
+        return add_verdict(result_of(design, after, task, **more), limits, violation)
 
 
 @pytest.fixture(scope="module")
@@ -134,20 +135,20 @@ def test_a_bound_asks_for_half_a_percent_of_strain(bound):
 def test_strain_is_judged_as_it_was_asked_for(good):
     strain = good.metrics["strain_max"]
     for factor, fine in ((1.1, True), (1.0, True), (0.99, False)):
-        asked = Asked(max_strain=factor * strain)
-        reasons = judge(result_of(good.design, good.mesh.vertices, pattern=good.pattern), asked)
+        limits = Limits(max_strain=factor * strain)
+        reasons = judge(result_of(good.design, good.mesh.vertices, pattern=good.pattern), limits)
         assert (not reasons) is fine
         assert fine or "not developable to a strain of" in reasons[0]
     # A distance beside it does not bring its own limit of half a percent.
-    asked = Asked(max_strain=0.5, max_deviation=1.0)
+    limits = Limits(max_strain=0.5, max_deviation=1.0)
     curved = result_of(saddle(9), 0.9 * saddle(9), pattern=lay_out(Mesh.from_grid(saddle(9))))
-    assert not any("largest strain" in r for r in judge(curved, asked))
+    assert not any("largest strain" in r for r in judge(curved, limits))
 
 
 def test_a_distance_that_is_passed():
     low = FLAT + np.array([0, 0, 0.5])
-    assert tried(FLAT, low, asked=Asked(max_deviation=0.5)).usable
-    result = tried(FLAT, low, asked=Asked(max_deviation=0.49))
+    assert tried(FLAT, low, limits=Limits(max_deviation=0.5)).usable
+    result = tried(FLAT, low, limits=Limits(max_deviation=0.49))
     assert result.status is Status.UNUSABLE
     assert "0.500 away from the input, more than 0.49" in result.reasons[0]
 
@@ -156,19 +157,18 @@ def test_a_result_that_has_left_its_design():
     far = tried(saddle(9), FLAT + 40.0)
     assert "of its diagonal" in far.reasons[0]
     # A handle that took it there asked for it.
-    assert tried(saddle(9), FLAT + 40.0, asked=Asked(moved=100.0)).usable
+    assert tried(saddle(9), FLAT + 40.0, violation=100.0).usable
 
 
 def test_a_target_that_is_missed():
-    result = tried(saddle(9), 0.9 * saddle(9), asked=Asked(target_curvature=0.01))
+    result = tried(saddle(9), 0.9 * saddle(9), limits=Limits(target_curvature=0.01))
     assert any("above the target of 0.01" in r for r in result.reasons)
 
 
 def test_more_curvature_than_before():
     assert "worse than" in tried(saddle(9, strength=0.3), saddle(9, strength=0.4)).reasons[0]
     # That of a handle is no fault.
-    asked = Asked(moved=0.1)
-    assert tried(saddle(9, strength=0.3), saddle(9, strength=0.4), asked=asked).usable
+    assert tried(saddle(9, strength=0.3), saddle(9, strength=0.4), violation=0.1).usable
 
 
 def test_nothing_was_done():
@@ -244,7 +244,7 @@ def test_coordinates_that_are_not_finite():
     flat = FLAT.reshape(-1, 3)[:, :2].copy()
     result = result_of(FLAT, FLAT, "flatten", flat=flat)
     result.flat[3] = np.nan
-    assert judge(result, Asked()) == ("the coordinates of vertex 3 are not finite",)
+    assert judge(result, Limits()) == ("the coordinates of vertex 3 are not finite",)
 
 
 def test_a_rougher_surface_is_not_denoised():
@@ -255,7 +255,7 @@ def test_a_rougher_surface_is_not_denoised():
 
 def test_the_verdict_is_fast():
     result = gso.tno.optimize(saddle(64), options="fast")
-    assert min(judged(result, Asked()).seconds["verdict"] for _ in range(5)) < 0.1
+    assert min(add_verdict(result, Limits()).seconds["verdict"] for _ in range(5)) < 0.1
 
 
 # Results that were called usable before there was a verdict.

@@ -70,7 +70,7 @@ class Kind:
     @property
     def options(self) -> dict[str, Any]:
         """Settings of the solver, by the names that files have had from the beginning."""
-        settings = tno.check(**self.arguments)[2]
+        settings = tno.check(**self.arguments).options
         former = {new: old for old, new in settings.RENAMED.items()}
         return {former.get(name, name): value for name, value in asdict(settings).items()}
 
@@ -133,9 +133,9 @@ def solve_many(
     """
     if device is None or kind not in BATCHED:
         return [solve(kind, p) for p in points]
-    from gso.tno.batched.batches import asked, solve_batch
+    from gso.tno.batched.batches import check_batch, solve_batch
 
-    what = asked(device=device, **KINDS[kind].arguments)
+    batch = check_batch(device=device, **KINDS[kind].arguments)
     designs: list[Mesh | GSOError] = [_or_error(Mesh.from_grid, p, weld=False) for p in points]
     good = [d for d in designs if isinstance(d, Mesh)]
     if minimise is None:
@@ -144,9 +144,9 @@ def solve_many(
         from gso.tno.batched.many import solve_all
 
         checked(device)
-        results = solve_all(what, good)
+        results = solve_all(batch, good)
     else:
-        results = iter(solve_batch(what, good, minimise))
+        results = iter(solve_batch(batch, good, minimise))
     found = [next(results) if isinstance(d, Mesh) else d for d in designs]
     labels = [_or_error(_labelled, kind, f) if isinstance(f, Result) else f for f in found]
     return [x if isinstance(x, Label) else _failed(kind, points.shape[1]) for x in labels]

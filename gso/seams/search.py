@@ -15,8 +15,7 @@ from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning, OptionError
 from gso.mesh import Mesh
 from gso.parallel import helpers
-from gso.pipeline.solve import Asked, check, solve_mesh
-from gso.pipeline.start import Start
+from gso.pipeline.component_solves import solve_mesh
 from gso.seams.candidates import (
     Candidate,
     cuts,
@@ -37,6 +36,7 @@ from gso.seams.segmentation import Segmentation
 from gso.seams.straight import straight
 from gso.seams.tree import Ground
 from gso.spelling import known_keywords
+from gso.tasks.request import check
 
 #: Ratio of the estimated to the measured strain of a first attempt.
 _RATIO = 1.3
@@ -188,9 +188,8 @@ def _ground(mesh: Any, keep: Any, along: Any, avoid: Any, symmetric: bool, denoi
     if isinstance(keep, Pieces):
         design, kept = _again(design, keep), keep.edges
     if denoise:
-        _, formulation, options = check("denoise")
-        asked = Asked("denoise", formulation, options, {}, False, verdict=False)
-        design = design.replaced(solve_mesh(asked, None, design, (), Start(None)).mesh.vertices)
+        smoothed = solve_mesh(check("denoise", verdict=False), design)
+        design = design.replaced(smoothed.mesh.vertices)
     if keep is not None and not isinstance(keep, Pieces):
         begun = cut(design, keep)
         design, kept = begun.design, begun.edges

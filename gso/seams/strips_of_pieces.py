@@ -12,15 +12,16 @@ from gso.constraints import Constraint
 from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning, GSOError, MeshError
 from gso.mesh import Mesh
-from gso.pipeline.component_results import renumbered, worst
-from gso.pipeline.start import Start
+from gso.pipeline.component_results import renumber, worst_status
 from gso.result import Result
 from gso.seams.joint_bounds import deviation
 from gso.seams.joint_solve import gap
 from gso.solver import Callback
 from gso.status import Status
 from gso.tasks.base import Options
-from gso.verdict import Asked, judge
+from gso.tasks.request import Limits
+from gso.tasks.start import Start
+from gso.verdict import judge
 from gso.wording import length
 
 if TYPE_CHECKING:
@@ -150,14 +151,14 @@ def _merged(
         reasons = tuple(
             f"piece {shape.name(k)}: {why}"
             for k, r in enumerate(strips)
-            for why in judge(r, Asked())
+            for why in judge(r, Limits())
         )
         for size, what in ((far, "from the design"), (apart, "apart at seams")):
             if allowed is not None and size > allowed:
                 reasons += (
                     f"the strips are up to {length(size)} {what}, more than {length(allowed)}",
                 )
-    status = worst([joint.status, *(result.status for result in strips)])
+    status = worst_status([joint.status, *(result.status for result in strips)])
     seconds = dict(joint.seconds)
     seconds["strips"] = sum(result.seconds["total"] for result in strips)
     notes = (
@@ -213,6 +214,6 @@ def _numbered(callback: Callback | None, place: int, count: int) -> Callback | N
         return None
 
     def call(progress: Any) -> Any:
-        return callback(renumbered(progress, place, count, "piece"))
+        return callback(renumber(progress, place, count, "piece"))
 
     return call

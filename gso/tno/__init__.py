@@ -1,9 +1,8 @@
 """The traditional numerical optimiser: sparse Gauss-Newton on CasADi's derivatives."""
 
-from typing import Any
-
-from gso.pipeline.start import Start
-from gso.tno.optimize import check, optimize
+from gso.tasks.request import check
+from gso.tasks.start import Start
+from gso.tno.optimize import optimize
 from gso.tno.optimize_many import optimize_many
 from gso.tno.session import Session
 
@@ -14,7 +13,7 @@ __all__ = ["Session", "Start", "check", "optimize", "optimize_many"]
 _BATCHED = {"optimize_batch": "optimize_batch", "BatchWorkers": "workers"}
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _BATCHED:
         raise AttributeError(f"module 'gso.tno' has no attribute {name!r}")
     from importlib import import_module

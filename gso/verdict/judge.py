@@ -9,7 +9,7 @@ import numpy as np
 
 from gso import tasks
 from gso.status import Status
-from gso.verdict.asked import Asked
+from gso.tasks.request import Limits
 from gso.verdict.surface_checks import against_itself, against_pattern, against_surface
 from gso.verdict.tasks import TASKS, ruled
 from gso.wording import places
@@ -21,24 +21,27 @@ if TYPE_CHECKING:
 _STRETCHED = ("conformal",)
 
 
-def judge(result: Result, asked: Asked) -> tuple[str, ...]:
+def judge(result: Result, limits: Limits, violation: float = 0.0) -> tuple[str, ...]:
     """List the reasons why a result is not usable, with their places; empty if it is usable.
 
     Parameters
     ----------
     result : Result
         The solver's result, with its `pattern` if it has one.
-    asked : Asked
-        Limits that were given.
+    limits : Limits
+        Limits that were given, in the user's unit.
+    violation : float
+        Largest violation of a constraint by the design, in its unit: 0 if the design satisfies all
+        constraints, infinite if a violation cannot be expressed as a length.
 
     Returns
     -------
     tuple of str
     """
-    return tuple(_reasons(result, asked))
+    return tuple(_reasons(result, limits, violation))
 
 
-def _reasons(result: Result, asked: Asked) -> Iterator[str]:
+def _reasons(result: Result, limits: Limits, violation: float) -> Iterator[str]:
     if result.status.is_failure:
         yield str(result.status)
     pattern = result.pattern
@@ -48,7 +51,7 @@ def _reasons(result: Result, asked: Asked) -> Iterator[str]:
         wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
         yield f"the coordinates of {places('vertex', wrong)} are not finite"
         return
-    if getattr(tasks.get(result.task), "BLOCK", "surface") == "flat":
+    if tasks.get(result.task).flat:
         surface = result.design
     else:
         surface = result.mesh
@@ -59,6 +62,6 @@ def _reasons(result: Result, asked: Asked) -> Iterator[str]:
     if pattern is not None:
         yield from against_pattern(surface, pattern, lengths=result.task not in _STRETCHED)
     if result.ruled is not None:
-        yield from ruled(result, asked)
+        yield from ruled(result, limits, violation)
     elif result.task in TASKS:
-        yield from TASKS[result.task](result, asked)
+        yield from TASKS[result.task](result, limits, violation)

@@ -15,7 +15,7 @@ from gso.errors import GSOError
 from gso.parallel import Done, processors
 from gso.result import Result
 from gso.tno.batched import device
-from gso.tno.batched.batches import Asked, solve_batch
+from gso.tno.batched.batches import BatchRequest, solve_batch
 from gso.tno.batched.gathered import Gathered, Solved
 from gso.tno.batched.workers import BatchWorkers
 
@@ -32,19 +32,19 @@ _ENOUGH, _GPU_ENOUGH = 4, 256
 
 
 def solve_all(
-    asked: Asked, designs: Sequence[Any], workers: int | BatchWorkers | None = 0
+    batch: BatchRequest, designs: Sequence[Any], workers: int | BatchWorkers | None = 0
 ) -> Iterator[Result | GSOError]:
     """Solve grids of one size, arrays (H, W, 3) or meshes; yield results or errors in order."""
     if not len(designs):
         return
-    if asked.device.partition(":")[0] != "cpu":
-        yield from _on_device(asked, designs, workers)
+    if batch.device.partition(":")[0] != "cpu":
+        yield from _on_device(batch, designs, workers)
         return
     if workers is None:
         workers = _useful_workers(-(-len(designs) // _BATCH), _ENOUGH)
     if workers == 0:
         for k in range(0, len(designs), _BATCH):
-            yield from _batch(asked, designs[k : k + _BATCH])
+            yield from _batch(batch, designs[k : k + _BATCH])
         return
     count = len(workers) if isinstance(workers, BatchWorkers) else workers
     # Smaller pieces where they leave no process without work.
@@ -52,11 +52,11 @@ def solve_all(
     pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
     own = nullcontext(workers) if isinstance(workers, BatchWorkers) else BatchWorkers(count)
     with own as ready:
-        yield from _in_order(ready.spread(partial(_measured, asked), pieces), share)
+        yield from _in_order(ready.spread(partial(_measured, batch), pieces), share)
 
 
 def _on_device(
-    asked: Asked, designs: Sequence[Any], workers: int | BatchWorkers | None
+    batch: BatchRequest, designs: Sequence[Any], workers: int | BatchWorkers | None
 ) -> Iterator[Result | GSOError]:
     """Solve designs on a graphics processor, planned by this process or by workers."""
     vertices = max(np.size(getattr(designs[0], "vertices", designs[0])) // 3, 1)
@@ -66,15 +66,15 @@ def _on_device(
     if workers == 0:
         together = min(most, _GPU_BATCH)
         for k in range(0, len(designs), together):
-            yield from _batch(asked, designs[k : k + together])
+            yield from _batch(batch, designs[k : k + together])
         return
     own = BatchWorkers(workers) if isinstance(workers, int) else nullcontext(workers)
     with own as ready:
         # Two for each process: while some are minimised, others are planned.
         share = min(-(-len(designs) // (2 * len(ready))), _SHARE, most)
         pieces = [designs[k : k + share] for k in range(0, len(designs), share)]
-        work = partial(solve_batch, asked)
-        yield from _in_order(in_batches(ready, work, pieces, asked.device, vertices), share)
+        work = partial(solve_batch, batch)
+        yield from _in_order(in_batches(ready, work, pieces, batch.device, vertices), share)
 
 
 def in_batches(
@@ -114,19 +114,21 @@ def _in_order(results: Generator[Done, None, None], share: int) -> Iterator[Resu
                 shown += 1
 
 
-def _batch(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
+def _batch(batch: BatchRequest, designs: Sequence[Any]) -> list[Result | GSOError]:
     """Solve designs in one batch in this process."""
-    with _one_thread(asked.device):
-        return solve_batch(asked, designs, partial(_minimised, asked.device))
+    with _one_thread(batch.device):
+        return solve_batch(batch, designs, partial(_minimised, batch.device))
 
 
 def _minimised(where: str, gathered: Gathered) -> Solved:
     return device.solve([gathered], where)[0]
 
 
-def _measured(asked: Asked, designs: Sequence[Any], *, minimise: Any) -> list[Result | GSOError]:
+def _measured(
+    batch: BatchRequest, designs: Sequence[Any], *, minimise: Any
+) -> list[Result | GSOError]:
     """Solve designs in a worker process, by itself, and compute their metrics there."""
-    found = _batch(asked, designs)
+    found = _batch(batch, designs)
     for result in found:
         if isinstance(result, Result):
             result.metrics  # noqa: B018

@@ -11,8 +11,9 @@ import torch
 from gso.errors import GSOError, MeshError, OptionError
 from gso.result import Result
 from gso.spelling import known_keywords
-from gso.tno.batched import batches
+from gso.tasks.base import Options
 from gso.tno.batched import device as devices
+from gso.tno.batched.batches import check_batch
 from gso.tno.batched.many import solve_all
 from gso.tno.batched.workers import BatchWorkers
 from gso.typing import Array
@@ -24,7 +25,7 @@ def optimize_batch(
     *,
     task: str = "developable",
     formulation: str | None = None,
-    options: Any = None,
+    options: str | Options | None = None,
     device: str = "cpu",
     workers: int | BatchWorkers | None = None,
     verdict: bool = False,
@@ -90,9 +91,9 @@ def optimize_batch(
         )
     designs = _designs(points)
     devices.checked(device)
-    asked = batches.asked(task, formulation, options, device, verdict)
+    batch = check_batch(task, formulation, options, device, verdict)
     out: list[Result] = []
-    for index, found in enumerate(solve_all(asked, list(designs), workers)):
+    for index, found in enumerate(solve_all(batch, list(designs), workers)):
         if isinstance(found, GSOError):
             raise type(found)(f"surface {index}: {found}")
         out.append(found)
