@@ -36,11 +36,12 @@ def tables() -> dict[str, str]:
     found["options"] = option_table(Options, shared={})
     shared = {f.name: f.default for f in fields(Options)}
     for task in tasks.names():
-        module = tasks.get(task)
-        found[f"options-{task}"] = option_table(module.Options, shared=shared)
-        for formulation, options in getattr(module, "OPTIONS", {}).items():
-            if options is not module.Options:
-                found[f"options-{task}-{formulation}"] = option_table(options, shared=shared)
+        own = tasks.get(task).options
+        found[f"options-{task}"] = option_table(own, shared=shared)
+        for name, formulation in tasks.get(task).formulations.items():
+            if formulation.options is not own:
+                table = option_table(formulation.options, shared=shared)
+                found[f"options-{task}-{name}"] = table
     for task, metric in (("developable", "K_A_r_worst"), ("flatten", "strain_mean")):
         found[f"splits-{task}"] = split_table(task, metric)
     if RESULTS.exists():

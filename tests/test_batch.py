@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 
 import gso
-from gso import tasks
 from gso.constraints import Compiled
 from gso.dataset import bezier
 from gso.energy import registry
 from gso.executors import SERIAL, ProcessExecutor
 from gso.linalg.base import Pattern
-from gso.pipeline.normalise import Canonical
+from gso.pipeline.case import Case
 from gso.solver import kernels
 from gso.solver.problem import Problem
-from gso.tasks.base import Request
+from gso.tasks.request import check
 from gso.unknowns.base import DIMENSIONS
 from tests.conftest import codes, cylinder, meshes, saddle
 
@@ -30,7 +29,7 @@ from gso.solver.directions import GaussNewton  # noqa: E402
 from gso.tno.batched import batch_steps, cholesky, device, many, stage_groups  # noqa: E402
 from gso.tno.batched import tensor_kernels as on_tensors  # noqa: E402
 from gso.tno.batched.batch_problem import Problem as Batch  # noqa: E402
-from gso.tno.batched.batches import asked, solve_batch  # noqa: E402
+from gso.tno.batched.batches import check_batch, solve_batch  # noqa: E402
 from gso.tno.batched.device_executor import DeviceExecutor, minimise_elsewhere  # noqa: E402
 from gso.tno.batched.gathered import TooLarge, Unbatchable, gather  # noqa: E402
 from gso.tno.batched.many import solve_all  # noqa: E402
@@ -55,12 +54,10 @@ def designs():
 
 
 def planned(task, points, **request):
-    module = tasks.get(task)
-    mesh = Canonical(gso.Mesh.from_grid(points)).mesh
-    formulation, kind = tasks.choose(module, request.pop("formulation", None), None)
-    options = kind.coerce(request.pop("options", None))
-    analysis = tasks.analyse(module, mesh, Compiled(flat=task == "flatten"))
-    return module.plan(analysis, Request(options, formulation, **request))
+    case = Case(
+        check(task, **request), gso.Mesh.from_grid(points), Compiled(flat=task == "flatten")
+    )
+    return case.task.plan(case.analysis, case.solver_request)
 
 
 def bump(n, height):
@@ -479,7 +476,7 @@ def on_cpu(parts):
 
 def by_workers(processes, some, task, together=on_cpu, most=100):
     found = {}
-    work = partial(solve_batch, asked(task), minimise=minimise_elsewhere)
+    work = partial(solve_batch, check_batch(task), minimise=minimise_elsewhere)
     with DeviceExecutor(processes, together, most=most, enough=1.0) as ready:
         for done in ready.as_completed(work, list(some[:, None])):
             assert done.error is None
@@ -550,7 +547,7 @@ def test_workers_are_ready_after_an_error(designs, processes):
 
 
 def test_workers_are_ready_after_results_that_nobody_wanted(designs, processes):
-    work = partial(solve_batch, asked("flatten"), minimise=minimise_elsewhere)
+    work = partial(solve_batch, check_batch("flatten"), minimise=minimise_elsewhere)
     with DeviceExecutor(processes, on_cpu) as ready:
         some = ready.as_completed(work, list(designs[:, None]))
         next(some)
@@ -563,12 +560,12 @@ def test_an_executor_that_is_closed(designs):
     ready.shutdown()
     for there in ("cpu", "cuda"):
         with pytest.raises(gso.OptionError, match="closed"):
-            list(solve_all(asked("flatten", device=there), list(designs), executor=ready))
+            list(solve_all(check_batch("flatten", device=there), list(designs), executor=ready))
 
 
 def test_an_executor_without_processes_of_this_machine(designs):
     with pytest.raises(gso.OptionError, match="give a ProcessExecutor"):
-        list(solve_all(asked("flatten", device="cuda"), list(designs), executor=SERIAL))
+        list(solve_all(check_batch("flatten", device="cuda"), list(designs), executor=SERIAL))
 
 
 @pytest.mark.parametrize("count", [-1, 1.5, "two"])
@@ -634,5 +631,5 @@ def test_what_fails_in_a_batch_is_solved_alone(designs, monkeypatch):
 def test_solved_yields_errors_in_place(designs):
     bad = designs.copy()
     bad[1] = 0.5
-    found = list(solve_all(asked("flatten"), bad))
+    found = list(solve_all(check_batch("flatten"), bad))
     assert [isinstance(one, gso.MeshError) for one in found] == [False, True, False, False]

@@ -17,7 +17,7 @@ from gso.pipeline import component_solves as solving
 from gso.pipeline.normalise import Canonical
 from gso.status import Status
 from gso.tasks.developable import Options
-from gso.tasks.evaluation import measured
+from gso.tasks.evaluation import compute_metrics
 
 #: Tasks and formulations, with options.
 ASKED = [
@@ -266,7 +266,7 @@ def test_progress_and_cancelling():
 def test_processes_give_what_one_process_gives(task, monkeypatch):
     whole = together(panel(), moved(irregular(), [5.0, 0, 0]), moved(panel(12), [9.0, 0, 0]))
     plain = gso.tno.optimize(whole, task=task, options="fast")
-    monkeypatch.setattr(solving, "_paying", lambda sizes: 2)
+    monkeypatch.setattr(solving, "_useful_workers", lambda sizes: 2)
     seen = []
     shared = gso.tno.optimize(whole, task=task, options="fast", callback=seen.append)
     assert np.array_equal(plain.mesh.vertices, shared.mesh.vertices)
@@ -298,11 +298,11 @@ def test_scripts_without_a_guard_and_workers_of_a_batch(tmp_path, monkeypatch):
     )
     assert done.stdout.split() == ["once", "True"]
     monkeypatch.setattr(solving, "_WORTH", 0)
-    assert solving._paying([9]) == 0
+    assert solving._useful_workers([9]) == 0
     monkeypatch.setattr("gso.executors.base.processors", lambda: 2)
-    assert solving._paying([9, 9, 9]) == 2
+    assert solving._useful_workers([9, 9, 9]) == 2
     monkeypatch.setattr("gso.executors.base.parent_process", lambda: object())
-    assert solving._paying([9, 9, 9]) == 0
+    assert solving._useful_workers([9, 9, 9]) == 0
 
 
 def test_written_and_read(tmp_path):
@@ -323,10 +323,12 @@ def test_measures_of_the_whole():
     big, small = panel(), moved(panel(), [9.0, 0, 0], 0.01)
     whole = together(big, small)
     lifted = whole.replaced(whole.vertices * [1, 1, 0.5])
-    alone = measured("developable", big, moved(big, 0.0).replaced(big.vertices * [1, 1, 0.5]), None)
-    assert measured("developable", whole, lifted, None) == pytest.approx(alone, rel=1e-9)
+    alone = compute_metrics(
+        "developable", big, moved(big, 0.0).replaced(big.vertices * [1, 1, 0.5]), None
+    )
+    assert compute_metrics("developable", whole, lifted, None) == pytest.approx(alone, rel=1e-9)
     assert average(metrics.loss_gc, whole) == pytest.approx(metrics.loss_gc(big), rel=1e-9)
-    other = measured("developable", big, lifted, None)
+    other = compute_metrics("developable", big, lifted, None)
     assert np.isfinite(list(other.values())).all()
     flips = [{"flipped_cells": 1.0, "scale_min": 0.5}, {"flipped_cells": 2.0, "scale_min": 0.2}]
     assert combined(flips, [1.0, 1.0]) == {"flipped_cells": 3.0, "scale_min": 0.2}

@@ -85,7 +85,7 @@ def figures(mesh: Mesh, flat: np.ndarray) -> np.ndarray:
     return np.array([strain.mean, strain.p99, metrics.edge_length_error(mesh, flat)])
 
 
-@pytest.mark.parametrize("formulation", flatten.FORMULATIONS)
+@pytest.mark.parametrize("formulation", flatten.TASK.formulations)
 def test_a_plane_comes_out_exactly(formulation):
     plane = saddle(17, 12, strength=0.0)
     sheared = plane @ Rotation.from_rotvec([0.3, 0.2, 0.1]).as_matrix() @ np.diag([1, 1.3, 0.8])
@@ -151,7 +151,7 @@ def test_no_worse_than_libigl_on_general_meshes(kind, surfaces):
     assert (figures(mesh, result.flat) <= slack * figures(mesh, libigl_arap(mesh))).all()
 
 
-@pytest.mark.parametrize("formulation", flatten.FORMULATIONS)
+@pytest.mark.parametrize("formulation", flatten.TASK.formulations)
 @pytest.mark.parametrize("norm", ["mixed", "l1", "l2"])
 def test_nothing_turns_over_on_strongly_curved_surfaces(formulation, norm):
     curved = [s.sample(24) for s in bezier.generate(3, seed=77, max_loss_gc=3.0)]
@@ -206,7 +206,7 @@ def test_lengths_reach_the_published_metric(surfaces):
         assert lengths["flipped_cells"] == 0
     mesh = Mesh.from_grid(surfaces[0])
     triangles = Mesh(mesh.vertices, mesh.triangles)
-    edges = [solve(triangles, formulation=f).metrics for f in flatten.FORMULATIONS]
+    edges = [solve(triangles, formulation=f).metrics for f in flatten.TASK.formulations]
     assert edges[1]["edge_length_error"] < edges[0]["edge_length_error"]
     assert "loss_iso_cell" not in edges[0]
 
@@ -314,7 +314,7 @@ def test_what_cannot_be_flattened_is_said():
 
 
 @pytest.mark.parametrize("shape", [(3, 3), (3, 40), (5, 4)])
-@pytest.mark.parametrize("formulation", flatten.FORMULATIONS)
+@pytest.mark.parametrize("formulation", flatten.TASK.formulations)
 def test_small_grids(shape, formulation):
     result = solve(saddle(*shape), formulation=formulation)
     assert result.metrics["flipped_cells"] == 0

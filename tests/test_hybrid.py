@@ -82,17 +82,17 @@ def test_a_search_is_the_same_once_its_start_is_dropped():
 
 def test_a_search_may_begin_at_its_own_results(monkeypatch):
     design = saddle(9)
-    judged = []
+    seen = []
     usable = Run.usable_start
 
     def counted(self, *requests):
-        judged.extend(r for r in requests if r.start is not None)
+        seen.extend(r for r in requests if r.x0 is not None)
         return usable(self, *requests)
 
     monkeypatch.setattr(Run, "usable_start", counted)
     near = Start(optimize(design).mesh, source="guess", guarded=True)
     assert optimize(design, x0=near, target_curvature=0.2).warm_start == "guess"
-    assert len(judged) == 1
+    assert len(seen) == 1
 
 
 def test_a_spline_is_compared_before_it_is_fitted(surfaces):

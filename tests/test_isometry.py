@@ -280,10 +280,10 @@ class TestOptions:
         assert (o.begin, o.variables, o.tolerance) == ("design", "free", 1e-3)
 
     def test_the_formulation_follows_from_the_options(self, curved):
-        assert gso.tno.check("developable", None, "jiang2020")[1] == "isometry"
-        assert gso.tno.check("developable", None, gso.IsometryOptions())[1] == "isometry"
-        assert gso.tno.check("flatten", None, "jiang2020")[1] == "isometry"
-        assert gso.tno.check("developable", None, "fast")[1] == "curvature"
+        assert gso.tno.check("developable", None, "jiang2020").formulation == "isometry"
+        assert gso.tno.check("developable", None, gso.IsometryOptions()).formulation == "isometry"
+        assert gso.tno.check("flatten", None, "jiang2020").formulation == "isometry"
+        assert gso.tno.check("developable", None, "fast").formulation == "curvature"
 
     @pytest.mark.parametrize(
         ("keywords", "message"),

@@ -11,10 +11,10 @@ from gso.constraints import compile_constraints
 from gso.hierarchy import Prolongation, Transfer, coarser, nearest_on_grid, thinned
 from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
-from gso.tasks.base import Request
 from gso.tasks.developable import levels as planned
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.developable.options import Options
+from gso.tasks.request import check
 
 
 def lifted(plane: np.ndarray) -> np.ndarray:
@@ -167,7 +167,7 @@ def test_smooth_curves_are_left_out_and_soft():
 def resolutions(mesh, constraints=(), **options):
     frame = Mesh(mesh.vertices, mesh.faces)
     analysis = Analysis(frame, compile_constraints(constraints, frame))
-    return planned.levels(analysis, Request(Options(**options), "curvature"))
+    return planned.levels(analysis, check("developable", options=Options(**options)))
 
 
 def test_only_large_meshes_have_coarser_ones():

@@ -127,14 +127,14 @@ def scattered(rng: np.random.Generator) -> Mesh:
 
 
 PLANS = [
-    (task, formulation) for task in tasks.names() for formulation in tasks.get(task).FORMULATIONS
+    (task, formulation) for task in tasks.names() for formulation in tasks.get(task).formulations
 ]
 
 
 def solved(mesh, number: int) -> None:
     """Solve by one of the tasks; whatever comes is finite, or an error of the package."""
     task, formulation = PLANS[number % len(PLANS)]
-    options = tasks.choose(tasks.get(task), formulation, "fast")[1].preset("fast")
+    options = tasks.get(task).formulations[formulation].options.preset("fast")
     try:
         result = gso.tno.optimize(
             mesh, task=task, formulation=formulation, options=replace(options, iterations=3)
@@ -254,7 +254,7 @@ def test_many_mutated_meshes(start):
     surfaces(range(start, start + 400))
 
 
-@pytest.mark.parametrize("formulation", tasks.get("denoise").FORMULATIONS)
+@pytest.mark.parametrize("formulation", tasks.get("denoise").formulations)
 def test_faces_scattered_among_many_vertices_are_denoised(formulation):
     for seed in range(12):
         mesh = scattered(np.random.default_rng(seed))

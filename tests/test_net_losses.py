@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gso import metrics, tasks
-from gso.constraints.compiled import compile_constraints
+from gso import metrics
+from gso.constraints import Compiled
 from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
 from gso.parametrization import rectangle
 from gso.tasks import developable, flatten
-from gso.tasks.base import Request
+from gso.tasks.request import check
 from tests.conftest import cylinder, saddle
 
 torch = pytest.importorskip("torch")
@@ -47,9 +47,8 @@ def total(items, points):
 
 def last_stage(points):
     mesh = Mesh.from_grid(points, weld=False)
-    module = tasks.get("developable")
-    analysis = tasks.analyse(module, mesh, compile_constraints((), mesh))
-    return module.plan(analysis, Request(developable.Options(), "curvature")).stages[-1]
+    analysis = developable.TASK.analysis(mesh, Compiled())
+    return developable.TASK.plan(analysis, check("developable")).stages[-1]
 
 
 def test_developable_energy_is_the_solvers(pair):

@@ -60,7 +60,8 @@ def workshop(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_python_blocks_run(page, workshop):
+def test_python_blocks_run(page, workshop, monkeypatch):
+    monkeypatch.setattr("gso.tasks._ADDED", {})
     for package in ("OCP", "rhino3dm", "ezdxf"):
         pytest.importorskip(package, exc_type=ImportError)
     scope = {}
@@ -75,6 +76,10 @@ def test_python_blocks_run(page, workshop):
     if page.stem == "extending":
         before = scope["problem"].by_term(scope["noisy"].vertices.ravel())["planarity"]
         assert scope["problem"].by_term(scope["solution"].x)["planarity"] < 0.1 * before
+        held, noisy = scope["held"], scope["noisy"]
+        assert held.metrics["nonplanarity_max"] < gso.metrics.nonplanarity(noisy).max()
+        rim = noisy.boundary_loops[0]
+        np.testing.assert_allclose(held.mesh.vertices[rim], noisy.vertices[rim])
 
 
 def test_commands_run(workshop):
@@ -145,7 +150,7 @@ def test_formulations_are_named():
 
     text = REFERENCE.read_text()
     for task in tasks.names():
-        names = ", ".join(f"``{name}``" for name in tasks.get(task).FORMULATIONS)
+        names = ", ".join(f"``{name}``" for name in tasks.get(task).formulations)
         assert f"   * - ``{task}``\n     - {names}\n" in text
 
 

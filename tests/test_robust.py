@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 
 import gso
 from gso import tasks
-from gso.constraints import Compiled
 from gso.mesh import Mesh
-from gso.pipeline.normalise import Canonical
+from gso.pipeline.case import Case
 from gso.solver.problem import Problem
-from gso.tasks.base import Request
+from gso.tasks.request import check
 from gso.unknowns import free
 from tests.conftest import saddle
 
@@ -86,12 +85,11 @@ def test_a_clear_error_or_a_finite_result(task, surface):
 def test_developable_results_have_no_more_energy_than_the_design(surface):
     try:
         result = gso.tno.optimize(surface, options="fast")
-        frame = Canonical(result.design)
+        case = Case(check("developable", options="fast"), result.design)
+        frame = case.frame
     except gso.GSOError:
         return
-    module = tasks.get("developable")
-    request = Request(module.Options.preset("fast"), "curvature")
-    plan = module.plan(tasks.analyse(module, frame.mesh, Compiled()), request)
+    plan = case.task.plan(case.analysis, case.solver_request)
     if not plan.stages:
         return
     stage = plan.stages[-1]
@@ -107,6 +105,6 @@ def test_nanometres_and_kilometres_far_from_the_origin(task, factor):
     points = saddle(12)
     near = gso.tno.optimize(points, task=task).mesh.vertices
     far = gso.tno.optimize(factor * (points + 1e5), task=task).mesh.vertices / factor
-    in_plane = getattr(tasks.get(task), "BLOCK", "surface") == "flat"
+    in_plane = tasks.get(task).flat
     far = far - (0.0 if in_plane else 1e5)
     assert np.abs(far - near).max() < 1e-5

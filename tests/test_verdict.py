@@ -16,11 +16,12 @@ from gso.cli import main
 from gso.dataset import bezier
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.pipeline.judgement import judged
+from gso.pipeline.judgement import add_verdict
 from gso.pipeline.lay_flat import largest_strain, lay_out
 from gso.result import headline
 from gso.status import Status
-from gso.verdict import Code, Limits, judge
+from gso.tasks.request import Limits
+from gso.verdict import Code, judge
 from tests.conftest import codes, cylinder, saddle, shuffled
 
 pytestmark = pytest.mark.filterwarnings("ignore::gso.ConvergenceWarning")
@@ -36,9 +37,9 @@ def result_of(design, after, task="developable", **more):
     return gso.Result(task, "", design, mesh, **more)
 
 
-def tried(design, after, task="developable", limits=None, **more):
+def tried(design, after, task="developable", limits=Limits(), violation=0.0, **more):  # noqa: B008
     with np.errstate(all="raise", under="ignore"):
-        return judged(result_of(design, after, task, **more), limits or Limits())
+        return add_verdict(result_of(design, after, task, **more), limits, violation)
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +162,7 @@ def test_a_result_that_has_left_its_design():
     assert codes(far.reasons) == [Code.FAR]
     assert far.reasons[0].value == far.details["verdict"]["deviation"] / far.design.diagonal
     # A handle that took it there asked for it.
-    assert tried(saddle(9), FLAT + 40.0, limits=Limits(moved=100.0)).usable
+    assert tried(saddle(9), FLAT + 40.0, violation=100.0).usable
 
 
 def test_a_target_that_is_missed():
@@ -173,8 +174,7 @@ def test_more_curvature_than_before():
     (why,) = tried(saddle(9, strength=0.3), saddle(9, strength=0.4)).reasons
     assert why.code is Code.CURVATURE_ROSE and why.value > why.bound
     # That of a handle is no fault.
-    limits = Limits(moved=0.1)
-    assert tried(saddle(9, strength=0.3), saddle(9, strength=0.4), limits=limits).usable
+    assert tried(saddle(9, strength=0.3), saddle(9, strength=0.4), violation=0.1).usable
 
 
 def test_nothing_was_done():
@@ -264,7 +264,7 @@ def test_a_rougher_surface_is_not_denoised():
 
 def test_the_verdict_is_fast():
     result = gso.tno.optimize(saddle(64), options="fast")
-    assert min(judged(result, Limits()).seconds["verdict"] for _ in range(5)) < 0.1
+    assert min(add_verdict(result, Limits()).seconds["verdict"] for _ in range(5)) < 0.1
 
 
 # Results that were called usable before there was a verdict.

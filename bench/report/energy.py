@@ -12,24 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from gso import tasks
-from gso.constraints import Compiled
 from gso.energy.losses import Absolute, Distance, Loss, Squared
 from gso.mesh import Mesh
-from gso.pipeline.normalise import Canonical
+from gso.pipeline.case import Case
 from gso.solver.kernels import casadi_function
 from gso.solver.problem import Problem
-from gso.tasks.base import Request
+from gso.tasks.request import check
 from gso.typing import Array
 
 
 def last_problem(points: np.ndarray, task: str, options: str) -> tuple[Any, np.ndarray]:
     """Return the problem of a task's last stage, and unknowns to evaluate it at."""
-    module = tasks.get(task)
-    frame = Canonical(Mesh.from_grid(points))
-    settings = module.Options.coerce(options)
-    analysis = tasks.analyse(module, frame.mesh, Compiled())
-    plan = module.plan(analysis, Request(settings, module.FORMULATIONS[0]))
+    case = Case(check(task, options=options), Mesh.from_grid(points))
+    plan = case.task.plan(case.analysis, case.solver_request)
     coordinates = plan.start
     for stage in plan.stages:
         coordinates = stage.enter(coordinates)

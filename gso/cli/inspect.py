@@ -48,17 +48,17 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
     from gso import metrics as measure
     from gso.components import average
     from gso.pipeline.lay_flat import strains_of
-    from gso.tasks.evaluation import measured
+    from gso.tasks.evaluation import compute_metrics
 
     flat = np.ptp(after.vertices[:, 2]) <= 1e-9 * after.diagonal
     values = {} if flat else strains_of(after)
-    values |= measured("developable", before, after, None)
+    values |= compute_metrics("developable", before, after, None)
     notes = []
     same = np.array_equal(before.faces, after.faces)
     if same and not flat:
         values["theta"] = float(average(measure.normal_angle, before, after))
     if same and flat:
-        values |= measured("flatten", before, after, after.vertices[:, :2])
+        values |= compute_metrics("flatten", before, after, after.vertices[:, :2])
         notes.append(
             "AFTER is flat: measured as the flat pattern of BEFORE too; how far it lies from "
             "BEFORE means nothing then"

@@ -171,10 +171,8 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
     ruled = {name: value for name, value in ruled.items() if value is not None}
     if ruled and given["formulation"] is None:
         given["formulation"] = "ruled"
-    formulation, kind = tasks.choose(
-        tasks.get(given["task"]), given["formulation"], given["preset"]
-    )
-    settings: Any = kind.coerce(given["preset"])
+    formulation, chosen = tasks.choose(given["task"], given["formulation"], given["preset"])
+    settings: Any = chosen.options.coerce(given["preset"])
     if ruled and formulation != "ruled":
         name = "--" + next(iter(ruled)).replace("_", "-")
         raise OptionError(f"{name} goes with --formulation ruled, not {formulation!r}")

@@ -92,7 +92,7 @@ class Job:
 
         if out.lower().endswith(".svg"):
             task = self.keywords["task"]
-            if task != "developable" and getattr(tasks.get(task), "BLOCK", "surface") != "flat":
+            if task != "developable" and not tasks.get(task).flat:
                 raise OptionError(
                     f"{out}: only a flat pattern is drawn as SVG; use --task flatten or "
                     "--task developable"

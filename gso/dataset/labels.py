@@ -70,7 +70,7 @@ class Kind:
     @property
     def options(self) -> dict[str, Any]:
         """Settings of the solver."""
-        return asdict(tno.check(**self.arguments)[2])
+        return asdict(tno.check(**self.arguments).options)
 
 
 @dataclass(frozen=True)
@@ -132,22 +132,22 @@ def solve_many(
     """
     if device is None or kind not in BATCHED:
         return [solve(kind, p) for p in points]
-    from gso.tno.batched.batches import asked, solve_batch
+    from gso.tno.batched.batches import check_batch, solve_batch
 
-    what = asked(device=device, **KINDS[kind].arguments)
+    batch = check_batch(device=device, **KINDS[kind].arguments)
     designs: list[Mesh | GSOError] = [_or_error(Mesh.from_grid, p, weld=False) for p in points]
     good = [d for d in designs if isinstance(d, Mesh)]
     if elsewhere:
         from gso.tno.batched.device_executor import minimise_elsewhere
 
-        results = iter(solve_batch(what, good, minimise_elsewhere))
+        results = iter(solve_batch(batch, good, minimise_elsewhere))
     else:
         # PyTorch is not loaded where another process minimises.
         from gso.tno.batched.device import checked
         from gso.tno.batched.many import solve_all
 
         checked(device)
-        results = solve_all(what, good)
+        results = solve_all(batch, good)
     found = [next(results) if isinstance(d, Mesh) else d for d in designs]
     labels = [_or_error(_labelled, kind, f) if isinstance(f, Result) else f for f in found]
     return [x if isinstance(x, Label) else _failed(kind, points.shape[1]) for x in labels]
@@ -179,7 +179,7 @@ def _measured(result: Result) -> dict[str, float]:
     if result.flat is None or result.task == "flatten":
         return result.metrics
     flatten = tasks.get("flatten").metrics
-    return flatten(result.mesh, None, result.flat, unit(result.design)) | result.metrics
+    return flatten(result.mesh, result.mesh, result.flat, unit(result.design)) | result.metrics
 
 
 def shapes(kind: str, size: int) -> dict[str, tuple[int, ...]]:

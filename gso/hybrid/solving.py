@@ -24,7 +24,7 @@ from gso.hybrid.warm_start import Prediction, predictions
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.pipeline import component_solves
-from gso.pipeline.job import Job
+from gso.pipeline.case import Case
 from gso.pipeline.normalise import Canonical
 from gso.result import Result
 from gso.status import Status
@@ -184,7 +184,7 @@ def _pieces(design: Mesh, task: str, sparing: bool, keywords: dict[str, Any]) ->
     """Return the components that are predicted one by one; none for the design as a whole."""
     if not several(design):
         return []
-    flat = getattr(tasks.get(task), "BLOCK", "surface") == "flat"
+    flat = tasks.get(task).flat
     compiled = compile_constraints(keywords["constraints"], design, flat=flat)
     pieces = component_solves.parts(design, compiled)
     if sparing and not any(net_saves_time(piece.mesh, task, keywords) for piece in pieces):
@@ -197,14 +197,14 @@ def _each(design: Mesh, pieces: list[Component], task: str, keywords: dict[str, 
     """Solve every component from its own prediction, where there is one."""
     callback, compiled = keywords.pop("callback", None), keywords.pop("constraints")
 
-    def one(job: Job, told: Any) -> Result:
-        kept = () if job.constraints.empty else job.constraints
-        return solve(job.design, task=task, constraints=kept, callback=told, **keywords)
+    def one(case: Case, told: Any) -> Result:
+        kept = () if case.constraints.empty else case.constraints
+        return solve(case.design, task=task, constraints=kept, callback=told, **keywords)
 
-    whole = Job(design, compiled, Start(None))
+    whole = Case(check(task), design, compiled)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
-        result = component_solves.solve(one, whole, pieces, callback, workers=0)
+        result = component_solves.solve_components(one, whole, pieces, callback, workers=0)
     if not result.converged and result.status is not Status.MAX_ITERATIONS:
         warnings.warn(str(result.status), ConvergenceWarning, stacklevel=3)
     return result

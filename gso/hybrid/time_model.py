@@ -30,14 +30,14 @@ def net_saves_time(
     many : bool
         Whether it is one of many designs.
     """
-    asked = {name: keywords.get(name) for name in ("formulation", "options")}
-    _, formulation, options = check(task, **asked)
-    if (task, formulation) != ("developable", "curvature") or design.grid_index is None:
+    request = check(task, keywords.get("formulation"), keywords.get("options"))
+    by_curvature = (task, request.formulation) == ("developable", "curvature")
+    if not by_curvature or design.grid_index is None:
         return False
     bounds = ("max_deviation", "max_strain", "target_curvature")
     if any(keywords.get(name) is not None for name in bounds):
         return False
     if keywords.get("constraints"):
         return False
-    least = _FREE if getattr(options, "variables", None) == "free" else _OFFSETS
+    least = _FREE if getattr(request.options, "variables", None) == "free" else _OFFSETS
     return len(design.vertices) >= least[many]

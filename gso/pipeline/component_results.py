@@ -12,7 +12,7 @@ from gso.components import Component, mean
 from gso.mesh import Mesh
 from gso.parametrization import beside
 from gso.pattern import Pattern
-from gso.pipeline.job import Job
+from gso.pipeline.case import Case
 from gso.result import Result
 from gso.status import Progress, Status
 from gso.typing import Array, Ints
@@ -37,7 +37,7 @@ _WORST_LAST = (
 )
 
 
-def renumbered(progress: Progress, place: int, count: int, what: str = "component") -> Progress:
+def renumber(progress: Progress, place: int, count: int, what: str = "component") -> Progress:
     """Number the stages in the progress of component `place` over all `count` components.
 
     All components are taken to have the same number of stages.
@@ -50,10 +50,10 @@ def renumbered(progress: Progress, place: int, count: int, what: str = "componen
     )
 
 
-def together(
-    whole: Job,
+def merge(
+    whole: Case,
     pieces: Sequence[Component],
-    jobs: Sequence[Job],
+    cases: Sequence[Case],
     results: Sequence[Result],
     chosen: Sequence[int],
 ) -> Result:
@@ -62,7 +62,7 @@ def together(
     for piece, result in zip(pieces, results, strict=True):
         result.names = piece.vertices
     areas = [piece.area for piece in pieces]
-    flat = _laid_out(len(design.vertices), pieces, jobs, results)
+    flat = _place_flat(len(design.vertices), pieces, cases, results)
     own = all(r.pattern is None or r.pattern.flat is r.flat for r in results)
     pattern = None if own and flat is not None else _side_by_side(design, pieces, results)
     if whole.constraints.flat and flat is not None:
@@ -84,12 +84,12 @@ def together(
         design=design,
         mesh=mesh,
         flat=flat,
-        cell_scale=_gathered(len(design.faces), pieces, [r.cell_scale for r in results]),
-        status=worst(r.status for r in results),
+        cell_scale=_gather(len(design.faces), pieces, [r.cell_scale for r in results]),
+        status=worst_status(r.status for r in results),
         iterations=sum(r.iterations for r in ran),
         energy=_energy(results, areas),
         history=[
-            renumbered(progress, place, len(ran))
+            renumber(progress, place, len(ran))
             for place, result in enumerate(ran)
             for progress in result.history
         ],
@@ -129,10 +129,10 @@ def _side_by_side(
     )
 
 
-def worst(several: Iterable[Status]) -> Status:
+def worst_status(several: Iterable[Status]) -> Status:
     """Return the worst of several statuses; `CANCELLED` is worse than all others.
 
-    >>> worst([Status.CONVERGED, Status.STALLED, Status.ALREADY_GOOD]).name
+    >>> worst_status([Status.CONVERGED, Status.STALLED, Status.ALREADY_GOOD]).name
     'STALLED'
     """
     order = {status: k for k, status in enumerate(_WORST_LAST)}
@@ -143,8 +143,8 @@ def worst(several: Iterable[Status]) -> Status:
     return max(several, key=rank)
 
 
-def _laid_out(
-    count: int, pieces: Sequence[Component], jobs: Sequence[Job], results: Sequence[Result]
+def _place_flat(
+    count: int, pieces: Sequence[Component], cases: Sequence[Case], results: Sequence[Result]
 ) -> Array | None:
     """Place flat images side by side; those positioned by constraints or a start stay there."""
     if any(r.flat is None for r in results):
@@ -152,9 +152,9 @@ def _laid_out(
     out = np.zeros((count, 2))
     loose: list[tuple[Ints, Array]] = []
     held: list[tuple[Ints, Array]] = []
-    for piece, job, result in zip(pieces, jobs, results, strict=True):
-        begun = job.start.points is not None and result.warm_start != "cold"
-        stays = job.constraints.flat and (begun or bool(job.constraints.anchored))
+    for piece, case, result in zip(pieces, cases, results, strict=True):
+        begun = case.request.start.points is not None and result.warm_start != "cold"
+        stays = case.constraints.flat and (begun or bool(case.constraints.anchored))
         (held if stays else loose).append((piece.vertices, np.asarray(result.flat)))
     for ids, image in held:
         out[ids] = image
@@ -168,7 +168,7 @@ def _laid_out(
     return out
 
 
-def _gathered(
+def _gather(
     count: int, pieces: Sequence[Component], values: Sequence[Array | None]
 ) -> Array | None:
     """Gather face values of all components, in the order of the whole mesh's faces."""
@@ -202,7 +202,7 @@ def _notes(design: Mesh, results: Sequence[Result]) -> tuple[str, ...]:
         if not design.used.all():
             out.append("vertices that belong to no face are at the pattern's origin")
     said: dict[str, list[int]] = {}
-    bad = worst(r.status for r in results)
+    bad = worst_status(r.status for r in results)
     for k, result in enumerate(results):
         for note in dict.fromkeys(result.notes):
             said.setdefault(note, []).append(k)

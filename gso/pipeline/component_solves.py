@@ -2,32 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from gso.components import Component, labels, split
-from gso.constraints import Compiled
-from gso.errors import GSOError
+from gso import tasks
+from gso.components import Component, labels, several, split
+from gso.constraints import Compiled, Constraint, compile_constraints
+from gso.errors import GSOError, MeshError
 from gso.executors import open_executor
 from gso.executors.base import useful_workers
 from gso.mesh import Mesh
-from gso.pipeline.component_results import renumbered, together
-from gso.pipeline.job import Job
+from gso.pipeline.case import Case
+from gso.pipeline.component_results import merge, renumber
+from gso.pipeline.judgement import conclude
+from gso.pipeline.lay_flat import lay_out
 from gso.pipeline.normalise import given_points
+from gso.pipeline.run import Run
 from gso.result import Result
 from gso.solver import Callback
 from gso.status import Progress
+from gso.tasks.base import Options
+from gso.tasks.request import Request
 
 #: Number of vertices outside the largest component from which worker processes save time.
 _WORTH = 20_000
 #: Largest coordinate difference, in the unit ball, of components that count as copies.
 _ALIKE = 1e-12
 
-#: Solves one job; a partial of a function that is importable by name.
-Solve = Callable[[Job, Callback | None], Result]
+#: Solves one case; it must be importable by name where worker processes are used.
+Solve = Callable[[Case, Callback | None], Result]
+
+
+def solve_mesh(
+    request: Request[Options],
+    design: Mesh,
+    constraints: Iterable[Constraint] = (),
+    callback: Callback | None = None,
+) -> Result:
+    """Solve a mesh: each of its components that no constraint joins to others on its own."""
+    flat = tasks.get(request.task).flat
+    whole = Case(request, design, compile_constraints(constraints, design, flat=flat))
+    pieces = parts(design, whole.constraints)
+    if pieces and request.formulation == "ruled":
+        raise MeshError(
+            f"the formulation 'ruled' takes one surface, and this mesh has {len(pieces)} "
+            "components: solve each on its own"
+        )
+    if pieces:
+        return solve_components(solve_case, whole, pieces, callback)
+    return solve_case(whole, callback)
+
+
+def solve_case(case: Case, callback: Callback | None = None) -> Result:
+    """Solve a single component, or several that constraints join."""
+    run = Run(case, callback, lay_out=lay_out)
+    solution = run.solve()
+    if several(case.design):
+        solution.notes += ("its components are joined by constraints and solved together",)
+    return conclude(run, solution)
 
 
 def parts(design: Mesh, constraints: Compiled) -> list[Component]:
@@ -38,9 +73,9 @@ def parts(design: Mesh, constraints: Compiled) -> list[Component]:
     return split(design, label) if label.max() > 0 else []
 
 
-def solve(
-    one: Solve,
-    whole: Job,
+def solve_components(
+    solve: Solve,
+    whole: Case,
     pieces: Sequence[Component],
     callback: Callback | None = None,
     workers: int | None = None,
@@ -52,9 +87,9 @@ def solve(
 
     Parameters
     ----------
-    one : callable
-        Solves a job.
-    whole : Job
+    solve : callable
+        Solves a case.
+    whole : Case
         The user's mesh, with its constraints and its start.
     pieces : sequence of Component
         Its :func:`parts`.
@@ -69,51 +104,50 @@ def solve(
     GSOError
         A component cannot be solved; the message says which.
     """
-    jobs = _jobs(whole, pieces)
-    origin = _origins(jobs)
+    cases = _cases(whole, pieces)
+    origin = _origins(cases)
     chosen = sorted(set(origin))
     watch = None if callback is None else _Watch(callback, len(chosen))
     if workers is None:
-        workers = _paying([len(jobs[k].design.vertices) for k in chosen])
-    solved = _spread(one, jobs, chosen, watch, workers) if workers > 0 else {}
+        workers = _useful_workers([len(cases[k].design.vertices) for k in chosen])
+    solved = _solve_in_workers(solve, cases, chosen, watch, workers) if workers > 0 else {}
     for place, k in enumerate(chosen):
         if k not in solved:
             if watch is not None:
                 watch.place = place
-            solved[k] = _named(one, k, len(jobs), jobs[k], watch)
+            solved[k] = _solve_named(solve, k, len(cases), cases[k], watch)
     results = [
-        solved[k] if k == number else _moved(solved[k], jobs[k].design, jobs[number].design)
+        solved[k] if k == number else _translate(solved[k], cases[k].design, cases[number].design)
         for number, k in enumerate(origin)
     ]
-    return together(whole, pieces, jobs, results, chosen)
+    return merge(whole, pieces, cases, results, chosen)
 
 
-def _jobs(whole: Job, pieces: Sequence[Component]) -> list[Job]:
-    count, flat = len(whole.design.vertices), whole.constraints.flat
-    points = whole.start.points
-    if points is not None:
-        points, _ = given_points(points, count, None, flat=flat)
-    return [
-        Job(
-            piece.mesh,
-            whole.constraints.within(piece.vertices, count),
-            whole.start if points is None else replace(whole.start, points=points[piece.vertices]),
-            piece.vertices,
-        )
-        for piece in pieces
-    ]
+def _cases(whole: Case, pieces: Sequence[Component]) -> list[Case]:
+    """Return the case of each component."""
+    count, start = len(whole.design.vertices), whole.request.start
+    points = None
+    if start.points is not None:
+        points, _ = given_points(start.points, count, None, flat=whole.constraints.flat)
+    out = []
+    for piece in pieces:
+        own = start if points is None else replace(start, points=points[piece.vertices])
+        constraints = whole.constraints.within(piece.vertices, count)
+        request = replace(whole.request, start=own)
+        out.append(Case(request, piece.mesh, constraints, piece.vertices))
+    return out
 
 
-def _origins(jobs: Sequence[Job]) -> list[int]:
-    """Return for each job the index of the job that it copies, or its own if there is none."""
+def _origins(cases: Sequence[Case]) -> list[int]:
+    """Return for each case the index of the case that it copies, or its own if there is none."""
     first: dict[bytes, list[int]] = {}
     out = []
-    for k, job in enumerate(jobs):
+    for k, case in enumerate(cases):
         out.append(k)
-        if job.start.points is not None or not job.constraints.empty:
+        if case.request.start.points is not None or not case.constraints.empty:
             continue
-        same = first.setdefault(job.design.faces.tobytes(), [])
-        like = next((j for j in same if _alike(jobs[j].design, job.design)), None)
+        same = first.setdefault(case.design.faces.tobytes(), [])
+        like = next((j for j in same if _alike(cases[j].design, case.design)), None)
         if like is None:
             same.append(k)
         else:
@@ -130,7 +164,7 @@ def _alike(a: Mesh, b: Mesh) -> bool:
     return same_size and bool(np.abs(here - there).max() <= _ALIKE)
 
 
-def _moved(result: Result, here: Mesh, there: Mesh) -> Result:
+def _translate(result: Result, here: Mesh, there: Mesh) -> Result:
     """Transfer the result of a mesh to a translated copy of it."""
     if np.array_equal(here.vertices, there.vertices):
         mesh = result.mesh
@@ -155,42 +189,42 @@ class _Watch:
 
     def __call__(self, progress: Progress) -> bool:
         if not self.stopped:
-            self.stopped = self.callback(renumbered(progress, self.place, self.count)) is False
+            self.stopped = self.callback(renumber(progress, self.place, self.count)) is False
         return not self.stopped
 
 
-def _named(one: Solve, k: int, count: int, job: Job, callback: Callback | None) -> Result:
+def _solve_named(solve: Solve, k: int, count: int, case: Case, callback: Callback | None) -> Result:
     """Solve one component, and name it in error messages."""
     try:
-        return one(job, callback)
+        return solve(case, callback)
     except GSOError as error:
-        names = job.design.vertices if job.names is None else job.names
+        names = case.design.vertices if case.names is None else case.names
         raise type(error)(
             f"component {k} of {count} ({len(names)} vertices, the first is vertex {names[0]}): "
             f"{error}"
         ) from None
 
 
-def _paying(sizes: Sequence[int]) -> int:
+def _useful_workers(sizes: Sequence[int]) -> int:
     """Return the number of worker processes that saves time for components of these sizes."""
     return 0 if sum(sizes) - max(sizes) < _WORTH else useful_workers(len(sizes))
 
 
-def _piece(one: Solve, count: int, numbered: tuple[int, Job]) -> Result | GSOError:
+def _solve_or_error(solve: Solve, count: int, numbered: tuple[int, Case]) -> Result | GSOError:
     """Solve one component in a worker process; return errors, so that they keep their type."""
     try:
-        return _named(one, numbered[0], count, numbered[1], None)
+        return _solve_named(solve, numbered[0], count, numbered[1], None)
     except GSOError as error:
         return error
 
 
-def _spread(
-    one: Solve, jobs: Sequence[Job], chosen: Sequence[int], watch: _Watch | None, workers: int
+def _solve_in_workers(
+    solve: Solve, cases: Sequence[Case], chosen: Sequence[int], watch: _Watch | None, workers: int
 ) -> dict[int, Result]:
     """Solve in worker processes; omit components whose worker died or that were not reached."""
     # The largest first, so that no large one runs alone at the end.
-    order = sorted(chosen, key=lambda k: -len(jobs[k].design.vertices))
-    work, items = partial(_piece, one, len(jobs)), ((k, jobs[k]) for k in order)
+    order = sorted(chosen, key=lambda k: -len(cases[k].design.vertices))
+    work, items = partial(_solve_or_error, solve, len(cases)), ((k, cases[k]) for k in order)
     found: dict[int, Result] = {}
     failed: dict[int, GSOError] = {}
     with open_executor(workers) as executor:

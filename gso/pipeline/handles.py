@@ -13,7 +13,7 @@ from gso.errors import OptionError
 from gso.mesh import Mesh
 
 
-def pinned(handle: Handle, mesh: Mesh, name: str) -> Pins:
+def pins_of(handle: Handle, mesh: Mesh, name: str) -> Pins:
     """Return indices (k,) and positions (k, 3) of a handle, in the user's numbering and unit.
 
     Raises
@@ -27,7 +27,7 @@ def pinned(handle: Handle, mesh: Mesh, name: str) -> Pins:
     return pins[0] if pins else Pins(0, np.zeros(0, np.int64), np.zeros((0, 3)))
 
 
-def moved(constraints: list[Constraint], mesh: Mesh, asked: Pins) -> list[Constraint]:
+def move_handles(constraints: list[Constraint], mesh: Mesh, target: Pins) -> list[Constraint]:
     """Return the constraints with their handles moved to given positions.
 
     Raises
@@ -35,17 +35,17 @@ def moved(constraints: list[Constraint], mesh: Mesh, asked: Pins) -> list[Constr
     OptionError
         A vertex has no handle.
     """
-    loose = np.ones(len(asked.ids), bool)
+    loose = np.ones(len(target.ids), bool)
     out = []
     for c in constraints:
         if isinstance(c, Handle):
-            pins = pinned(c, mesh, "a handle")
-            at, which = np.nonzero(pins.ids[:, None] == asked.ids)
-            pins.positions[at] = asked.positions[which]
+            pins = pins_of(c, mesh, "a handle")
+            at, which = np.nonzero(pins.ids[:, None] == target.ids)
+            pins.positions[at] = target.positions[which]
             loose[which] = False
             c = replace(c, ids=pins.ids, positions=pins.positions)
         out.append(c)
     if loose.any():
-        vertex = asked.ids[loose].min()
+        vertex = target.ids[loose].min()
         raise OptionError(f"vertex {vertex} has no handle; name one with constrain()")
     return out

@@ -6,38 +6,52 @@ import time
 
 import numpy as np
 
-from gso.constraints import Compiled
-from gso.mesh import Mesh
 from gso.metrics import nonplanarity
+from gso.pipeline.case import Case
 from gso.pipeline.lay_flat import lay_out
+from gso.pipeline.run import Run
+from gso.pipeline.user_result import pack
 from gso.result import Result
 from gso.status import Status
-from gso.verdict import Limits, judge
+from gso.tasks.base import Solution
+from gso.tasks.request import Limits
+from gso.verdict import judge
 
 #: Distance of a quad's diagonals over the mean edge length: up to the first value quads count
 #: as planar, above the second they are visibly not.
 _PLANAR, _BENT = 1e-6, 1e-3
 
 
-def requirements(mesh: Mesh, compiled: Compiled, scale: float, **limits: float | None) -> Limits:
-    """Gather what a result has to meet, in the user's unit.
-
-    Design and constraints are the solver's, in the unit ball of radius `scale`. `moved` is the
-    design's largest violation of the constraints.
-    """
-    moved = 0.0
-    if not compiled.empty and not compiled.flat:
-        misses = compiled.violations(mesh.vertices).values()
-        # Violations below rounding errors do not count.
-        moved = max((miss.length for miss in misses if miss.length > 1e-9), default=0.0)
-    return Limits(**limits, moved=scale * moved)
+def conclude(run: Run, solution: Solution) -> Result:
+    """Return the result of a run in the user's frame, judged if that was asked for."""
+    result, request = pack(run, solution), run.case.request
+    return add_verdict(result, request.limits, _violation(run.case)) if request.verdict else result
 
 
-def judged(result: Result, limits: Limits) -> Result:
+def _violation(case: Case) -> float:
+    """Return the largest violation of a constraint by the design, in its unit."""
+    constraints = case.analysis.constraints
+    if constraints.empty or constraints.flat:
+        return 0.0
+    misses = constraints.violations(case.analysis.mesh.vertices).values()
+    # Violations below rounding errors do not count.
+    largest = max((miss.length for miss in misses if miss.length > 1e-9), default=0.0)
+    return case.frame.scale * largest
+
+
+def add_verdict(result: Result, limits: Limits, violation: float = 0.0) -> Result:
     """Add to a result the pattern of its surface, the reasons against it, and its final status.
 
     `seconds` gets entries "pattern" and "verdict". If there are reasons against the result, a
     status that does not refuse it becomes ``Status.UNUSABLE``.
+
+    Parameters
+    ----------
+    result : Result
+    limits : Limits
+        What it was asked to hold.
+    violation : float
+        Largest violation of a constraint by the design, see :func:`gso.verdict.judge`.
     """
     known = result.ruled is not None
     if result.task == "developable" and not known and np.isfinite(result.mesh.vertices).all():
@@ -46,7 +60,7 @@ def judged(result: Result, limits: Limits) -> Result:
         result.seconds["pattern"] = time.perf_counter() - clock
         result.notes += _planarity(result)
     clock = time.perf_counter()
-    result.reasons = judge(result, limits)
+    result.reasons = judge(result, limits, violation)
     if result.reasons and not result.status.is_failure:
         result.status = Status.UNUSABLE
     result.seconds["verdict"] = time.perf_counter() - clock

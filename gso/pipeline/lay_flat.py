@@ -10,10 +10,11 @@ from gso.errors import MeshError
 from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.pipeline.normalise import Canonical
+from gso.pipeline.case import Case
 from gso.pipeline.run import Run
-from gso.tasks.base import Analysis, Request
+from gso.pipeline.user_result import pattern_of
 from gso.tasks.evaluation import largest_strain
+from gso.tasks.request import Request
 
 #: Number of groups of components that are laid out apart, and of vertices from which on.
 _GROUPS, _LARGE = 4, 2000
@@ -62,18 +63,14 @@ def lay_out(
 
     if not parametrization.flattens(surface):
         return given
-    frame = Canonical(surface)
-    analysis = Analysis(frame.mesh, Compiled(flat=True))
+    request = Request("flatten", formulation, flatten.Options.preset(options), verdict=False)
+    run = Run(Case(request, surface, Compiled(flat=True)))
     try:
-        outcome = Run(flatten, analysis)(Request(flatten.Options.preset(options), formulation))
+        solution = run.solve()
     except MeshError:
         return given
-    flat = outcome.points * frame.frame.scale
-    if outcome.cut is None:
-        found = Pattern.whole(surface, frame.back("flat", flat))
-    elif surface.grid_index is None:
-        found = Pattern(flat, outcome.cut.mesh.faces, outcome.cut.vertex, outcome.cut.seams)
-    else:
+    found = pattern_of(run.case, solution)
+    if found is None or (solution.cut is not None and surface.grid_index is not None):
         return given
     if given is not None and largest_strain(surface, given) <= largest_strain(surface, found):
         return given

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gso.constraints import Compiled, Constraint, compile_constraints
+from gso.constraints import Compiled
 from gso.errors import MeshError
 from gso.mesh import Frame, Mesh, topology
-from gso.typing import Array
+from gso.typing import Array, Ints, MeshLike
 
 
 class Canonical:
@@ -25,7 +22,7 @@ class Canonical:
         Vertex indices for messages, where the design is a part of the user's mesh.
     """
 
-    def __init__(self, design: Mesh, names: NDArray[np.int64] | None = None):
+    def __init__(self, design: Mesh, names: Ints | None = None):
         self.design = design
         self.frame: Frame = design.frame
         if not self.frame.scale > 0:
@@ -42,7 +39,12 @@ class Canonical:
         #: Indices for messages of the vertices in this numbering.
         self.names = self.order if names is None else names[self.order]
 
-    def start(self, x0: Any, *, flat: bool) -> Array | None:
+    @property
+    def scale(self) -> float:
+        """Radius of the unit ball, in the user's unit."""
+        return self.frame.scale
+
+    def start(self, x0: MeshLike | None, *, flat: bool) -> Array | None:
         """Convert the coordinates of a warm start to this numbering and frame."""
         if x0 is None:
             return None
@@ -53,17 +55,17 @@ class Canonical:
         points = points if ordered else points[self.order]
         return points[:, :2] / self.frame.scale if flat else self.frame.to_unit(points)
 
-    def constraints(self, given: Iterable[Constraint] | Compiled, *, flat: bool) -> Compiled:
-        """Check constraints against the design, and convert them to this numbering and frame."""
-        frame = Frame(np.zeros(2), self.frame.scale) if flat else self.frame
-        return compile_constraints(given, self.design, flat=flat).mapped(frame, self.new_index)
+    def constraints(self, given: Compiled) -> Compiled:
+        """Convert constraints on the design to this numbering and frame."""
+        frame = Frame(np.zeros(2), self.scale) if given.flat else self.frame
+        return given.mapped(frame, self.new_index)
 
     def back(self, block: str, values: Array) -> Array:
         """Reorder the rows of a block from this numbering to the user's."""
         return values[self._new_face if block == "scale" else self.new_index]
 
     @cached_property
-    def _new_face(self) -> NDArray[np.int64]:
+    def _new_face(self) -> Ints:
         """Index in this numbering of every face of the design."""
         here, there = self.mesh.faces, self.design.faces
         if self.design.grid_index is None:
@@ -82,7 +84,7 @@ def _row_by_row(mesh: Mesh) -> bool:
 
 
 def given_points(
-    x0: Any, count: int, shape: tuple[int, int] | None, *, flat: bool
+    x0: MeshLike, count: int, shape: tuple[int, int] | None, *, flat: bool
 ) -> tuple[Array, bool]:
     """Read points (count, 3), or (count, 2) of a flat image, that a user gave as mesh or array.
 

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 
+from gso.energy import Weighted
 from gso.mesh import Mesh
 from gso.pattern import Pattern
+from gso.pipeline.case import Case
 from gso.solver import Callback, Minimum, Timings, minimise
 from gso.solver.augmented_lagrangian import tighten
+from gso.solver.elements import Kind
 from gso.solver.minimiser import says_no
 from gso.solver.problem import Problem, energies, largest_counts
 from gso.status import Progress, Status
-from gso.tasks.base import Options, Plan, Request, Solution, Stage, same
+from gso.tasks.base import Analysis, Options, Plan, Solution, Stage, same
+from gso.tasks.request import Request
 from gso.typing import Array
 from gso.unknowns import control_points
 
@@ -33,7 +35,7 @@ def objective(stage: Stage, *coordinates: Array) -> list[dict[str, float]]:
 
 
 @dataclass(frozen=True)
-class Reached:
+class PlanState:
     """The state after some stages of a plan.
 
     Attributes
@@ -63,18 +65,11 @@ class Run:
 
     Parameters
     ----------
-    module : module
-        The task.
-    analysis : Analysis
-        Its analysis of the design and the constraints.
+    case : Case
+        The design and the request. Its start says whether :meth:`usable_start` refuses points
+        with more energy than a cold start, and bounds iterations and tolerance.
     callback : callable, optional
         Called after each iteration.
-    guarded : bool
-        Whether :meth:`usable_start` refuses a start with more energy than a cold start.
-    budget : int or None
-        Largest number of iterations of all solves together.
-    tolerance : float
-        Lower limit of the stages' tolerance where a start was given.
     lay_out : callable, optional
         Flattens a surface, for searches that bound its strain.
 
@@ -88,122 +83,119 @@ class Run:
 
     def __init__(
         self,
-        module: ModuleType,
-        analysis: Any,
+        case: Case,
         callback: Callback | None = None,
         *,
-        guarded: bool = False,
-        budget: int | None = None,
-        tolerance: float = 0.0,
         lay_out: Callable[[Mesh], Pattern | None] = lambda surface: None,
     ):
-        self.module = module
-        self.analysis = analysis
+        self.case = case
         self.callback = callback
-        self.guarded = guarded
-        self.budget = budget
-        self.tolerance = tolerance
         self.lay_out = lay_out
         self.start_refused = ""
-        self._planned: tuple[Request, Plan] | None = None
+        self._planned: tuple[Request[Options], Plan] | None = None
         self._problem: Problem | None = None
         self.history: list[Progress] = []
         self.timings = Timings()
         self.iterations = 0
         self.converting = 0.0
 
-    def __call__(self, request: Request) -> Solution:
-        """Plan and solve the stages."""
-        clock = time.perf_counter()
-        made, self._planned = self._planned, None
-        if made is not None and made[0] is request:
-            plan = made[1]
-        else:
-            plan = self.module.plan(self.analysis, request)
-        self.timings.setup += time.perf_counter() - clock
-        return self.solve(plan, request.options)
+    @property
+    def analysis(self) -> Analysis:
+        """The task's analysis of the design."""
+        return self.case.analysis
 
-    def solve(self, plan: Plan, options: Options) -> Solution:
-        """Solve the stages of a plan, and post-process the coordinates."""
-        solution = self._solution(plan, options)
-        if plan.convert is None or solution.status is Status.CANCELLED:
-            return solution
+    def plan(self, request: Request[Options]) -> Plan:
+        """Plan a request in the solver's frame."""
+        return self.case.task.plan(self.analysis, request)
+
+    def solve(self) -> Solution:
+        """Solve the request of the case, by a search where it has limits."""
+        request = self.case.solver_request
+        search = self.case.task.formulations[request.formulation].search
+        if request.limits.given and search is not None:
+            return search(self, request)
+        return self(request if self.usable_start(request) else replace(request, x0=None))
+
+    def __call__(self, request: Request[Options]) -> Solution:
+        """Plan and solve the stages, and post-process the coordinates."""
         clock = time.perf_counter()
-        solution = plan.convert(solution, self._told)
-        self.converting += time.perf_counter() - clock
+        known, self._planned = self._planned, None
+        plan = known[1] if known is not None and known[0] is request else self.plan(request)
+        self.timings.setup += time.perf_counter() - clock
+        if not plan.stages:
+            solution = solution_at(plan, plan.start, plan.status or Status.CONVERGED)
+        else:
+            solution = self.conclude(plan, self.solve_stages(plan, request.options))
+        if plan.convert is not None and solution.status is not Status.CANCELLED:
+            clock = time.perf_counter()
+            solution = plan.convert(solution, self._tell)
+            self.converting += time.perf_counter() - clock
+        solution.formulation = request.formulation
         return solution
 
-    def _told(self, progress: Progress) -> bool:
+    def _tell(self, progress: Progress) -> bool:
         """Report an iteration of a conversion; return whether to go on."""
         return self.callback is None or not says_no(self.callback(progress))
 
-    def _solution(self, plan: Plan, options: Options) -> Solution:
-        if not plan.stages:
-            return _finished(plan, plan.start, plan.status or Status.CONVERGED)
-        return self.concluded(plan, self.through(plan, options))
-
-    def concluded(self, plan: Plan, reached: Reached) -> Solution:
+    def conclude(self, plan: Plan, state: PlanState) -> Solution:
         """Return the solution of a plan whose stages have been solved."""
-        coordinates, energy = _guard(plan, reached)
-        status = reached.minimum.status
+        coordinates, energy = _guard(plan, state)
+        status = state.minimum.status
         if plan.status is not None and status is not Status.CANCELLED:
             status = plan.status
-        solution = _finished(plan, coordinates, status, energy, reached.stage)
+        solution = solution_at(plan, coordinates, status, energy, state.stage)
         if plan.result_notes is not None:
             solution.notes += tuple(plan.result_notes(plan.finish(coordinates)))
-        solution.backend = reached.minimum.backend
+        solution.backend = state.minimum.backend
         if plan.spline is not None:
-            x = reached.minimum.x
-            if reached.entered is None or coordinates is not reached.coordinates:
+            x = state.minimum.x
+            if state.entered is None or coordinates is not state.coordinates:
                 x = plan.stages[-1].unknowns(coordinates).project(coordinates)
             solution.spline = control_points(plan.layout, plan.spline, x)
-            if reached.entered is not None:
-                solution.fitted = plan.layout.split(reached.entered)["surface"]
+            if state.entered is not None:
+                solution.fitted = plan.layout.split(state.entered)["surface"]
         return solution
 
-    def usable_start(self, *requests: Request) -> bool:
+    def usable_start(self, *requests: Request[Options]) -> bool:
         """Return whether a start is to be used for requests that differ in bounds only.
 
-        It is not if a plan refuses it, or, with `guarded`, if its energy is above that of a
-        cold start. :attr:`start_refused` says why.
+        It is not if a plan refuses it, or, with a guarded start, if its energy is above that of
+        a cold start. :attr:`start_refused` says why.
         """
+        guarded = self.case.request.start.guarded
         for number, request in enumerate(requests):
-            if request.start is None:
+            if request.x0 is None:
                 return True
             clock = time.perf_counter()
-            plan = self.module.plan(self.analysis, request)
+            plan = self.plan(request)
             if number == 0:
                 self.start_refused = plan.start_refused
-            if self.guarded and not self.start_refused:
+            if guarded and not self.start_refused:
                 plan = _entered(plan)
                 self.start_refused = _worse(plan)
             if number == 0:
                 self._planned = (request, plan)
             self.timings.setup += time.perf_counter() - clock
-        return not (self.guarded and self.start_refused)
+        return not (guarded and self.start_refused)
 
     def continue_from(self, other: Run) -> None:
         """Continue the history, the timings and the count of iterations of another run."""
         self.history, self.timings = other.history, other.timings
         self.iterations = other.iterations
 
-    def moved(self, solution: Solution, blocks: dict[str, Array]) -> Solution:
+    def evaluate(self, solution: Solution, blocks: dict[str, Array]) -> Solution:
         """Return a solution at other coordinates, with the energy that they have."""
         stage = solution.stage
         if stage is None:
             return replace(solution, blocks=blocks)
         coordinates = stage.layout.pack(blocks)
-        return replace(
-            solution,
-            blocks=blocks,
-            coordinates=coordinates,
-            energy=objective(stage, coordinates)[0],
-        )
+        energy = objective(stage, coordinates)[0]
+        return replace(solution, blocks=blocks, coordinates=coordinates, energy=energy)
 
-    def through(self, plan: Plan, options: Options) -> Reached:
+    def solve_stages(self, plan: Plan, options: Options) -> PlanState:
         """Solve the stages of a plan with at least one, the last one until hard terms hold."""
         coordinates, entered = plan.start, None
-        least = 0.0 if plan.cold_start is None else self.tolerance
+        least = 0.0 if plan.cold_start is None else self.case.request.start.tolerance
         stages = plan.stages
         # Coarser grids use the kernels of the finest, which are compiled if that one is large.
         counts = largest_counts((stage.items, stage.layout) for stage in stages)
@@ -244,7 +236,7 @@ class Run:
                 lambda items, at: solve(at, items=items),
             )
         self._problem = None
-        return Reached(stage, coordinates, None if after else entered, minimum)
+        return PlanState(stage, coordinates, None if after else entered, minimum)
 
     def minimise(
         self,
@@ -252,10 +244,10 @@ class Run:
         stage: Stage,
         coordinates: Array,
         *,
-        items: Any = None,
+        items: Sequence[Weighted] | None = None,
         place: tuple[int, int] = (0, 1),
         reserved: int = 0,
-        counts: Any = None,
+        counts: Mapping[Kind, int] | None = None,
     ) -> tuple[Array, Minimum]:
         """Minimise the objective of one stage from coordinates.
 
@@ -278,11 +270,10 @@ class Run:
         """
         clock = time.perf_counter()
         variables = stage.unknowns(coordinates)
-        again = items is not None
         # The stage before may have the same sparsity pattern, as with other directions of offsets.
         before, self._problem = self._problem, None
-        wanted = items if again else stage.items
-        problem = Problem(wanted, variables, stage.limits, like=before, counts=counts)
+        terms = stage.items if items is None else items
+        problem = Problem(terms, variables, stage.limits, like=before, counts=counts)
         del before
         self._problem = problem
         x = variables.project(coordinates)
@@ -291,14 +282,15 @@ class Run:
             x = np.clip(x, *bounds)
         self.timings.setup += time.perf_counter() - clock
         most = stage.iterations
-        if self.budget is not None:
-            most = min(most, max(self.budget - self.iterations - reserved, 0))
+        budget = self.case.request.start.iterations
+        if budget is not None:
+            most = min(most, max(budget - self.iterations - reserved, 0))
         minimum = minimise(
             problem,
             x,
             iterations=most,
             tolerance=stage.tolerance,
-            continuation=stage.continuation[-1:] if again else stage.continuation,
+            continuation=stage.continuation if items is None else stage.continuation[-1:],
             continued=stage.continued,
             bounds=bounds,
             method=options.method,
@@ -314,7 +306,7 @@ class Run:
         return variables.points(minimum.x), minimum
 
 
-def _finished(
+def solution_at(
     plan: Plan,
     coordinates: Array,
     status: Status,
@@ -335,12 +327,12 @@ def _finished(
     )
 
 
-def _guard(plan: Plan, reached: Reached) -> tuple[Array, dict[str, float]]:
+def _guard(plan: Plan, state: PlanState) -> tuple[Array, dict[str, float]]:
     """Return the coordinates and their energy, or the fallback's if that has less."""
-    stage, coordinates = reached.stage, reached.coordinates
+    stage, coordinates = state.stage, state.coordinates
     if plan.fallback is None:
-        return coordinates, (reached.energies or objective(stage, coordinates))[0]
-    energy, other = reached.energies or objective(stage, coordinates, plan.fallback)
+        return coordinates, (state.energies or objective(stage, coordinates))[0]
+    energy, other = state.energies or objective(stage, coordinates, plan.fallback)
     if not sum(energy.values()) <= sum(other.values()):
         return plan.fallback, other
     return coordinates, energy

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso import tasks
-from gso.constraints import TIGHT, Compiled
-from gso.mesh import Mesh
+from gso.constraints import TIGHT
 from gso.pattern import Pattern
-from gso.pipeline.normalise import Canonical
+from gso.pipeline.case import Case
 from gso.pipeline.run import Run
 from gso.result import Result
 from gso.spline.fit import describe_spline
@@ -16,13 +14,13 @@ from gso.status import Status
 from gso.tasks.base import Solution
 
 
-def record_violations(compiled: Compiled, frame: Canonical, solution: Solution) -> None:
+def _record_violations(case: Case, solution: Solution) -> None:
     """Record the violation of each constraint, in the user's unit; note missed hard ones."""
-    if not compiled.names:
+    constraints, frame = case.analysis.constraints, case.frame
+    if not constraints.names:
         return
-    unit = frame.frame.scale
-    misses = compiled.violations(solution.blocks[compiled.block])
-    lengths = {name: unit * miss.length for name, miss in misses.items()}
+    misses = constraints.violations(solution.blocks[constraints.block])
+    lengths = {name: frame.scale * miss.length for name, miss in misses.items()}
     solution.details = {**solution.details, "constraints": lengths}
     broken = [k for k, miss in misses.items() if miss.hard and not miss.length <= TIGHT]
     for name in broken:
@@ -32,63 +30,69 @@ def record_violations(compiled: Compiled, frame: Canonical, solution: Solution) 
         solution.status = Status.CONSTRAINTS_MISSED
 
 
-def packed(
-    task: str,
-    formulation: str,
-    design: Mesh,
-    frame: Canonical,
-    solution: Solution,
-    run: Run,
-) -> Result:
-    """Convert a solution to a result in the user's frame and numbering."""
+def pattern_of(case: Case, solution: Solution) -> Pattern | None:
+    """Return the flat image of a solution in the user's unit and numbering; None without one."""
+    flat, cut = solution.blocks.get("flat"), solution.cut
+    if flat is None:
+        return None
+    if cut is None:
+        return Pattern.whole(case.design, case.frame.back("flat", flat) * case.frame.scale)
     # The numbering of a cut mesh begins with the user's.
-    own = {"flat"} if solution.cut is not None else set()
-    blocks = {k: x if k in own else frame.back(k, x) for k, x in solution.blocks.items()}
-    flat = blocks["flat"] * frame.frame.scale if "flat" in blocks else None
-    pattern = None
-    if solution.cut is not None and flat is not None:
-        pattern = Pattern(flat, solution.cut.mesh.faces, solution.cut.vertex, solution.cut.seams)
-        flat = None
+    return Pattern(flat * case.frame.scale, cut.mesh.faces, cut.vertex, cut.seams)
+
+
+def pack(run: Run, solution: Solution) -> Result:
+    """Convert a solution to a result in the user's frame and numbering."""
+    case, design, frame = run.case, run.case.design, run.case.frame
+    _record_violations(case, solution)
+    pattern = pattern_of(case, solution)
+    flat = None if pattern is None or solution.cut is not None else pattern.flat
+    surface, ratios = (solution.blocks.get(name) for name in ("surface", "scale"))
     if solution.status is Status.ALREADY_GOOD:
         mesh = design
-    elif "surface" in blocks:
-        mesh = design.replaced(frame.frame.to_user(blocks["surface"]))
-    elif pattern is not None:
-        mesh = pattern.mesh
+    elif surface is not None:
+        mesh = design.replaced(frame.frame.to_user(frame.back("surface", surface)))
+    elif flat is not None:
+        mesh = design.replaced(np.c_[flat, np.zeros(len(flat))])
     else:
-        mesh = design.replaced(np.c_[flat, np.zeros(len(design.vertices))])
+        mesh = design if pattern is None else pattern.mesh
     seconds = run.timings.as_dict()
     ruled = None
     if solution.ruled is not None:
         seconds["strips"] = run.converting
         ruled = solution.ruled.transformed(
-            frame.frame.to_user, frame.frame.scale, lambda rows: frame.back("surface", rows)
+            frame.frame.to_user, frame.scale, lambda rows: frame.back("surface", rows)
         )
         mesh, pattern = ruled.mesh, ruled.pattern
         flat = None if pattern.is_cut else pattern.flat
-    spline, details = None, dict(solution.details)
-    lengths = getattr(tasks.get(task), "LENGTHS", ())
-    details |= {name: details[name] * frame.frame.scale for name in lengths if name in details}
+    details = dict(solution.details)
+    details |= {k: details[k] * frame.scale for k in case.task.lengths if k in details}
+    spline = None
     if solution.spline is not None:
         before = solution.fitted
         fitted = None if before is None else frame.frame.to_user(frame.back("surface", before))
         spline, said = describe_spline(frame.frame.to_user(solution.spline), mesh, design, fitted)
-        details = {**details, "spline": said}
+        details["spline"] = said
+    start, notes = case.request.start, design.notes + solution.notes
+    if run.start_refused:
+        notes += (f"the start ({start.source}) was not used: {run.start_refused}",)
+    begun = start.points is not None and not run.start_refused
     return Result(
-        task=task,
-        formulation=formulation,
+        task=case.request.task,
+        formulation=solution.formulation or case.request.formulation,
         design=design,
         mesh=mesh,
         flat=flat,
         pattern=pattern,
-        cell_scale=blocks["scale"][:, 0] if "scale" in blocks else None,
+        cell_scale=None if ratios is None else frame.back("scale", ratios)[:, 0],
         status=solution.status,
         iterations=run.iterations,
         energy=solution.energy,
         history=run.history,
         seconds=seconds,
         backend=solution.backend,
-        notes=design.notes + solution.notes,
+        warm_start=start.source if begun else "cold",
+        notes=notes,
         details=details,
         spline=spline,
         ruled=ruled,

@@ -181,25 +181,25 @@ class Result:
         from gso import tasks
         from gso.components import combined
         from gso.metrics import area, strains
-        from gso.tasks.evaluation import measured
+        from gso.tasks.evaluation import compute_metrics
 
         if self.components:
             areas = [area(part.design) for part in self.components]
             return combined([part.metrics for part in self.components], areas)
-        module, pattern = tasks.get(self.task), self.pattern
         if self.ruled is not None:
-            return module.ruled_metrics(self.design, self.ruled)
-        if pattern is not None and getattr(module, "BLOCK", "surface") == "flat":
-            if pattern.is_cut:
-                surface = pattern.surface(self.design)
-                return measured(self.task, surface, pattern.mesh, pattern.flat)
-            return measured(self.task, self.design, self.mesh, self.flat)
-        known = measured(self.task, self.design, self.mesh, self.flat)
-        if pattern is None or self.task != "developable":
+            from gso.tasks.developable.developable_metrics import ruled_metrics
+
+            return ruled_metrics(self.design, self.ruled)
+        task, pattern = tasks.get(self.task), self.pattern
+        if task.flat and pattern is not None and pattern.is_cut:
+            surface = pattern.surface(self.design)
+            return compute_metrics(self.task, surface, pattern.mesh, pattern.flat)
+        known = compute_metrics(self.task, self.design, self.mesh, self.flat)
+        if pattern is None or task.pattern_metrics is None:
             return known
         surface = pattern.surface(self.mesh)
         if pattern.is_cut:
-            known |= module.flat_metrics(surface, pattern.flat)
+            known |= task.pattern_metrics(surface, pattern.flat)
         found = strains(surface, pattern.flat)
         return found | {k: v for k, v in known.items() if k not in found}
 

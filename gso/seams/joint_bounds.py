@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from gso.errors import OptionError
 from gso.pipeline.lay_flat import strains_of
 from gso.result import Result
 from gso.status import Status
+from gso.tasks.options import Options as BaseOptions
 
 if TYPE_CHECKING:
     from gso.tasks.developable import Options
@@ -24,7 +25,7 @@ _STEP, _STEPS, _BISECTIONS = 4.0, 3, 4
 
 
 def within(
-    pieces: Pieces, allowed: float, options: Any, solve: Callable[[Options], Result]
+    pieces: Pieces, allowed: float, options: BaseOptions, solve: Callable[[Options], Result]
 ) -> Result:
     """Return the most developable result within a distance of the design.
 

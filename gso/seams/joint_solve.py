@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -15,15 +14,15 @@ from gso.cut_pieces import Pieces
 from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.mesh.cut import Cut
-from gso.pipeline.judgement import judged
-from gso.pipeline.solve import Asked, solve_mesh
-from gso.pipeline.start import Start
+from gso.pipeline.component_solves import solve_mesh
+from gso.pipeline.judgement import add_verdict
 from gso.result import Result
 from gso.seams import joint_bounds
 from gso.seams.chains import chains
 from gso.solver import Callback
+from gso.tasks.base import Options
+from gso.tasks.request import Limits, Request
 from gso.typing import Ints
-from gso.verdict import Limits
 
 #: Weight of the smoothness of seams.
 _SMOOTH = 8e-6
@@ -56,52 +55,73 @@ def _straight(mesh: Mesh, line: Ints) -> list[Ints]:
     return [line[a : b + 1] for a, b in pairwise(ends)]
 
 
-def solved(
+def solve_pieces(
     pieces: Pieces,
-    task: str,
-    constraints: Sequence[Constraint],
-    start: Start,
-    solve: Callable[[Mesh, Sequence[Constraint], Start], Result],
+    request: Request[Options],
+    constraints: Sequence[Constraint] = (),
+    callback: Callback | None = None,
 ) -> Result:
-    """Solve a design cut into pieces.
+    """Solve a design in pieces, within a distance of it where one is given.
 
     Parameters
     ----------
     pieces : Pieces
-    task : str
-        The task: "developable", or "flatten" for the patterns of the pieces as they are.
+    request : Request
+        Its task is "developable", or "flatten" for the patterns of the pieces as they are. Its
+        start is in the numbering of the design.
     constraints : sequence of Constraint
         In the numbering of the design.
-    start : Start
-        In the numbering of the design.
-    solve : callable
-        Solves a mesh with constraints from a start.
+    callback : callable, optional
+        Called after every iteration.
 
     Returns
     -------
     Result
         Its design and mesh are cut open; `pieces` has the result's.
     """
-    if task not in ("developable", "flatten"):
+    if request.task not in ("developable", "flatten"):
         raise OptionError(
-            f"task {task!r} does not take pieces; give it the whole design, pieces.design"
+            f"task {request.task!r} does not take pieces; give it the whole design, pieces.design"
         )
+    allowed = request.limits.max_deviation
+    if allowed is None:
+        return _solve(pieces, constraints, callback, request)
+    free = replace(request, limits=replace(request.limits, max_deviation=None), verdict=False)
+    solve = partial(_solve, pieces, constraints, callback)
+    result = solve(free) if free.limits.given else None
+    # A limit on strain or curvature is met with the least displacement, which may be too much.
+    if result is None or joint_bounds.deviation(pieces, result) > allowed:
+        free = replace(free, limits=Limits())
+        result = joint_bounds.within(
+            pieces, allowed, free.options, lambda options: solve(free.with_options(options))
+        )
+    return add_verdict(result, request.limits) if request.verdict else result
+
+
+def _solve(
+    pieces: Pieces,
+    constraints: Sequence[Constraint],
+    callback: Callback | None,
+    request: Request[Options],
+) -> Result:
+    """Solve pieces, which are close to the design by the weights of the energy only."""
     design = pieces.opened.mesh
-    joined = constraints_of(pieces) if task == "developable" else []
+    joined = constraints_of(pieces) if request.task == "developable" else []
+    start = request.start
     if start.points is not None:
         points = np.asarray(getattr(start.points, "vertices", start.points), float)
         if len(points) == len(pieces.design.vertices):
             start = replace(start, points=points[pieces.opened.vertex])
-    result = solve(design, [*joined, *constraints], start)
+    result = solve_mesh(replace(request, start=start), design, [*joined, *constraints], callback)
     # Advice to join what was cut open is no use here.
     own = tuple(note for note in result.notes if note not in design.notes)
     result.notes = pieces.design.notes + own
-    if task == "developable":
-        result.pieces = moved(pieces, result.mesh)
+    if request.task == "developable":
+        result.pieces = _with_vertices(pieces, result.mesh)
     return result
 
 
-def moved(pieces: Pieces, surface: Mesh) -> Pieces:
+def _with_vertices(pieces: Pieces, surface: Mesh) -> Pieces:
     """Return the pieces with the vertices of a surface that is cut open, (p, 3)."""
     vertex = pieces.opened.vertex
     points = pieces.design.vertices.copy()
@@ -114,34 +134,3 @@ def gap(surface: Mesh, seams: Ints) -> float:
     """Return the largest distance between the two copies of a vertex on a seam."""
     one, two = (surface.vertices[seams[:, k]] for k in (0, 1))
     return float(np.linalg.norm(one - two, axis=2).max(initial=0.0))
-
-
-def solve_pieces(
-    pieces: Pieces,
-    asked: Asked,
-    constraints: Sequence[Constraint],
-    start: Start,
-    callback: Callback | None,
-) -> Result:
-    """Solve a design in pieces, within a distance of it where one is given."""
-
-    def solve(what: Asked) -> Result:
-        one = partial(solve_mesh, what, callback)
-        return solved(pieces, what.task, constraints, start, one)
-
-    allowed = asked.bounds.get("max_deviation")
-    if allowed is None:
-        return solve(asked)
-    bounds = {**asked.bounds, "max_deviation": None}
-    free = replace(asked, bounds=bounds, verdict=False)
-    result = solve(free) if free.bounded else None
-    # A bound on strain or curvature is met with the least displacement, which may be too much.
-    if result is None or joint_bounds.deviation(pieces, result) > allowed:
-        free = replace(free, bounds=dict.fromkeys(bounds))
-        result = joint_bounds.within(
-            pieces, allowed, asked.options, lambda options: solve(replace(free, options=options))
-        )
-    if asked.verdict:
-        limits: dict[str, Any] = dict(asked.bounds)
-        result = judged(result, Limits(**limits))
-    return result

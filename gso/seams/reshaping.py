@@ -11,8 +11,6 @@ from gso import faults, metrics
 from gso.cut_pieces import Pieces
 from gso.errors import MeshError
 from gso.pipeline.lay_flat import strains_of
-from gso.pipeline.solve import Asked
-from gso.pipeline.start import Start
 from gso.result import Result
 from gso.seams.candidates import Candidate, cuts, joined, measured, neck_of
 from gso.seams.facets import FACETS, facet_ratio
@@ -21,6 +19,7 @@ from gso.seams.options import Wishes
 from gso.seams.straight import straightened_pieces
 from gso.seams.tree import Ground
 from gso.tasks.developable import Options
+from gso.tasks.request import Request
 
 #: Bound on the estimated strain of the first cuts, the factor between attempts, and the ratio of a
 #: bound that is too large to one that is not at which the search ends.
@@ -177,5 +176,4 @@ def _fairer(options: Options) -> Options:
 
 
 def _solved(pieces: Pieces, options: Options) -> Result:
-    asked = Asked("developable", "curvature", options, {}, False, verdict=False)
-    return solve_pieces(pieces, asked, (), Start(None), None)
+    return solve_pieces(pieces, Request("developable", "curvature", options, verdict=False))

@@ -16,8 +16,7 @@ from gso.errors import ConvergenceWarning, OptionError
 from gso.executors import open_executor
 from gso.executors.base import processors
 from gso.mesh import Mesh
-from gso.pipeline.solve import Asked, check, solve_mesh
-from gso.pipeline.start import Start
+from gso.pipeline.component_solves import solve_mesh
 from gso.quantities import Length, Strain, as_length, as_strain
 from gso.seams.candidates import (
     Candidate,
@@ -38,6 +37,7 @@ from gso.seams.search_result import packed
 from gso.seams.segmentation import Segmentation
 from gso.seams.straight import straight
 from gso.seams.tree import Ground
+from gso.tasks.request import check
 
 #: Ratio of the estimated to the measured strain of a first attempt.
 _RATIO = 1.3
@@ -200,9 +200,8 @@ def _ground(
     if isinstance(keep, Pieces):
         design, kept = _again(design, keep), keep.edges
     if denoise:
-        _, formulation, options = check("denoise")
-        asked = Asked("denoise", formulation, options, {}, False, verdict=False)
-        design = design.replaced(solve_mesh(asked, None, design, (), Start(None)).mesh.vertices)
+        smoothed = solve_mesh(check("denoise", verdict=False), design)
+        design = design.replaced(smoothed.mesh.vertices)
     if keep is not None and not isinstance(keep, Pieces):
         begun = cut(design, keep)
         design, kept = begun.design, begun.edges

@@ -12,15 +12,16 @@ from gso.constraints import Constraint
 from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning, GSOError, MeshError
 from gso.mesh import Mesh
-from gso.pipeline.component_results import renumbered, worst
-from gso.pipeline.start import Start
+from gso.pipeline.component_results import renumber, worst_status
 from gso.result import Result
 from gso.seams.joint_bounds import deviation
 from gso.seams.joint_solve import gap
 from gso.solver import Callback
 from gso.status import Status
 from gso.tasks.base import Options
-from gso.verdict import Code, Limits, Reason, compare, judge, ordered
+from gso.tasks.request import Limits
+from gso.tasks.start import Start
+from gso.verdict import Code, Reason, compare, judge, ordered
 from gso.wording import length
 
 if TYPE_CHECKING:
@@ -154,7 +155,7 @@ def _merged(
         ]
         whole = {Code.DEVIATION: far, Code.SEAM_GAP: apart}
         reasons = ordered([*own, *compare(whole, dict.fromkeys(whole, allowed))])
-    status = worst([joint.status, *(result.status for result in strips)])
+    status = worst_status([joint.status, *(result.status for result in strips)])
     seconds = dict(joint.seconds)
     seconds["strips"] = sum(result.seconds["total"] for result in strips)
     notes = (
@@ -209,6 +210,6 @@ def _numbered(callback: Callback | None, place: int, count: int) -> Callback | N
         return None
 
     def call(progress: Any) -> Any:
-        return callback(renumbered(progress, place, count, "piece"))
+        return callback(renumber(progress, place, count, "piece"))
 
     return call

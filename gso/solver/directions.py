@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from gso.geometry import ops
 from gso.linalg import SingularError
 from gso.typing import Array, Ints
+
+
+class LinearSolver(Protocol):
+    """A linear backend, analysed for the pattern of a matrix."""
+
+    name: str
+
+    def factor(self, values: Array) -> None:
+        """Factor the matrix with these values."""
+
+    def solve(self, rhs: Array) -> Array:
+        """Solve for right-hand sides."""
+
 
 #: Relative damping above which an indefinite matrix is given up for the gradient direction.
 HOPELESS = 1e3
@@ -32,7 +45,7 @@ class GaussNewton:
     def __init__(self, damping: float = 1e-9):
         self.damping = damping
 
-    def step(self, solver: Any, values: Array, diagonal: Ints, gradient: Array) -> Array:
+    def step(self, solver: LinearSolver, values: Array, diagonal: Ints, gradient: Array) -> Array:
         """Solve ``(H + damping mean(diag H) I) d = -gradient``.
 
         The mean of the diagonal is proportional to the trace, which is invariant to rotations
@@ -40,7 +53,7 @@ class GaussNewton:
 
         Parameters
         ----------
-        solver : backend solver
+        solver : LinearSolver
             Linear backend, analysed for the pattern of `values`.
         values, diagonal : ndarray
             Matrix values (changed in place) and the positions of the diagonal in them.

@@ -32,7 +32,16 @@ class Timings:
 
     def as_dict(self) -> dict[str, float]:
         """Phases by name."""
-        return dict(self.__dict__)
+        return dict(vars(self))
+
+    def scaled(self, factor: float) -> Timings:
+        """Return a share of them."""
+        return Timings(**{phase: factor * seconds for phase, seconds in vars(self).items()})
+
+    def add(self, other: Timings) -> None:
+        """Add those of another solve."""
+        for phase, seconds in vars(other).items():
+            setattr(self, phase, getattr(self, phase) + seconds)
 
 
 @dataclass

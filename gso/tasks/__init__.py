@@ -1,81 +1,78 @@
-"""Tasks: one file each, found by name.
-
-A task module defines ``FORMULATIONS`` (the first is the default), an ``Options``
-dataclass with presets, ``plan(analysis, request)`` and ``metrics(...)``; see :mod:`gso.tasks.base`.
-"""
+"""Tasks: one file each, which exports its :class:`gso.tasks.base.Task` as ``TASK``."""
 
 from __future__ import annotations
 
-from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gso.errors import OptionError
 from gso.registry import Registry
 from gso.spelling import choices
 
 if TYPE_CHECKING:
-    from gso.constraints import Compiled
-    from gso.mesh import Mesh
-    from gso.tasks.base import Analysis
+    from gso.tasks.base import Formulation, Task
     from gso.tasks.options import Options
 
-_MODULES = Registry(
+_FILES = Registry(
     __name__,
     __path__,
-    ("base", "constrained", "evaluation", "imposed", "options", "per_component"),
+    (
+        "base",
+        "constrained",
+        "evaluation",
+        "imposed",
+        "options",
+        "per_component",
+        "request",
+        "start",
+    ),
 )
-#: Register a task module from outside the package: ``add(name, module)``.
-add = _MODULES.add
+_ADDED: dict[str, Task] = {}
 
 
 def names() -> list[str]:
     """List the names of the tasks."""
-    return _MODULES.names()
+    return sorted([*_FILES.names(), *_ADDED])
 
 
-def choose(module: ModuleType, formulation: str | None, options: Any) -> tuple[str, type[Options]]:
-    """Return the formulation to use and the class of its settings.
+def get(name: str) -> Task:
+    """Return the task of a name."""
+    if name not in names():
+        raise OptionError(f"no task {name!r}; {choices(name, names())}")
+    found: Task = _ADDED[name] if name in _ADDED else _FILES.get(name).TASK
+    return found
+
+
+def add(name: str, task: Task) -> None:
+    """Register a task from outside the package, for this process.
+
+    Raises
+    ------
+    OptionError
+        The name is taken.
+    """
+    if name in names():
+        raise OptionError(f"{name!r} is taken in gso.tasks; choose another name")
+    _ADDED[name] = task
+
+
+def choose(
+    task: str, formulation: str | None = None, options: str | Options | None = None
+) -> tuple[str, Formulation[Options]]:
+    """Return the name of the formulation to use, and the formulation.
 
     Without a name, the preset or the class of `options` determines the formulation; failing
     that, it is the task's default.
     """
-    kinds: dict[str, type[Options]] = getattr(module, "OPTIONS", {})
-    implied = getattr(module, "IMPLIES", {}).get(options) if isinstance(options, str) else None
-    if formulation is None:
-        of_class = (name for name, kind in kinds.items() if type(options) is kind)
-        formulation = implied or next(of_class, module.FORMULATIONS[0])
-    if formulation not in module.FORMULATIONS:
+    known = get(task).formulations
+    implied = next((name for name, one in known.items() if options in one.presets), None)
+    of_class = (name for name, one in known.items() if type(options) is one.options)
+    name = formulation
+    if name is None:
+        name = implied or next(of_class, next(iter(known)))
+    if name not in known:
+        raise OptionError(f"task {task!r} has no formulation {name!r}; {choices(name, known)}")
+    if implied not in (None, name):
         raise OptionError(
-            f"task {module.__name__.rpartition('.')[2]!r} has no formulation {formulation!r}; "
-            + choices(formulation, module.FORMULATIONS)
+            f"options {options!r} are those of the formulation {implied!r}, not {name!r}"
         )
-    if implied not in (None, formulation):
-        raise OptionError(
-            f"options {options!r} are those of the formulation {implied!r}, not {formulation!r}"
-        )
-    return formulation, kinds.get(formulation, module.Options)
-
-
-def get(name: str) -> ModuleType:
-    """Import the module of a task."""
-    if name not in names():
-        raise OptionError(f"no task {name!r}; {choices(name, names())}")
-    return _MODULES.get(name)
-
-
-def analyse(module: ModuleType, mesh: Mesh, constraints: Compiled) -> Analysis:
-    """Analyse a design for a task.
-
-    Parameters
-    ----------
-    module : module
-        The task.
-    mesh : Mesh
-        The design, scaled to the unit ball, with grids numbered row by row.
-    constraints : Compiled
-        Constraints on it, in the same frame and numbering.
-    """
-    from gso.tasks import base
-
-    made: Analysis = getattr(module, "Analysis", base.Analysis)(mesh, constraints)
-    return made
+    return name, known[name]

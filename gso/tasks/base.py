@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from gso import parametrization
 from gso.constraints import Compiled
@@ -22,6 +22,10 @@ from gso.unknowns import Layout, Variables
 
 if TYPE_CHECKING:
     from gso.ruled.ruled_surface import RuledSurface
+    from gso.tasks.request import Request
+
+#: The settings of a formulation.
+O = TypeVar("O", bound=Options)
 
 
 def same(coordinates: Array) -> Array:
@@ -55,40 +59,15 @@ class Analysis:
         """The design, cut open where it closes around itself, ready to be flattened."""
         return parametrization.opened(self.mesh)
 
-    def opened_for(self, request: Request) -> parametrization.Opened:
+    def opened_for(self, request: Request[Options]) -> parametrization.Opened:
         """Return the design ready to be flattened.
 
         Constraints and warm starts refer to the vertices of the uncut design: with them it is
         not cut.
         """
-        if request.start is not None or not self.constraints.empty:
+        if request.x0 is not None or not self.constraints.empty:
             return parametrization.Opened(self.mesh)
         return self.opened
-
-
-@dataclass(frozen=True)
-class Request:
-    """What to solve for a design, in the unit ball.
-
-    Attributes
-    ----------
-    options : Options
-        Settings of the task.
-    formulation : str
-        Which energy to minimise.
-    start : ndarray or None
-        Warm start: (n, 3), or (n, 2) for a flat image.
-    max_displacement : float or None
-        Largest displacement of a vertex. Only tasks with bounds have it.
-    weight_factor : float
-        Factor on the weight of the task's main term (curvature, isometry), which searches vary.
-    """
-
-    options: Any
-    formulation: str
-    start: Array | None = None
-    max_displacement: float | None = None
-    weight_factor: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -246,6 +225,8 @@ class Solution:
         The stage that was solved last; None if none was.
     coordinates : ndarray
         Coordinates at its end, before the plan's post-processing.
+    formulation : str
+        The formulation, where the solve was of a request.
     """
 
     blocks: dict[str, Array]
@@ -260,6 +241,7 @@ class Solution:
     cut: Cut | None = None
     stage: Stage | None = None
     ruled: RuledSurface | None = None
+    formulation: str = ""
 
     @property
     def points(self) -> Array:
@@ -270,28 +252,97 @@ class Solution:
 class Runner(Protocol):
     """Solver of the requests of one task for one design, as a search sees it."""
 
-    analysis: Any
+    @property
+    def analysis(self) -> Analysis:
+        """The task's analysis of the design."""
 
-    def __call__(self, request: Request) -> Solution:
+    def __call__(self, request: Request[Options]) -> Solution:
         """Plan and solve."""
 
-    def usable_start(self, *requests: Request) -> bool:
+    def usable_start(self, *requests: Request[Options]) -> bool:
         """Return whether the start of these requests, which differ in bounds, is to be used."""
 
-    def moved(self, solution: Solution, blocks: dict[str, Array]) -> Solution:
+    def evaluate(self, solution: Solution, blocks: dict[str, Array]) -> Solution:
         """Return a solution at other coordinates, with the energy that they have."""
 
     def lay_out(self, surface: Mesh) -> Pattern | None:
         """Flatten a surface; None where it cannot be flattened."""
 
 
+@dataclass(frozen=True)
+class Formulation(Generic[O]):
+    """An energy that a task can minimise.
+
+    Attributes
+    ----------
+    options : type
+        Class of its settings.
+    plan : callable
+        Makes the plan, from the task's analysis of the design and the request in its frame.
+    presets : tuple of str
+        Names of presets that imply this formulation.
+    limits : tuple of str
+        Names of the :class:`gso.tasks.request.Limits` that it takes.
+    search : callable, optional
+        Finds the solution for a request with limits.
+    """
+
+    options: type[O]
+    plan: Callable[[Any, Request[O]], Plan]
+    presets: tuple[str, ...] = ()
+    limits: tuple[str, ...] = ()
+    search: Callable[[Runner, Request[O]], Solution] | None = None
+
+
+@dataclass(frozen=True)
+class Task:
+    """What can be done with a design.
+
+    Attributes
+    ----------
+    formulations : dict of str to Formulation
+        The first is the default.
+    metrics : callable
+        ``metrics(design, result, flat, scale)`` returns values by the names in
+        :data:`gso.metrics.INFO`, from a component before and after, its flat image (n, 2) or
+        None, and its size.
+    flat : bool
+        Whether the result is a flat image, to which start and constraints refer.
+    lengths : tuple of str
+        Names of those `details` of its plans that are lengths.
+    analysis : type
+        Derived from :class:`Analysis`, if its plans need more than that.
+    pattern_metrics : callable, optional
+        Metrics of the pattern (n, 2) of a surface, if its result is a surface that can be laid
+        flat.
+    """
+
+    formulations: Mapping[str, Formulation[Any]]
+    metrics: Callable[[Mesh, Mesh, Any, float], dict[str, float]]
+    flat: bool = False
+    lengths: tuple[str, ...] = ()
+    analysis: type[Analysis] = Analysis
+    pattern_metrics: Callable[[Mesh, Array], dict[str, float]] | None = None
+
+    @property
+    def options(self) -> type[Options]:
+        """Class of the default formulation's settings."""
+        kind: type[Options] = next(iter(self.formulations.values())).options
+        return kind
+
+    def plan(self, analysis: Analysis, request: Request[Options]) -> Plan:
+        """Plan a request in the frame of an analysed design."""
+        return self.formulations[request.formulation].plan(analysis, request)
+
+
 __all__ = [
     "Analysis",
+    "Formulation",
     "Options",
     "Plan",
-    "Request",
     "Runner",
     "Solution",
     "Stage",
+    "Task",
     "same",
 ]

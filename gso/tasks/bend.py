@@ -30,12 +30,11 @@ from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.status import Status
 from gso.tasks import per_component
-from gso.tasks.base import Analysis, Plan, Request, Stage
+from gso.tasks.base import Analysis, Formulation, Plan, Stage, Task
 from gso.tasks.options import Options as BaseOptions
+from gso.tasks.request import Request
 from gso.typing import Array
 from gso.unknowns import Layout, free
-
-FORMULATIONS = ("isometry",)
 
 #: Tolerance (relative decrease of the energy) of all stages but the last.
 _NEARLY = 1e-3
@@ -80,14 +79,14 @@ class Options(BaseOptions):
             )
 
 
-def plan(analysis: Analysis, request: Request) -> Plan:
+def plan(analysis: Analysis, request: Request[Options]) -> Plan:
     """Plan stages of falling bending weight, from a surface that follows its handles smoothly."""
     mesh, options = analysis.mesh, request.options
     layout = Layout.of(len(mesh.vertices), "surface")
-    if analysis.constraints.empty and request.start is None:
+    if analysis.constraints.empty and request.x0 is None:
         return Plan(layout, mesh.vertices.ravel(), status=Status.ALREADY_GOOD)
     weights = [options.w_bending]
-    while request.start is None and weights[-1] < 0.3 * options.w_bending_start:
+    while request.x0 is None and weights[-1] < 0.3 * options.w_bending_start:
         weights.append(10.0 * weights[-1])
     lengths = per_component.objective(mesh, partial(_lengths, options))
     change = per_component.objective(mesh, _change)
@@ -115,12 +114,12 @@ def _change(mesh: Mesh) -> list[Weighted]:
     return [Weighted(t, 1.0) for t in bending.build(mesh)]
 
 
-def _start(analysis: Analysis, request: Request) -> Array:
+def _start(analysis: Analysis, request: Request[Options]) -> Array:
     """Move the vertices of the design, or of the user's start, smoothly with the handles."""
     mesh = analysis.mesh
     ids, targets = analysis.constraints.pinned_positions
-    if request.start is not None:
-        mesh = mesh.replaced(request.start)
+    if request.x0 is not None:
+        mesh = mesh.replaced(request.x0)
         return mesh.vertices + ThinPlateField(mesh, ids)(targets - mesh.vertices[ids])
     return follow(mesh, ThinPlateField(mesh, ids), targets)
 
@@ -141,3 +140,6 @@ def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict
         "loss_gc": measure.loss_gc(after, scale=scale),
     }
     return {name: value for name, value in out.items() if not np.isnan(value)}
+
+
+TASK = Task({"isometry": Formulation(Options, plan)}, metrics)

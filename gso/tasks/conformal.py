@@ -28,13 +28,11 @@ from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.parametrization import orientation
 from gso.tasks import constrained, per_component
-from gso.tasks.base import Analysis, Plan, Request, Stage
+from gso.tasks.base import Analysis, Formulation, Plan, Stage, Task
 from gso.tasks.options import Options as BaseOptions
+from gso.tasks.request import Request
 from gso.typing import Array
 from gso.unknowns import Layout, free
-
-FORMULATIONS = ("isometry",)
-BLOCK = "flat"
 
 
 @dataclass(frozen=True)
@@ -74,7 +72,7 @@ class Options(BaseOptions):
             )
 
 
-def plan(analysis: Analysis, request: Request) -> Plan:
+def plan(analysis: Analysis, request: Request[Options]) -> Plan:
     """Plan one stage, from an image without inverted triangles; more under constraints.
 
     Raises
@@ -86,7 +84,7 @@ def plan(analysis: Analysis, request: Request) -> Plan:
     opened = analysis.opened_for(request)
     mesh = opened.mesh
     layout = Layout((("flat", len(mesh.vertices), 2), ("scale", len(mesh.faces), 1)))
-    given, refused = parametrization.given(mesh, request.start)
+    given, refused = parametrization.given(mesh, request.x0)
     flat = given
     if flat is None:
         flat = parametrization.begin(
@@ -172,3 +170,6 @@ def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[s
         "area_error": measure.area_error(mesh, flat),
         "flipped_cells": float(measure.flips(mesh, flat)),
     }
+
+
+TASK = Task({"isometry": Formulation(Options, plan)}, metrics, flat=True)

@@ -17,14 +17,11 @@ from gso.mesh import Mesh
 from gso.smoothing import smooth_grid, smooth_mesh
 from gso.status import Status
 from gso.tasks import constrained
-from gso.tasks.base import Analysis, Plan, Request
+from gso.tasks.base import Analysis, Formulation, Plan, Task
 from gso.tasks.options import Options as BaseOptions
+from gso.tasks.request import Request
 from gso.typing import Array
 from gso.unknowns import Layout
-
-FORMULATIONS = ("smooth", "crease")
-#: Entries of a result's `details` that are lengths.
-LENGTHS = ("sigma",)
 
 
 @dataclass(frozen=True)
@@ -48,13 +45,13 @@ class Options(BaseOptions):
     weight: float | None = None
 
 
-def plan(analysis: Analysis, request: Request) -> Plan:
+def plan(analysis: Analysis, request: Request[Options]) -> Plan:
     """Smooth the surface, unless a start is given, and plan a stage for the constraints if any."""
     mesh, options = analysis.mesh, request.options
-    if request.start is None:
+    if request.x0 is None:
         points, details = _smoothed(mesh, request)
     else:
-        points, details = request.start, {}
+        points, details = request.x0, {}
     points = np.where(mesh.used[:, None], points, mesh.vertices)
     free = analysis.constraints.empty
     return Plan(
@@ -66,18 +63,15 @@ def plan(analysis: Analysis, request: Request) -> Plan:
     )
 
 
-def _smoothed(mesh: Mesh, request: Request) -> tuple[Array, dict[str, Any]]:
+def _smoothed(mesh: Mesh, request: Request[Options]) -> tuple[Array, dict[str, Any]]:
     """Compute smoothed vertices (n, 3), and the order, weight, sigma and degrees of freedom."""
     options = request.options
-    settings = {
-        "order": options.order,
-        "weight": options.weight,
-        "norm": "l1" if request.formulation == "crease" else "l2",
-    }
+    order, weight = options.order, options.weight
+    norm = "l1" if request.formulation == "crease" else "l2"
     if mesh.grid is not None:
-        smoothed = smooth_grid(mesh.grid, **settings)
+        smoothed = smooth_grid(mesh.grid, order=order, weight=weight, norm=norm)
     else:
-        smoothed = smooth_mesh(mesh, **settings)
+        smoothed = smooth_mesh(mesh, order=order, weight=weight, norm=norm)
     names = ("order", "weight", "sigma", "dof")
     return smoothed.points.reshape(-1, 3), {name: getattr(smoothed, name) for name in names}
 
@@ -93,3 +87,10 @@ def metrics(before: Mesh, after: Mesh, flat: None, scale: float) -> dict[str, fl
         "loss_gc_before": measure.loss_gc(before, scale=scale),
         "loss_gc": measure.loss_gc(after, scale=scale),
     }
+
+
+TASK = Task(
+    {"smooth": Formulation(Options, plan), "crease": Formulation(Options, plan)},
+    metrics,
+    lengths=("sigma",),
+)

@@ -17,7 +17,7 @@ def parted(design: Mesh) -> list[Component]:
     return split(design) if several(design) else []
 
 
-def measured(task: str, design: Mesh, after: Mesh, flat: Array | None) -> dict[str, float]:
+def compute_metrics(task: str, design: Mesh, after: Mesh, flat: Array | None) -> dict[str, float]:
     """Compute the metrics of a result, per component by its own size, and combine them.
 
     Parameters
@@ -34,15 +34,15 @@ def measured(task: str, design: Mesh, after: Mesh, flat: Array | None) -> dict[s
     --------
     >>> panel = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
     >>> lifted = Mesh.from_grid(panel + [0.0, 0.0, 0.1])
-    >>> round(measured("developable", Mesh.from_grid(panel), lifted, None)["d_H"], 6)
+    >>> round(compute_metrics("developable", Mesh.from_grid(panel), lifted, None)["d_H"], 6)
     3.535534
     """
-    module = tasks.get(task)
+    metrics = tasks.get(task).metrics
     parts = parted(design) if np.array_equal(design.faces, after.faces) else []
     if not parts:
-        return module.metrics(design, after, flat, measure.unit(design))
+        return metrics(design, after, flat, measure.unit(design))
     found = [
-        module.metrics(
+        metrics(
             part.mesh,
             part.of(after),
             None if flat is None else flat[part.vertices],

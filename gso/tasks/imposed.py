@@ -42,7 +42,7 @@ class Imposed:
         start, _, _ = layout.where(self.constraints.block)
         return variables.constrained(*reduction.maps(start, layout.size))
 
-    def moved(self, constraints: Compiled) -> Imposed:
+    def with_handles(self, constraints: Compiled) -> Imposed:
         """Return the same constraints with other positions of handles; multipliers stay.
 
         The parts of `constraints` must be those of this object, in the same order.

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from gso.errors import OptionError
 from gso.spelling import KnownFields, choices
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 
 @dataclass(frozen=True)
@@ -50,23 +53,23 @@ class Options(KnownFields):
                 + choices(self.method, ("gauss-newton", "levenberg-marquardt"))
             )
 
-    def in_unit(self, unit: float) -> Options:
+    def in_unit(self, unit: float) -> Self:
         """Return the settings with lengths of the mesh's unit divided by another unit."""
         return self
 
-    def for_pieces(self) -> Options:
+    def for_pieces(self) -> Self:
         """Return the settings for a surface that is cut into pieces."""
         return self
 
     @classmethod
-    def preset(cls, name: str) -> Options:
+    def preset(cls, name: str) -> Self:
         """Return the settings of a named preset."""
         if name not in cls.PRESETS:
             raise OptionError(f"no preset {name!r}; {choices(name, cls.PRESETS)}")
         return cls(**cls.PRESETS[name])
 
     @classmethod
-    def coerce(cls, given: str | Options | None) -> Options:
+    def coerce(cls, given: str | Options | None) -> Self:
         """Return settings from a preset's name, an instance, or None for "balanced"."""
         if given is None or isinstance(given, str):
             return cls.preset(given or "balanced")
@@ -82,7 +85,7 @@ def _named(kind: type) -> str:
     return kind.__name__ if kind.__module__ == "builtins" else f"{kind.__module__}.{kind.__name__}"
 
 
-def _check_number(name: str, kind: str, value: Any) -> None:
+def _check_number(name: str, kind: str, value: object) -> None:
     """Raise unless a setting annotated as int or float is one, finite and not negative."""
     wanted = kind.split(" | ")
     if value is None and "None" in wanted:

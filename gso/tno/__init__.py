@@ -1,9 +1,8 @@
 """The traditional numerical optimiser: sparse Gauss-Newton on CasADi's derivatives."""
 
-from typing import Any
-
-from gso.pipeline.start import Start
-from gso.tno.optimize import check, optimize
+from gso.tasks.request import check
+from gso.tasks.start import Start
+from gso.tno.optimize import optimize
 from gso.tno.optimize_many import optimize_many
 from gso.tno.session import Session
 
@@ -11,7 +10,7 @@ from gso.tno.session import Session
 __all__ = ["Session", "Start", "check", "optimize", "optimize_many"]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name != "optimize_batch":
         raise AttributeError(f"module 'gso.tno' has no attribute {name!r}")
     from importlib import import_module

@@ -5,31 +5,32 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Sequence
-from typing import Any
 
 from gso.constraints import Constraint
 from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning
+from gso.pipeline.component_solves import solve_mesh
 from gso.pipeline.judgement import warning
-from gso.pipeline.solve import Asked, check, solve_mesh
-from gso.pipeline.start import Start
 from gso.result import Result
 from gso.seams import joint_solve, strips_of_pieces
 from gso.solver import Callback
 from gso.tasks.base import Options
+from gso.tasks.request import check
+from gso.tasks.start import Start
+from gso.typing import MeshLike
 
 
 def optimize(
-    mesh: Any,
+    mesh: MeshLike | Pieces,
     *,
     task: str = "developable",
     formulation: str | None = None,
-    options: Any = None,
+    options: str | Options | None = None,
     constraints: Sequence[Constraint] = (),
     max_deviation: float | None = None,
     max_strain: float | None = None,
     target_curvature: float | None = None,
-    x0: Any = None,
+    x0: MeshLike | Start | None = None,
     callback: Callback | None = None,
     verdict: bool = True,
 ) -> Result:
@@ -109,29 +110,29 @@ def optimize(
     Jiang et al. 2020, Quad-mesh based isometric mappings and developable surfaces.
     """
     clock = time.perf_counter()
-    bounds = {
-        "max_deviation": max_deviation,
-        "max_strain": max_strain,
-        "target_curvature": target_curvature,
-    }
-    module, chosen, settings = check(task, formulation, options, **bounds)
-    given = x0 if isinstance(x0, Start) else Start(x0)
+    request = check(
+        task,
+        formulation,
+        options,
+        max_deviation=max_deviation,
+        max_strain=max_strain,
+        target_curvature=target_curvature,
+        x0=x0,
+        verdict=verdict,
+    )
     if isinstance(mesh, Pieces) and not isinstance(options, Options):
-        settings = settings.for_pieces()
-    asked = Asked(task, chosen, settings, bounds, formulation is not None, verdict)
-    if given.iterations is not None and asked.bounded:
-        module.check_iterations(bounds)
-    if isinstance(mesh, Pieces) and chosen == "ruled":
-        ask = strips_of_pieces.Ask(settings, max_deviation, verdict)
-        result = strips_of_pieces.solved(mesh, ask, constraints, given, callback, optimize)
+        request = request.with_options(request.options.for_pieces())
+    if isinstance(mesh, Pieces) and request.formulation == "ruled":
+        ask = strips_of_pieces.Ask(request.options, max_deviation, verdict)
+        result = strips_of_pieces.solved(mesh, ask, constraints, request.start, callback, optimize)
     elif isinstance(mesh, Pieces):
-        result = joint_solve.solve_pieces(mesh, asked, constraints, given, callback)
+        result = joint_solve.solve_pieces(mesh, request, constraints, callback)
     else:
         from gso.io import as_mesh
 
         design = as_mesh(mesh)
         design.check_joined()
-        result = solve_mesh(asked, callback, design, constraints, given)
+        result = solve_mesh(request, design, constraints, callback)
     result.seconds["total"] = time.perf_counter() - clock
     if said := warning(result):
         warnings.warn(said, ConvergenceWarning, stacklevel=2)

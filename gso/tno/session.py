@@ -6,28 +6,28 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso import linalg, tasks
-from gso.constraints import Compiled, Constraint, Handle, listed
+from gso import linalg
+from gso.constraints import Constraint, Handle, compile_constraints, listed
 from gso.deformation import ThinPlateField
 from gso.errors import ConvergenceWarning, OptionError
-from gso.pipeline.handles import moved, pinned
-from gso.pipeline.judgement import better, difference, judged, requirements, warning
-from gso.pipeline.normalise import Canonical
-from gso.pipeline.run import Run, objective
-from gso.pipeline.user_result import packed, record_violations
+from gso.pipeline.case import Case
+from gso.pipeline.handles import move_handles, pins_of
+from gso.pipeline.judgement import better, conclude, difference, warning
+from gso.pipeline.run import Run, objective, solution_at
 from gso.result import Result
 from gso.solver import METHODS, Minimum, minimise
 from gso.solver.augmented_lagrangian import tighten
+from gso.solver.directions import LinearSolver
 from gso.solver.problem import Problem
 from gso.status import Status
-from gso.tasks.base import Plan, Request, Solution, Stage
-from gso.tno.optimize import check
-from gso.typing import Array, Ints
+from gso.tasks.base import Options, Plan, Stage
+from gso.tasks.request import check
+from gso.tasks.start import Start
+from gso.typing import Array, Ints, MeshLike
 from gso.unknowns import control_points
 
 #: Iteration limit of the solve in :meth:`Session.settle`.
@@ -85,46 +85,45 @@ class Session:
 
     def __init__(
         self,
-        mesh: Any,
+        mesh: MeshLike,
         *,
         task: str = "bend",
         formulation: str | None = None,
-        options: Any = None,
+        options: str | Options | None = None,
         constraints: Sequence[Constraint] = (),
-        x0: Any = None,
+        x0: MeshLike | Start | None = None,
     ):
         from gso.io import as_mesh
 
-        self._design = as_mesh(mesh)
-        self._design.check_joined()
-        self._module, self._formulation, self._options = check(task, formulation, options)
-        if getattr(self._module, "BLOCK", "surface") == "flat":
+        design = as_mesh(mesh)
+        design.check_joined()
+        self._case = Case(check(task, formulation, options, x0=x0), design)
+        if self._case.task.flat:
             raise OptionError(f"task {task!r} makes no surface that handles could move")
-        self._task = task
-        self._frame = Canonical(self._design)
+        self._options = self._case.solver_request.options
         self.analyses = 0
         self._constraints: list[Constraint] = []
         self._spread: ThinPlateField | None = None
         #: Problem and solver of the stage's unknowns, and of those while handles move.
-        self._kept: dict[bool, tuple[Problem, Any]] = {}
+        self._kept: dict[bool, tuple[Problem, LinearSolver]] = {}
         #: Whether the current unknowns are those for the first iteration after a move.
         self._moving = False
         #: Whether a handle has moved since the last iteration.
         self._moved = False
         self._direction = METHODS[self._options.method].direction()
-        self._x0 = self._frame.start(x0, flat=False)
-        self._run: Any = None
-        self._compiled = Compiled()
+        self._x0 = self._case.solver_request.x0
+        self._run = Run(self._case)
         self._stage: Stage | None = None
-        self._plan = self._planned(constraints, self._x0)
+        self._plan = self._prepare(constraints, self._x0)
         self._status = self._plan.status or Status.CONVERGED
-        self._coordinates = self._solved(self._plan)
+        self._coordinates = self._solve_stages(self._plan)
         self._pose()
 
     @property
     def vertices(self) -> Array:
         """Current vertices (n, 3), in the user's frame and numbering."""
-        return self._frame.frame.to_user(self._frame.back("surface", self._surface))
+        frame = self._case.frame
+        return frame.frame.to_user(frame.back("surface", self._surface))
 
     def move(self, ids: ArrayLike, positions: ArrayLike) -> None:
         """Move vertices that have a :class:`gso.Handle`.
@@ -143,15 +142,17 @@ class Session:
         OptionError
             A vertex has no handle, or the positions are not k finite points.
         """
-        asked = pinned(Handle(ids, positions), self._design, "move()")
-        constraints = moved(self._constraints, self._design, asked)
-        compiled = self._frame.constraints(constraints, flat=False)
-        before = self._compiled.pinned_positions[1]
-        self._constraints, self._compiled = constraints, compiled
+        design = self._case.design
+        pins = pins_of(Handle(ids, positions), design, "move()")
+        constraints = move_handles(self._constraints, design, pins)
+        case = self._case.constrained(compile_constraints(constraints, design))
+        before = self._case.analysis.constraints.pinned_positions[1]
+        held, after = case.analysis.constraints.pinned_positions
+        self._constraints, self._case, self._run.case = constraints, case, case
         stage = self._stage
         if stage is not None and stage.imposed is not None:
-            self._stage = replace(stage, imposed=stage.imposed.moved(compiled))
-        held, after = compiled.pinned_positions
+            imposed = stage.imposed.with_handles(case.analysis.constraints)
+            self._stage = replace(stage, imposed=imposed)
         self._follow(held, after - before)
         self._pose(moving=True)
         self._moved = True
@@ -168,8 +169,8 @@ class Session:
         OptionError
             Constraints contradict each other, or one is invalid.
         """
-        self._plan = self._planned(constraints, self._surface)
-        c = self._compiled
+        self._plan = self._prepare(constraints, self._surface)
+        c = self._case.analysis.constraints
         self._follow(c.hard_ids, c.hard_positions - self._surface[c.hard_ids])
         self._pose()
         self._moved = False
@@ -226,11 +227,11 @@ class Session:
             The :meth:`result`, with a `ConvergenceWarning` if it has not converged. If the solve
             from the design was taken, a note says how far it is from the dragged surface.
         """
-        result = self._settled()
+        result = self._settle()
         if self._stage is not None:
             dragged, kept = result, (self._plan, self._stage, self._coordinates, self._status)
-            self._plan = self._planned(self._constraints, self._x0)
-            self._coordinates = self._solved(self._plan)
+            self._plan = self._prepare(self._constraints, self._x0)
+            self._coordinates = self._solve_stages(self._plan)
             self._pose()
             result = self.result()
             if better(result, dragged):
@@ -243,7 +244,7 @@ class Session:
             warnings.warn(warning(result) or str(result.status), ConvergenceWarning, stacklevel=2)
         return result
 
-    def _settled(self) -> Result:
+    def _settle(self) -> Result:
         """Iterate from the current surface until the stage converges."""
         stage = self._stage
         if stage is not None:
@@ -261,57 +262,44 @@ class Session:
     def result(self) -> Result:
         """Return the current surface as a result, like that of :func:`gso.tno.optimize`."""
         plan, stage, at = self._plan, self._stage, self._coordinates
-        solution = Solution(
-            plan.layout.split(plan.finish(at)),
-            self._status,
-            {"objective": 0.0} if stage is None else objective(stage, at)[0],
-            at,
-            backend="" if stage is None else self._kept[False][1].name,
-            notes=tuple(plan.notes),
-            details=dict(plan.details),
-            cut=plan.cut,
-        )
+        energy = None if stage is None else objective(stage, at)[0]
+        solution = solution_at(plan, at, self._status, energy, stage)
+        if stage is not None:
+            solution.backend = self._kept[False][1].name
         if plan.spline is not None:
             solution.spline = control_points(plan.layout, plan.spline, self._x)
-        record_violations(self._compiled, self._frame, solution)
-        result = packed(
-            self._task, self._formulation, self._design, self._frame, solution, self._run
-        )
+        result = conclude(self._run, solution)
         result.warm_start = "session"
-        return judged(
-            result, requirements(self._frame.mesh, self._compiled, self._frame.frame.scale)
-        )
+        return result
 
     @property
     def _surface(self) -> Array:
         """Current vertices (n, 3), in the solver's frame and numbering."""
         return self._plan.layout.split(self._coordinates)["surface"]
 
-    def _solved(self, plan: Plan) -> Array:
+    def _solve_stages(self, plan: Plan) -> Array:
         """Solve all stages of a plan, and return the final coordinates."""
         if not plan.stages:
             return plan.start
-        reached = self._run.through(plan, self._options)
-        self._status = plan.status or reached.minimum.status
-        return reached.coordinates
+        state = self._run.solve_stages(plan, self._options)
+        self._status = plan.status or state.minimum.status
+        return state.coordinates
 
     def _left_to_do(self) -> None:
         """Mark the surface as not converged, because its constraints have changed."""
         if self._stage is not None:
             self._status = Status.MAX_ITERATIONS
 
-    def _planned(self, constraints: Sequence[Constraint], start: Array | None) -> Plan:
+    def _prepare(self, constraints: Sequence[Constraint], start: Array | None) -> Plan:
         """Check constraints, and return the task's plan with them."""
         given = listed(constraints)
-        compiled = self._frame.constraints(given, flat=False)
-        run = Run(self._module, tasks.analyse(self._module, self._frame.mesh, compiled))
-        plan = self._module.plan(run.analysis, Request(self._options, self._formulation, start))
+        case = self._case.constrained(compile_constraints(given, self._case.design))
+        run = Run(case)
+        plan = run.plan(replace(case.solver_request, x0=start))
         if not plan.stages and plan.status is not Status.ALREADY_GOOD:
-            raise OptionError(f"task {self._task!r} has no iterations to go on with")
-        if self._run is not None:
-            run.continue_from(self._run)
-        self._run = run
-        self._compiled, self._constraints, self._spread = compiled, given, None
+            raise OptionError(f"task {case.request.task!r} has no iterations to go on with")
+        run.continue_from(self._run)
+        self._case, self._run, self._constraints, self._spread = case, run, given, None
         self._stage = plan.edited or (plan.stages[-1] if plan.stages else None)
         return plan
 
@@ -320,7 +308,7 @@ class Session:
         if self._stage is None or not len(ids):
             return
         if self._spread is None or not np.array_equal(self._spread.ids, ids):
-            self._spread = ThinPlateField(self._frame.mesh, ids)
+            self._spread = ThinPlateField(self._case.frame.mesh, ids)
         start, count, dim = self._stage.layout.where("surface")
         self._coordinates = self._coordinates.copy()
         surface = self._coordinates[start : start + count * dim].reshape(count, dim)
@@ -341,9 +329,11 @@ class Session:
         if stage is None:
             return
         variables = stage.unknowns(self._coordinates, moving=self._moving)
-        before, solver = self._kept.get(self._moving, (None, None))
-        problem = Problem(stage.items, variables, stage.limits, like=before)
-        if before is None or problem.pattern is not before.pattern:
+        kept = self._kept.get(self._moving)
+        problem = Problem(stage.items, variables, stage.limits, like=kept and kept[0])
+        if kept is not None and problem.pattern is kept[0].pattern:
+            solver = kept[1]
+        else:
             solver = linalg.choose(problem.pattern, self._options.backend)
             self.analyses += 1
         self._kept[self._moving] = problem, solver

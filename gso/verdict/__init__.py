@@ -3,14 +3,12 @@
 from gso.verdict.codes import TIGHT, Code, Kind
 from gso.verdict.compare import Measurement, compare, failure, merge
 from gso.verdict.judge import judge
-from gso.verdict.limits import Limits
 from gso.verdict.reason import Places, Reason, describe, ordered
 
 __all__ = [
     "TIGHT",
     "Code",
     "Kind",
-    "Limits",
     "Measurement",
     "Places",
     "Reason",

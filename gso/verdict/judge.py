@@ -8,9 +8,9 @@ import numpy as np
 
 from gso import tasks
 from gso.status import Status
+from gso.tasks.request import Limits
 from gso.verdict.codes import Code
 from gso.verdict.compare import Measurement, compare, failure
-from gso.verdict.limits import Limits
 from gso.verdict.reason import Reason, ordered
 from gso.verdict.surface_checks import Measured, of_pattern, of_surface
 from gso.verdict.task_checks import TASKS, Bounds, ruled
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _STRETCHED = ("conformal",)
 
 
-def judge(result: Result, limits: Limits) -> tuple[Reason, ...]:
+def judge(result: Result, limits: Limits, violation: float = 0.0) -> tuple[Reason, ...]:
     """List the reasons why a result is not usable, the most severe first; empty if it is usable.
 
     For developable surfaces the largest strain, the deviation and the given limits are stored in
@@ -33,25 +33,28 @@ def judge(result: Result, limits: Limits) -> tuple[Reason, ...]:
     result : Result
         The solver's result, with its `pattern` if it has one.
     limits : Limits
-        Limits that were given.
+        Limits that were given, in the user's unit.
+    violation : float
+        Largest violation of a constraint by the design, in its unit: 0 if the design satisfies all
+        constraints, infinite if a violation cannot be expressed as a length.
 
     Returns
     -------
     tuple of Reason
     """
-    measured, bounds = _measured(result, limits)
+    measured, bounds = _measured(result, limits, violation)
     stopped = [failure(Code[result.status.name])] if result.status.is_failure else []
     return ordered([*stopped, *compare(measured, bounds)])
 
 
-def _measured(result: Result, limits: Limits) -> tuple[Measured, Bounds]:
+def _measured(result: Result, limits: Limits, violation: float) -> tuple[Measured, Bounds]:
     pattern = result.pattern
     for points in (result.mesh.vertices, None if pattern is None else pattern.flat):
         if points is not None and not np.isfinite(points).all():
             wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
             return {Code.NOT_FINITE: Measurement.count("vertex", wrong)}, {}
     measured: Measured = {}
-    if getattr(tasks.get(result.task), "BLOCK", "surface") == "flat":
+    if tasks.get(result.task).flat:
         surface = result.design
     else:
         surface = result.mesh
@@ -65,5 +68,5 @@ def _measured(result: Result, limits: Limits) -> tuple[Measured, Bounds]:
     check = ruled if result.ruled is not None else TASKS.get(result.task)
     if check is None:
         return measured, {}
-    own, bounds = check(result, limits)
+    own, bounds = check(result, limits, violation)
     return measured | own, bounds

@@ -10,10 +10,10 @@ import numpy as np
 from gso import metrics
 from gso.mesh import Mesh
 from gso.pattern import Pattern
+from gso.tasks.request import Limits
 from gso.typing import Array
 from gso.verdict.codes import Code
 from gso.verdict.compare import Measurement
-from gso.verdict.limits import Limits
 from gso.verdict.surface_checks import Measured
 
 if TYPE_CHECKING:
@@ -26,13 +26,15 @@ Bounds = dict[Code, float | None]
 _FAR, _RULED = 0.5, 0.1
 
 
-def developable(result: Result, limits: Limits) -> tuple[Measured, Bounds]:
+def developable(result: Result, limits: Limits, violation: float) -> tuple[Measured, Bounds]:
     """Measure deviation, strain of the pattern, and curvature."""
     # Imported here, as it imports scipy.
     from gso.tasks.developable.options import DEVELOPABLE, Options
 
     design, mesh = result.design, result.mesh
-    measured, bounds = _away(result, metrics.surface_distance(design, mesh), limits, _FAR)
+    measured, bounds = _away(
+        result, metrics.surface_distance(design, mesh), limits, violation, _FAR
+    )
     strain, allowed = np.inf, limits.max_strain
     if allowed is None and limits.max_deviation is not None:
         allowed = DEVELOPABLE
@@ -49,7 +51,7 @@ def developable(result: Result, limits: Limits) -> tuple[Measured, Bounds]:
     target = limits.target_curvature
     measured[Code.TARGET_CURVATURE] = curvature = Measurement(after)
     bounds[Code.TARGET_CURVATURE] = target
-    if limits.moved <= 0 and after > max(Options().developable_below, target or 0.0):
+    if violation <= 0 and after > max(Options().developable_below, target or 0.0):
         measured[Code.CURVATURE_ROSE] = curvature
         bounds[Code.CURVATURE_ROSE] = before
         same = after <= (1.0 + Code.CURVATURE_ROSE.info.tolerance) * before
@@ -60,13 +62,13 @@ def developable(result: Result, limits: Limits) -> tuple[Measured, Bounds]:
     return measured, bounds
 
 
-def ruled(result: Result, limits: Limits) -> tuple[Measured, Bounds]:
+def ruled(result: Result, limits: Limits, violation: float) -> tuple[Measured, Bounds]:
     """Measure deviation and strain of strips, and count rulings that cross."""
     surface = result.ruled
     if surface is None:
         return {}, {}
     far = surface.deviation or surface.distances(result.design)
-    measured, bounds = _away(result, far, limits, _RULED)
+    measured, bounds = _away(result, far, limits, violation, _RULED)
     measured[Code.RULINGS_CROSS] = Measurement(float(surface.crossed))
     measured[Code.STRAIN] = Measurement(_strains(result.mesh, surface.pattern).max())
     bounds[Code.STRAIN] = limits.max_strain
@@ -74,15 +76,15 @@ def ruled(result: Result, limits: Limits) -> tuple[Measured, Bounds]:
     return measured, bounds
 
 
-def denoise(result: Result, limits: Limits) -> tuple[Measured, Bounds]:
+def denoise(result: Result, limits: Limits, violation: float) -> tuple[Measured, Bounds]:
     """Measure the roughness over that of the input."""
-    if limits.moved:
+    if violation:
         return {}, {}
     return {Code.ROUGHER: Measurement(metrics.fairness_ratio(result.design, result.mesh))}, {}
 
 
 def _away(
-    result: Result, far: metrics.Distances, limits: Limits, share: float
+    result: Result, far: metrics.Distances, limits: Limits, violation: float, share: float
 ) -> tuple[Measured, Bounds]:
     """Measure the distance to the design, also as a share of its diagonal."""
     deviation, diagonal = max(far.there_max, far.back_max), result.design.diagonal
@@ -92,7 +94,7 @@ def _away(
         Code.FAR: Measurement(deviation / diagonal),
     }, {
         Code.DEVIATION: limits.max_deviation,
-        Code.FAR: share + limits.moved / diagonal,
+        Code.FAR: share + violation / diagonal,
     }
 
 
@@ -108,7 +110,7 @@ def _remember(result: Result, measured: Measured, limits: Limits) -> None:
 
 
 #: Checks by task; other tasks only have the checks of surface and pattern.
-TASKS: dict[str, Callable[[Result, Limits], tuple[Measured, Bounds]]] = {
+TASKS: dict[str, Callable[[Result, Limits, float], tuple[Measured, Bounds]]] = {
     "developable": developable,
     "denoise": denoise,
 }

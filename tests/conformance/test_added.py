@@ -13,7 +13,7 @@ from gso import energy, io, linalg, tasks
 from gso.energy import Term, Weighted
 from gso.geometry import sub
 from gso.io.raw_surface import Surface
-from gso.tasks.base import Plan, Stage
+from gso.tasks.base import Formulation, Plan, Stage, Task
 from gso.unknowns import Layout, free
 from tests.conftest import saddle
 
@@ -26,8 +26,8 @@ def module(name, **members):
 
 @pytest.fixture
 def added():
-    """Register modules, and remove them after the test."""
-    registries = {"term": energy._MODULES, "task": tasks._MODULES, "backend": linalg._MODULES}
+    """Register modules, and remove them and tasks after the test."""
+    registries = {"term": energy._MODULES, "backend": linalg._MODULES}
 
     def add(kind, name, **members):
         registries[kind].add(name, module(name, **members))
@@ -35,6 +35,7 @@ def added():
     yield add
     for registry in registries.values():
         registry._added.clear()
+    tasks._ADDED.clear()
 
 
 def to_origin(points, constants):
@@ -69,15 +70,10 @@ def test_a_term(added):
 
 
 def test_a_task(added):
-    options = tasks.get("denoise").Options
-    added(
-        "task",
-        "shrink",
-        FORMULATIONS=("half",),
-        Options=options,
-        plan=shrink,
-        metrics=lambda before, after, flat, scale: {"displacement_rms": 1.0},
-    )
+    half = Formulation(gso.DenoiseOptions, shrink)
+    task = Task({"half": half}, lambda before, after, flat, scale: {"displacement_rms": 1.0})
+    tasks.add("shrink", task)
+    assert "shrink" in tasks.names()
     points = saddle(7)
     result = gso.tno.optimize(points, task="shrink", verdict=False)
     centre = points.reshape(-1, 3).mean(axis=0)
@@ -86,7 +82,7 @@ def test_a_task(added):
     held = gso.tno.optimize(points, task="shrink", constraints=[gso.Fixed([0])], verdict=False)
     np.testing.assert_allclose(held.mesh.vertices[0], points[0, 0])
     with pytest.raises(gso.OptionError, match="shrink"):
-        tasks.add("shrink", module("shrink"))
+        tasks.add("shrink", task)
 
 
 def test_a_backend(added):

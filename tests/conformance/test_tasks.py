@@ -12,7 +12,7 @@ from tests.conftest import rotation, saddle
 CASES = [
     pytest.param(task, formulation, id=f"{task}-{formulation}")
     for task in tasks.names()
-    for formulation in tasks.get(task).FORMULATIONS
+    for formulation in tasks.get(task).formulations
 ]
 #: Without ruled surfaces, which have vertices of their own: see tests/test_ruled.py.
 ON_DESIGN = [case for case in CASES if case.values[1] != "ruled"]
@@ -118,7 +118,7 @@ def test_bad_input_is_named(task, formulation):
 
 @pytest.mark.parametrize("task", tasks.names())
 def test_options_name_what_is_wrong(task):
-    options = tasks.get(task).Options
+    options = tasks.get(task).options
     assert {"fast", "balanced", "accurate"} <= set(options.PRESETS)
     for preset in options.PRESETS:
         assert options.preset(preset) == options.preset(preset)

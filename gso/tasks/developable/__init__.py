@@ -2,61 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from gso.tasks.base import Plan, Request
+from gso.tasks.base import Formulation, Plan, Task
 from gso.tasks.developable import joint_isometry, ruled, schedule
 from gso.tasks.developable.analysis import Analysis
-from gso.tasks.developable.bound_search import check_bounds, check_iterations, search
-from gso.tasks.developable.developable_metrics import flat_metrics, metrics, ruled_metrics
+from gso.tasks.developable.bound_search import count_strips, search
+from gso.tasks.developable.developable_metrics import flat_metrics, metrics
 from gso.tasks.developable.options import Options
+from gso.tasks.request import Request
 from gso.unknowns import ALONG
 
-__all__ = [
-    "FORMULATIONS",
-    "IMPLIES",
-    "OPTIONS",
-    "Analysis",
-    "Options",
-    "check_bounds",
-    "check_iterations",
-    "flat_metrics",
-    "metrics",
-    "plan",
-    "ruled_metrics",
-    "search",
-]
-
-#: The formulation that a preset belongs to.
-IMPLIES = {"jiang2020": "isometry"}
-#: Settings by formulation.
-OPTIONS = {"curvature": Options, "isometry": joint_isometry.Options, "ruled": ruled.Options}
+__all__ = ["TASK", "Options"]
 
 
-def plan(analysis: Analysis, request: Request) -> Plan:
-    """Plan the stages of the solve."""
-    return _PLANS[request.formulation](analysis, request)
-
-
-def _before_ruled(analysis: Analysis, request: Request) -> Plan:
+def _before_ruled(analysis: Analysis, request: Request[ruled.Options]) -> Plan:
     """Plan the curvature solve whose normals the first rulings follow."""
-    return schedule.plan(analysis, replace(request, options=Options()))
+    return schedule.plan(analysis, request.with_options(Options()))
 
 
-def _before_isometry(analysis: Analysis, request: Request) -> Plan:
+def _before_isometry(analysis: Analysis, request: Request[joint_isometry.Options]) -> Plan:
     """Plan the curvature solve whose result the solve by isometry starts from."""
     bound = request.max_displacement
     # The box bounds of the solve by isometry cover only part of the ball around a vertex.
     bound = None if bound is None else 0.99 * ALONG * bound
-    return schedule.plan(analysis, replace(request, options=Options(), max_displacement=bound))
+    return schedule.plan(analysis, replace(request.with_options(Options()), max_displacement=bound))
 
 
-#: How each formulation is planned; the first is the default.
-_PLANS: dict[str, Callable[[Analysis, Request], Plan]] = {
-    "curvature": schedule.plan,
-    "isometry": partial(joint_isometry.plan, curvature=_before_isometry),
-    "ruled": partial(ruled.plan, before=_before_ruled),
-}
-FORMULATIONS = tuple(_PLANS)
+TASK = Task(
+    {
+        "curvature": Formulation(
+            Options,
+            schedule.plan,
+            limits=("max_deviation", "max_strain", "target_curvature"),
+            search=search,
+        ),
+        "isometry": Formulation(
+            joint_isometry.Options,
+            partial(joint_isometry.plan, curvature=_before_isometry),
+            presets=("jiang2020",),
+            limits=("max_deviation", "max_strain"),
+            search=search,
+        ),
+        "ruled": Formulation(
+            ruled.Options,
+            partial(ruled.plan, before=_before_ruled),
+            limits=("max_deviation", "max_strain"),
+            search=count_strips,
+        ),
+    },
+    metrics,
+    analysis=Analysis,
+    pattern_metrics=flat_metrics,
+)

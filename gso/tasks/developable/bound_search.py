@@ -7,117 +7,93 @@ that meets the bound gives the smallest displacement.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
 from gso import metrics, parametrization
-from gso.errors import OptionError
 from gso.status import Status
-from gso.tasks.base import Analysis, Request, Runner, Solution
-from gso.tasks.developable import joint_isometry
+from gso.tasks.base import Analysis, Runner, Solution
+from gso.tasks.base import Options as BaseOptions
+from gso.tasks.developable import joint_isometry, ruled
 from gso.tasks.developable.options import DEVELOPABLE, Options
-from gso.tasks.developable.target import PROGRESS, of_curvature, of_strain, reach, strain_of
+from gso.tasks.developable.target import (
+    PROGRESS,
+    SearchRequest,
+    of_curvature,
+    of_strain,
+    reach,
+    strain_of,
+)
+from gso.tasks.request import Request
+
+R = TypeVar("R", bound=Request[BaseOptions])
 
 #: Weights tried in turn within a bound, until the strain is small enough.
 _HARDER = (1.0, 6.0, 36.0)
 
-#: Formulations that search themselves: "ruled" for the number of strips; it has no strain.
-_OWN = ("ruled",)
+
+def count_strips(run: Runner, request: Request[ruled.Options]) -> Solution:
+    """Solve for strips within given limits: the solve itself finds their number."""
+    request = _with_usable_start(run, request)
+    return run(replace(request, max_displacement=request.limits.max_deviation))
 
 
-def check_bounds(formulation: str, bounds: dict[str, float | None]) -> None:
-    """Raise an OptionError if bounds contradict each other or the formulation."""
-    if bounds["target_curvature"] is None:
-        return
-    if formulation != "curvature":
-        raise OptionError(
-            f"target_curvature belongs to the formulation 'curvature', not {formulation!r}"
-        )
-    for name in ("max_deviation", "max_strain"):
-        if bounds[name] is not None:
-            raise OptionError(f"give {name} or target_curvature, not both")
+def search(run: Runner, request: SearchRequest) -> Solution:
+    """Search for a result within given limits.
 
-
-def check_iterations(bounds: dict[str, float | None]) -> None:
-    """Raise an OptionError if bounds exclude a start with a limit on the iterations."""
-    for name in ("target_curvature", "max_strain"):
-        if bounds[name] is not None:
-            raise OptionError(
-                f"{name} takes many solves, which the iterations of a start would cut off; "
-                "leave one of them out"
-            )
-
-
-def search(
-    run: Runner,
-    request: Request,
-    bounds: dict[str, float | None],
-    unit: float,
-    *,
-    others: bool,
-) -> tuple[Solution, str]:
-    """Search for a result within given bounds.
-
-    If a bound on distance or strain is missed, "isometry" is tried too where that is allowed.
+    If a bound on distance or strain is missed, "isometry" is tried too where the user did not
+    name the formulation.
 
     Parameters
     ----------
     run : Runner
         Solves requests.
     request : Request
-        The request without bounds.
-    bounds : dict
-        "max_deviation" in the user's unit, "max_strain", "target_curvature"; None for none.
-    unit : float
-        Radius of the unit ball in the user's unit.
-    others : bool
-        Whether other formulations may be tried.
-
-    Returns
-    -------
-    solution, formulation
+        The request, in the solver's frame.
     """
-    analysis = run.analysis
-    target, strain = bounds["target_curvature"], bounds["max_strain"]
-    bound = bounds["max_deviation"]
-    bound = None if bound is None else bound / unit
-    free = replace(request, max_displacement=None)
-    asked = [free] if bound is None else [replace(request, max_displacement=bound), free]
-    if not run.usable_start(*asked):
-        request = replace(request, start=None)
-    if request.formulation in _OWN:
-        return run(replace(request, max_displacement=bound)), request.formulation
-    if target is not None:
-        return reach(run, request, of_curvature(analysis, target))[0], request.formulation
-    best: Any = None
-    least, formulation = np.inf, request.formulation
-    for tried in (request, *(_others(analysis, request) if others else ())):
-        if bound is not None:
-            solution, met = stay_within(run, tried, bound, strain)
-        else:
-            solution, met = reach(run, tried, of_strain(run, strain))  # type: ignore[arg-type]
-        if best is not None or not met:
-            value = _strain_left(run, solution)
-        if best is None or met or value < least:
-            best, formulation = solution, tried.formulation
-        if met:
-            break
-        least = min(least, value)
-    return best, formulation
+    analysis, limits = run.analysis, request.limits
+    bound, strain = limits.max_deviation, limits.max_strain
+    request = _with_usable_start(run, request)
+    if limits.target_curvature is not None:
+        return reach(run, request, of_curvature(analysis, limits.target_curvature))[0]
+
+    def attempt(request: SearchRequest) -> tuple[Solution, bool]:
+        if bound is None:
+            return reach(run, request, of_strain(run, strain or DEVELOPABLE))
+        return stay_within(run, request, bound, strain)
+
+    best, met = attempt(request)
+    other = None if met else _other(analysis, request)
+    if other is not None:
+        solution, met = attempt(other)
+        if met or _strain_left(run, solution) < _strain_left(run, best):
+            best = solution
+    return best
 
 
-def _others(analysis: Analysis, request: Request) -> list[Request]:
+def _with_usable_start(run: Runner, request: R) -> R:
+    """Return the request, without its start where that is not to be used."""
+    bound = request.limits.max_deviation
+    bounded = [] if bound is None else [replace(request, max_displacement=bound)]
+    return request if run.usable_start(*bounded, request) else replace(request, x0=None)
+
+
+def _other(analysis: Analysis, request: SearchRequest) -> SearchRequest | None:
     """Return a request for "isometry", if it is applicable.
 
-    It is for meshes that can be flattened, without hard constraints, B-splines or options of
-    another formulation than "curvature".
+    It is where the user did not name the formulation, for meshes that can be flattened, without
+    hard constraints, B-splines or options of another formulation than "curvature".
     """
-    usual = type(request.options) is Options and request.options.variables != "surface"
+    options = request.options
+    usual = type(options) is Options and options.variables != "surface"
     hard = any(part.hard for part in analysis.constraints.parts)
-    if not usual or hard or not parametrization.flattens(analysis.mesh):
-        return []
-    return [replace(request, formulation="isometry", options=joint_isometry.Options(), start=None)]
+    if request.formulation_given or not usual or hard:
+        return None
+    if not parametrization.flattens(analysis.mesh):
+        return None
+    other = request.with_options(joint_isometry.Options())
+    return replace(other, formulation="isometry", x0=None)
 
 
 def _strain_left(run: Runner, solution: Solution) -> float:
@@ -128,7 +104,7 @@ def _strain_left(run: Runner, solution: Solution) -> float:
 
 
 def stay_within(
-    run: Runner, request: Request, bound: float, strain: float | None
+    run: Runner, request: SearchRequest, bound: float, strain: float | None
 ) -> tuple[Solution, bool]:
     """Return the most developable result within a bound on the distance to the design.
 
@@ -145,12 +121,12 @@ def stay_within(
     limit = of_strain(run, DEVELOPABLE if strain is None else strain)
     if strain is None and not parametrization.flattens(run.analysis.mesh):
         limit = of_curvature(run.analysis, 0.0)
-    best: Any = None
+    best: Solution | None = None
     least = np.inf
     for weight in _HARDER:
         solution = run(replace(request, max_displacement=bound, weight_factor=weight))
         if solution.status in (Status.ALREADY_GOOD, Status.CANCELLED):
-            return _cancelled(best or solution, solution), True
+            return _ended(best or solution, solution), True
         value = limit.value(solution.points)
         if best is not None and not value < PROGRESS * least:
             break
@@ -159,13 +135,16 @@ def stay_within(
             break
     free = run(request)
     if free.status is Status.CANCELLED:
-        return _cancelled(best, free), True
-    if _distance(run.analysis, free) <= bound and (value := limit.value(free.points)) < least:
-        return free, limit.met(value)
-    return best, limit.met(least)
+        return _ended(best or free, free), True
+    if _distance(run.analysis, free) <= bound:
+        value = limit.value(free.points)
+        if value < least:
+            best, least = free, value
+    return best or free, limit.met(least)
 
 
-def _cancelled(best: Any, last: Any) -> Any:
+def _ended(best: Solution, last: Solution) -> Solution:
+    """Return the best solution, which is cancelled if the last one is."""
     if last.status is Status.CANCELLED:
         best.status = Status.CANCELLED
     return best

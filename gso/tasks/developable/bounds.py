@@ -11,18 +11,19 @@ from gso.constraints import Pins
 from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
-from gso.tasks.base import Request
 from gso.tasks.developable.analysis import Analysis
+from gso.tasks.options import Options
+from gso.tasks.request import Request
 from gso.typing import Array
 
 
-def radius(request: Request) -> float | None:
+def radius(request: Request[Options]) -> float | None:
     """Return the bound on the displacement, reduced by a tiny margin for rounding."""
     bound = request.max_displacement
     return None if bound is None else bound * (1.0 - 1e-7)
 
 
-def check_handles(analysis: Analysis, request: Request) -> None:
+def check_handles(analysis: Analysis, request: Request[Options]) -> None:
     """Raise if hard constraints are incompatible with `max_deviation`."""
     c, reach = analysis.constraints, request.max_displacement
     if reach is None:

@@ -34,11 +34,12 @@ from gso.mesh.normals import vertex_normals
 from gso.parametrization import orientation
 from gso.status import Status
 from gso.tasks import constrained, per_component
-from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.base import Plan, Stage
 from gso.tasks.developable import flat_image, spline_stage
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.developable.bounds import radius
 from gso.tasks.options import Options as BaseOptions
+from gso.tasks.request import Request
 from gso.typing import Array
 from gso.unknowns import Layout, Variables, ball_bounds, framed_displacements, free
 
@@ -139,7 +140,9 @@ class Options(BaseOptions):
 
 
 def plan(
-    analysis: Analysis, request: Request, curvature: Callable[[Analysis, Request], Plan]
+    analysis: Analysis,
+    request: Request[Options],
+    curvature: Callable[[Analysis, Request[Options]], Plan],
 ) -> Plan:
     """Plan the stages of the joint solve.
 
@@ -160,13 +163,13 @@ def plan(
     mesh, options, constraints = analysis.mesh, request.options, analysis.constraints
     spline = spline_stage.controls(analysis, request)
     _check_bound(analysis, request)
-    if request.start is None:
+    if request.x0 is None:
         begun, opened = mesh, analysis.opened
     else:
-        begun = mesh.replaced(request.start)
+        begun = mesh.replaced(request.x0)
         opened = parametrization.opened(begun)
     cut = opened.cut
-    own = spline is None and request.start is None and constraints.empty
+    own = spline is None and request.x0 is None and constraints.empty
     if own and measure.loss_gc_worst(mesh, scale=1.0) <= options.developable_below:
         return _unrolling(analysis, request, opened)
     levels = _levels(analysis, request, begun)
@@ -175,7 +178,7 @@ def plan(
     start = [*resample_like(levels, begun), begun][0].vertices
     if not constraints.empty:
         before = [constrained.approach(analysis, start)]
-    elif request.start is None and options.begin == "curvature":
+    elif request.x0 is None and options.begin == "curvature":
         first = curvature(analysis, request)
         before, start = list(first.stages), first.start.reshape(-1, 3)
     enter = partial(flat_image.with_flat, levels[0] if levels else mesh, cut)
@@ -193,13 +196,13 @@ def plan(
         result_notes=partial(flat_image.notes, mesh, cut),
         spline=spline,
         cold_start=None
-        if request.start is None
+        if request.x0 is None
         else partial(flat_image.cold_start, [*levels, mesh], cut),
         cut=cut,
     )
 
 
-def _check_bound(analysis: Analysis, request: Request) -> None:
+def _check_bound(analysis: Analysis, request: Request[Options]) -> None:
     """Raise if constraints or options are incompatible with `max_deviation`."""
     if request.max_displacement is None:
         return
@@ -217,7 +220,9 @@ def _check_bound(analysis: Analysis, request: Request) -> None:
         )
 
 
-def _unrolling(analysis: Analysis, request: Request, opened: parametrization.Opened) -> Plan:
+def _unrolling(
+    analysis: Analysis, request: Request[Options], opened: parametrization.Opened
+) -> Plan:
     """Plan to keep the design fixed and solve for its flat image."""
     mesh, options, cut = analysis.mesh, request.options, opened.cut
     flat = flat_image.initial(flat_image.opened(mesh, cut, mesh.vertices))
@@ -244,7 +249,7 @@ def _unrolling(analysis: Analysis, request: Request, opened: parametrization.Ope
     )
 
 
-def _levels(analysis: Analysis, request: Request, begun: Mesh) -> list[Mesh]:
+def _levels(analysis: Analysis, request: Request[Options], begun: Mesh) -> list[Mesh]:
     """Return the coarser copies of the design on which to solve first, coarsest first.
 
     There are none if the result of the formulation "curvature" is the start, or if a warm start
@@ -254,7 +259,7 @@ def _levels(analysis: Analysis, request: Request, begun: Mesh) -> list[Mesh]:
     grid = analysis.mesh.grid_index is not None and analysis.constraints.empty
     if not (grid and o.coarse_size):
         return []
-    if request.start is None:
+    if request.x0 is None:
         climb = o.begin == "design" and o.variables == "free"
         return coarser(analysis.mesh, o.coarse_size) if climb else []
     flat = parametrization.begin(begun).flat
@@ -263,7 +268,7 @@ def _levels(analysis: Analysis, request: Request, begun: Mesh) -> list[Mesh]:
 
 
 def _chain(
-    analysis: Analysis, request: Request, levels: list[Mesh], cut: Cut | None = None
+    analysis: Analysis, request: Request[Options], levels: list[Mesh], cut: Cut | None = None
 ) -> list[Stage]:
     """Plan the stages, coarse to fine, with falling fairness on each grid.
 
@@ -271,7 +276,7 @@ def _chain(
     """
     options = request.options
     weights = [options.w_fairness]
-    while request.start is None and weights[0] < 0.999 * options.w_fairness_start:
+    while request.x0 is None and weights[0] < 0.999 * options.w_fairness_start:
         weights.insert(0, _FALL * weights[0])
     stages = []
     for below, mesh in zip([None, *levels], levels, strict=False):
@@ -290,7 +295,11 @@ def _chain(
 
 
 def _stage(
-    analysis: Analysis, request: Request, mesh: Mesh, w_fairness: float, cut: Cut | None = None
+    analysis: Analysis,
+    request: Request[Options],
+    mesh: Mesh,
+    w_fairness: float,
+    cut: Cut | None = None,
 ) -> Stage:
     layout, bound = flat_image.layout_of(mesh, cut), radius(request)
     sheet = mesh if cut is None else cut.mesh

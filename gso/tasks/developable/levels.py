@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gso.constraints import Compiled, Pins
+from gso.constraints.equations import Part
 from gso.errors import MeshError
 from gso.hierarchy import (
     Prolongation,
@@ -19,10 +20,11 @@ from gso.hierarchy import (
     thinned,
 )
 from gso.mesh import Mesh
-from gso.tasks.base import Request
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.developable.bounds import inside
+from gso.tasks.developable.options import Options
 from gso.tasks.evaluation import parted
+from gso.tasks.request import Request
 from gso.typing import Array, Ints
 
 #: Vertices of a mesh to those of the next coarser one.
@@ -76,7 +78,7 @@ class Level:
         return inside(moved, self.mesh, bound).ravel()
 
 
-def levels(analysis: Analysis, request: Request) -> list[Level]:
+def levels(analysis: Analysis, request: Request[Options]) -> list[Level]:
     """Return the resolutions at which a design is solved, coarsest first, its own last.
 
     It is the only one where there are no others: on small meshes, with several components that are
@@ -84,7 +86,7 @@ def levels(analysis: Analysis, request: Request) -> list[Level]:
     constraints that coarser meshes cannot have.
     """
     mesh, constraints = analysis.mesh, analysis.constraints
-    start = request.start
+    start = request.x0
     own = Level(mesh, mesh if start is None else mesh.replaced(start), constraints)
     begun = start is not None
     free = constraints.empty
@@ -100,15 +102,15 @@ def levels(analysis: Analysis, request: Request) -> list[Level]:
     return _thinned(own) if len(mesh.vertices) > least else [own]
 
 
-def _resampled(own: Level, request: Request) -> list[Level]:
+def _resampled(own: Level, request: Request[Options]) -> list[Level]:
     """Return the levels of a grid."""
     o = request.options
     # A warm start has the large displacements already, which the coarsest grids are for.
-    meshes = coarser(own.mesh, o.coarse_size if request.start is None else o.free_size)
+    meshes = coarser(own.mesh, o.coarse_size if request.x0 is None else o.free_size)
     # A warm start keeps its fine detail: only the displacements found on the coarser grids are
     # interpolated and added to it. They correct its low-frequency error, which would take many
     # iterations on the fine grid, at a fraction of the cost.
-    begins = meshes if request.start is None else resample_like(meshes, own.begin)
+    begins = meshes if request.x0 is None else resample_like(meshes, own.begin)
     found = []
     wanted = _vertices(own.constraints.parts)
     for mesh, begin in zip(meshes, begins, strict=True):
@@ -152,7 +154,7 @@ def _thinned(own: Level) -> list[Level]:
     return [*found[-1:], *linked[::-1]] if found else [own]
 
 
-def _vertices(parts: Sequence) -> Ints:
+def _vertices(parts: Sequence[Part]) -> Ints:
     ids = [p.vertices.ravel() for p in parts]
     return np.unique(np.concatenate([np.zeros(0, np.int64), *ids]))
 

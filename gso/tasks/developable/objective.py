@@ -24,10 +24,10 @@ from gso.hierarchy import resample
 from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
 from gso.tasks import per_component
-from gso.tasks.base import Request
 from gso.tasks.developable.analysis import Analysis, Shape, own_bending
 from gso.tasks.developable.options import Options
 from gso.tasks.evaluation import parted
+from gso.tasks.request import Request
 from gso.typing import Array
 
 #: Mean |K| and mean squared bending of a typical design, for which weights are quoted.
@@ -51,7 +51,7 @@ def adapted_weights(options: Options, curved: Any, bending: Any) -> tuple[Any, A
     return curvature, options.w_fairness * (TYPICAL_BENDING / (bending + 1.0)) ** 0.5
 
 
-def objective(analysis: Analysis, request: Request, mesh: Mesh) -> list[Weighted]:
+def objective(analysis: Analysis, request: Request[Options], mesh: Mesh) -> list[Weighted]:
     """Build the terms on the design or on a coarser copy of it, without constraints.
 
     Several components are weighted each for its own size and curvature.
@@ -69,21 +69,18 @@ def objective(analysis: Analysis, request: Request, mesh: Mesh) -> list[Weighted
     return per_component.objective(mesh, make)
 
 
-def _on_triangles(request: Request, analysis: Analysis) -> Request:
+def _on_triangles(request: Request[Options], analysis: Analysis) -> Request[Options]:
     """Return a request with the weights for a coarser mesh of triangles."""
     o = request.options
     fairness = 1.0 if analysis.mesh.has_triangles else _QUADS
     curvature = 1.0
     if analysis.constraints.empty:
         curvature, fairness = COARSE_CURVATURE, COARSE_FAIRNESS * fairness
-    weights = {
-        "w_curvature": curvature * o.w_curvature,
-        "w_fairness": fairness * o.w_fairness,
-    }
-    return replace(request, options=replace(o, **weights))
+    options = replace(o, w_curvature=curvature * o.w_curvature, w_fairness=fairness * o.w_fairness)
+    return replace(request, options=options)
 
 
-def _terms(request: Request, shape: Shape, curved: float, mesh: Mesh) -> list[Weighted]:
+def _terms(request: Request[Options], shape: Shape, curved: float, mesh: Mesh) -> list[Weighted]:
     """Build the terms of one component, on its own mesh or on a coarser copy of it."""
     o = request.options
     w_curvature, w_fairness = adapted_weights(o, max(curved, 1e-3), shape.bending)

@@ -21,9 +21,10 @@ from gso.mesh.normals import vertex_normals
 from gso.ruled.conditions import Conditions
 from gso.ruled.strip_mirror import Mirror
 from gso.status import Progress, Status
-from gso.tasks.base import Plan, Request, Solution
+from gso.tasks.base import Plan, Solution
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.options import Options as BaseOptions
+from gso.tasks.request import Request
 from gso.typing import Array
 from gso.unknowns import Layout
 
@@ -103,7 +104,11 @@ class Options(BaseOptions):
         return self if self.min_radius is None else replace(self, min_radius=self.min_radius / unit)
 
 
-def plan(analysis: Analysis, request: Request, before: Callable[[Analysis, Request], Plan]) -> Plan:
+def plan(
+    analysis: Analysis,
+    request: Request[Options],
+    before: Callable[[Analysis, Request[Options]], Plan],
+) -> Plan:
     """Plan the solve of `before` where its result is wanted, and then that for the strips.
 
     Raises
@@ -132,9 +137,9 @@ def plan(analysis: Analysis, request: Request, before: Callable[[Analysis, Reque
             "itself and has no handles; cut it open, or take 'curvature'"
         )
     made = replace(request, max_displacement=None)
-    if request.start is not None:
-        first = before(analysis, replace(made, start=None))
-        first = replace(first, start=request.start.ravel(), stages=())
+    if request.x0 is not None:
+        first = before(analysis, replace(made, x0=None))
+        first = replace(first, start=request.x0.ravel(), stages=())
     elif "curvature" in request.options.starts or not compiled.empty:
         first = before(analysis, made)
     else:
@@ -143,7 +148,10 @@ def plan(analysis: Analysis, request: Request, before: Callable[[Analysis, Reque
 
 
 def _converted(
-    analysis: Analysis, request: Request, before: Solution, tell: Callable[[Progress], bool]
+    analysis: Analysis,
+    request: Request[Options],
+    before: Solution,
+    tell: Callable[[Progress], bool],
 ) -> Solution:
     """Solve for the strips from the normals of the design and of another surface."""
     from gso.ruled.domain import Domain
@@ -161,7 +169,7 @@ def _converted(
     domain = Domain(mesh, parametrization.begin(mesh).flat)
     starts = {"design": domain.normals} if "design" in options.starts else {}
     if not np.array_equal(before.points, near):
-        name = "curvature" if request.start is None else "x0"
+        name = "curvature" if request.x0 is None else "x0"
         starts[name] = vertex_normals(analysis.mesh.replaced(before.points))
     bound = request.max_displacement
     bounded = bound is not None or options.max_crease is not None

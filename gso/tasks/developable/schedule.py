@@ -17,7 +17,7 @@ from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
 from gso.status import Status
 from gso.tasks import base, constrained
-from gso.tasks.base import Plan, Request, Stage
+from gso.tasks.base import Plan, Stage
 from gso.tasks.developable import spline_stage
 from gso.tasks.developable.analysis import FLAT_CURVATURE, Analysis
 from gso.tasks.developable.bounds import check_handles, inside, offset_bounds, radius
@@ -25,6 +25,7 @@ from gso.tasks.developable.levels import FREE_VERTICES, Level, levels, pinned_on
 from gso.tasks.developable.objective import objective
 from gso.tasks.developable.options import Options
 from gso.tasks.imposed import Imposed
+from gso.tasks.request import Request
 from gso.typing import Array
 from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets, tangents
 
@@ -47,21 +48,21 @@ _SWEEPS = 3
 _LOOSE = 1e-3
 
 
-def plan(analysis: Analysis, request: Request) -> Plan:
+def plan(analysis: Analysis, request: Request[Options]) -> Plan:
     """Plan the stages of the formulation "curvature"."""
     mesh, options, constraints = analysis.mesh, request.options, analysis.constraints
     notes: list[str] = []
     check_handles(analysis, request)
     if not mesh.stars:
         raise _nothing_inside(mesh)
-    start = mesh.vertices if request.start is None else request.start
+    start = mesh.vertices if request.x0 is None else request.x0
     curved = analysis.shape.curvature
     spline = spline_stage.controls(analysis, request)
     if spline is not None:
         # The spline stage starts from the result of the usual solve.
         request = replace(request, options=replace(options, variables="normal"))
     good = curved <= options.developable_below and spline is None
-    if good and request.start is None and constraints.empty:
+    if good and request.x0 is None and constraints.empty:
         return Plan(_layout(mesh), mesh.vertices.ravel(), status=Status.ALREADY_GOOD)
     smooth = analysis.shape.smooth
     left = curved if smooth is mesh else measure.loss_gc_mean(smooth, scale=1.0)
@@ -91,7 +92,7 @@ def plan(analysis: Analysis, request: Request) -> Plan:
         )
     begin = coarse[0].begin.vertices if coarse else inside(start, mesh, radius(request))
     free_to_return = constraints.empty
-    free_to_return &= request.start is None or request.max_displacement is None
+    free_to_return &= request.x0 is None or request.max_displacement is None
     fallback = start.ravel()
     if spline is not None:
         fallback = spline_stage.closest(_layout(mesh), mesh, spline, fallback)
@@ -102,7 +103,7 @@ def plan(analysis: Analysis, request: Request) -> Plan:
         notes=notes,
         fallback=fallback if free_to_return else None,
         spline=spline,
-        cold_start=None if request.start is None else mesh.vertices.ravel,
+        cold_start=None if request.x0 is None else mesh.vertices.ravel,
         edited=edited,
     )
 
@@ -133,12 +134,12 @@ def _unknowns(kind: str, mesh: Mesh, options: Options, coordinates: Array) -> Va
     return normal_offsets(layout, points, normals)
 
 
-def _stages(analysis: Analysis, request: Request, coarser_meshes: int) -> list[Stage]:
+def _stages(analysis: Analysis, request: Request[Options], coarser_meshes: int) -> list[Stage]:
     """Plan the stages on the design's own vertices."""
     o, mesh, constraints = request.options, analysis.mesh, analysis.constraints
     items = objective(analysis, request, mesh)
     bounds = offset_bounds(mesh, radius(request), constraints.hard_ids)
-    cold = request.start is None and mesh.grid_index is None and not coarser_meshes
+    cold = request.x0 is None and mesh.grid_index is None and not coarser_meshes
     falling = _falling(o) if cold else (Absolute(o.eps),)
     # On small meshes free vertices are fast enough, and offsets alone cannot meet lengths.
     quick = len(mesh.vertices) > _QUICK and not _repeated(constraints)
@@ -160,7 +161,7 @@ def _stages(analysis: Analysis, request: Request, coarser_meshes: int) -> list[S
         )
 
     final = falling[-1:]
-    most = _iterations(o, coarser_meshes, request.start is not None)
+    most = _iterations(o, coarser_meshes, request.x0 is not None)
     if request.max_displacement is not None:
         # Only offsets along normals have bounds. The second stage uses updated normals.
         return [stage("normal", o.iterations, losses) for losses in (falling, final)]
@@ -177,10 +178,10 @@ def _stages(analysis: Analysis, request: Request, coarser_meshes: int) -> list[S
         last = stage("free" if bound else o.variables, o.iterations, final)
         if not bound:
             return [first, last]
-        start = mesh.vertices if request.start is None else request.start
+        start = mesh.vertices if request.x0 is None else request.x0
         return [constrained.approach(analysis, start), first, last]
     last = stage(o.variables, most, falling)
-    if o.variables == "free" and request.start is not None:
+    if o.variables == "free" and request.x0 is not None:
         # Normal offsets remove most of the remaining energy at a third of the cost.
         first = stage("normal", _OFFSETS_FIRST, falling)
         return [replace(first, tolerance=_LOOSE), last]
@@ -214,7 +215,9 @@ def _iterations(options: Options, coarser_meshes: int, begun: bool) -> int:
     return max(most >> max(coarser_meshes - 3, 0), min(most, 5))
 
 
-def _coarse_stage(analysis: Analysis, request: Request, level: Level, number: int) -> Stage:
+def _coarse_stage(
+    analysis: Analysis, request: Request[Options], level: Level, number: int
+) -> Stage:
     """Plan the stage of a coarser mesh, with free vertices on the coarsest.
 
     So are those of the next ones up to `free_size` on grids, and up to `FREE_VERTICES` on others;
@@ -222,7 +225,7 @@ def _coarse_stage(analysis: Analysis, request: Request, level: Level, number: in
     are not positions of vertices. With `max_displacement` all use normal offsets.
     """
     o, mesh = request.options, level.mesh
-    first, begun = number == 0, request.start is not None
+    first, begun = number == 0, request.x0 is not None
     grid = mesh.grid_shape
     small = max(grid) <= o.free_size if grid else len(mesh.vertices) <= FREE_VERTICES
     iterations = o.coarse_iterations if first else o.between_iterations

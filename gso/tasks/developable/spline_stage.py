@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.spline.fit import fitting_controls, grid_of
-from gso.tasks.base import Analysis, Array, Request, Stage
+from gso.tasks.base import Analysis, Stage
+from gso.tasks.developable.options import Options
+from gso.tasks.request import Request
+from gso.typing import Array
 from gso.unknowns import Layout, Variables, spline_surface
 
+if TYPE_CHECKING:
+    from gso.tasks.developable.joint_isometry import Options as IsometryOptions
 
-def controls(analysis: Analysis, request: Request) -> tuple[int, int] | None:
+
+def controls(
+    analysis: Analysis, request: Request[Options | IsometryOptions]
+) -> tuple[int, int] | None:
     """Return the control points along both sides of the grid; None when no spline is wanted.
 
     Raises

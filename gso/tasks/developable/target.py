@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -15,9 +15,15 @@ from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.status import Status
-from gso.tasks.base import Analysis, Request, Runner, Solution
+from gso.tasks.base import Analysis, Runner, Solution
+from gso.tasks.developable import joint_isometry
+from gso.tasks.developable.options import Options
 from gso.tasks.evaluation import largest_strain
+from gso.tasks.request import Request
 from gso.typing import Array
+
+#: Requests of the formulations whose weights are searched.
+SearchRequest: TypeAlias = Request["Options | joint_isometry.Options"]
 
 #: Curvature threshold above the curvature of every design.
 _ANY = 1e300
@@ -109,7 +115,7 @@ def strain_of(run: Runner, points: Array) -> float:
     return largest_strain(surface, _pattern(run, points))
 
 
-def reach(run: Runner, request: Request, bound: Bound) -> tuple[Solution, bool]:
+def reach(run: Runner, request: SearchRequest, bound: Bound) -> tuple[Solution, bool]:
     """Search for the weight that just meets a bound.
 
     The value falls with the weight, but not monotonically. The search is a regula falsi on
@@ -128,14 +134,14 @@ def reach(run: Runner, request: Request, bound: Bound) -> tuple[Solution, bool]:
     free = run.analysis.constraints.empty
     if bound.met(start) and free:
         options = replace(request.options, developable_below=_ANY)
-        return run(replace(request, options=options, start=None)), True
+        return run(replace(request, options=options, x0=None)), True
     found = _Found(run, bound)
     if free:
         found.missed = (design, start)
     weighed = replace(request, options=_patient(request.options))
     weight, low, high = 1.0, 0.0, np.inf
     value_low = value_high = np.nan
-    last, least, obstacles = None, np.inf, 0
+    least, obstacles = np.inf, 0
     for _ in range(_SOLVES):
         last = run(replace(weighed, weight_factor=weight))
         if last.status is Status.CANCELLED:
@@ -152,7 +158,7 @@ def reach(run: Runner, request: Request, bound: Bound) -> tuple[Solution, bool]:
             low, value_low = weight, value
             # Lost curvature or strain returns slowly: continue from a result that has more.
             # Where more weight changes nothing, begin again from the request's start.
-            weighed = replace(weighed, start=request.start if stuck else last.points)
+            weighed = replace(weighed, x0=request.x0 if stuck else last.points)
         obstacles = 0 if value < PROGRESS * least else obstacles + 1
         least = min(least, value)
         if found.best is None and obstacles == _OBSTACLES:
@@ -174,22 +180,22 @@ class _Found:
 
     run: Runner
     bound: Bound
-    best: Any = None
+    best: Solution | None = None
     value: float = np.inf
-    moved: float = np.inf
+    displacement: float = np.inf
     missed: tuple[Array, float] | None = None
-    closest: tuple[Any, float] = field(default=(None, np.inf))
+    closest: tuple[Solution | None, float] = (None, np.inf)
 
-    def add(self, solution: Any, value: float) -> bool:
+    def add(self, solution: Solution, value: float) -> bool:
         """Record a result; return whether it is too far from the design."""
         u = solution.points - self.run.analysis.mesh.vertices
-        moved = float(np.sqrt((u * u).sum(axis=1)).max(initial=0.0))
-        if not (np.isfinite(moved) and moved <= FARTHEST):
+        far = float(np.sqrt((u * u).sum(axis=1)).max(initial=0.0))
+        if not (np.isfinite(far) and far <= FARTHEST):
             return True
         if self.bound.met(value):
             mean = float(np.abs(u).mean())
-            if mean < self.moved:
-                self.best, self.value, self.moved = solution, value, mean
+            if mean < self.displacement:
+                self.best, self.value, self.displacement = solution, value, mean
         else:
             if self.missed is None or value < self.missed[1]:
                 self.missed = (solution.points, value)
@@ -197,7 +203,7 @@ class _Found:
                 self.closest = (solution, value)
         return False
 
-    def chosen(self, last: Any) -> Any:
+    def chosen(self, last: Solution) -> Solution:
         """Return the best result, with its status."""
         best = self.best
         if best is None:
@@ -232,13 +238,11 @@ class _Found:
         blocks = {"surface": points}
         if "flat" in solution.blocks:
             blocks["flat"] = _pattern(self.run, points).flat
-        return self.run.moved(solution, blocks)
+        return self.run.evaluate(solution, blocks)
 
 
-def _patient(options: Any) -> Any:
+def _patient(options: Options | joint_isometry.Options) -> Options | joint_isometry.Options:
     """Return options with enough iterations and, except for B-splines, free vertices."""
-    if not hasattr(options, "coarse_iterations"):
-        return options
     changes: dict[str, Any] = {
         "iterations": max(options.iterations, _ITERATIONS),
         "coarse_iterations": max(options.coarse_iterations, _COARSE_ITERATIONS),

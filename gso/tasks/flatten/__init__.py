@@ -23,7 +23,7 @@ from gso.constraints import Compiled
 from gso.hierarchy import coarser
 from gso.mesh import Mesh
 from gso.tasks import constrained
-from gso.tasks.base import Analysis, Plan, Request, Stage
+from gso.tasks.base import Analysis, Formulation, Plan, Stage, Task
 from gso.tasks.developable.flat_image import length_notes
 from gso.tasks.flatten.options import Options
 from gso.tasks.flatten.stages import (
@@ -34,18 +34,14 @@ from gso.tasks.flatten.stages import (
     planned_stages,
     strain_stage,
 )
+from gso.tasks.request import Request
 from gso.typing import Array
 from gso.unknowns import Layout
 
-FORMULATIONS = ("strain", "lengths", "isometry", "minimax")
-#: The formulation that a preset belongs to.
-IMPLIES = {"jiang2020": "isometry"}
-BLOCK = "flat"
-
-__all__ = ["BLOCK", "FORMULATIONS", "IMPLIES", "Options", "bent", "metrics", "plan"]
+__all__ = ["TASK", "Options", "bent"]
 
 
-def plan(analysis: Analysis, request: Request) -> Plan:
+def plan(analysis: Analysis, request: Request[Options]) -> Plan:
     """Plan the stages of the solve, from an image without inverted triangles.
 
     Raises
@@ -62,7 +58,7 @@ def plan(analysis: Analysis, request: Request) -> Plan:
         levels[0], iterations=options.relax_iterations, doubtful=opened.doubtful
     )
     notes = [*opened.notes, *_remarks(mesh, start.level)]
-    given, refused = parametrization.given(mesh, request.start)
+    given, refused = parametrization.given(mesh, request.x0)
     typical = max(start.level, SMALLEST_LEVEL)
     if given is None:
         planned = planned_stages(request, levels, typical)
@@ -102,7 +98,7 @@ def _notes(opened: parametrization.Opened, coordinates: Array) -> list[str]:
     return length_notes(surface, coordinates.reshape(-1, 2))
 
 
-def _constrained(analysis: Analysis, request: Request, stages: list[Stage]) -> list[Stage]:
+def _constrained(analysis: Analysis, request: Request[Options], stages: list[Stage]) -> list[Stage]:
     """Plan stages under constraints: first soft with growing weight, then as they are given."""
     even = strain_stage(replace(request.options, norm="l2"), analysis.mesh, 1.0)
     steps = constrained.gradual(analysis.constraints, replace(even, iterations=30))
@@ -161,3 +157,15 @@ def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[s
         "flipped_cells": float(measure.flips(mesh, flat)),
     }
     return {name: value for name, value in out.items() if not np.isnan(value)}
+
+
+TASK = Task(
+    {
+        "strain": Formulation(Options, plan),
+        "lengths": Formulation(Options, plan),
+        "isometry": Formulation(Options, plan, presets=("jiang2020",)),
+        "minimax": Formulation(Options, plan),
+    },
+    metrics,
+    flat=True,
+)

@@ -25,9 +25,10 @@ from gso.energy.losses import Absolute
 from gso.mesh import Mesh
 from gso.parametrization import orientation
 from gso.tasks import per_component
-from gso.tasks.base import Request, Stage, same
+from gso.tasks.base import Stage, same
 from gso.tasks.evaluation import parted
 from gso.tasks.flatten.options import Options
+from gso.tasks.request import Request
 from gso.typing import Array
 from gso.unknowns import Layout, free
 
@@ -51,7 +52,7 @@ _W_COLLAPSE = 3e-3
 _UNSQUEEZE = (1e-2, 1e-3)
 
 
-def planned_stages(request: Request, levels: list[Mesh], level: float) -> list[Stage]:
+def planned_stages(request: Request[Options], levels: list[Mesh], level: float) -> list[Stage]:
     """Plan coarse-to-fine stages, the last of which has the objective of the formulation."""
     options, mesh = request.options, levels[-1]
     even = options if options.norm != "l1" else replace(options, norm="mixed")

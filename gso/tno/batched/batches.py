@@ -7,47 +7,51 @@ import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
 from gso import tasks
 from gso.constraints import Compiled
 from gso.errors import ConvergenceWarning, GSOError, OptionError
 from gso.linalg import blas_threads
-from gso.mesh import Mesh
-from gso.pipeline.judgement import judged, requirements
-from gso.pipeline.normalise import Canonical
+from gso.pipeline.case import Case
+from gso.pipeline.judgement import conclude
 from gso.pipeline.run import Run
-from gso.pipeline.user_result import packed
 from gso.result import Result
-from gso.tasks.base import Options, Plan, Request
+from gso.tasks.base import Options, Plan
+from gso.tasks.request import Request, check
 from gso.tno.batched import stage_groups
 from gso.tno.batched.gathered import TooLarge, Unbatchable
-from gso.tno.batched.stage_groups import Minimise
-from gso.tno.optimize import check, optimize
+from gso.tno.batched.stage_groups import Minimise, Structure
+from gso.tno.optimize import optimize
+from gso.typing import MeshLike
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What every surface of a batch is solved for, with checked options."""
+class BatchRequest:
+    """What is asked of a batch.
 
-    task: str
-    formulation: str
-    options: Options
+    Attributes
+    ----------
+    request : Request
+        What every surface is solved for.
+    device : str
+        PyTorch's name of the device that minimises.
+    """
+
+    request: Request[Options]
     device: str
-    verdict: bool
 
 
 #: Formulations whose stages can be solved in batches, by task.
 FORMULATIONS = {"developable": ("curvature",), "flatten": ("strain", "lengths")}
 
 
-def asked(
+def check_batch(
     task: str = "developable",
     formulation: str | None = None,
-    options: Any = None,
+    options: str | Options | None = None,
     device: str = "cpu",
     verdict: bool = False,
-) -> Asked:
+) -> BatchRequest:
     """Check what a batch is asked for, but for its device.
 
     Raises
@@ -55,22 +59,20 @@ def asked(
     OptionError
         Something is unknown, or has no batched solve.
     """
-    _, chosen, settings = check(task, formulation, options)
-    if chosen not in FORMULATIONS.get(task, ()):
+    request = check(task, formulation, options, verdict=verdict)
+    if request.formulation not in FORMULATIONS.get(task, ()):
         there = "; ".join(f"{name}: {', '.join(some)}" for name, some in FORMULATIONS.items())
         raise OptionError(
-            f"task {task!r} with formulation {chosen!r} is not solved in batches ({there} are); "
-            "use gso.tno.optimize_many"
+            f"task {task!r} with formulation {request.formulation!r} is not solved in batches "
+            f"({there} are); use gso.tno.optimize_many"
         )
-    return Asked(task, chosen, settings, str(device), verdict)
+    return BatchRequest(request, str(device))
 
 
 @dataclass
 class _Planned:
     """One surface that has been planned, and the seconds that this took."""
 
-    design: Mesh
-    frame: Canonical
     run: Run
     plan: Plan
     seconds: float
@@ -80,36 +82,33 @@ class _Planned:
 class _Group:
     """Surfaces whose stages have one structure, with their places among the designs."""
 
-    structure: list[Any]
+    structure: Structure
     indices: list[int]
     planned: list[_Planned]
 
 
 def solve_batch(
-    asked: Asked, designs: Sequence[Any], minimise: Minimise
+    batch: BatchRequest, designs: Sequence[MeshLike], minimise: Minimise
 ) -> list[Result | GSOError]:
     """Solve designs in one batch for each structure that their stages have."""
-    out: list[Any] = [None] * len(designs)
+    out: dict[int, Result | GSOError] = {}
     groups: list[_Group] = []
-    with blas_threads(asked.options.threads):
+    with blas_threads(batch.request.options.threads):
         for index, given in enumerate(designs):
             with suppress(Unbatchable, GSOError):
-                _grouped(groups, index, _planned(asked, given))
+                _add_to_group(groups, index, _plan(batch.request, given))
         for group in groups:
-            try:
-                found = _solve_group(group.planned, asked, minimise)
-            except (Unbatchable, GSOError):
-                continue
-            for index, result in zip(group.indices, found, strict=True):
-                out[index] = result
+            with suppress(Unbatchable, GSOError):
+                found = _solve_group(group.planned, batch, minimise)
+                out |= zip(group.indices, found, strict=True)
         for index, given in enumerate(designs):
-            if out[index] is None:
+            if index not in out:
                 # This also finds out which surface an error is about.
-                out[index] = _solve_alone(asked, given)
-    return out
+                out[index] = _solve_alone(batch.request, given)
+    return [out[index] for index in range(len(designs))]
 
 
-def _grouped(groups: list[_Group], index: int, planned: _Planned) -> None:
+def _add_to_group(groups: list[_Group], index: int, planned: _Planned) -> None:
     """Add a surface to the group of its structure."""
     structure = stage_groups.structure(planned.plan)
     for group in groups:
@@ -120,7 +119,7 @@ def _grouped(groups: list[_Group], index: int, planned: _Planned) -> None:
     groups.append(_Group(structure, [index], [planned]))
 
 
-def _planned(asked: Asked, given: Any) -> _Planned:
+def _plan(request: Request[Options], given: MeshLike) -> _Planned:
     """Plan the solve of a surface."""
     from gso.io import as_mesh
 
@@ -128,16 +127,12 @@ def _planned(asked: Asked, given: Any) -> _Planned:
     design = as_mesh(given)
     if design.grid_index is None:
         raise Unbatchable
-    frame, module = Canonical(design), tasks.get(asked.task)
-    flat = getattr(module, "BLOCK", "surface") == "flat"
-    analysis = tasks.analyse(module, frame.mesh, Compiled(flat=flat))
-    run = Run(module, analysis)
-    request = Request(asked.options.in_unit(frame.frame.scale), asked.formulation)
-    plan = module.plan(analysis, request)
-    return _Planned(design, frame, run, plan, time.perf_counter() - clock)
+    run = Run(Case(request, design, Compiled(flat=tasks.get(request.task).flat)))
+    plan = run.plan(run.case.solver_request)
+    return _Planned(run, plan, time.perf_counter() - clock)
 
 
-def _solve_alone(asked: Asked, given: Any) -> Result | GSOError:
+def _solve_alone(request: Request[Options], given: MeshLike) -> Result | GSOError:
     """Solve a surface by itself."""
     try:
         with warnings.catch_warnings():
@@ -145,48 +140,43 @@ def _solve_alone(asked: Asked, given: Any) -> Result | GSOError:
             warnings.simplefilter("ignore", ConvergenceWarning)
             return optimize(
                 given,
-                task=asked.task,
-                formulation=asked.formulation,
-                options=asked.options,
-                verdict=asked.verdict,
+                task=request.task,
+                formulation=request.formulation,
+                options=request.options,
+                verdict=request.verdict,
             )
     except GSOError as error:
         return error
 
 
-def _solve_group(group: list[_Planned], asked: Asked, minimise: Minimise) -> list[Result]:
+def _solve_group(group: list[_Planned], batch: BatchRequest, minimise: Minimise) -> list[Result]:
     """Solve surfaces whose stages have one structure, in halves where memory is short."""
     clock = time.perf_counter()
     plans, half = [planned.plan for planned in group], len(group) // 2
     try:
-        reached, iterations, timings = stage_groups.solve(
-            plans, asked.options.method, f"blocks ({asked.device})", minimise
+        states, iterations, timings = stage_groups.solve(
+            plans, batch.request.options.method, f"blocks ({batch.device})", minimise
         )
     except TooLarge:
         if not half:
             # It is then solved by itself, on the processor.
             raise Unbatchable from None
-        reached = []
-    if not reached:
+        states = []
+    if not states:
         return [
             result
             for part in (group[:half], group[half:])
-            for result in _solve_group(part, asked, minimise)
+            for result in _solve_group(part, batch, minimise)
         ]
     each = (time.perf_counter() - clock) / len(group)
     out = []
-    for planned, state, count in zip(group, reached, iterations, strict=True):
+    for planned, state, count in zip(group, states, iterations, strict=True):
         clock = time.perf_counter()
         run = planned.run
         run.iterations, run.history = count, state.minimum.history
-        for phase, seconds in timings.as_dict().items():
-            setattr(run.timings, phase, seconds / len(group))
+        run.timings = timings.scaled(1.0 / len(group))
         run.timings.setup += planned.seconds
-        solution = run.concluded(planned.plan, state)
-        result = packed(asked.task, asked.formulation, planned.design, planned.frame, solution, run)
-        if asked.verdict:
-            scale = planned.frame.frame.scale
-            result = judged(result, requirements(planned.frame.mesh, Compiled(), scale))
+        result = conclude(run, run.conclude(planned.plan, state))
         result.seconds["total"] = planned.seconds + each + time.perf_counter() - clock
         out.append(result)
     return out

@@ -79,7 +79,7 @@ def _solve(parts: Sequence[Gathered], device: torch.device) -> list[Solved]:
     for part in parts:
         own = slice(begin, begin + len(part))
         begin = own.stop
-        share = Timings(**{k: v * len(part) / total for k, v in timings.as_dict().items()})
+        share = timings.scaled(len(part) / total)
         x, at, energy, step = (a[own] for a in whole)
         value, code, iterations = (a[own] for a in flat)
         by_term = tuple({name: each[own] for name, each in energies.items()} for energies in found)

@@ -15,7 +15,7 @@ from gso.executors import Executor, Item, ProcessExecutor, open_executor
 from gso.executors.base import processors, useful_workers
 from gso.result import Result
 from gso.tno.batched import device
-from gso.tno.batched.batches import Asked, solve_batch
+from gso.tno.batched.batches import BatchRequest, solve_batch
 from gso.tno.batched.device_executor import DeviceExecutor, minimise_elsewhere
 from gso.tno.batched.gathered import Gathered, Solved
 
@@ -32,7 +32,7 @@ _ENOUGH, _GPU_ENOUGH = 4, 256
 
 
 def solve_all(
-    asked: Asked,
+    batch: BatchRequest,
     designs: Sequence[Any],
     workers: int | None = 0,
     executor: Executor | None = None,
@@ -42,7 +42,7 @@ def solve_all(
     if not count:
         return
     vertices = max(np.size(getattr(designs[0], "vertices", designs[0])) // 3, 1)
-    here = _on_processor(asked.device)
+    here = _on_processor(batch.device)
     most = _BATCH if here else max(_VERTICES // vertices, 1)
     if executor is None and workers is None:
         parts, enough = (-(-count // most), _ENOUGH) if here else (count, _GPU_ENOUGH)
@@ -50,19 +50,19 @@ def solve_all(
     if executor is None and workers == 0:
         together = min(most, _GPU_BATCH)
         for k in range(0, count, together):
-            yield from _batch(asked, designs[k : k + together])
+            yield from _batch(batch, designs[k : k + together])
     elif here:
         with nullcontext(executor) if executor else open_executor(workers) as ready:
             # Smaller pieces where they leave no process without work.
             own = max(ready.workers, 1)
             share = -(-count // (own * -(-count // (most * own))))
             pieces = [designs[k : k + share] for k in range(0, count, share)]
-            yield from _in_order(ready.as_completed(partial(_measured, asked), pieces), share)
+            yield from _in_order(ready.as_completed(partial(_measured, batch), pieces), share)
     else:
-        with planners(asked.device, vertices, workers, executor) as ready:
+        with planners(batch.device, vertices, workers, executor) as ready:
             share = min(-(-count // ready.workers), _SHARE, most)
             pieces = [designs[k : k + share] for k in range(0, count, share)]
-            work = partial(solve_batch, asked, minimise=minimise_elsewhere)
+            work = partial(solve_batch, batch, minimise=minimise_elsewhere)
             yield from _in_order(ready.as_completed(work, pieces), share)
 
 
@@ -117,19 +117,19 @@ def _in_order(
                 shown += 1
 
 
-def _batch(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
+def _batch(batch: BatchRequest, designs: Sequence[Any]) -> list[Result | GSOError]:
     """Solve designs in one batch in this process."""
-    with _one_thread(asked.device):
-        return solve_batch(asked, designs, partial(_minimised, asked.device))
+    with _one_thread(batch.device):
+        return solve_batch(batch, designs, partial(_minimised, batch.device))
 
 
 def _minimised(where: str, gathered: Gathered) -> Solved:
     return device.solve([gathered], where)[0]
 
 
-def _measured(asked: Asked, designs: Sequence[Any]) -> list[Result | GSOError]:
+def _measured(batch: BatchRequest, designs: Sequence[Any]) -> list[Result | GSOError]:
     """Solve designs in a worker process, by itself, and compute their metrics there."""
-    found = _batch(asked, designs)
+    found = _batch(batch, designs)
     for result in found:
         if isinstance(result, Result):
             result.metrics  # noqa: B018

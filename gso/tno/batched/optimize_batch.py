@@ -12,8 +12,9 @@ from gso.errors import GSOError, MeshError
 from gso.executors import Executor
 from gso.executors.base import check_workers
 from gso.result import Result
-from gso.tno.batched import batches
+from gso.tasks.base import Options
 from gso.tno.batched import device as devices
+from gso.tno.batched.batches import check_batch
 from gso.tno.batched.many import solve_all
 from gso.typing import Array
 
@@ -23,7 +24,7 @@ def optimize_batch(
     *,
     task: str = "developable",
     formulation: str | None = None,
-    options: Any = None,
+    options: str | Options | None = None,
     device: str = "cpu",
     workers: int | None = None,
     executor: Executor | None = None,
@@ -88,9 +89,9 @@ def optimize_batch(
     check_workers(workers)
     designs = _designs(points)
     devices.checked(device)
-    asked = batches.asked(task, formulation, options, device, verdict)
+    batch = check_batch(task, formulation, options, device, verdict)
     out: list[Result] = []
-    for index, found in enumerate(solve_all(asked, list(designs), workers, executor)):
+    for index, found in enumerate(solve_all(batch, list(designs), workers, executor)):
         if isinstance(found, GSOError):
             raise type(found)(f"surface {index}: {found}")
         out.append(found)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
 from gso.parametrization.orientation import Orientation
-from gso.pipeline.run import Reached
+from gso.pipeline.run import PlanState
 from gso.solver import Minimum, Timings
 from gso.status import Progress, Status
 from gso.tasks.base import Plan, Stage
@@ -35,7 +35,11 @@ _STATUSES = {
 Minimise = Callable[[Gathered], Solved]
 
 
-def structure(plan: Plan) -> list[Any]:
+#: All of a plan that must be the same in a batch: arrays, and values that can be compared.
+Structure: TypeAlias = "list[object]"
+
+
+def structure(plan: Plan) -> Structure:
     """Return all of a plan that must be the same in a batch, to compare by :func:`same`.
 
     Raises
@@ -45,33 +49,38 @@ def structure(plan: Plan) -> list[Any]:
     """
     if not plan.stages or plan.spline is not None or plan.convert is not None:
         raise Unbatchable
-    parts = [part for stage in plan.stages for part in _described(stage)]
+    parts = [part for stage in plan.stages for part in _describe(stage)]
     return [plan.fallback is None, *parts]
 
 
-def same(one: Sequence[Any], other: Sequence[Any]) -> bool:
+def same(one: Structure, other: Structure) -> bool:
     """Return whether two plans can be solved together."""
-    return len(one) == len(other) and all(
-        np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b
-        for a, b in zip(one, other, strict=True)
-    )
+    return len(one) == len(other) and all(map(_equal, one, other))
 
 
-def _digest(described: Sequence[Any]) -> bytes:
+def _equal(one: object, other: object) -> bool:
+    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
+        return np.array_equal(one, other)
+    return bool(one == other)
+
+
+def _digest(described: Structure) -> bytes:
     digest = hashlib.blake2b()
     for part in described:
-        array = isinstance(part, np.ndarray)
-        digest.update(np.ascontiguousarray(part).data if array else repr(part).encode())
+        if isinstance(part, np.ndarray):
+            digest.update(np.ascontiguousarray(part).data)
+        else:
+            digest.update(repr(part).encode())
         digest.update(b";")
     return digest.digest()
 
 
-def _described(stage: Stage) -> list[Any]:
+def _describe(stage: Stage) -> Structure:
     """Return all of a stage that must be the same in a batch."""
     constrained = stage.imposed is not None and not stage.imposed.constraints.empty
     if stage.bounds is not None or stage.finished is not None or constrained:
         raise Unbatchable
-    out: list[Any] = [stage.layout.blocks, stage.iterations, stage.tolerance, stage.continued]
+    out: Structure = [stage.layout.blocks, stage.iterations, stage.tolerance, stage.continued]
     out += [type(loss) for loss in stage.continuation]
     for limit in stage.limits:
         if not isinstance(limit, Orientation):
@@ -88,13 +97,13 @@ def _described(stage: Stage) -> list[Any]:
     return out
 
 
-def _name(function: Any) -> str:
+def _name(function: Callable[..., object] | None) -> str:
     return "" if function is None else f"{function.__module__}.{function.__qualname__}"
 
 
 def solve(
     plans: Sequence[Plan], method: str, backend: str, minimise: Minimise
-) -> tuple[list[Reached], list[int], Timings]:
+) -> tuple[list[PlanState], list[int], Timings]:
     """Solve the stages of plans with one structure.
 
     Parameters
@@ -109,7 +118,7 @@ def solve(
 
     Returns
     -------
-    reached : list of Reached
+    states : list of PlanState
         The state of each plan after its last stage.
     iterations : list of int
         Iterations of each plan, over all stages.
@@ -137,21 +146,20 @@ def solve(
         gathered = gather(stages, coordinates, method, key + bytes([number]), others)
         timings.setup += time.perf_counter() - clock
         solved = minimise(gathered)
-        for phase, seconds in solved.timings.as_dict().items():
-            setattr(timings, phase, getattr(timings, phase) + seconds)
+        timings.add(solved.timings)
         coordinates = list(solved.points)
         found = _minima(solved, stages[0], (number, count), backend)
         for history, one in zip(histories, found, strict=True):
             history += one.history
         iterations += solved.iterations
-    reached = []
+    states = []
     for k, one in enumerate(found):
         one.history = histories[k]
         energies = [{name: float(e[k]) for name, e in at.items()} for at in solved.by_term]
-        reached.append(
-            Reached(stages[k], coordinates[k], entered[k], one, (energies[0], energies[-1]))
+        states.append(
+            PlanState(stages[k], coordinates[k], entered[k], one, (energies[0], energies[-1]))
         )
-    return reached, iterations.tolist(), timings
+    return states, iterations.tolist(), timings
 
 
 def _fallbacks(plans: Sequence[Plan]) -> list[Array] | None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from gso.errors import OptionError
+from gso.typing import MeshLike
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Start:
 
     Attributes
     ----------
-    points : Mesh, array or None
+    points : Mesh, array_like or None
         As `x0`; None for the optimiser's own start.
     source : str
         Origin of the start, reported as the result's `warm_start`.
@@ -47,7 +47,7 @@ class Start:
     ('cold', True)
     """
 
-    points: Any
+    points: MeshLike | None = None
     source: str = "x0"
     guarded: bool = False
     iterations: int | None = None
