@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
+from numbers import Real
 from typing import TypeAlias
-
-import numpy as np
 
 from gso.errors import OptionError
 from gso.spelling import choices
@@ -64,7 +64,7 @@ def as_length(value: Length, name: str, *, diagonal: float, unit: str = "mm") ->
         number *= 0.01 * diagonal
     elif sign:
         number *= millimetres(sign, name) / millimetres(unit)
-    if not 0.0 < number < np.inf:
+    if not 0.0 < number < math.inf:
         raise OptionError(
             f"{name} is {value!r}; it must be a positive length, such as 5, '5mm' or '0.5%' (of "
             "the diagonal)"
@@ -88,7 +88,7 @@ def as_strain(value: Strain, name: str) -> float:
     number, sign = _split(value)
     if sign == "%":
         number *= 0.01
-    if sign not in ("", "%") or not 0.0 < number < np.inf:
+    if sign not in ("", "%") or not 0.0 < number < math.inf:
         raise OptionError(f"{name} is {value!r}; it must be a positive ratio, such as 0.01 or '1%'")
     return number
 
@@ -108,7 +108,7 @@ def _split(value: object) -> tuple[float, str]:
     """Divide a value into its number, NaN if it has none, and its unit."""
     if isinstance(value, str):
         found = _TEXT.fullmatch(value)
-        return (float(found[1]), found[2].lower()) if found else (np.nan, "")
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-        return np.nan, ""
+        return (float(found[1]), found[2].lower()) if found else (math.nan, "")
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return math.nan, ""
     return float(value), ""

@@ -20,7 +20,6 @@ FUNCTIONS = {
     "optimize": gso.tno.optimize,
     "pieces": gso.pieces,
     "fabricate": gso.fabricate,
-    "hybrid": gso.hybrid.solve,
 }
 TERMS = (Path(__file__).parents[1] / "docs" / "terms.rst").read_text()
 #: Options that mean the same wherever they are, by the names of Python.

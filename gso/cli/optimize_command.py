@@ -13,6 +13,7 @@ from gso.cli import file_options
 from gso.cli import shared_options as shared
 from gso.cli.optimize_job import Job, is_cad
 from gso.errors import MeshError, OptionError
+from gso.quantities import as_length
 
 if TYPE_CHECKING:
     from gso.mesh import Mesh
@@ -167,7 +168,10 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
     strips, number = given["strips"], None
     if strips is not None:
         number = int(strips) if strips.isdecimal() else strips
-    ruled = {"strips": number, "flats": given["flats"] or None, "min_radius": given["min_radius"]}
+    radius = given["min_radius"]
+    if radius is not None:
+        radius = as_length(radius, "min_radius", diagonal=float("nan"), unit=given["unit"])
+    ruled = {"strips": number, "flats": given["flats"] or None, "min_radius": radius}
     ruled = {name: value for name, value in ruled.items() if value is not None}
     if ruled and given["formulation"] is None:
         given["formulation"] = "ruled"
@@ -191,6 +195,7 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
         "task": given["task"],
         "formulation": given["formulation"],
         "options": settings,
+        "unit": given["unit"],
         **questions,
     }
     wanted: list[Any] = []

@@ -9,7 +9,7 @@ from gso.quantities import MILLIMETRES, as_length, as_strain
 
 
 class _Length(click.ParamType):
-    """A length such as ``5``, ``5mm`` or ``0.5%``, checked; the command's function converts it."""
+    """A length such as ``5``, ``5mm`` or ``0.5%``: a number, or a text that is checked."""
 
     name = "length"
 
@@ -25,7 +25,10 @@ class _Length(click.ParamType):
                 param,
                 ctx,
             )
-        return value
+        try:
+            return float(value)
+        except ValueError:
+            return value
 
 
 class _Millimetres(click.ParamType):

@@ -26,6 +26,7 @@ from gso.pattern import Pattern
 from gso.pipeline import component_solves
 from gso.pipeline.case import Case
 from gso.pipeline.normalise import Canonical
+from gso.quantities import as_length
 from gso.result import Result
 from gso.status import Status
 from gso.tno import Start, check, optimize
@@ -84,7 +85,7 @@ def solve(
         "curvature". Elsewhere the result is that of :func:`gso.tno.optimize`.
     **keywords
         Passed to :func:`gso.tno.optimize`: `formulation`, `options`, `constraints`,
-        `max_deviation`, `max_strain`, `target_curvature`, `callback`, `verdict`.
+        `max_deviation`, `max_strain`, `target_curvature`, `unit`, `callback`, `verdict`.
 
     Returns
     -------
@@ -196,6 +197,11 @@ def _pieces(design: Mesh, task: str, sparing: bool, keywords: dict[str, Any]) ->
 def _each(design: Mesh, pieces: list[Component], task: str, keywords: dict[str, Any]) -> Result:
     """Solve every component from its own prediction, where there is one."""
     callback, compiled = keywords.pop("callback", None), keywords.pop("constraints")
+    far, unit = keywords.get("max_deviation"), keywords.pop("unit", "mm")
+    if far is not None:
+        # A share is of the whole design's diagonal.
+        size = design.diagonal
+        keywords["max_deviation"] = as_length(far, "max_deviation", diagonal=size, unit=unit)
 
     def one(case: Case, told: Any) -> Result:
         kept = () if case.constraints.empty else case.constraints

@@ -9,6 +9,7 @@ import numpy as np
 
 from gso import linalg, tasks
 from gso.errors import OptionError
+from gso.quantities import Length, Strain, as_length, as_strain
 from gso.tasks.options import Options
 from gso.tasks.start import Start
 from gso.typing import Array, MeshLike
@@ -124,13 +125,18 @@ def check(
     formulation: str | None = None,
     options: str | Options | None = None,
     *,
-    max_deviation: float | None = None,
-    max_strain: float | None = None,
+    max_deviation: Length | None = None,
+    max_strain: Strain | None = None,
     target_curvature: float | None = None,
     x0: MeshLike | Start | None = None,
     verdict: bool = True,
+    diagonal: float = 1.0,
+    unit: str = "mm",
 ) -> Request[Options]:
     """Check what :func:`gso.tno.optimize` is asked for, as far as it does not depend on the mesh.
+
+    Of the mesh, it only needs the `diagonal` of its bounding box, and the `unit` of its
+    coordinates, where `max_deviation` is a text.
 
     Raises
     ------
@@ -149,7 +155,12 @@ def check(
     settings = chosen.options.coerce(options)
     if settings.backend is not None:
         linalg.find(settings.backend)
-    limits = Limits(max_deviation, max_strain, target_curvature)
+    far = max_deviation
+    limits = Limits(
+        None if far is None else as_length(far, "max_deviation", diagonal=diagonal, unit=unit),
+        None if max_strain is None else as_strain(max_strain, "max_strain"),
+        target_curvature,
+    )
     start = x0 if isinstance(x0, Start) else Start(x0)
     known = {limit: f for f, kind in tasks.get(task).formulations.items() for limit in kind.limits}
     for limit in limits.given:

@@ -11,6 +11,7 @@ from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning
 from gso.pipeline.component_solves import solve_mesh
 from gso.pipeline.judgement import warning
+from gso.quantities import Length, Strain
 from gso.result import Result
 from gso.seams import joint_solve, strips_of_pieces
 from gso.solver import Callback
@@ -27,9 +28,10 @@ def optimize(
     formulation: str | None = None,
     options: str | Options | None = None,
     constraints: Sequence[Constraint] = (),
-    max_deviation: float | None = None,
-    max_strain: float | None = None,
+    max_deviation: Length | None = None,
+    max_strain: Strain | None = None,
     target_curvature: float | None = None,
+    unit: str = "mm",
     x0: MeshLike | Start | None = None,
     callback: Callback | None = None,
     verdict: bool = True,
@@ -59,19 +61,22 @@ def optimize(
         Constraints on the result: `Fixed`, `FixedBoundary`, `Handle`, `OnCurve`,
         `SlidingBoundary`, `Glue`, `SymmetryPlane`, `PlanarFaces`, `FixedLengths`. For
         `flatten` and `conformal` they apply to the flat image.
-    max_deviation : float, optional
-        `developable`: the largest distance between result and design, in both directions, in
-        the mesh's unit. The result is as developable as this bound allows; by "ruled" it has as
+    max_deviation : float or str, optional
+        `developable`: the largest distance between design and result, both ways: a number in the
+        mesh's unit, or a text such as "5mm" or "0.5%" (of the diagonal of the bounding box). The
+        result is as developable as this bound allows; by "ruled" it has as
         few strips as it allows.
-    max_strain : float, optional
+    max_strain : float or str, optional
         `developable`: the largest principal strain, max ``|s - 1|``, of the result's flat
-        pattern, such as 0.005. The displacement is the smallest that reaches it, or stays
+        pattern, such as 0.005 or "0.5%". The displacement is the smallest that reaches it, or stays
         within `max_deviation` where that is given.
     target_curvature : float, optional
         `developable` by "curvature" only: the mean absolute curvature ``loss_gc_worst`` to
         reach within 5 %, with the smallest displacement. Its unit is 1/size^2, as in the
         metrics (size: the largest distance from the centroid). Each of several components
         reaches it by its own size.
+    unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
+        Unit of the coordinates, for lengths that are texts.
     x0 : Mesh, array or Start, optional
         Warm start: vertices (n, 3) or a grid; (n, 2) or (H, W, 2) for a flat image.
         Proximity and lengths still refer to `mesh`. On grids, large-scale errors of the start
@@ -110,6 +115,9 @@ def optimize(
     Jiang et al. 2020, Quad-mesh based isometric mappings and developable surfaces.
     """
     clock = time.perf_counter()
+    from gso.io import as_mesh
+
+    design = mesh.design if isinstance(mesh, Pieces) else as_mesh(mesh)
     request = check(
         task,
         formulation,
@@ -119,18 +127,17 @@ def optimize(
         target_curvature=target_curvature,
         x0=x0,
         verdict=verdict,
+        diagonal=design.diagonal,
+        unit=unit,
     )
     if isinstance(mesh, Pieces) and not isinstance(options, Options):
         request = request.with_options(request.options.for_pieces())
     if isinstance(mesh, Pieces) and request.formulation == "ruled":
-        ask = strips_of_pieces.Ask(request.options, max_deviation, verdict)
+        ask = strips_of_pieces.Ask(request.options, request.limits.max_deviation, verdict)
         result = strips_of_pieces.solved(mesh, ask, constraints, request.start, callback, optimize)
     elif isinstance(mesh, Pieces):
         result = joint_solve.solve_pieces(mesh, request, constraints, callback)
     else:
-        from gso.io import as_mesh
-
-        design = as_mesh(mesh)
         design.check_joined()
         result = solve_mesh(request, design, constraints, callback)
     result.seconds["total"] = time.perf_counter() - clock
