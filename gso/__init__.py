@@ -13,19 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     # The same names for type checkers and editors; they are imported at first use.
-    from gso import (
-        constraints,
-        dataset,
-        executors,
-        hybrid,
-        io,
-        metrics,
-        net,
-        plot,
-        rulings,
-        seams,
-        tno,
-    )
+    from gso import constraints, dataset, hybrid, io, metrics, net, plot, rulings, seams, tno
+    from gso import executors as executors
     from gso import verdict as verdict
     from gso.constraints import (
         Fixed,
