@@ -7,7 +7,8 @@ import numpy as np
 from gso import faults, metrics
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
-from gso.typing import Array, Ints
+from gso.mesh.topology import edge_graph
+from gso.typing import Ints
 
 #: Rounds in which folded triangles are smoothed, and the one from which their neighbours move too.
 _ROUNDS, _WIDER = 20, 4
@@ -90,9 +91,8 @@ def _unfolded(light: Mesh, surface: Nearest, original: Mesh) -> Mesh:
 
 def _means(edges: Ints, count: int):
     """Return the matrix (n, n) that gives the mean of each vertex's neighbours."""
-    from scipy.sparse import coo_matrix, diags
+    from scipy.sparse import diags
 
     rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
-    joined: Array = np.ones(len(rows))
-    matrix = coo_matrix((joined, (rows, columns)), shape=(count, count)).tocsr()
+    matrix = edge_graph(count, rows, columns)
     return diags(1.0 / np.maximum(matrix.sum(axis=1).A1, 1.0)) @ matrix

@@ -55,7 +55,7 @@ def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
     bad = [np.flatnonzero(broken & quad)]
     # Triangles of a diagonal along which the quad folds are not tested against neighbours.
     sound = ~fold
-    h = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    h = he.interior
     local = np.arange(he.face.size) - np.searchsorted(he.face, he.face)
     size = np.where(quad, 4, 3)[he.face]
     sides = (h, he.twin[h])

@@ -20,7 +20,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from gso.errors import MeshError, OptionError
-from gso.io.atomic import check_writable, replacing
+from gso.io.atomic import check_writable, replacing, suffix_of
 from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_faces, save_patches, save_spline
 from gso.io.convert import Unwelded, as_mesh
 from gso.io.flat_svg import save_flat
@@ -48,6 +48,7 @@ __all__ = [
     "save_lines",
     "save_patches",
     "save_spline",
+    "suffix_of",
     "welded",
     "write",
 ]
@@ -132,7 +133,7 @@ def load(path: str | PathLike[str], *, weld: float | None = None) -> Mesh:
         `weld` is not a finite number of 0 or more.
     """
     name = os.fsdecode(path)
-    suffix = os.path.splitext(name)[1].lower()
+    suffix = suffix_of(name)
     try:
         if suffix not in _FORMATS and not os.path.isdir(name):
             what = f"a {suffix!r} file" if suffix else "a file without a suffix"
@@ -181,7 +182,7 @@ def write(mesh: Any, path: str | PathLike[str]) -> tuple[str, ...]:
     check_writable(path, tuple(_FORMATS))
     name = os.fsdecode(path)
     surface = as_mesh(mesh)
-    form = _FORMATS[os.path.splitext(name)[1].lower()]
+    form = _FORMATS[suffix_of(name)]
     writer = form.function(form.write)
     with replacing(path) as file:
         try:
@@ -193,7 +194,7 @@ def write(mesh: Any, path: str | PathLike[str]) -> tuple[str, ...]:
 
 def left_out(mesh: Mesh, path: str | PathLike[str]) -> tuple[str, ...]:
     """Return notes to the user on the attributes of a mesh that this file cannot store."""
-    suffix = os.path.splitext(os.fsdecode(path))[1].lower()
+    suffix = suffix_of(path)
     if mesh.attributes is None or mesh.attributes.empty or suffix in (".obj", ".npz"):
         return ()
     return (f"a {suffix} file holds no {mesh.attributes}: left out, an .obj file keeps them",)

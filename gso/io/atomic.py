@@ -13,6 +13,15 @@ from typing import BinaryIO
 from gso.errors import MeshError
 
 
+def suffix_of(path: str | PathLike[str]) -> str:
+    """Return the suffix of a file in lower case, with its dot.
+
+    >>> suffix_of("Panel.OBJ")
+    '.obj'
+    """
+    return os.path.splitext(os.fsdecode(path))[1].lower()
+
+
 def check_writable(path: str | PathLike[str], suffixes: Collection[str] | None = None) -> None:
     """Reject an output path that cannot be written, before anything is computed.
 
@@ -35,7 +44,7 @@ def check_writable(path: str | PathLike[str], suffixes: Collection[str] | None =
     gso.errors.MeshError: panel.doc: cannot write a '.doc' file; use .obj, .ply
     """
     name = os.fsdecode(path)
-    suffix = os.path.splitext(name)[1].lower()
+    suffix = suffix_of(name)
     if suffixes is not None and suffix not in suffixes:
         what = f"a {suffix!r} file" if suffix else "a file without a suffix"
         raise MeshError(f"{name}: cannot write {what}; use {', '.join(suffixes)}")

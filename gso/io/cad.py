@@ -9,7 +9,7 @@ from os import PathLike
 from typing import NamedTuple
 
 from gso.errors import GSOError, MeshError, OptionError
-from gso.io.atomic import check_writable, replacing
+from gso.io.atomic import check_writable, replacing, suffix_of
 from gso.mesh import Mesh
 from gso.quantities import millimetres
 from gso.spline import BSplineSurface, TrimmedSpline
@@ -46,19 +46,15 @@ def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
     """
     check_writable(path, SPLINE_SUFFIXES)
     millimetres(unit)
-    writer = _WRITERS[_suffix(path)]
+    writer = _WRITERS[suffix_of(path)]
     try:
         importlib.import_module(writer.package)
+        return
+    except ModuleNotFoundError:
+        what = 'pip install ".[cad]" in the folder of gso'
     except ImportError as error:
-        missing = isinstance(error, ModuleNotFoundError)
-        what = (
-            'pip install ".[cad]" in the folder of gso'
-            if missing
-            else f"it is there but cannot be loaded: {error}"
-        )
-        raise GSOError(
-            f"{os.fsdecode(path)}: {_suffix(path)} files need {writer.name}: {what}"
-        ) from None
+        what = f"it is there but cannot be loaded: {error}"
+    raise GSOError(f"{os.fsdecode(path)}: {suffix_of(path)} files need {writer.name}: {what}")
 
 
 def save_spline(spline: BSplineSurface, path: str | PathLike[str], *, unit: str = "mm") -> None:
@@ -166,13 +162,9 @@ def _write(
     path: str | PathLike[str], unit: str, content: BSplineSurface | Mesh | Sequence[TrimmedSpline]
 ) -> None:
     check_spline(path, unit)
-    module = importlib.import_module(f"gso.io.{_WRITERS[_suffix(path)].module}")
+    module = importlib.import_module(f"gso.io.{_WRITERS[suffix_of(path)].module}")
     with replacing(path) as file:
         try:
-            file.write(module.write(content, unit, _suffix(path)))
+            file.write(module.write(content, unit, suffix_of(path)))
         except MeshError as error:
             raise MeshError(f"{os.fsdecode(path)}: {error}") from None
-
-
-def _suffix(path: str | PathLike[str]) -> str:
-    return os.path.splitext(os.fsdecode(path))[1].lower()

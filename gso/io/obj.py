@@ -62,9 +62,8 @@ def read(data: bytes) -> Surface:
 
 def _vertices(words: Words, v: Ints) -> Array:
     count = words.count[v] - 1
-    if (count < 3).any():
-        row = v[(count < 3).argmax()]
-        words.fail_row(row, f"a vertex needs three numbers, not {words.count[row] - 1}")
+    short = count < 3
+    words.refuse(v, short, f"a vertex needs three numbers, not {count[short.argmax()]}")
     first = words.first[v] + 1
     points = words.points(first)
     weighted = np.flatnonzero(count == 4)
@@ -79,9 +78,8 @@ def _vertices(words: Words, v: Ints) -> Array:
 def _polygons(words: Words, v: Ints, f: Ints) -> tuple[Ints, Ints, Ints]:
     """Return the words of all corners, their vertex indices, and corner counts of polygons."""
     count = words.count[f] - 1
-    if (count < 3).any():
-        row = f[(count < 3).argmax()]
-        words.fail_row(row, f"a face needs three corners or more, not {words.count[row] - 1}")
+    short = count < 3
+    words.refuse(f, short, f"a face needs three corners or more, not {count[short.argmax()]}")
     corner = ranges(words.first[f] + 1, count)
     number = words.ints(corner, until=b"/")
     index = _from_front(number, v, f, count)

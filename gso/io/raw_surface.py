@@ -10,6 +10,7 @@ import numpy as np
 from gso.errors import MeshError, OptionError
 from gso.mesh import Mesh
 from gso.mesh.attributes import Attributes
+from gso.mesh.validation import checked_table, checked_vertices
 from gso.mesh.welding import collapse, equal, near
 from gso.typing import Array, Ints
 
@@ -91,35 +92,24 @@ def welded(mesh: Mesh, weld: float) -> Mesh:
 
 
 def _welded(surface: Surface, weld: float) -> Surface:
-    try:
-        points, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
-        sound = points.dtype.kind in "iuf" and faces.dtype.kind in "iuf"
-        with np.errstate(invalid="ignore"):
-            points, table = points.astype(np.float64), faces.astype(np.int64)
-        sound &= points.ndim == 2 and points.shape[1] == 3 and bool(np.isfinite(points).all())
+    points = checked_vertices(surface.vertices)
+    table = checked_table(surface.faces, len(points))
+    if np.abs(points).max(initial=0.0) > 1e150:
         # Squared distances would overflow; the mesh constructor reports that.
-        sound &= float(np.abs(points).max(initial=0.0)) < 1e150
-        sound &= table.ndim == 2 and table.shape[1] in (3, 4) and bool((table == faces).all())
-        corner = np.ones(table.shape, bool)
-        corner[:, 3:] = table[:, 3:] != -1
-        sound &= bool(((table >= 0) & (table < len(points)))[corner].all()) and len(table) > 0
-    except (TypeError, ValueError, IndexError, OverflowError):
-        sound = False
-    if not sound:
-        # The mesh constructor reports what is wrong.
         return surface
+    corner = table >= 0
     used = np.unique(table[corner])
     target = np.arange(len(points))
     target[used] = used[near(points[used], weld, used)]
-    merged = int((target != np.arange(len(points))).sum())
-    if not merged:
+    kept = target == np.arange(len(points))
+    if kept.all():
         note = f"weld={weld:.3g} merged nothing: no two vertices are that close"
         return Surface(points, table, (*surface.notes, note), surface.attributes)
     done = collapse(table, target)
     if not len(done.faces):
         raise MeshError(f"weld={weld:.3g} leaves no face; give a length below that of the edges")
-    new = np.cumsum(target == np.arange(len(points))) - 1
-    notes = [f"weld={weld:.3g} merged {merged} of {len(points)} vertices with others"]
+    new = np.cumsum(kept) - 1
+    notes = [f"weld={weld:.3g} merged {int((~kept).sum())} of {len(points)} vertices with others"]
     triangles = int(((done.turns[:, 3:] < 0) & corner[done.kept, 3:]).sum())
     if triangles:
         notes.append(f"{triangles} quads lost an edge by that and are triangles now")
@@ -130,7 +120,7 @@ def _welded(surface: Surface, weld: float) -> Surface:
         )
     said = surface.attributes
     return Surface(
-        points[target == np.arange(len(points))],
+        points[kept],
         np.where(done.faces < 0, -1, new[done.faces]),
         (*surface.notes, *notes),
         None if said is None else said.taken(done.kept, done.turns),

@@ -20,14 +20,14 @@ _HEAD = 84
 def read(data: bytes) -> Surface:
     """Read the surface in an STL file; vertices with equal coordinates are merged."""
     announced = int.from_bytes(data[80:_HEAD], "little") if len(data) >= _HEAD else -1
+    more = len(data) - _HEAD - announced * _RECORD.itemsize
     # Binary files may start with "solid" too; their length identifies them.
-    if announced >= 0 and len(data) == _HEAD + announced * _RECORD.itemsize:
-        corners = doubles(np.frombuffer(data, _RECORD, announced, _HEAD)["corners"])
-    elif data.lstrip()[:5].lower() == b"solid" and b"\0" not in data:
+    exact = announced >= 0 and more == 0
+    if not exact and data.lstrip()[:5].lower() == b"solid" and b"\0" not in data:
         corners = _read_text(data)
     elif len(data) < _HEAD:
         raise MeshError("the STL file is shorter than its header; it is cut off or no STL file")
-    elif len(data) > _HEAD + announced * _RECORD.itemsize and announced > 0:
+    elif exact or (more > 0 and announced > 0):
         corners = doubles(np.frombuffer(data, _RECORD, announced, _HEAD)["corners"])
     else:
         raise MeshError(

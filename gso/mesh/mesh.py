@@ -205,6 +205,13 @@ class Mesh:
         a, b = self.edges.T
         return np.asarray(np.linalg.norm(self.vertices[a] - self.vertices[b], axis=1))
 
+    def edge_numbers(self, a: Ints, b: Ints) -> Ints:
+        """Return the rows of :attr:`edges` that join vertices a and b, in either direction."""
+        ends, count = self.edges, len(self.vertices)
+        keys = topology.edge_keys(ends[:, 0], ends[:, 1], count)
+        order = np.argsort(keys)
+        return order[np.searchsorted(keys[order], topology.edge_keys(a, b, count))]
+
     @cached_property
     def boundary_edges(self) -> NDArray[np.bool_]:
         """Mask over :attr:`edges`: boundary edges."""

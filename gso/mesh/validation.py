@@ -76,8 +76,8 @@ def checked_grid(points: ArrayLike) -> Array:
     return grid
 
 
-def checked_faces(faces: Any, points: Array) -> tuple[Ints, NDArray[np.bool_], tuple[str, ...]]:
-    """Check and orient faces; return them, a mask of the reversed ones, and notes."""
+def checked_table(faces: Any, count: int) -> Ints:
+    """Convert faces to integers (m, 3) or (m, 4), with vertices from 0 to ``count - 1``."""
     try:
         given = np.asarray(faces)
     except ValueError:
@@ -93,14 +93,20 @@ def checked_faces(faces: Any, points: Array) -> tuple[Ints, NDArray[np.bool_], t
     if table.shape[1] == 4 and (table[:, 3] == -1).all():
         table = table[:, :3].copy()
     tri = table[:, 3] == -1 if table.shape[1] == 4 else np.ones(len(table), bool)
-    inside = (table >= 0) & (table < len(points))
+    inside = (table >= 0) & (table < count)
     inside[tri, 3:] = True
     bad = np.flatnonzero(~inside.all(axis=1))
     if bad.size:
         raise MeshError(
-            f"face {bad[0]} = {table[bad[0]].tolist()} points outside the {len(points)} vertices "
+            f"face {bad[0]} = {table[bad[0]].tolist()} points outside the {count} vertices "
             f"({bad.size} such faces)"
         )
+    return table
+
+
+def checked_faces(faces: Any, points: Array) -> tuple[Ints, NDArray[np.bool_], tuple[str, ...]]:
+    """Check and orient faces; return them, a mask of the reversed ones, and notes."""
+    table = checked_table(faces, len(points))
     check_corners(table)
     given_table = table
     table, flips, components = topology.orient(table, len(points))

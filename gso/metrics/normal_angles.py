@@ -30,7 +30,7 @@ def dihedral_angles(surface: Any) -> Array:
     """
     mesh = mesh_of(surface)
     he, normal = mesh.half_edges, face_normals(mesh)
-    inner = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    inner = he.interior
     a, b = (components(normal[he.face[h]]) for h in (inner, he.twin[inner]))
     return np.degrees(geometry.angle(a, b))
 

@@ -8,6 +8,7 @@ from gso import geometry
 from gso.errors import MeshError
 from gso.linalg import spd
 from gso.mesh import Mesh
+from gso.mesh.topology import edge_graph
 from gso.parametrization.arap import strain_level
 from gso.typing import Array, Ints
 
@@ -183,24 +184,41 @@ def _tutte(mesh: Mesh, loop: Ints, at: Array) -> Array:
     Other loops are filled with a central vertex. On a 3-connected mesh the faces of the image
     are convex.
     """
-    from scipy.sparse import coo_matrix
-
     n = len(mesh.vertices)
     a, b = mesh.edges.T
     holes = [h for h in mesh.boundary_loops if h is not loop]
     for number, hole in enumerate(holes):
         a, b = np.r_[a, hole], np.r_[b, np.full(len(hole), n + number)]
-    size = n + len(holes)
-    links = coo_matrix((np.ones(len(a)), (a, b)), shape=(size, size)).tocsr()
-    links = links + links.T
-    image = np.zeros((size, 2))
-    image[loop] = at
-    inner = np.setdiff1d(np.arange(size), loop)
-    if inner.size == 0:
-        return image[:n]
+    return centred(n + len(holes), a, b, loop, at)[:n]
+
+
+def centred(count: int, a: Ints, b: Ints, loop: Ints, at: Array) -> Array:
+    """Place nodes of a graph (count, 2) at the means of their neighbours, with some nodes fixed.
+
+    Parameters
+    ----------
+    count : int
+        Number of nodes; those without edges are put at the origin.
+    a, b : ndarray of int, (e,)
+        Ends of the edges, each edge once.
+    loop : ndarray of int, (f,)
+        The fixed nodes, of which each other node can be reached.
+    at : ndarray, (f, 2)
+        Their positions.
+
+    Examples
+    --------
+    >>> centred(3, np.array([0, 1]), np.array([1, 2]), np.array([0, 2]), np.eye(2))[1]
+    array([0.5, 0.5])
+    """
     from scipy.sparse import diags
 
-    rows = links[inner]
-    matrix = diags(np.asarray(rows.sum(axis=1)).ravel()) - rows[:, inner]
-    image[inner] = spd(matrix)(rows @ image)
-    return image[:n]
+    image = np.zeros((count, 2))
+    image[loop] = at
+    inner = np.setdiff1d(np.r_[a, b], loop)
+    if inner.size:
+        links = edge_graph(count, a, b)
+        rows = (links + links.T)[inner]
+        matrix = diags(np.asarray(rows.sum(axis=1)).ravel()) - rows[:, inner]
+        image[inner] = spd(matrix)(rows @ image)
+    return image

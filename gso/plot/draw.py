@@ -6,7 +6,6 @@ This is faster than Matplotlib's own 3D axes and preserves proportions.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from os import PathLike
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso import geometry
-from gso.io import check_writable, replacing
+from gso.io import check_writable, replacing, suffix_of
 from gso.mesh import topology
 from gso.plot.heat import Heat, Scale
 from gso.typing import Array
@@ -228,7 +227,6 @@ def write(figure: Figure, path: str | PathLike[str] | None) -> Figure:
     """Write a figure to a file, if one is given, and return it."""
     if path is not None:
         check_writable(path, SUFFIXES)
-        suffix = os.path.splitext(os.fsdecode(path))[1].lower()
         with replacing(path) as file:
-            figure.savefig(file, format=suffix[1:])
+            figure.savefig(file, format=suffix_of(path)[1:])
     return figure

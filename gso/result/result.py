@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -218,11 +217,11 @@ class Result:
         from gso import io
         from gso.result.file import arrays
 
-        suffix = os.path.splitext(os.fsdecode(path))[1].lower()[1:]
-        if suffix == "npz":
+        suffix = io.suffix_of(path)
+        if suffix == ".npz":
             with io.replacing(path) as file:
                 np.savez(file, **arrays(self))
-        elif suffix == "svg":
+        elif suffix == ".svg":
             if self.pattern is None:
                 raise MeshError(
                     f"{path}: this result has no flat pattern to write as SVG; a closed surface "
@@ -232,9 +231,9 @@ class Result:
             outline = self.pattern.surface(surface)
             bends = () if self.ruled is None else self.ruled.bends
             io.save_flat(self.pattern.flat, outline, path, unit=unit, bends=bends)
-        elif f".{suffix}" in io.SPLINE_SUFFIXES and self.ruled is not None:
+        elif suffix in io.SPLINE_SUFFIXES and self.ruled is not None:
             self._save_strips(self.ruled, path, unit)
-        elif f".{suffix}" in io.SPLINE_SUFFIXES:
+        elif suffix in io.SPLINE_SUFFIXES:
             if any(part.spline is not None for part in self.components):
                 raise MeshError(
                     f"{path}: every component has a spline of its own; write them one by one, "

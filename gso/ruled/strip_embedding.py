@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso.parametrization.embedding import centred
 from gso.ruled.strip_layout import Strips
 from gso.typing import Array, Ints
 
@@ -28,22 +29,9 @@ def plane(strips: Strips, triangles: Ints) -> Array:
     The border is on a circle, and all other vertices are the means of their neighbours, so that
     no face is inverted.
     """
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.linalg import spsolve
-
     loop = border(triangles)
     angle = 2.0 * np.pi * np.arange(len(loop)) / len(loop)
-    out = np.zeros((strips.size, 2))
-    out[loop] = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    inner = np.setdiff1d(np.unique(triangles), loop)
-    if inner.size:
-        i = triangles.ravel()
-        j = np.roll(triangles, -1, axis=1).ravel()
-        ones = np.ones(len(i))
-        graph = csr_matrix((ones, (i, j)), (strips.size, strips.size))
-        graph = ((graph + graph.T) > 0).astype(float).tocsr()
-        degree = np.asarray(graph.sum(axis=1)).ravel()
-        rows = graph[inner]
-        laplacian = csr_matrix((degree[inner], (np.arange(inner.size),) * 2)) - rows[:, inner]
-        out[inner] = spsolve(laplacian.tocsc(), rows @ out)
-    return out
+    at = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    a, b = np.unique(np.sort(sides, axis=1), axis=0).T
+    return centred(strips.size, a, b, loop, at)

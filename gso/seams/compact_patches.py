@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from gso.mesh import Mesh
+from gso.mesh.separation import centres
 from gso.mesh.topology import edge_graph, edge_keys
 from gso.typing import Ints
 
@@ -17,11 +18,10 @@ def patches(mesh: Mesh, count: int, kept: Ints) -> Ints:
     reaches across an edge of `kept` (k, 2).
     """
     he, n = mesh.half_edges, len(mesh.vertices)
-    k = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    k = he.interior
     cut = np.isin(edge_keys(he.origin[k], he.dest[k], n), edge_keys(kept[:, 0], kept[:, 1], n))
     k = k[~cut]
-    corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
-    centre = mesh.vertices[corners].mean(axis=1)
+    centre = centres(mesh)
     f, g = he.face[k], he.face[he.twin[k]]
     length = np.linalg.norm(centre[f] - centre[g], axis=1)
     graph = edge_graph(len(centre), f, g, length)

@@ -55,13 +55,11 @@ def opening(mesh: Mesh, factor: Array | None = None) -> Ints:
         return_predecessors=True,
     )
     before = np.where((before >= 0) & (before < n), before, -1)
-    keys = np.sort(ends, axis=1) @ np.array([n, 1])
     child = np.flatnonzero(before[:n] >= 0)
-    in_tree = np.isin(keys, np.sort(np.stack([child, before[child]], 1), axis=1) @ np.array([n, 1]))
-    k = np.flatnonzero(he.twin > np.arange(he.twin.size))
-    own = np.sort(np.stack([he.origin[k], he.dest[k]], axis=1), axis=1) @ np.array([n, 1])
-    order = np.argsort(keys)
-    edge = order[np.searchsorted(keys[order], own)]
+    in_tree = np.zeros(len(ends), bool)
+    in_tree[mesh.edge_numbers(child, before[child])] = True
+    k = he.interior
+    edge = mesh.edge_numbers(he.origin[k], he.dest[k])
     k, edge = k[~in_tree[edge]], edge[~in_tree[edge]]
     longest = away[ends[edge]].sum(axis=1) + length[edge]
     # A spanning tree of most length; of parallel edges between two faces only one can be in it.

@@ -196,23 +196,16 @@ class Creases(Seam):
     angle: float = 30.0
 
     def edges(self, mesh: Mesh) -> Ints:
-        good = isinstance(self.angle, int | float | np.number) and 0 < self.angle < 180
-        if not good:
+        if not (isinstance(self.angle, int | float | np.number) and 0 < self.angle < 180):
             raise OptionError(f"angle is {self.angle!r}; it must be between 0 and 180 degrees")
         he = mesh.half_edges
-        k = _inner(mesh)[metrics.dihedral_angles(mesh) > self.angle]
+        k = he.interior[metrics.dihedral_angles(mesh) > self.angle]
         return np.stack([he.origin[k], he.dest[k]], axis=1)
-
-
-def _inner(mesh: Mesh) -> Ints:
-    """Return one half-edge (e,) of each interior edge, in the order of the metrics."""
-    twin = mesh.half_edges.twin
-    return np.flatnonzero(twin > np.arange(twin.size))
 
 
 def _between(mesh: Mesh, label: Ints) -> Ints:
     """Return the edges (e, 2) between faces with different labels (m,)."""
-    he, k = mesh.half_edges, _inner(mesh)
+    he, k = mesh.half_edges, mesh.half_edges.interior
     k = k[label[he.face[k]] != label[he.face[he.twin[k]]]]
     return np.stack([he.origin[k], he.dest[k]], axis=1)
 

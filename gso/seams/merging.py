@@ -29,7 +29,7 @@ class Merging:
         self.ground, self.strain, self.compact = ground, strain, compact
         self.label = label.astype(np.int64).copy()
         he = mesh.half_edges
-        k = np.flatnonzero(he.twin > np.arange(he.twin.size))
+        k = he.interior
         self._ends = np.stack([he.origin[k], he.dest[k]], axis=1)
         self._sides = np.stack([he.face[k], he.face[he.twin[k]]], axis=1)
         self._length = np.linalg.norm(

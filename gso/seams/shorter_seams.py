@@ -135,7 +135,7 @@ def _divided(ground: Ground, faces: Ints, path: Ints) -> NDArray[np.bool_] | Non
     he = mesh.half_edges
     local = np.full(len(mesh.faces), -1)
     local[faces] = np.arange(len(faces))
-    k = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    k = he.interior
     f, g = local[he.face[k]], local[he.face[he.twin[k]]]
     cut = np.isin(edge_keys(he.origin[k], he.dest[k], n), edge_keys(path[:-1], path[1:], n))
     keep = (f >= 0) & (g >= 0) & ~cut

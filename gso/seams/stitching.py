@@ -181,7 +181,7 @@ def _flat(mesh: Mesh, keys: set[int], faces: Ints) -> Sheet | None:
         # The pieces also touch at a single vertex.
         return None
     he = part.half_edges
-    k = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    k = he.interior
     ends = np.stack([he.origin[k], he.dest[k]], axis=1)
     own = np.sort(ids[ends], axis=1) @ np.array([n, 1])
     opened = cut(part, ends[np.isin(own, np.array(sorted(keys), np.int64))])

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from gso.mesh import Mesh
 from gso.mesh.paths import Paths
-from gso.mesh.topology import edge_keys
 from gso.seams.compact_patches import patches
 from gso.seams.estimates import Estimates
 from gso.seams.potential import Potential
@@ -80,12 +79,7 @@ class Ground:
         """Return the factor (k,) of some edges (k, 2) of the mesh; None if all are one."""
         if self.factor is None:
             return None
-        n = len(self.mesh.vertices)
-        keys = edge_keys(self.mesh.edges[:, 0], self.mesh.edges[:, 1], n)
-        order = np.argsort(keys)
-        return self.factor[
-            order[np.searchsorted(keys[order], edge_keys(ends[:, 0], ends[:, 1], n))]
-        ]
+        return self.factor[self.mesh.edge_numbers(ends[:, 0], ends[:, 1])]
 
     @cached_property
     def estimates(self) -> Estimates:

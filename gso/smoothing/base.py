@@ -11,8 +11,6 @@ from gso.mesh import Frame
 from gso.spelling import choices
 from gso.typing import Array
 
-NORMS = ("l2", "l1")
-
 
 @dataclass(frozen=True)
 class Smoothed:
@@ -51,8 +49,8 @@ def checked_options(
     OptionError
         `order` is not in `orders`, `weight` is negative or not finite, or `norm` is unknown.
     """
-    if norm not in NORMS:
-        raise OptionError(f"norm {norm!r} is unknown; {choices(norm, NORMS)}")
+    if norm not in ("l2", "l1"):
+        raise OptionError(f"norm {norm!r} is unknown; {choices(norm, ('l2', 'l1'))}")
     if order is not None and order not in orders:
         known = ", ".join(map(str, orders))
         raise OptionError(f"order {order} does not exist for norm {norm!r}; choose one of {known}")

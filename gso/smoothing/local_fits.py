@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.mesh import Mesh
+from gso.mesh.topology import edge_graph
 from gso.typing import Array, Ints
 
 # Largest number of vertices in a fit; more, as around a pole with hundreds of faces, are sampled.
@@ -43,10 +44,10 @@ def umbrella(mesh: Mesh, near: Any) -> Any:
     >>> umbrella(mesh, neighbours(mesh)).toarray()[0]
     array([ 1. , -0.5,  0. , -0.5])
     """
-    from scipy.sparse import csr_matrix, diags
+    from scipy.sparse import diags
 
     i, j = mesh.edges[mesh.boundary_edges].T
-    along = csr_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=near.shape)
+    along = edge_graph(near.shape[0], np.r_[i, j], np.r_[j, i])
     inner = ~mesh.half_edges.boundary_vertex
     links = diags(inner * 1.0) @ (near - diags(near.diagonal())) + along
     valence = np.asarray(links.sum(axis=1)).ravel()

@@ -133,15 +133,12 @@ def _creased(
         local = residuals(pilot, patches, order)
         sigma = min(sigma, noise(unit, local))
         rough = local.heights(pilot)
-        limit = tolerance * (_typical(rough[local.freedom > 0]) + NOTHING)
+        typical = np.median(rough[local.freedom > 0]) if local.freedom.any() else 0.0
+        limit = tolerance * (typical + NOTHING)
         trust = 1 / (1 + (rough / limit) ** 2)
         done = _solve(local.penalty(trust), unit, start, sigma, weight)
         pilot, start = done.points, done.weight
     return done, order, sigma
-
-
-def _typical(values: Array) -> float:
-    return float(np.median(values)) if values.size else 0.0
 
 
 def _patches(near: Any, order: int) -> Rings:

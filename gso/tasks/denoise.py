@@ -65,8 +65,7 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
 
 def _smoothed(mesh: Mesh, request: Request[Options]) -> tuple[Array, dict[str, Any]]:
     """Compute smoothed vertices (n, 3), and the order, weight, sigma and degrees of freedom."""
-    options = request.options
-    order, weight = options.order, options.weight
+    order, weight = request.options.order, request.options.weight
     norm = "l1" if request.formulation == "crease" else "l2"
     if mesh.grid is not None:
         smoothed = smooth_grid(mesh.grid, order=order, weight=weight, norm=norm)

@@ -163,7 +163,7 @@ def _plates(panel: Panel) -> tuple[Ints, Ints, Ints]:
     Seen along a bend from its first end, the second plate lies to the left.
     """
     he, n = panel.surface.half_edges, len(panel.flat)
-    k = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    k = he.interior
     keys = np.sort(np.stack([he.origin[k], he.dest[k]], axis=1), axis=1) @ np.array([n, 1])
     wanted = np.sort(panel.bends, axis=1) @ np.array([n, 1])
     order = np.argsort(keys)

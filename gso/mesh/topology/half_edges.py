@@ -43,6 +43,11 @@ class HalfEdges:
         return mask
 
     @cached_property
+    def interior(self) -> Ints:
+        """One half-edge of each interior edge, ascending."""
+        return np.flatnonzero(self.twin > np.arange(self.twin.size))
+
+    @cached_property
     def face_count(self) -> Ints:
         """Number of faces at each vertex."""
         return np.bincount(self.origin, minlength=self.vertex_count)

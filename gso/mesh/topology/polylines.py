@@ -47,7 +47,7 @@ def polyline_crosses(he: HalfEdges, faces: Ints) -> Ints:
 
 def hinges(he: HalfEdges) -> Ints:
     """List the four vertices (a, b, left, right) around every interior edge of a triangulation."""
-    h = np.flatnonzero(he.twin > np.arange(he.twin.size))
+    h = he.interior
     return np.stack(
         [he.origin[h], he.dest[h], he.dest[he.next[h]], he.dest[he.next[he.twin[h]]]], axis=1
     )

@@ -62,7 +62,7 @@ def quad_splits(faces: Ints, he: HalfEdges) -> NDArray[np.bool_]:
     if faces.shape[1] == 3:
         return np.zeros(len(faces), bool)
     quad = faces[:, 3] >= 0
-    inner = np.flatnonzero((he.twin > np.arange(he.twin.size)) & quad[he.face])
+    inner = he.interior[quad[he.face[he.interior]]]
     inner = inner[quad[he.face[he.twin[inner]]]]
     local = _place_in_face(he, quad)
     # For each of the two faces: is the origin of this half-edge on its diagonal 0-2?

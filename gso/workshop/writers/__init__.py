@@ -8,13 +8,12 @@ folder.
 
 from __future__ import annotations
 
-import os
 from os import PathLike
 from types import ModuleType
 from typing import Any
 
 from gso.errors import OptionError
-from gso.io.atomic import check_writable, replacing
+from gso.io.atomic import check_writable, replacing, suffix_of
 from gso.registry import Registry
 from gso.spelling import choices
 from gso.workshop.part import Drawing
@@ -101,12 +100,11 @@ def write(
     Traceback (most recent call last):
     gso.errors.OptionError: plate.dwg: no writer for '.dwg' files; there are .dxf, .pdf, .svg
     """
-    name = os.fsdecode(path)
-    suffix = os.path.splitext(name)[1].lower()
+    suffix = suffix_of(path)
     known = suffixes()
     if suffix not in known:
         what = f"{suffix!r} files" if suffix else "files without a suffix"
-        raise OptionError(f"{name}: no writer for {what}; there are {', '.join(known)}")
+        raise OptionError(f"{path}: no writer for {what}; there are {', '.join(known)}")
     writer = get(known[suffix])
     require_package(writer)
     check_writable(path)
