@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parent.parent
 BENCH = ROOT / "bench"
 #: Presets that sections compare.
 PRESETS = ("fast", "balanced", "accurate")
-#: A column of :func:`compared`: heading, key of the rating if it is another, and how its values
+#: A column of :func:`compare`: heading, key of the rating if it is another, and how its values
 #: are summarised if not by their mean.
 Column = str | tuple[Any, ...]
 
@@ -61,7 +61,7 @@ def quietly(function: Callable[..., Any], *given: Any, **keywords: Any) -> Any:
         return function(*given, **keywords)
 
 
-def apart(function: Callable[..., Any], *given: Any) -> Any:
+def run_apart(function: Callable[..., Any], *given: Any) -> Any:
     """Call a function in a process of its own, whose memory is the function's."""
     with get_context("spawn").Pool(1) as pool:
         return pool.apply(function, given)
@@ -91,7 +91,7 @@ def pure(run: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return hidden
 
 
-def compared(
+def compare(
     title: str,
     runs: Mapping[str, Callable[[Any], Any]],
     cases: Sequence[Any],
@@ -117,10 +117,10 @@ def compared(
             outcome, spent = timed(run, case)
             rows.append({"s": spent, **rate(case, outcome)})
         found[name] = {label: how([row[key] for row in rows]) for label, key, how in asked}
-    return shown(title, [head], found)
+    return tabulate(title, [head], found)
 
 
-def shown(
+def tabulate(
     title: str, heads: Sequence[str], rows: Mapping[Any, Mapping[str, Any]]
 ) -> dict[str, Any]:
     """Print a table, and return it.
@@ -178,7 +178,7 @@ def axes_of(path: str, **labels: str) -> Iterator[Any]:
     figure.savefig(path)
 
 
-def called(section: Callable[..., Any], settings: Mapping[str, str]) -> Any:
+def call(section: Callable[..., Any], settings: Mapping[str, str]) -> Any:
     """Call a section with those of the settings, as text, that it has parameters for."""
     kinds = {"int": int, "float": float, "bool": lambda text: text not in ("0", "no", "false")}
     parameters = inspect.signature(section).parameters

@@ -37,7 +37,7 @@ if not any(word.startswith("device=") for word in sys.argv):
 BENCH = Path(__file__).resolve().parent
 sys.path.insert(0, str(BENCH))
 
-from harness import called  # noqa: E402
+from harness import call  # noqa: E402
 from report import build, surfaces, tuning  # noqa: E402
 from report.methods import methods  # noqa: E402
 from report.quality import levels  # noqa: E402
@@ -116,7 +116,7 @@ def _sections(parser: argparse.ArgumentParser, arguments: argparse.Namespace) ->
         if missing and name in words:
             parser.error(f"{name} needs {', '.join(f'{m}=...' for m in missing)}")
         if not missing:
-            found[name] = called(section, settings)
+            found[name] = call(section, settings)
     if arguments.json:
         text = json.dumps({**found, "machine": machine()}, indent=1, default=float)
         arguments.json.write_text(text + "\n")

@@ -23,7 +23,6 @@ from report.surfaces import Surfaces
 from report.timing import Timing, pieces, timings
 from report.verdict import losses, unmeasured
 
-TITLE = "gso: quality and time, beside the paper and its peers"
 #: Surfaces of each method whose figures a test compares.
 COMPARED = 2
 
@@ -64,7 +63,7 @@ def run(settings: Settings, surfaces: Surfaces, out: Path, command: str) -> dict
         "surfaces": {"name": surfaces.name, "count": count, "loss_gc": curved},
         **_figures(records, times),
     }
-    text = pages.markdown(TITLE, result, times, drawn, out)
+    text = pages.markdown(result, times, drawn, out)
     _write(out / "results.json", json.dumps(result, indent=1) + "\n")
     _write(out / "report.md", text)
     _write(out / "report.html", pages.html(text, out))

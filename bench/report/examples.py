@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+from harness import quietly
 
-from gso.errors import ConvergenceWarning
 from gso.linalg import blas_threads
 from gso.metrics import loss_gc
 from report.method import TASKS, Array, Method, level_name
@@ -38,6 +37,10 @@ class Example:
     results: dict[str, Array] = field(default_factory=dict)
 
 
+#: By task and level of the noise.
+Examples = dict[tuple[str, float], list[Example]]
+
+
 def chosen(settings: Settings, surfaces: Surfaces) -> list[int]:
     """Return the surfaces whose mean curvature is nearest to the values in the settings."""
     among = min(_AMONG, len(surfaces))
@@ -47,11 +50,10 @@ def chosen(settings: Settings, surfaces: Surfaces) -> list[int]:
 
 def solved(
     settings: Settings, surfaces: Surfaces, kept: Store, tick: Callable[..., None]
-) -> dict[tuple[str, float], list[Example]]:
+) -> Examples:
     """Solve the examples, by task and level of the noise."""
-    found: dict[tuple[str, float], list[Example]] = {}
-    with warnings.catch_warnings(), blas_threads(1):
-        warnings.simplefilter("ignore", ConvergenceWarning)
+    found: Examples = {}
+    with blas_threads(1):
         for task in TASKS:
             # The figure of denoising shows one surface, with a row for each level.
             some = chosen(settings, surfaces)[: 1 if task == "denoise" else None]
@@ -68,7 +70,8 @@ def _example(surfaces: Surfaces, k: int, task: str, sigma: float, kept: Store) -
         if not method.absent():
             place = f"examples/{task}-{name}-{level_name(sigma)}".replace(" ", "-")
             key = method.key(sigma) | {"surfaces": surfaces.key, "number": k}
-            points = kept.arrays(place, key, partial(_points, method, example.case))["points"]
+            make = partial(_points, method, example.case)
+            points = quietly(kept.arrays, place, key, make)["points"]
             example.results |= {name: points} if points.size else {}
     return example
 

@@ -19,7 +19,7 @@ from gso.plot.draw import GRAZING, Panel, draw
 from gso.plot.heat import Heat, Scale, curvatures, distance, strain
 from gso.plot.view import View
 from gso.typing import Array
-from report.examples import Example
+from report.examples import Example, Examples
 from report.method import TASKS
 from report.published import CHOSEN
 from report.quality import Records
@@ -41,13 +41,12 @@ class Figure:
     path: Path
 
 
-def drawn(
-    folder: Path,
-    records: Records,
-    times: Sequence[Timing],
-    examples: dict[tuple[str, float], list[Example]],
-) -> dict[str, list[Figure]]:
-    """Draw every figure into a folder, and return them by the names of the report's template."""
+#: By the names of the report's template.
+Figures = dict[str, list[Figure]]
+
+
+def drawn(folder: Path, records: Records, times: Sequence[Timing], examples: Examples) -> Figures:
+    """Draw every figure into a folder."""
     noisy = [(sigma, some) for (task, sigma), some in examples.items() if task == "denoise"]
     return {
         "5": [figure_5(folder)],

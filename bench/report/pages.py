@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from report import kernels
-from report.figures import Figure
+from report.figures import Figures
 from report.published import INPUT
 from report.timing import PHASES, Timing, exponent
 from report.verdict import against_limit
@@ -99,15 +99,11 @@ def exponents(timings: Iterable[Timing]) -> list[str]:
 
 
 def markdown(
-    title: str,
-    result: dict[str, Any],
-    times: Iterable[Timing],
-    figures: dict[str, list[Figure]],
-    folder: Path,
+    result: dict[str, Any], times: Sequence[Timing], figures: Figures, folder: Path
 ) -> str:
     """Return the report as Markdown; paths of pictures are relative to the folder."""
     packages = ", ".join(f"{k} {v}" for k, v in result["machine"]["packages"].items() if v)
-    context = {"title": title, "result": result, "times": times, "figures": figures}
+    context = {"result": result, "times": times, "figures": figures}
     context |= {"folder": folder, "packages": packages, "input": INPUT, "kernels": kernels}
     context |= {"quality_table": quality_table, "timing_table": timing_table}
     text = _template("page.md", context | {"limits": against_limit(times)})
@@ -136,7 +132,7 @@ def _block(block: str, folder: Path) -> tuple[str, Any]:
     if picture := re.fullmatch(r"!\[(.*)\]\((.*)\)", block):
         data = base64.b64encode((folder / picture[2]).read_bytes()).decode()
         return "!", (picture[1], f"data:image/png;base64,{data}")
-    return ("*", block[1:-1]) if block[0] == block[-1] == "*" else ("", block)
+    return "", block.strip("*")
 
 
 def _template(name: str, context: dict[str, Any]) -> str:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
+from harness import quietly
 
 from gso import metrics, tasks
 from gso.dataset.noise import LEVELS
-from gso.errors import ConvergenceWarning
 from gso.executors import open_executor
 from gso.linalg import blas_threads
 from gso.mesh import Mesh
@@ -147,8 +146,7 @@ _warm: set[tuple[str, str, bool]] = set()
 def measure(block: Block) -> list[Record]:
     """Measure the surfaces of a block."""
     method, cases = block.method, partial(block.surfaces.case, sigma=block.sigma)
-    with warnings.catch_warnings(), blas_threads(1), kernels.chosen(block.choice):
-        warnings.simplefilter("ignore", ConvergenceWarning)
+    with blas_threads(1), kernels.chosen(block.choice):
         if block.timed and (block.task, block.name, block.numpy) not in _warm:
             _prepare(method, cases(block.start), block.numpy)
             _warm.add((block.task, block.name, block.numpy))
@@ -170,7 +168,7 @@ def _record(method: Method, case: Case) -> Record:
         case.mesh  # noqa: B018 - before the clock starts
     clock = time.perf_counter()
     try:
-        solved = method(case)
+        solved = quietly(method, case)
     except Exception as error:  # a peer may raise anything; the others still run
         return {"error": f"{type(error).__name__}: {error}"}
     seconds = time.perf_counter() - clock

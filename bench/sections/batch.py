@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from harness import energy, shown, timed
+from harness import energy, tabulate, timed
 
 import gso
 from gso.dataset import bezier
@@ -53,7 +53,7 @@ def batches(n: int = 256, device: str = "cpu", seed: int = 31) -> dict[str, Any]
             "over 1 %, stretched": int((shaken > _OTHER).sum()),
         }
     title = f"{n} surfaces 64 x 64: a batch on {device!r}, and {workers} processes; energies "
-    return shown(title + "relative to the latter's", ["task"], rows)
+    return tabulate(title + "relative to the latter's", ["task"], rows)
 
 
 def device(
@@ -88,7 +88,7 @@ def device(
     title = (
         f"{n} surfaces 64 x 64 on {device!r}, planned by {workers or 'all'} processes; set-up is "
     )
-    return shown(title + "that of the processes, which work at the same time", ["task"], rows)
+    return tabulate(title + "that of the processes, which work at the same time", ["task"], rows)
 
 
 def _mean(results: list[Any], phase: str) -> float:

@@ -12,7 +12,7 @@ from typing import Any
 
 import designs
 from designs import KINDS
-from harness import progress, shown, solver, timed
+from harness import progress, solver, tabulate, timed
 
 import gso
 from gso import metrics
@@ -49,7 +49,7 @@ def borders(kind: str = "", preset: str = "balanced", seed: int = 0) -> dict[str
         for design in progress(KINDS[name](seed), f"{name} {preset}"):
             result, spent = timed(solver(**keywords), design.mesh)
             found[design.name] = _figures(design, result.mesh) | {"s": spent}
-        rows = shown(f"{name}, {preset}, seed {seed}", ["design"], found)
+        rows = tabulate(f"{name}, {preset}, seed {seed}", ["design"], found)
         out |= {f"{name} {design}": row for design, row in rows.items()}
     loops = [row[k] for row in out.values() for k in ("loops", "to")]
     print(f"\nof {len(out)} designs: loops {min(loops):.3f} to {max(loops):.3f}, ", end="")

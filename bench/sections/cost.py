@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from harness import PRESETS, ROOT, apart, progress, reference, shown, solver, timed
+from harness import PRESETS, ROOT, progress, reference, run_apart, solver, tabulate, timed
 from report.energy import last_problem
 from report.measure import peak_mb
 
@@ -43,7 +43,7 @@ def breakdown() -> dict[str, Any]:
                 chosen.factor(values)
                 row[f"factor {backend}"] = milliseconds(chosen.factor, values, repeats=5)
         rows[name] = row
-    return shown("One iteration at 64 x 64, milliseconds", ["unknowns"], rows)
+    return tabulate("One iteration at 64 x 64, milliseconds", ["unknowns"], rows)
 
 
 def sizes() -> dict[str, Any]:
@@ -56,12 +56,12 @@ def sizes() -> dict[str, Any]:
     ):
         base = None
         for size in progress(sides, f"{task} {preset}"):
-            seconds, peak = apart(_grid, task, preset, size)
+            seconds, peak = run_apart(_grid, task, preset, size)
             each = 1e6 * seconds / size**2
             base = base or each
             row = {"s": seconds, "us / vertex": each, "against 64": each / base, "peak GB": peak}
             rows[f"{task} {preset} {size}"] = row
-    return shown("Size", ["solve"], rows)
+    return tabulate("Size", ["solve"], rows)
 
 
 def _grid(task: str, preset: str, size: int) -> tuple[float, float]:
@@ -81,38 +81,28 @@ def components() -> dict[str, Any]:
     noise = 1e-12 * size * np.random.default_rng(0).standard_normal((count, 3))
     asked = [
         *(("developable", "curvature", o) for o in PRESETS),
-        ("developable", "isometry", "balanced"),
-        ("developable", "isometry", "jiang2020"),
+        *(("developable", "isometry", o) for o in ("balanced", "jiang2020")),
         *(("flatten", f, "balanced") for f in ("strain", "lengths", "isometry")),
         *(("denoise", f, "balanced") for f in ("smooth", "crease")),
-        ("bend", "isometry", "balanced"),
-        ("conformal", "isometry", "balanced"),
+        *((task, "isometry", "balanced") for task in ("bend", "conformal")),
     ]
 
     def solved(shifts: list[list[float]], added: Any, wanted: tuple[str, str, str]) -> list[Any]:
         """Return the result of each copy, moved back to the panel's place."""
-        points = panel.vertices + added
-        mesh = gso.Mesh(
-            np.concatenate([points + s for s in shifts]),
-            np.concatenate([panel.faces + k * count for k in range(len(shifts))]),
-        )
-        task, formulation, options = wanted
-        constraints = []
-        if task == "bend":
+        points, copies = panel.vertices + added, range(len(shifts))
+        faces = np.concatenate([panel.faces + k * count for k in copies])
+        mesh = gso.Mesh(np.concatenate([points + s for s in shifts]), faces)
+        keywords: dict[str, Any] = dict(zip(("task", "formulation", "options"), wanted))
+        if wanted[0] == "bend":
             rows = np.arange(count).reshape(33, 33)
-            every = count * np.arange(len(shifts))
-            held, lifted = ((rows[r] + every[:, None]).ravel() for r in (0, -1))
+            held, lifted = (np.ravel(rows[r] + count * np.c_[copies]) for r in (0, -1))
             places = mesh.vertices[lifted] + np.array([-0.05, 0.0, 0.1]) * size
-            constraints = [gso.Fixed(held), gso.Handle(lifted, places)]
-        result = gso.tno.optimize(
-            mesh, task=task, formulation=formulation, options=options, constraints=constraints
-        )
-        flat = task in ("flatten", "conformal")
-        parts = result.components or [result]
-        return [
-            np.asarray(part.flat) if flat else part.mesh.vertices - s
-            for part, s in zip(parts, shifts, strict=True)
-        ]
+            keywords["constraints"] = [gso.Fixed(held), gso.Handle(lifted, places)]
+        result = gso.tno.optimize(mesh, **keywords)
+        parts = zip(result.components or [result], shifts, strict=True)
+        if wanted[0] in ("flatten", "conformal"):
+            return [np.asarray(part.flat) for part, _ in parts]
+        return [part.mesh.vertices - s for part, s in parts]
 
     here, beside = [0.0, 0.0, 0.0], [[3.0 * size * k, 0.0, 0.0] for k in range(8)]
     far = [100.0 * size, 0.0, 0.0]
@@ -128,19 +118,16 @@ def components() -> dict[str, Any]:
     for wanted in progress(asked, "components"):
         alone = solved([here], 0.0, wanted)[0]
         found = {name: solved(*case, wanted) for name, case in cases.items()}
-        row = {"alone": alone, "with copy": found["100 m away"][0]}
-        for name, points in row.items():
-            off = points - panel.vertices if points.shape[1] == 3 else None
-            row[name] = "-" if off is None else np.linalg.norm(off, axis=1).max()
+        row: dict[str, Any] = {}
+        for name, points in {"alone": alone, "with copy": found["100 m away"][0]}.items():
+            flat = points.shape[1] == 2
+            row[name] = "-" if flat else np.linalg.norm(points - panel.vertices, axis=1).max()
         for name, copies in found.items():
             row[name] = max(float(np.abs(points - alone).max()) for points in copies) / size
         rows[" ".join(wanted)] = row
-    title = (
-        "A panel of 4 m and copies of it: largest displacement in mm, alone and with a copy 100 m "
-    )
-    return shown(
-        title + "away;\n  then the largest difference to the panel alone, in sizes", ["task"], rows
-    )
+    title = "A panel of 4 m and copies of it: largest displacement in mm, alone and with a copy "
+    title += "100 m away;\n  then the largest difference to the panel alone, in sizes"
+    return tabulate(title, ["task"], rows)
 
 
 def startup() -> dict[str, Any]:
@@ -158,7 +145,7 @@ def startup() -> dict[str, Any]:
         "gso optimize panel.obj -o out.obj, cold": {"median s": cold, "at most": 2.0},
         "import gso over import numpy": {"median s": more, "at most": 0.1},
     }
-    return shown("Start-up", ["what"], rows)
+    return tabulate("Start-up", ["what"], rows)
 
 
 SECTIONS = (breakdown, sizes, components, startup)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from designs.base import shuffled, without
-from harness import BENCH, PRESETS, axes_of, energy, progress, quietly, shown, timed
+from harness import BENCH, PRESETS, axes_of, energy, progress, quietly, tabulate, timed
 from report.store import Store
 from report.surfaces import Surfaces, opened, screened
 
@@ -27,8 +27,10 @@ from gso.net import tasks as net_tasks
 from gso.net.catalogue import available
 from gso.tno import Start, optimize
 
-#: Cases that are compared: task and keywords.
-CASES = {
+#: Task and keywords.
+Case = tuple[str, dict[str, Any]]
+#: Cases that are compared.
+CASES: dict[str, Case] = {
     "balanced": ("developable", {}),
     "accurate": ("developable", {"options": "accurate"}),
     "jiang2020": ("developable", {"options": "jiang2020"}),
@@ -61,11 +63,7 @@ def first(count: int, data: Path | None) -> list[np.ndarray]:
 
 
 def compared(
-    designs: Iterable[Any],
-    task: str,
-    keywords: dict[str, Any],
-    workers: int | None = 0,
-    stretched: bool = False,
+    designs: Iterable[Any], case: Case, workers: int | None = 0, stretched: bool = False
 ) -> dict[str, np.ndarray]:
     """Solve every design cold and hybrid: seconds, energies, and which used the net's start.
 
@@ -73,7 +71,7 @@ def compared(
     the stretched designs are included; they show how much such minima differ by chance.
     """
     rows = []
-    solved = partial(_solved, task, keywords, stretched)
+    solved = partial(_solved, case, stretched)
     with open_executor(workers, main=True) as executor:
         for done in executor.as_completed(solved, designs):
             if done.error is not None:
@@ -82,7 +80,8 @@ def compared(
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
-def _solved(task: str, keywords: dict[str, Any], stretched: bool, design: Any) -> dict[str, float]:
+def _solved(case: Case, stretched: bool, design: Any) -> dict[str, float]:
+    task, keywords = case
     cold, slow = timed(quietly, optimize, design, task=task, **keywords)
     warm, quick = timed(quietly, hybrid.solve, design, task=task, **keywords)
     least = max(energy(cold), 1e-300)
@@ -119,17 +118,17 @@ def speed(n: int = 64, data: Path | None = None) -> dict[str, Any]:
     """Print time and energy of the same surfaces, cold and from the net's result."""
     chosen = first(n, data)
     rows: dict[Any, dict[str, Any]] = {}
-    for name, (task, keywords) in CASES.items():
-        if net_tasks.get(task).default not in available(task):
+    for name, case in CASES.items():
+        if net_tasks.get(case[0]).default not in available(case[0]):
             print(f"{name}: no net comes with the package")
             continue
-        compared(chosen[:2], task, keywords)  # imports and code generation of the first use
-        rows[name] = costs(compared(progress(chosen, name), task, keywords))
+        compared(chosen[:2], case)  # imports and code generation of the first use
+        rows[name] = costs(compared(progress(chosen, name), case))
     cold = float(np.median([timed(quietly, optimize, p, task="denoise")[1] for p in chosen]))
     blank = dict.fromkeys(next(iter(rows.values()), ()), "")
     rows["denoise, in closed form: no start can help"] = blank | {"cold ms": 1e3 * cold}
     title = f"Speed: medians over {len(chosen)} surfaces; energies over the cold ones"
-    return shown(title, ["case"], rows)
+    return tabulate(title, ["case"], rows)
 
 
 def sizes(n: int = 4, data: Path | None = None) -> dict[str, Any]:
@@ -139,10 +138,10 @@ def sizes(n: int = 4, data: Path | None = None) -> dict[str, Any]:
         grids = [resample(np.asarray(p, float), side, side) for p in chosen]
         quietly(hybrid.solve, grids[0], options=preset)
         shown_grids = progress(grids, f"{side} {preset}")
-        found = compared(shown_grids, "developable", {"options": preset})
+        found = compared(shown_grids, ("developable", {"options": preset}))
         rows[f"{side} x {side}", preset] = costs(found)
     title = f"Sizes: medians over {len(chosen)} surfaces, PyTorch loaded before"
-    return shown(title, ["grid", "preset"], rows)
+    return tabulate(title, ["grid", "preset"], rows)
 
 
 def guard(n: int = 0, data: Path | None = None) -> dict[str, Any]:
@@ -152,20 +151,20 @@ def guard(n: int = 0, data: Path | None = None) -> dict[str, Any]:
         some = split(name, data)
         total = min(n or len(some), len(some))
         designs = (some[k] for k in progress(range(total), name))
-        found = compared(designs, "developable", {}, workers=None, stretched=True)
+        found = compared(designs, CASES["balanced"], workers=None, stretched=True)
         rows |= _against_chance(f"{name}, {total} surfaces", found)
     title = "Guard: energy of the hybrid solve over that of the cold one, balanced"
-    return shown(title, ["surfaces", "solve"], rows)
+    return tabulate(title, ["surfaces", "solve"], rows)
 
 
 def general(n: int = 32, data: Path | None = None) -> dict[str, Any]:
     """Print energies on triangulated patches in random order, half of them with a hole."""
     chosen = first(n, data)
     meshes = [patch(p, HOLES[k % len(HOLES)], seed=k) for k, p in enumerate(chosen)]
-    found = compared(progress(meshes, "general"), "developable", {}, stretched=True)
+    found = compared(progress(meshes, "general"), CASES["balanced"], stretched=True)
     rows = _against_chance(f"{len(meshes)} meshes", found)
     title = "General meshes, triangulated in random order, half with a hole"
-    return shown(title, ["meshes", "solve"], rows)
+    return tabulate(title, ["meshes", "solve"], rows)
 
 
 def _against_chance(name: str, found: dict[str, np.ndarray]) -> dict[Any, dict[str, float]]:
@@ -213,7 +212,7 @@ def anytime(n: int = 16, data: Path | None = None, plot: str = "anytime.png") ->
         axes.plot(*rows["hybrid", "0"].values(), "o", color="black", label="net alone")
     title = f"Anytime: medians over {len(chosen)} surfaces; energy over that of the cold solve; "
     title += f"the net alone is the hybrid's first point; see {plot}"
-    return shown(title, ["solve", "iterations"], rows)
+    return tabulate(title, ["solve", "iterations"], rows)
 
 
 SECTIONS = (speed, sizes, guard, general, anytime)

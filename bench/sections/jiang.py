@@ -9,7 +9,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from harness import PRESETS, compared, progress, quality, reference, shown, solver
+from harness import PRESETS, compare, progress, quality, reference, solver, tabulate
 from report.peers_flatten import lscm
 
 import gso
@@ -52,7 +52,7 @@ def developable() -> dict[str, Any]:
     def rated(points: np.ndarray, result: gso.Result) -> dict[str, float]:
         return quality(points, result.grid) | {k: result.metrics.get(k, np.nan) for k in flat}
 
-    return compared(
+    return compare(
         "Developable, 24 surfaces (published: loss_gc 0.0283, K_A-r 0.8888, d_H 0.823 %, 38 s). "
         "Strains of the flat image that comes with the surface",
         {name: solver(formulation=f, options=o) for name, (f, o) in SOLVES.items()},
@@ -74,7 +74,7 @@ def tradeoff() -> dict[str, Any]:
         weights = {k: factor * getattr(frozen, k) for k in ("w_isometry", "w_mapping")}
         options = replace(frozen, **weights, w_fairness=fairness)
         runs[f"isometry x {factor:g}, fairness {fairness:.0e}"] = solver(options=options)
-    return compared(
+    return compare(
         "Isometry alone, 8 surfaces of seed 2002",
         runs,
         [s.sample(64) for s in bezier.generate(8, seed=2002)],
@@ -90,7 +90,7 @@ def interactive() -> dict[str, Any]:
     for name, drag in _drags().items():
         for steps in (1, 2):
             rows[name, str(steps)] = _dragged(*drag, steps)
-    return shown(
+    return tabulate(
         "Dragging (aim: 10 frames / s). Lag: largest distance from the settled surface, percent "
         "of its diagonal, and relative to what the handle moves in a frame",
         ["task", "iterations"],
@@ -167,7 +167,7 @@ def bend() -> dict[str, Any]:
         title = f"A sheet rolled up, {name}; the handles are on a smooth cylinder, whose chords "
         runs = {f"{name}, {preset}": partial(rolled_up, preset=preset) for preset in PRESETS}
         columns = [*keys, "from cylinder", "iterations"]
-        found |= compared(title + "are shorter", runs, [case], rated, columns)
+        found |= compare(title + "are shorter", runs, [case], rated, columns)
     return found
 
 
@@ -177,7 +177,7 @@ def conformal() -> dict[str, Any]:
         preset: lambda m, o=preset: gso.tno.optimize(m, task="conformal", options=o).flat
         for preset in PRESETS
     }
-    return compared(
+    return compare(
         "Conformal maps of the 24 surfaces: s1/s2 - 1 of the cells, lengths flat / surface",
         runs | {"libigl LSCM": lscm},
         [Mesh.from_grid(s) for s in reference()[0]],

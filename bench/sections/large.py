@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from designs.base import refined
 from designs.irregular import star
-from harness import apart, energy, progress, shown
+from harness import energy, progress, run_apart, tabulate
 from report.measure import peak_mb
 
 import gso
@@ -84,13 +84,13 @@ def _compared(title: str, cases: list[tuple[tuple[str, int], str]], checked: int
     """Measure cases, with the full solve where the side of the design is at most `checked`."""
     rows = {}
     for design, kind in progress(cases, title):
-        row = apart(_solved, design, kind, False)
+        row = run_apart(_solved, design, kind, False)
         none = dict.fromkeys(("s", "energy", "|K|"), np.nan)
-        full = apart(_solved, design, kind, True) if design[1] <= checked else none
+        full = run_apart(_solved, design, kind, True) if design[1] <= checked else none
         ratio = row["energy"] / full["energy"]
         more = {"full s": full["s"], "energy ratio": ratio, "full |K|": full["|K|"]}
         rows[f"{design[0]} {design[1]} {kind}".strip()] = row | more
-    return shown(title, ["design"], rows)
+    return tabulate(title, ["design"], rows)
 
 
 def _stars(title: str, kind: str, side: int, checked: int) -> dict[str, Any]:

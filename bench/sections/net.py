@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from harness import axes_of, progress, shown, timed
+from harness import axes_of, progress, tabulate, timed
 from report.published import NETS, TABLE_3
 
 from gso import dataset, net
@@ -61,11 +61,9 @@ def over(task: str, model: Any, split: Any, array: str, count: int) -> dict[str,
     return {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
 
 
-def milliseconds(
-    task: str, model: Any, surface: np.ndarray, times: int = 20, rounds: int = 10
-) -> float:
+def milliseconds(task: str, model: Any, surface: np.ndarray) -> float:
     """Return the smallest of several medians of the time for one surface, array to array."""
-    spent = np.empty((rounds, times))
+    spent = np.empty((10, 20))
     net.predict(surface, task=task, model=model)
     for place in np.ndindex(spent.shape):
         spent[place] = timed(net.predict, surface, task=task, model=model)[1]
@@ -130,15 +128,10 @@ def rounding(data: Path, run: Path, n: int = 0) -> dict[str, Any]:
         halved = Path(folder) / "half.safetensors"
         weights.save(exact, halved)
         one, other = (measured(exact.task, m, split, n) for m in (exact, halved))
-    rows = {
-        name: {
-            "exact": x,
-            "half": other[name],
-            "change %": 100.0 * abs(other[name] - x) / max(abs(x), 1e-12),
-        }
-        for name, x in one.items()
-    }
-    return shown("Metrics of the net of the run, and in half precision", ["metric"], rows)
+    rows = {name: {"exact": x, "half": other[name]} for name, x in one.items()}
+    for name, x in one.items():
+        rows[name]["change %"] = 100.0 * abs(other[name] - x) / max(abs(x), 1e-12)
+    return tabulate("Metrics of the net of the run, and in half precision", ["metric"], rows)
 
 
 def curve(plot: str = "curves.png") -> dict[str, Any]:

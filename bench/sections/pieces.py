@@ -12,7 +12,7 @@ import importlib.util
 from typing import Any
 
 import numpy as np
-from harness import example, medians, progress, quietly, reference, shown, timed
+from harness import example, medians, progress, quietly, reference, tabulate, timed
 
 import gso
 from gso import faults, metrics
@@ -33,7 +33,7 @@ def as_is(shapes: str = "", strain: str = "0.01") -> dict[str, Any]:
     for name, mesh in _shapes(shapes, "as is"):
         for how, darts in (("darts", True), ("no darts", False)):
             rows[name, how] = _figures(mesh, max_strain=float(strain), darts=darts)
-    return shown(f"as they are, strain {strain}", ["design", ""], rows)
+    return tabulate(f"as they are, strain {strain}", ["design", ""], rows)
 
 
 def joint(shapes: str = "") -> dict[str, Any]:
@@ -43,7 +43,7 @@ def joint(shapes: str = "") -> dict[str, Any]:
         for share in _AWAY:
             far = 0.01 * share * mesh.diagonal
             rows[name, f"{share:g} %"] = _figures(mesh, max_strain=_JOINT, max_deviation=far)
-    return shown(f"shape may change, strain {_JOINT}", ["design", ""], rows)
+    return tabulate(f"shape may change, strain {_JOINT}", ["design", ""], rows)
 
 
 def ruled(shapes: str = "") -> dict[str, Any]:
@@ -68,7 +68,7 @@ def ruled(shapes: str = "") -> dict[str, Any]:
             "usable": result.usable,
             "s": cutting + seconds,
         }
-    return shown(f"exactly ruled, within {_AWAY[0]:g} %", ["design"], rows)
+    return tabulate(f"exactly ruled, within {_AWAY[0]:g} %", ["design"], rows)
 
 
 def uncut(shapes: str = "") -> dict[str, Any]:
@@ -89,7 +89,7 @@ def uncut(shapes: str = "") -> dict[str, Any]:
             rows[name, kind] = row | {"mean %": 0, "max %": 0}
         rows[name, "uncut"]["mean %"] = percent * away.there_mean
         rows[name, "uncut"]["max %"] = percent * away.there_max
-    return shown("against no cuts, and against xatlas", ["design", ""], rows)
+    return tabulate("against no cuts, and against xatlas", ["design", ""], rows)
 
 
 def minimax() -> dict[str, Any]:
@@ -102,7 +102,9 @@ def minimax() -> dict[str, Any]:
             for f in ("strain", "minimax")
         )
         ratios.append({name: least[key] / strain[key] for name, key in names.items()})
-    return shown("minimax over strain, medians", ["surfaces"], {str(len(ratios)): medians(ratios)})
+    return tabulate(
+        "minimax over strain, medians", ["surfaces"], {str(len(ratios)): medians(ratios)}
+    )
 
 
 def times() -> dict[str, Any]:
@@ -121,7 +123,7 @@ def times() -> dict[str, Any]:
             quietly, gso.tno.optimize, found["no darts"], verdict=False
         )
         rows[str(len(mesh.faces))] = row
-    return shown("times", ["triangles"], rows)
+    return tabulate("times", ["triangles"], rows)
 
 
 def _figures(mesh: Mesh, **given: Any) -> dict[str, Any]:

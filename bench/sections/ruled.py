@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from designs import analytic
 from designs.base import shuffled
-from harness import ROOT, compared, example, progress, quietly, reference, shown, timed
+from harness import ROOT, compare, example, progress, quietly, reference, tabulate, timed
 
 import gso
 from gso import metrics
@@ -35,7 +35,7 @@ def strips(seed: str = "", start: str = "design", count: int = 24) -> dict[str, 
     columns += [("fold 90 %", "fold", _quantile), ("usable", sum), ("s", np.median)]
     runs = {number: _solver(start, **settings) for number, settings in STRIPS.items()}
     title = f"{len(surfaces)} surfaces, starts {start}"
-    return compared(title, runs, surfaces, _rated, columns, head="strips")
+    return compare(title, runs, surfaces, _rated, columns, head="strips")
 
 
 def cad(seed: str = "", count: int = 24) -> dict[str, Any]:
@@ -53,7 +53,7 @@ def cad(seed: str = "", count: int = 24) -> dict[str, Any]:
     columns += [("torsal", sum), *((k, np.median) for k in ("mean %", "max %", "faces", "s"))]
     runs = {number: _solver("design", **STRIPS[number]) for number in ("1", "tree", "4")}
     title = f"Smooth strips of {len(surfaces)} surfaces"
-    return compared(title, runs, surfaces, rated, columns, head="strips")
+    return compare(title, runs, surfaces, rated, columns, head="strips")
 
 
 def _surfaces(seed: str = "", count: int = 24) -> list[Any]:
@@ -105,7 +105,7 @@ def convergence() -> dict[str, Any]:
                 "all deg": angle.max(),
                 "usable": str(result.usable),
             }
-    return shown("Known surfaces", ["surface", "rulings"], rows)
+    return tabulate("Known surfaces", ["surface", "rulings"], rows)
 
 
 def bounds(seed: str = "", start: str = "design", count: int = 24) -> dict[str, Any]:
@@ -129,7 +129,7 @@ def bounds(seed: str = "", start: str = "design", count: int = 24) -> dict[str, 
             "median s": np.median(seconds),
             "max s": max(seconds),
         }
-    return shown(f"{len(surfaces)} surfaces, starts {start}", ["bound"], rows)
+    return tabulate(f"{len(surfaces)} surfaces, starts {start}", ["bound"], rows)
 
 
 def general(start: str = "design") -> dict[str, Any]:
@@ -160,7 +160,7 @@ def general(start: str = "design") -> dict[str, Any]:
                 row |= {"usable": "", "s": ""}
             row.pop("fold", None)
             rows[name, str(number)] = row
-    return shown("Meshes from practice", ["mesh", "strips"], rows)
+    return tabulate("Meshes from practice", ["mesh", "strips"], rows)
 
 
 def peers() -> dict[str, Any]:
@@ -186,7 +186,7 @@ def peers() -> dict[str, Any]:
     columns += [("strain %", np.nanmedian), ("off straight %", np.median)]
     columns += [("usable", sum), ("s", np.median)]
     title = "Largest strain of the pattern, and how far rulings are off straight"
-    return compared(title, runs, _surfaces(), rated, columns)
+    return compare(title, runs, _surfaces(), rated, columns)
 
 
 SECTIONS = (strips, convergence, bounds, general, peers, cad)

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from harness import energy, medians, progress, shown
+from harness import energy, medians, progress, tabulate
 
 import gso
 from gso.dataset import bezier
@@ -40,7 +40,7 @@ def drags(n: int = 64, count: int = 16) -> dict[str, Any]:
         worst = float(max(f["settled %"] for f in found))
         rows[task] = medians(found) | {"worst settled %": worst}
     title = f"A corner dragged, the opposite border fixed, {n} x {n}, medians of {count} surfaces"
-    return shown(title, ["task", "formulation"], rows)
+    return tabulate(title, ["task", "formulation"], rows)
 
 
 def kinds(n: int = 64) -> dict[str, Any]:
@@ -51,7 +51,7 @@ def kinds(n: int = 64) -> dict[str, Any]:
             way = _UP * mesh.diagonal * vertex_normals(mesh)[middle]
             rows[(*task, name)] = _dragged(mesh, task, more, middle, way)
     title = f"The middle dragged under each kind of constraint, {n} x {n}"
-    return shown(title, ["task", "formulation", "constraint"], rows)
+    return tabulate(title, ["task", "formulation", "constraint"], rows)
 
 
 def frames(

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from designs.base import shuffled
-from harness import PRESETS, compared, example, pure, quality, reference, solver
+from harness import PRESETS, compare, example, pure, quality, reference, solver
 from report.peers_flatten import arap
 
 import gso
@@ -44,7 +44,7 @@ def developable() -> dict[str, Any]:
     columns = [*columns, *strains, ("backend", "backend", lambda x: x[-1])]
     curved = np.mean([metrics.loss_gc(s) for s in surfaces])
     title = f"Developable, 24 surfaces, mean input loss_gc {curved:.3f}"
-    found = compared(title, runs, surfaces, _rated, columns, head="preset")
+    found = compare(title, runs, surfaces, _rated, columns, head="preset")
     given = np.median([strains_of(gso.Mesh.from_grid(s))["strain_max"] for s in surfaces])
     print("  strain: the largest of each result's pattern, median and 90th percentile; ", end="")
     print(f"of the input {100.0 * given:.3g} %")
@@ -75,7 +75,7 @@ def flatten() -> dict[str, Any]:
     columns += [("flipped", np.sum)]
     title = "Flatten, 24 surfaces (floors: strain 0.0093 0.0353 0.0053 no flips; "
     title += "lengths 2.6e-5 1.7e-5 no flips; 0.15 s)"
-    return compared(title, runs, reference()[0], _flat, columns, head="formulation")
+    return compare(title, runs, reference()[0], _flat, columns, head="formulation")
 
 
 def denoise() -> dict[str, Any]:
@@ -88,7 +88,7 @@ def denoise() -> dict[str, Any]:
         angle = metrics.normal_angle(pair[0], result.grid)
         return {"theta deg": angle, "sigma found": result.details["sigma"]}
 
-    return compared(
+    return compare(
         "Denoise, 24 surfaces, nothing told about sigma",
         {f"{sigma:.3f}, floor {floor}": solved(sigma) for sigma, floor in FLOORS.items()},
         list(zip(*reference(), strict=True)),
@@ -106,7 +106,7 @@ def resolution() -> dict[str, Any]:
         def solved(shape: Any, size: int, options: str = preset) -> gso.Result:
             return gso.tno.optimize(shape.sample(size), options=options)
 
-        found |= compared(
+        found |= compare(
             f"One set of weights, {count} surfaces of seed 77",
             {f"{preset} {size}": partial(solved, size=size) for size in (32, 64, 128)},
             shapes[:count],
@@ -135,7 +135,7 @@ def questions() -> dict[str, Any]:
     columns = [("kept on", "kept", np.sum), "worse", ("largest / bound", "reach", np.max)]
     columns += [("both ways", "both", np.max)]
     title = "max_deviation, share of the diagonal"
-    found = compared(title, runs, meshes, within, columns, head="bound")
+    found = compare(title, runs, meshes, within, columns, head="bound")
     presets = {id(m): [gso.tno.optimize(m, options=p).metrics for p in PRESETS] for m in meshes}
 
     def aimed(mesh: gso.Mesh, target: float) -> tuple[float, gso.Result]:
@@ -150,7 +150,7 @@ def questions() -> dict[str, Any]:
     runs = {f"target {target}": partial(aimed, target=target) for target in (0.05, 0.02)}
     columns = [("met on", "met", np.sum), ("closest on", "closest", np.sum), "d_H %"]
     title = "target_curvature; closest: no preset that meets it has a smaller mean distance"
-    return found | compared(title, runs, meshes, reached, columns, head="target")
+    return found | compare(title, runs, meshes, reached, columns, head="target")
 
 
 def general() -> dict[str, Any]:
@@ -163,10 +163,10 @@ def general() -> dict[str, Any]:
     for name, mesh in (("teapot patch, triangles", patch), ("quads with a hole", hole)):
         runs = {f"{name}, strain": solver(task="flatten"), f"{name}, libigl ARAP": arap}
         columns = ["strain", "p99", "edges", "flipped"]
-        found |= compared(f"Flatten, {name}", runs, [mesh], _flat, columns)
+        found |= compare(f"Flatten, {name}", runs, [mesh], _flat, columns)
     for name, mesh in (("quads, irregular", disk), ("quads with a hole", hole)):
         bound = solver(max_deviation=0.01 * mesh.diagonal)
-        found |= compared(
+        found |= compare(
             f"Developable, {name}",
             {name: solver(), f"{name}, within 1 %": bound},
             [mesh],

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from harness import example, progress, quietly, shown, timed
+from harness import example, progress, quietly, tabulate, timed
 
 import gso
 from gso.mesh import Mesh
@@ -49,7 +49,7 @@ def fabricate(names: str = ",".join(_SETS), seconds: str = "30") -> dict[str, An
             "refused": sum(bool(d["reasons"]) for d in own),
             "s": took,
         }
-    return shown("fabricate", ["set"], rows)
+    return tabulate("fabricate", ["set"], rows)
 
 
 def _designs(name: str, folder: Path) -> list[Mesh | Path]:
