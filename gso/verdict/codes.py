@@ -55,7 +55,7 @@ class CodeInfo:
     least: bool = False
 
 
-def _most(
+def _limit(
     value: str,
     kind: Kind,
     meaning: str,
@@ -63,26 +63,20 @@ def _most(
     remedy: str,
     limit: float | None = None,
     tolerance: float = TIGHT,
+    least: bool = False,
 ) -> tuple[str, CodeInfo]:
-    """Describe what may be at most its bound."""
-    return value, CodeInfo(kind, meaning, sentence, remedy, limit, tolerance)
-
-
-def _least(
-    value: str, kind: Kind, meaning: str, sentence: str, remedy: str, limit: float | None = None
-) -> tuple[str, CodeInfo]:
-    """Describe what must be at least its bound."""
-    return value, CodeInfo(kind, meaning, sentence, remedy, limit, least=True)
+    """Describe a number that has a bound."""
+    return value, CodeInfo(kind, meaning, sentence, remedy, limit, tolerance, least)
 
 
 def _fault(value: str, meaning: str, sentence: str, remedy: str) -> tuple[str, CodeInfo]:
     """Describe what must not occur at all: the number is how often it does."""
-    return _most(value, Kind.COUNT, meaning, sentence, remedy, limit=0.0)
+    return value, CodeInfo(Kind.COUNT, meaning, sentence, remedy, limit=0.0)
 
 
 def _stop(value: str, meaning: str, sentence: str, remedy: str) -> tuple[str, CodeInfo]:
     """Describe what is not measured."""
-    return _most(value, Kind.NONE, meaning, sentence, remedy)
+    return value, CodeInfo(Kind.NONE, meaning, sentence, remedy)
 
 
 class Code(str, enum.Enum):
@@ -104,7 +98,7 @@ class Code(str, enum.Enum):
         "failed",
         "An error ended the work.",
         "{detail}",
-        "what the message of the error says",
+        "do what its message says",
     )
     UNFINISHED = _stop(
         "unfinished",
@@ -140,21 +134,22 @@ class Code(str, enum.Enum):
         "folded",
         "Faces at edges where the surface turns by more than 120 degrees; not those of the design.",
         "the surface is folded onto itself",
-        "let it change less (max_deviation), or hold less of it",
+        "allow less distance (max_deviation), or hold fewer vertices",
     )
     CROSSES_ITSELF = _fault(
         "crosses_itself",
         "Faces that pass through others; not those of the design.",
         "the surface passes through itself",
-        "let it change less (max_deviation), or hold less of it",
+        "allow less distance (max_deviation), or hold fewer vertices",
     )
-    COLLAPSED = _least(
+    COLLAPSED = _limit(
         "collapsed",
         Kind.SHARE,
         "Length of an edge over that in the design.",
         "edges of the surface keep {value} of their length, less than {bound}",
-        "let it change less (max_deviation), or mesh it more evenly",
+        "allow less distance (max_deviation), or take an evener mesh",
         limit=SHORT,
+        least=True,
     )
     NO_PATTERN = _fault(
         "no_pattern",
@@ -174,20 +169,21 @@ class Code(str, enum.Enum):
         "the pattern lies on itself",
         "cut the surface into pieces (gso pieces)",
     )
-    PATTERN_COLLAPSED = _least(
+    PATTERN_COLLAPSED = _limit(
         "pattern_collapsed",
         Kind.SHARE,
         "Length of an edge of the pattern over that of the surface.",
         "edges of the pattern keep {value} of their length, less than {bound}",
         "cut the surface into pieces (gso pieces)",
         limit=SHORT,
+        least=True,
     )
-    NOT_FLATTENED = _most(
+    NOT_FLATTENED = _limit(
         "not_flattened",
         Kind.SHARE,
         "Strain with which no pattern fits a face: it is squeezed to a line, doubled or inverted.",
         "no pattern fits the surface: its lengths would change by {value}",
-        "ask for less change, or mesh it more finely there",
+        "ask for less, or take a finer mesh there",
         limit=0.99,
     )
     RULINGS_CROSS = _fault(
@@ -196,35 +192,37 @@ class Code(str, enum.Enum):
         "pairs of successive rulings that cross: {value}",
         "allow more strips (strips)",
     )
-    TOO_THICK = _least(
+    TOO_THICK = _limit(
         "too_thick",
         Kind.LENGTH,
-        "Smallest radius of a part's surface; its bound is how far the inner face of the sheet "
-        "is from that surface, half the thickness for parts without bend lines.",
+        "Smallest radius of a part; its bound is the depth of the inner face below the surface, "
+        "half the thickness for parts without bend lines.",
         "the sheet is too thick to be rolled to a radius of {value}, less than {bound}",
         "take a thinner sheet, or fold it along its bend lines (--bend-radius)",
+        least=True,
     )
-    NEUTRAL_STRAIN = _most(
+    NEUTRAL_STRAIN = _limit(
         "neutral_strain",
         Kind.SHARE,
         "Strain of the sheet's neutral surface against the pattern of a part without bend lines.",
-        "without bend lines the pattern is that of the design's surface, and the neutral "
-        "surface of the sheet is longer or shorter by up to {value}, more than {bound}",
+        "the pattern is that of the surface, as there are no bend lines, and the sheet's neutral "
+        "surface is longer or shorter by up to {value}, more than {bound}",
         "take --face middle and --k-factor 0.5, or a thinner sheet",
     )
-    BEND_ANGLE = _most(
+    BEND_ANGLE = _limit(
         "bend_angle",
         Kind.ANGLE,
         "Largest angle of a bend; its bound is the last one of the bend table.",
         "bends of up to {value} are beyond the end of the bend table, {bound}",
         "add larger angles to the table",
     )
-    BENDS_NEAR = _least(
+    BENDS_NEAR = _limit(
         "bends_near",
         Kind.LENGTH,
         "Distance of two bends of a part; its bound is the room that both need.",
         "two bends are {value} apart, and folded they need {bound}",
         "take a smaller --bend-radius or a thinner sheet",
+        least=True,
     )
     BENDS_OVERLAP = _fault(
         "bends_overlap",
@@ -232,11 +230,11 @@ class Code(str, enum.Enum):
         "bends are too near each other for the sheet",
         "take a thinner sheet",
     )
-    SEAM_SIDES = _most(
+    SEAM_SIDES = _limit(
         "seam_sides",
         Kind.LENGTH,
-        "Difference of the lengths of a seam's sides that the thickness of the sheet makes; its"
-        " bound is a tenth of the thickness more than what the strain explains.",
+        "Difference in length of a seam's two sides; its bound is a tenth of the thickness more "
+        "than the strain explains.",
         "the sides of a seam differ by {value} in a sheet of this thickness, more than {bound}",
         "take --face middle, or a thinner sheet",
     )
@@ -262,40 +260,40 @@ class Code(str, enum.Enum):
         "not_nested",
         "A part does not fit on the sheet.",
         "{detail}",
-        "what the message says",
+        "do what its message says",
     )
-    DEVIATION = _most(
+    DEVIATION = _limit(
         "deviation",
         Kind.LENGTH,
         "Largest distance between result and design, in both directions.",
         "the result is {value} away from the design, more than {bound}",
         "allow more distance (max_deviation), or more strips or pieces",
     )
-    FAR = _most(
+    FAR = _limit(
         "far",
         Kind.SHARE,
-        "The same over the diagonal of the design's bounding box, whatever limit was given; the"
-        " bound is 10 % for strips. What constraints ask for is added.",
+        "The same over the design's diagonal, whatever limit was given; for strips the bound is "
+        "10 %. What constraints ask for is added.",
         "the result has left the design by {value} of its diagonal, more than {bound}",
-        "cut it into pieces (gso pieces), allow more strips, or hold more of it",
+        "cut the design into pieces (gso pieces), allow more strips, or hold more vertices",
         limit=0.5,
     )
-    SEAM_GAP = _most(
+    SEAM_GAP = _limit(
         "seam_gap",
         Kind.LENGTH,
         "Largest distance between the two sides of a seam; its bound is max_deviation.",
         "the sides of seams are up to {value} apart, more than {bound}",
         "allow more distance (max_deviation), or more strips",
     )
-    STRAIN = _most(
+    STRAIN = _limit(
         "strain",
         Kind.SHARE,
         "Largest strain of the pattern; its bound is 0.5 % where only max_deviation is given.",
         "the largest strain of the pattern is {value}, more than {bound}",
-        "allow more strain (max_strain), more distance (max_deviation) or narrower necks "
-        "(min_neck), or cut it into pieces (gso pieces)",
+        "allow more strain (max_strain), distance (max_deviation) or narrow necks (min_neck), or use "
+        "gso pieces",
     )
-    TARGET_CURVATURE = _most(
+    TARGET_CURVATURE = _limit(
         "target_curvature",
         Kind.FACTOR,
         "Mean absolute curvature, more than 5 % above the target.",
@@ -303,77 +301,80 @@ class Code(str, enum.Enum):
         "raise target_curvature, or cut the design into pieces (gso pieces)",
         tolerance=0.05,
     )
-    CURVATURE_ROSE = _most(
+    CURVATURE_ROSE = _limit(
         "curvature_rose",
         Kind.FACTOR,
         "Mean absolute curvature, more than 1 % above that of the input.",
         "mean |K| is {value}, worse than the {bound} of the input",
-        "hold less of it, or take another formulation",
+        "hold fewer vertices, or take another formulation",
         tolerance=0.01,
     )
-    NOTHING_DONE = _most(
+    NOTHING_DONE = _limit(
         "nothing_done",
         Kind.FACTOR,
         "Mean absolute curvature, less than 1 % below that of the input, which is not developable.",
         "nothing was done: mean |K| is {value}, as in the input",
-        "hold less of it, allow more distance (max_deviation), or cut it into pieces (gso pieces)",
+        "hold fewer vertices, allow more distance (max_deviation), or use gso pieces",
         tolerance=-0.01,
     )
-    ROUGHER = _most(
+    ROUGHER = _limit(
         "rougher",
         Kind.FACTOR,
         "Roughness over that of the input.",
         "the result is {value} times as rough as the input",
-        "take another formulation, or hold less of it",
+        "hold fewer vertices, or take another formulation",
         limit=1.0,
         tolerance=0.01,
     )
-    PIECES = _most(
+    PIECES = _limit(
         "pieces",
         Kind.COUNT,
         "Number of pieces.",
         "there are {value} pieces, more than {bound}",
         "allow more pieces (max_pieces), strain or change of shape",
     )
-    SEAM_LENGTH = _most(
+    SEAM_LENGTH = _limit(
         "seam_length",
         Kind.FACTOR,
         "Length of all seams, over the root of the design's area.",
         "the seams are {value} times the root of the area long, more than {bound}",
         "allow longer seams (seam), more strain or change of shape",
     )
-    NECK = _least(
+    NECK = _limit(
         "neck",
         Kind.LENGTH,
         "Width of a piece at its narrowest place.",
         "necks are {value} wide, less than {bound}",
         "allow narrower necks (min_neck) or more strain (max_strain)",
+        least=True,
     )
-    TOO_SHORT = _least(
+    TOO_SHORT = _limit(
         "too_short",
         Kind.LENGTH,
         "Length of a pattern.",
         "patterns are only {value} long, less than {bound}",
         "allow shorter pieces (min_size) or more strain (max_strain)",
+        least=True,
     )
-    TOO_LONG = _most(
+    TOO_LONG = _limit(
         "too_long",
         Kind.LENGTH,
         "Length of a pattern; its bound is that of the sheet.",
         "patterns are up to {value} long, more than the {bound} of the sheet",
-        "take larger sheets, or mesh it more finely",
+        "take larger sheets, or a finer mesh",
     )
-    TOO_WIDE = _most(
+    TOO_WIDE = _limit(
         "too_wide",
         Kind.LENGTH,
         "Width of a pattern; its bound is that of the sheet.",
         "patterns are up to {value} wide, more than the {bound} of the sheet",
-        "take larger sheets, or mesh it more finely",
+        "take larger sheets, or a finer mesh",
     )
-    BEND_RADIUS = _least(
+    BEND_RADIUS = _limit(
         "bend_radius",
         Kind.LENGTH,
         "Smallest radius that a part is bent to.",
         "parts are bent to a radius of {value}, less than {bound}",
         "allow a smaller radius (min_radius) or more distance (max_deviation)",
+        least=True,
     )

@@ -111,8 +111,11 @@ def judge(made: Made, ask: Ask) -> tuple[Reason, ...]:
             np.array([bend_radius(panel) for panel in plain]), "part", [p.name for p in plain]
         ),
     }
-    # The solve may have had another design in its place, or less room.
-    return merge(made.reasons, compare(measured, limits), decided=(Code.DEVIATION,))
+    later = compare(measured, limits)
+    # The solve may have had another design in its place, or less room; and a strain that is too
+    # large is said as the record has it.
+    decided = {Code.DEVIATION} | ({Code.STRAIN_P99} & {reason.code for reason in later})
+    return merge(made.reasons, later, decided)
 
 
 def _worst(design: Mesh, surface: Mesh) -> list[float]:
