@@ -16,7 +16,7 @@ import gso
 from gso import metrics
 from gso.cli import main
 from gso.energy import Weighted, congruence, fairness
-from gso.io.flat_svg import MILLIMETRES
+from gso.quantities import MILLIMETRES
 from gso.mesh import Mesh
 from gso.solver import minimise
 from gso.solver.problem import Problem
