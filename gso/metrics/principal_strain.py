@@ -52,7 +52,7 @@ def strains(surface: Any, flat: Any) -> dict[str, float]:
     """
     found = principal_strains(surface, flat)
     largest = float(found.values.max())
-    return {"strain_mean": found.mean, "strain_p99": found.p99, "strain_max": largest}
+    return {"strain_max": largest, "strain_p99": found.p99, "strain_mean": found.mean}
 
 
 def corner_strains(surface: Any, flat: Any) -> Array:
