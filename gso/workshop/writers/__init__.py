@@ -18,7 +18,7 @@ from gso.registry import Registry
 from gso.spelling import choices
 from gso.workshop.part import Drawing
 
-_MODULES = Registry(__name__, __path__, ("checks", "layers", "strokes", "tiles"))
+_MODULES = Registry(__name__, __path__, ("layers", "strokes", "tiles", "writer_checks"))
 #: Register a writer from outside the package: ``add(name, module)``.
 add = _MODULES.add
 
