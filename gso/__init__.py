@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from gso.mesh import Mesh, topology
     from gso.result import Result
     from gso.ruled.loft import loft
+    from gso.ruled.paneling.lay_strips import strips
+    from gso.ruled.paneling.options import Options as RuledOptions
     from gso.ruled.smooth.smooth_surface import smooth_strips
     from gso.seams import cut, pieces
     from gso.spline import BSplineSurface
@@ -51,7 +53,6 @@ if TYPE_CHECKING:
     from gso.tasks.denoise import Options as DenoiseOptions
     from gso.tasks.developable import Options as DevelopableOptions
     from gso.tasks.developable.joint_isometry import Options as IsometryOptions
-    from gso.tasks.developable.ruled import Options as RuledOptions
     from gso.tasks.flatten import Options as FlattenOptions
     from gso.tasks.options import Options
     from gso.workshop.fabricate import fabricate
@@ -110,6 +111,7 @@ __all__ = [
     "save_spline",
     "seams",
     "smooth_strips",
+    "strips",
     "tno",
     "topology",
     "verdict",
@@ -138,6 +140,7 @@ _NAMES = {
     "pieces": "gso.seams",
     "fabricate": "gso.workshop.fabricate",
     "loft": "gso.ruled.loft",
+    "strips": "gso.ruled.paneling.lay_strips",
     "smooth_strips": "gso.ruled.smooth.smooth_surface",
     "Fixed": "gso.constraints",
     "FixedBoundary": "gso.constraints",
@@ -154,7 +157,7 @@ _NAMES = {
 _OPTIONS = {
     "DevelopableOptions": "gso.tasks.developable",
     "IsometryOptions": "gso.tasks.developable.joint_isometry",
-    "RuledOptions": "gso.tasks.developable.ruled",
+    "RuledOptions": "gso.ruled.paneling.options",
     "FlattenOptions": "gso.tasks.flatten",
     "DenoiseOptions": "gso.tasks.denoise",
     "BendOptions": "gso.tasks.bend",

@@ -39,20 +39,24 @@ def judged(result: Result, asked: Asked) -> Result:
     `seconds` gets entries "pattern" and "verdict". If there are reasons against the result, a
     status that does not refuse it becomes ``Status.UNUSABLE``. Each reason becomes a note.
     """
-    known = result.ruled is not None
-    if result.task == "developable" and not known and np.isfinite(result.mesh.vertices).all():
+    if result.task == "developable" and np.isfinite(result.mesh.vertices).all():
         clock = time.perf_counter()
         result.pattern = lay_out(result.mesh, result.pattern)
         result.seconds["pattern"] = time.perf_counter() - clock
         result.notes += _planarity(result)
     clock = time.perf_counter()
-    result.reasons = judge(result, asked)
+    add_reasons(result, judge(result, asked))
+    result.seconds["verdict"] = time.perf_counter() - clock
+    return result
+
+
+def add_reasons(result: Result, reasons: tuple[str, ...]) -> None:
+    """Add reasons to a result, also to its notes; its status then refuses it."""
+    result.reasons = reasons
     said = str(result.status)
     result.notes += tuple(r for r in result.reasons if r != said and r not in result.notes)
     if result.reasons and not result.status.is_failure:
         result.status = Status.UNUSABLE
-    result.seconds["verdict"] = time.perf_counter() - clock
-    return result
 
 
 def _planarity(result: Result) -> tuple[str, ...]:

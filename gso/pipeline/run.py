@@ -15,7 +15,6 @@ from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.solver import Callback, Minimum, Timings, minimise
 from gso.solver.augmented_lagrangian import tighten
-from gso.solver.minimiser import says_no
 from gso.solver.problem import Problem, energies, largest_counts
 from gso.status import Progress, Status
 from gso.tasks.base import Options, Plan, Request, Solution, Stage, same
@@ -82,8 +81,6 @@ class Run:
     ----------
     start_refused : str
         Why the start was not used; empty if it was.
-    converting : float
-        Seconds that plans took to make their results from the solutions of their stages.
     """
 
     def __init__(
@@ -110,7 +107,6 @@ class Run:
         self.history: list[Progress] = []
         self.timings = Timings()
         self.iterations = 0
-        self.converting = 0.0
 
     def __call__(self, request: Request) -> Solution:
         """Plan and solve the stages."""
@@ -125,19 +121,6 @@ class Run:
 
     def solve(self, plan: Plan, options: Options) -> Solution:
         """Solve the stages of a plan, and post-process the coordinates."""
-        solution = self._solution(plan, options)
-        if plan.convert is None or solution.status is Status.CANCELLED:
-            return solution
-        clock = time.perf_counter()
-        solution = plan.convert(solution, self._told)
-        self.converting += time.perf_counter() - clock
-        return solution
-
-    def _told(self, progress: Progress) -> bool:
-        """Report an iteration of a conversion; return whether to go on."""
-        return self.callback is None or not says_no(self.callback(progress))
-
-    def _solution(self, plan: Plan, options: Options) -> Solution:
         if not plan.stages:
             return _finished(plan, plan.start, plan.status or Status.CONVERGED)
         return self.concluded(plan, self.through(plan, options))

@@ -13,7 +13,7 @@ import numpy as np
 from gso import linalg, tasks
 from gso.components import several
 from gso.constraints import Constraint, compile_constraints
-from gso.errors import MeshError, OptionError
+from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.pipeline import component_solves
 from gso.pipeline.job import Job
@@ -69,11 +69,6 @@ def solve_mesh(
     whole = Job(design, compile_constraints(constraints, design, flat=flat), start)
     one = partial(_solved, asked)
     parts = component_solves.parts(design, whole.constraints)
-    if parts and asked.formulation == "ruled":
-        raise MeshError(
-            f"the formulation 'ruled' takes one surface, and this mesh has {len(parts)} "
-            "components: solve each on its own"
-        )
     if parts:
         return component_solves.solve(one, whole, parts, callback)
     return one(whole, callback)
@@ -106,7 +101,7 @@ def _solved(asked: Asked, job: Job, callback: Callback | None) -> Result:
         if not run.usable_start(request):
             request = replace(request, start=None)
         solution, formulation = run(request), asked.formulation
-    record_violations(compiled, frame, solution)
+    record_violations(compiled, frame, solution.blocks[compiled.block], solution)
     result = packed(asked.task, formulation, job.design, frame, solution, run)
     if several(job.design):
         result.notes += ("its components are joined by constraints and solved together",)

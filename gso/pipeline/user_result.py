@@ -14,22 +14,28 @@ from gso.result import Result
 from gso.spline.fit import describe_spline
 from gso.status import Status
 from gso.tasks.base import Solution
+from gso.typing import Array
 
 
-def record_violations(compiled: Compiled, frame: Canonical, solution: Solution) -> None:
-    """Record the violation of each constraint, in the user's unit; note missed hard ones."""
+def record_violations(
+    compiled: Compiled, frame: Canonical, points: Array, out: Solution | Result
+) -> None:
+    """Record the violation of each constraint, in the user's unit; note missed hard ones.
+
+    `points` are the vertices or the flat image, in the solver's frame and numbering.
+    """
     if not compiled.names:
         return
     unit = frame.frame.scale
-    misses = compiled.violations(solution.blocks[compiled.block])
+    misses = compiled.violations(points)
     lengths = {name: unit * miss.length for name, miss in misses.items()}
-    solution.details = {**solution.details, "constraints": lengths}
+    out.details = {**out.details, "constraints": lengths}
     broken = [k for k, miss in misses.items() if miss.hard and not miss.length <= TIGHT]
     for name in broken:
         where = ", ".join(map(str, frame.names[misses[name].vertices]))
-        solution.notes += (f"{name} is missed by {lengths[name]:.3g} (vertices {where})",)
-    if broken and solution.status is not Status.CANCELLED:
-        solution.status = Status.CONSTRAINTS_MISSED
+        out.notes += (f"{name} is missed by {lengths[name]:.3g} (vertices {where})",)
+    if broken and out.status is not Status.CANCELLED:
+        out.status = Status.CONSTRAINTS_MISSED
 
 
 def packed(
@@ -58,14 +64,6 @@ def packed(
     else:
         mesh = design.replaced(np.c_[flat, np.zeros(len(design.vertices))])
     seconds = run.timings.as_dict()
-    ruled = None
-    if solution.ruled is not None:
-        seconds["strips"] = run.converting
-        ruled = solution.ruled.transformed(
-            frame.frame.to_user, frame.frame.scale, lambda rows: frame.back("surface", rows)
-        )
-        mesh, pattern = ruled.mesh, ruled.pattern
-        flat = None if pattern.is_cut else pattern.flat
     spline, details = None, dict(solution.details)
     lengths = getattr(tasks.get(task), "LENGTHS", ())
     details |= {name: details[name] * frame.frame.scale for name in lengths if name in details}
@@ -91,5 +89,4 @@ def packed(
         notes=design.notes + solution.notes,
         details=details,
         spline=spline,
-        ruled=ruled,
     )

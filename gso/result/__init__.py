@@ -1,5 +1,6 @@
 """The result of a solve, and its files."""
 
 from gso.result.result import Result
+from gso.result.strips_result import StripsResult
 
-__all__ = ["Result"]
+__all__ = ["Result", "StripsResult"]

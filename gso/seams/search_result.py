@@ -76,7 +76,16 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
             far = beyond(numbers["deviation_max"], allowed)
             reasons.append(f"the largest distance between surface and design is {far}")
     return Segmentation(
-        own.design, own.opened, own.names, sheets, numbers, tuple(reasons), tuple(notes), result
+        own.design,
+        own.opened,
+        own.names,
+        sheets,
+        numbers,
+        tuple(reasons),
+        tuple(notes),
+        result,
+        ground.mesh,
+        ground.kept,
     )
 
 

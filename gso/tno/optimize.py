@@ -5,16 +5,22 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Sequence
+from types import ModuleType
 from typing import Any
 
+from gso import linalg
 from gso.constraints import Constraint
 from gso.cut_pieces import Pieces
-from gso.errors import ConvergenceWarning
+from gso.errors import ConvergenceWarning, OptionError
+from gso.pipeline import solve
 from gso.pipeline.judgement import warning
-from gso.pipeline.solve import Asked, check, solve_mesh
+from gso.pipeline.solve import Asked, solve_mesh
 from gso.pipeline.start import Start
 from gso.result import Result
-from gso.seams import joint_solve, strips_of_pieces
+from gso.ruled.paneling.options import RULED
+from gso.ruled.paneling.options import Options as StripsOptions
+from gso.ruled.paneling.strips_request import Request
+from gso.seams import joint_solve
 from gso.solver import Callback
 from gso.spelling import known_keywords
 from gso.tasks.base import Options
@@ -46,13 +52,12 @@ def optimize(
     mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, path, or Pieces
         The design, in any unit of length. A design that :func:`gso.cut` or :func:`gso.pieces` has
         cut into pieces is solved as a whole: each piece becomes developable, the seams stay
-        closed, and may become creases. The result's `pieces` has its pieces. By "ruled" each
-        piece then becomes strips that follow that result: their seams are closed up to the
-        distance in ``details["seam_gap"]``.
+        closed, and may become creases. The result's `pieces` has its pieces.
     task : {"developable", "flatten", "denoise", "bend", "conformal"}
         What to do.
     formulation : str, optional
-        Which energy; the task's first when not given.
+        Which energy; the task's first when not given. `developable` by "ruled" is
+        :func:`gso.strips`.
     options : str or Options, optional
         "fast", "balanced" (default), "accurate", or an options dataclass of the task.
         "jiang2020" (`developable`, `flatten`) is the classical reference, by isometry.
@@ -62,8 +67,7 @@ def optimize(
         `flatten` and `conformal` they apply to the flat image.
     max_deviation : float, optional
         `developable`: the largest distance between result and design, in both directions, in
-        the mesh's unit. The result is as developable as this bound allows; by "ruled" it has as
-        few strips as it allows.
+        the mesh's unit. The result is as developable as this bound allows.
     max_strain : float, optional
         `developable`: the largest principal strain, max ``|s - 1|``, of the result's flat
         pattern, such as 0.005. The displacement is the smallest that reaches it, or stays
@@ -118,23 +122,67 @@ def optimize(
     }
     module, chosen, settings = check(task, formulation, options, **bounds)
     given = x0 if isinstance(x0, Start) else Start(x0)
-    if isinstance(mesh, Pieces) and not isinstance(options, Options):
-        settings = settings.for_pieces()
-    asked = Asked(task, chosen, settings, bounds, formulation is not None, verdict)
-    if given.iterations is not None and asked.bounded:
-        module.check_iterations(bounds)
-    if isinstance(mesh, Pieces) and chosen == "ruled":
-        ask = strips_of_pieces.Ask(settings, max_deviation, verdict)
-        result = strips_of_pieces.solved(mesh, ask, constraints, given, callback, optimize)
-    elif isinstance(mesh, Pieces):
-        result = joint_solve.solve_pieces(mesh, asked, constraints, given, callback)
-    else:
-        from gso.io import as_mesh
+    if isinstance(settings, StripsOptions):
+        # Imported here, as it imports SciPy.
+        from gso.ruled.paneling.lay_strips import lay_strips
 
-        design = as_mesh(mesh)
-        design.check_joined()
-        result = solve_mesh(asked, callback, design, constraints, given)
+        wanted = Request(
+            settings,
+            max_deviation,
+            constraints=constraints,
+            start=given,
+            verdict=verdict,
+            callback=callback,
+            **({} if max_strain is None else {"max_strain": max_strain}),
+        )
+        result = lay_strips(mesh, wanted)
+    else:
+        if isinstance(mesh, Pieces) and not isinstance(options, Options):
+            settings = settings.for_pieces()
+        asked = Asked(task, chosen, settings, bounds, formulation is not None, verdict)
+        if given.iterations is not None and asked.bounded:
+            module.check_iterations(bounds)
+        result = _solved(mesh, asked, constraints, given, callback)
     result.seconds["total"] = time.perf_counter() - clock
     if said := warning(result):
         warnings.warn(said, ConvergenceWarning, stacklevel=3)
     return result
+
+
+def _solved(
+    mesh: Any,
+    asked: Asked,
+    constraints: Sequence[Constraint],
+    start: Start,
+    callback: Callback | None,
+) -> Result:
+    if isinstance(mesh, Pieces):
+        return joint_solve.solve_pieces(mesh, asked, constraints, start, callback)
+    from gso.io import as_mesh
+
+    design = as_mesh(mesh)
+    design.check_joined()
+    return solve_mesh(asked, callback, design, constraints, start)
+
+
+def check(
+    task: str,
+    formulation: str | None = None,
+    options: Any = None,
+    **bounds: float | None,
+) -> tuple[ModuleType, str, Options]:
+    """Check the arguments of :func:`optimize` that do not depend on the mesh.
+
+    Returns and raises what :func:`gso.pipeline.solve.check` does; ``"ruled"`` stands for strips,
+    with their own settings.
+    """
+    named = formulation == RULED or (formulation is None and isinstance(options, StripsOptions))
+    if task != "developable" or not named:
+        return solve.check(task, formulation, options, **bounds)
+    settings = StripsOptions.coerce(options)
+    if bounds.get("target_curvature") is not None:
+        raise OptionError(f"target_curvature belongs to the formulation 'curvature', not {RULED!r}")
+    module, _, _ = solve.check(task, **bounds)
+    if settings.backend is not None:
+        linalg.find(settings.backend)
+    return module, RULED, settings

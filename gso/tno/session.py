@@ -19,6 +19,7 @@ from gso.pipeline.handles import moved, pinned
 from gso.pipeline.judgement import better, difference, judged, requirements, warning
 from gso.pipeline.normalise import Canonical
 from gso.pipeline.run import Run, objective
+from gso.pipeline.solve import check
 from gso.pipeline.user_result import packed, record_violations
 from gso.result import Result
 from gso.solver import METHODS, Minimum, minimise
@@ -27,7 +28,6 @@ from gso.solver.problem import Problem
 from gso.spelling import known_keywords
 from gso.status import Status
 from gso.tasks.base import Plan, Request, Solution, Stage
-from gso.tno.optimize import check
 from gso.typing import Array, Ints
 from gso.unknowns import control_points
 
@@ -275,7 +275,8 @@ class Session:
         )
         if plan.spline is not None:
             solution.spline = control_points(plan.layout, plan.spline, self._x)
-        record_violations(self._compiled, self._frame, solution)
+        points = solution.blocks[self._compiled.block]
+        record_violations(self._compiled, self._frame, points, solution)
         result = packed(
             self._task, self._formulation, self._design, self._frame, solution, self._run
         )

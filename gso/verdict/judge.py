@@ -10,8 +10,8 @@ import numpy as np
 from gso import tasks
 from gso.status import Status
 from gso.verdict.asked import Asked
-from gso.verdict.surface_checks import against_itself, against_pattern, against_surface
-from gso.verdict.tasks import TASKS, ruled
+from gso.verdict.surface_checks import against_pattern, against_surface
+from gso.verdict.tasks import CHECKS
 from gso.wording import places
 
 if TYPE_CHECKING:
@@ -52,13 +52,10 @@ def _reasons(result: Result, asked: Asked) -> Iterator[str]:
         surface = result.design
     else:
         surface = result.mesh
-        if result.ruled is not None:
-            yield from against_itself(surface)
-        elif result.status is not Status.ALREADY_GOOD:
+        if result.status is not Status.ALREADY_GOOD:
             yield from against_surface(result.design, surface)
     if pattern is not None:
         yield from against_pattern(surface, pattern, lengths=result.task not in _STRETCHED)
-    if result.ruled is not None:
-        yield from ruled(result, asked)
-    elif result.task in TASKS:
-        yield from TASKS[result.task](result, asked)
+    check = CHECKS.get(result.KIND or result.task)
+    if check is not None:
+        yield from check(result, asked)

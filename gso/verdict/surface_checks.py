@@ -17,29 +17,22 @@ from gso.wording import places
 def against_surface(design: Mesh, surface: Mesh) -> Iterator[str]:
     """Check a surface for folds, self-intersections and collapsed edges.
 
-    Folds and self-intersections that the design has already are ignored.
+    Folds and self-intersections that the design has already are ignored, if the surface has its
+    faces.
     """
+    same = np.array_equal(design.faces, surface.faces)
     bad = faults.folded(surface)
-    if bad.size:
+    if same and bad.size:
         bad = np.setdiff1d(bad, faults.folded(design))
     if bad.size:
         yield f"the surface is folded onto itself at {places('face', bad)}"
     pairs = faults.crossings(surface)
-    if pairs.size:
+    if same and pairs.size:
         pairs = pairs[~_known(design, pairs)]
     if pairs.size:
         yield f"the surface passes through itself at {places('face', np.unique(pairs))}"
-    yield from _collapsed(design, surface.vertices, "the surface")
-
-
-def against_itself(surface: Mesh) -> Iterator[str]:
-    """Check a surface that has not the faces of its design for folds and self-intersections."""
-    bad = faults.folded(surface)
-    if bad.size:
-        yield f"the surface is folded onto itself at {places('face', bad)}"
-    pairs = faults.crossings(surface)
-    if pairs.size:
-        yield f"the surface passes through itself at {places('face', np.unique(pairs))}"
+    if same:
+        yield from _collapsed(design, surface.vertices, "the surface")
 
 
 def against_pattern(surface: Mesh, pattern: Pattern, *, lengths: bool = True) -> Iterator[str]:

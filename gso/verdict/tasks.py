@@ -23,8 +23,8 @@ _EXACT = 1e-9
 #: Distance from the design, relative to the diagonal of its bounding box, beyond which a result is
 #: refused whatever limit was given. Displacement that constraints require is added.
 _FAR = 0.5
-#: The same for ruled surfaces, where more strips are the remedy.
-_RULED = 0.1
+#: The same for strips, where more of them are the remedy.
+_STRIPS = 0.1
 
 
 def developable(result: Result, asked: Asked) -> Iterator[str]:
@@ -34,7 +34,7 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
     """
     design, mesh = result.design, result.mesh
     scale = metrics.unit(design)
-    far = metrics.surface_distance(design, mesh)
+    far = result.distances
     deviation = max(far.there_max, far.back_max)
     before, after = (asked_curvature(m, scale=scale) for m in (design, mesh))
     strain = None
@@ -81,7 +81,7 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
         yield f"nothing was done: mean |K| is {after:.3g}, as in the input"
 
 
-def ruled(result: Result, asked: Asked) -> Iterator[str]:
+def strips(result: Result, asked: Asked) -> Iterator[str]:
     """Check that no rulings cross, and that the deviation is within its limit.
 
     The measured values are stored in the result's details under "verdict".
@@ -89,7 +89,7 @@ def ruled(result: Result, asked: Asked) -> Iterator[str]:
     surface = result.ruled
     if surface is None:
         return
-    far = surface.deviation or surface.distances(result.design)
+    far = result.distances
     deviation = max(far.there_max, far.back_max)
     found = {"deviation": deviation, **asked.limits, "strain_max": 0.0}
     if result.pattern is not None:
@@ -100,7 +100,7 @@ def ruled(result: Result, asked: Asked) -> Iterator[str]:
     result.details = {**result.details, "verdict": found}
     if surface.crossed:
         yield f"{surface.crossed} pairs of successive rulings cross"
-    yield from _limits(result.design.diagonal, deviation, asked, _RULED)
+    yield from _limits(result.design.diagonal, deviation, asked, _STRIPS)
 
 
 def _limits(diagonal: float, deviation: float, asked: Asked, far: float = _FAR) -> Iterator[str]:
@@ -121,8 +121,9 @@ def denoise(result: Result, asked: Asked) -> Iterator[str]:
         yield f"the result is {ratio:.3g} times as rough as the input"
 
 
-#: Checks by task; other tasks only have the checks of surface and pattern.
-TASKS: dict[str, Callable[[Result, Asked], Iterator[str]]] = {
+#: Checks by task, or by kind of result; others only have the checks of surface and pattern.
+CHECKS: dict[str, Callable[[Result, Asked], Iterator[str]]] = {
     "developable": developable,
     "denoise": denoise,
+    "strips": strips,
 }

@@ -14,10 +14,6 @@ from gso.pattern import Pattern
 from gso.workshop.asking import Ask
 from gso.workshop.panels import Panel
 
-#: Share of the area whose curvature counts, and the curvature, times the diagonal, up to which a
-#: panel is flat.
-_MOST, _STRAIGHT = 0.99, 1e-6
-
 
 def of_panels(design: Mesh, panels: list[Panel], ask: Ask, allowed: float) -> dict[str, Any]:
     """Measure panels together, against the whole design."""
@@ -36,19 +32,10 @@ def of_panels(design: Mesh, panels: list[Panel], ask: Ask, allowed: float) -> di
 
 
 def bend_radius(panel: Panel) -> float:
-    """Return the smallest radius that a panel is bent to, in its unit.
-
-    Of a panel with bend lines it is that of the bends; otherwise the 1 % of the area that is
-    curved most is left out, as the curvature of single faces is not accurate.
-    """
+    """Return the smallest radius of a panel's bends, or of its surface if it has none."""
     if len(panel.bends):
         return float(panel.radii.min())
-    shape = rulings.shape_operator(panel.surface)
-    curved = np.abs(shape.curvatures).max(axis=1)
-    order = np.argsort(curved)
-    share = np.cumsum(shape.areas[order]) / shape.areas.sum()
-    most = curved[order[min(int(np.searchsorted(share, _MOST)), len(order) - 1)]]
-    return float(1.0 / most) if most * panel.surface.diagonal > _STRAIGHT else np.inf
+    return rulings.smallest_radius(panel.surface)
 
 
 def of_pattern(

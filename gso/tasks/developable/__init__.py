@@ -7,10 +7,10 @@ from dataclasses import replace
 from functools import partial
 
 from gso.tasks.base import Plan, Request
-from gso.tasks.developable import joint_isometry, ruled, schedule
+from gso.tasks.developable import joint_isometry, schedule
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.developable.bound_search import check_bounds, check_iterations, search
-from gso.tasks.developable.developable_metrics import flat_metrics, metrics, ruled_metrics
+from gso.tasks.developable.developable_metrics import flat_metrics, metrics
 from gso.tasks.developable.options import Options
 from gso.unknowns import ALONG
 
@@ -25,24 +25,18 @@ __all__ = [
     "flat_metrics",
     "metrics",
     "plan",
-    "ruled_metrics",
     "search",
 ]
 
 #: The formulation that a preset belongs to.
 IMPLIES = {"jiang2020": "isometry"}
 #: Settings by formulation.
-OPTIONS = {"curvature": Options, "isometry": joint_isometry.Options, "ruled": ruled.Options}
+OPTIONS = {"curvature": Options, "isometry": joint_isometry.Options}
 
 
 def plan(analysis: Analysis, request: Request) -> Plan:
     """Plan the stages of the solve."""
     return _PLANS[request.formulation](analysis, request)
-
-
-def _before_ruled(analysis: Analysis, request: Request) -> Plan:
-    """Plan the curvature solve whose normals the first rulings follow."""
-    return schedule.plan(analysis, replace(request, options=Options()))
 
 
 def _before_isometry(analysis: Analysis, request: Request) -> Plan:
@@ -57,6 +51,5 @@ def _before_isometry(analysis: Analysis, request: Request) -> Plan:
 _PLANS: dict[str, Callable[[Analysis, Request], Plan]] = {
     "curvature": schedule.plan,
     "isometry": partial(joint_isometry.plan, curvature=_before_isometry),
-    "ruled": partial(ruled.plan, before=_before_ruled),
 }
 FORMULATIONS = tuple(_PLANS)

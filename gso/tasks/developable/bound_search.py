@@ -22,9 +22,6 @@ from gso.tasks.developable.target import PROGRESS, of_curvature, of_strain, reac
 #: Weights tried in turn within a bound, until the strain is small enough.
 _HARDER = (1.0, 6.0, 36.0)
 
-#: Formulations that search themselves: "ruled" for the number of strips; it has no strain.
-_OWN = ("ruled",)
-
 
 def check_bounds(formulation: str, bounds: dict[str, float | None]) -> None:
     """Raise an OptionError if bounds contradict each other or the formulation."""
@@ -86,8 +83,6 @@ def search(
     asked = [free] if bound is None else [replace(request, max_displacement=bound), free]
     if not run.usable_start(*asked):
         request = replace(request, start=None)
-    if request.formulation in _OWN:
-        return run(replace(request, max_displacement=bound)), request.formulation
     if target is not None:
         return reach(run, request, of_curvature(analysis, target))[0], request.formulation
     best: Any = None
