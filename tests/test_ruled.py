@@ -514,7 +514,7 @@ def test_what_cannot_be_ruled_is_refused():
         gso.tno.optimize(
             Mesh(two, np.concatenate([faces, faces + tube[..., 0].size])), formulation="ruled"
         )
-    with pytest.raises(gso.OptionError, match=r"takes Fixed.*Ruling"):
+    with pytest.raises(gso.OptionError, match=r"take Fixed.*Ruling"):
         planar = gso.PlanarFaces()
         gso.tno.optimize(saddle(9), formulation="ruled", constraints=[planar])
     for wrong in ({"strips": 0}, {"strips": "many"}, {"rulings": 3}, {"starts": ("x",)}):
