@@ -50,7 +50,7 @@ class StripsRequest:
     """
 
     options: Options
-    limits: Limits = Limits()
+    limits: Limits = field(default_factory=Limits)
     sheet: tuple[float, float] | None = None
     kept: Ints = field(default_factory=_no_edges)
     constraints: Sequence[Constraint] = ()
