@@ -246,7 +246,10 @@ def test_unreachable_bounds_are_said():
         result = gso.tno.optimize(points, options=options, max_deviation=1e-4)
     assert not result.usable
     assert result.status is gso.Status.TARGET_MISSED
-    assert codes(result.reasons) == [Code.TARGET_MISSED, Code.DEVIATION, Code.FAR]
+    found = codes(result.reasons)
+    assert found[0] is Code.TARGET_MISSED
+    # A single strip so far from its design may be folded, too.
+    assert found[-2:] == [Code.DEVIATION, Code.FAR]
     assert result.reasons[1].value == result.details["verdict"]["deviation"] > 1e-4
 
 
