@@ -60,6 +60,19 @@ def maximum(x: Any, y: Any) -> Any:
     return mod.maximum(x, y) if _module_of(y) is mod else mod.clamp(x, min=y)
 
 
+def power(x: Any, exponent: float) -> Any:
+    """Return ``x**exponent``, by multiplications where the exponent is whole and at most eight.
+
+    >>> power(np.array([2.0]), 7.0)
+    array([128.])
+    """
+    whole = int(exponent) if 2.0 < exponent <= 8.0 else 0
+    if whole != exponent:
+        return x**exponent
+    half = power(x, whole // 2)
+    return half * half * x if whole % 2 else half * half
+
+
 def where(condition: Any, x: Any, y: Any) -> Any:
     """Return x where a condition on NumPy arrays or torch tensors holds, and y elsewhere."""
     mod = _module_of(condition)

@@ -1,7 +1,7 @@
 """Initial plane images of a surface, and the placement of the final image."""
 
 from gso.parametrization.alignment import align, settle
-from gso.parametrization.arap import Relaxed, relax, strain_level
+from gso.parametrization.relaxation import Relaxed, relax, strain_level
 from gso.parametrization.embedding import embed, embeddings, flattens, parts, spanned
 from gso.parametrization.grid import rectangle
 from gso.parametrization.initial import begin, flips, given, oriented_triangles, refine, strain

@@ -8,7 +8,7 @@ from gso import geometry
 from gso.errors import MeshError
 from gso.linalg import spd
 from gso.mesh import Mesh
-from gso.parametrization.arap import strain_level
+from gso.parametrization.relaxation import strain_level
 from gso.typing import Array, Ints
 
 

@@ -12,7 +12,7 @@ from gso.errors import MeshError
 from gso.hierarchy import coarser, resample
 from gso.mesh import Mesh
 from gso.mesh.topology import corner_triangles
-from gso.parametrization.arap import Relaxed, relax, strain_level
+from gso.parametrization.relaxation import Relaxed, relax, strain_level
 from gso.parametrization.embedding import embeddings
 from gso.parametrization.grid import rectangle
 from gso.typing import Array, Ints
@@ -74,7 +74,7 @@ def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> R
     mesh : Mesh
         Components with a boundary and without handles.
     iterations : int
-        Largest number of iterations of :func:`gso.parametrization.arap`.
+        Largest number of iterations of :func:`gso.parametrization.relaxation`.
     doubtful : float
         Strain above which the other embeddings are tried.
 

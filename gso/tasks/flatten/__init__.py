@@ -30,7 +30,6 @@ from gso.tasks.flatten.stages import (
     FAR_FROM_FLAT,
     SMALLEST_LEVEL,
     STRAINED,
-    bent,
     planned_stages,
     strain_stage,
 )
@@ -42,7 +41,7 @@ FORMULATIONS = ("strain", "lengths", "isometry", "minimax")
 IMPLIES = {"jiang2020": "isometry"}
 BLOCK = "flat"
 
-__all__ = ["BLOCK", "FORMULATIONS", "IMPLIES", "Options", "bent", "metrics", "plan"]
+__all__ = ["BLOCK", "FORMULATIONS", "IMPLIES", "Options", "metrics", "plan"]
 
 
 def plan(analysis: Analysis, request: Request) -> Plan:
