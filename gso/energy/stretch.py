@@ -210,12 +210,19 @@ def corner_shares(vertices: Array, quads: Ints) -> Array:
 
     The sign is relative to the normal of the face.
     """
-    normal = geometry.quad_area_vectors(vertices, quads).T
-    normal = normal / np.maximum(geometry.norm(tuple(normal)), 1e-300)
-    corners = geometry.quad_corner_vectors(vertices, quads)
-    side2 = ((np.roll(vertices[quads], -1, axis=1) - vertices[quads]) ** 2).sum(axis=2).T
-    around = np.maximum(side2 + np.roll(side2, 1, axis=0), 1e-300)
-    return np.stack([geometry.dot(tuple(c), tuple(normal)) for c in corners]) / around
+    v = geometry.corners(vertices, quads)
+    normal = geometry.cross(geometry.sub(v[2], v[0]), geometry.sub(v[3], v[1]))
+    sides = [geometry.sub(v[(k + 1) % 4], v[k]) for k in range(4)]
+    length2 = [geometry.norm2(side) for side in sides]
+    own = 1.0 / np.maximum(geometry.norm(normal), 1e-300)
+    return np.stack(
+        [
+            geometry.dot(geometry.cross(sides[k - 1], sides[k]), normal)
+            * own
+            / np.maximum(length2[k] + length2[k - 1], 1e-300)
+            for k in range(4)
+        ]
+    )
 
 
 def rest_constants(vertices: Array, faces: Ints) -> Array:

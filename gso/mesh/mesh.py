@@ -231,6 +231,8 @@ class Mesh:
     @cached_property
     def components(self) -> Ints:
         """Component number of each vertex, (n,)."""
+        if self.grid_index is not None:
+            return np.zeros(len(self.vertices), np.int64)
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
 

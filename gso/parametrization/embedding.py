@@ -69,9 +69,10 @@ def flattens(mesh: Mesh) -> bool:
     >>> flattens(Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
     True
     """
+    every = parts(mesh)
     try:
-        for ids in parts(mesh):
-            _check(_part(mesh, ids), int(ids[0]))
+        for ids in every:
+            _check(_part(mesh, ids) if len(every) > 1 else mesh, int(ids[0]))
     except MeshError:
         return False
     return True

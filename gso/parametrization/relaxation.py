@@ -23,10 +23,11 @@ _LIGHT, _HEAVY = 0.3, 5.0
 _MEMORY = 6
 #: Share of the expected decrease that a step must reach, and the shortest step.
 _DECREASE, _SHORTEST = 1e-4, 1e-3
+_GROW = 1.3
 
 
 class Relaxed(NamedTuple):
-    """A plane image and its root-mean-square strain."""
+    """A plane image, and the root of its mean loss: without a loss its root-mean-square strain."""
 
     flat: Array
     level: float
@@ -175,10 +176,11 @@ def relax(
     weights = np.clip(slope, _LIGHT, _HEAVY)
     solve = strain.diagonal(weights) if near else strain.solver(weights)
     memory: list[tuple[Array, Array, float]] = []
+    step = 1.0
     for _ in range(iterations):
         direction = _direction(gradient, memory, solve)
         expected = _dot(gradient, direction)
-        step = 1.0
+        step = min(_GROW * step, 1.0)
         while True:
             moved = x + step * direction
             found = strain.energy(moved, loss, good)
@@ -190,7 +192,7 @@ def relax(
                 break
             step *= 0.5 if value == np.inf else _shorter(value - energy, step * expected)
             if step < _SHORTEST:
-                return _relaxed(strain, x)
+                return _relaxed(x, energy)
         shift, change = moved - x, found[1] - gradient
         curvature = _dot(shift, change)
         if curvature > 0:
@@ -199,7 +201,7 @@ def relax(
         x, gradient = moved, found[1]
         if before - energy <= tolerance * before:
             break
-    return _relaxed(strain, x)
+    return _relaxed(x, energy)
 
 
 def _direction(
@@ -222,9 +224,8 @@ def _shorter(rise: float, expected: float) -> float:
     return min(max(-0.5 * expected / (rise - expected), 0.1), 0.5)
 
 
-def _relaxed(strain: _Strain, x: Array) -> Relaxed:
-    level = np.sqrt(2.0 * strain.energy(x, squared)[0])
-    return Relaxed(np.ascontiguousarray(x.T), float(level))
+def _relaxed(x: Array, energy: float) -> Relaxed:
+    return Relaxed(np.ascontiguousarray(x.T), float(np.sqrt(2.0 * energy)))
 
 
 def _dot(a: Array, b: Array) -> float:

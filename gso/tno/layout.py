@@ -8,25 +8,23 @@ from gso import components, metrics, parametrization
 from gso.constraints import Compiled
 from gso.errors import MeshError
 from gso.mesh import Mesh
+from gso.mesh.cutting import Cut
 from gso.parallel import Each, here
 from gso.pattern import Pattern
 from gso.tasks.base import Analysis, Request
 from gso.tasks.evaluation import largest_strain
 from gso.tno.normalise import Canonical
 from gso.tno.run import Run
+from gso.typing import Array
 
 #: Number of groups of components that are laid out apart, and of vertices from which on.
 _GROUPS, _LARGE = 4, 2000
 
 
 def lay_out(
-    surface: Mesh,
-    given: Pattern | None = None,
-    *,
-    options: str = "fast",
-    formulation: str = "strain",
+    surface: Mesh, given: Pattern | None = None, *, formulation: str = "strain"
 ) -> Pattern | None:
-    """Flatten a surface with little strain, by the flatten task.
+    """Flatten a surface with little strain.
 
     A surface that closes around itself is cut open.
 
@@ -36,10 +34,8 @@ def lay_out(
         In any frame.
     given : Pattern, optional
         An existing pattern of the surface; the one with the smaller maximal strain is returned.
-    options : str
-        Preset of the flatten task.
     formulation : str
-        Formulation of the flatten task.
+        Formulation of the flatten task. By "strain" the task solves only what is far from flat.
 
     Returns
     -------
@@ -57,27 +53,37 @@ def lay_out(
     >>> largest_strain(mesh, lay_out(mesh)) < 1e-3
     True
     """
-    # Imported here because it imports SciPy.
-    from gso.tasks import flatten
-
     if not parametrization.flattens(surface):
         return given
     frame = Canonical(surface)
-    analysis = Analysis(frame.mesh, Compiled(flat=True))
     try:
-        outcome = Run(flatten, analysis)(Request(flatten.Options.preset(options), formulation))
+        points, cut = _image(Analysis(frame.mesh, Compiled(flat=True)), formulation)
     except MeshError:
         return given
-    flat = outcome.points * frame.frame.scale
-    if outcome.cut is None:
+    flat = points * frame.frame.scale
+    if cut is None:
         found = Pattern.whole(surface, frame.back("flat", flat))
     elif surface.grid_index is None:
-        found = Pattern(flat, outcome.cut.mesh.faces, outcome.cut.vertex, outcome.cut.seams)
+        found = Pattern(flat, cut.mesh.faces, cut.vertex, cut.seams)
     else:
         return given
     if given is not None and largest_strain(surface, given) <= largest_strain(surface, found):
         return given
     return found
+
+
+def _image(analysis: Analysis, formulation: str) -> tuple[Array, Cut | None]:
+    """Compute an image in the unit ball, with the cut that it is of."""
+    # Imported here because it imports SciPy.
+    from gso.tasks import flatten
+
+    if formulation == "strain":
+        opened = analysis.opened
+        image = parametrization.low_strain(opened.mesh, doubtful=opened.doubtful)
+        if image.level <= flatten.FAR_FROM_FLAT:
+            return opened.back(parametrization.place(opened.mesh, image.flat)), opened.cut
+    solution = Run(flatten, analysis)(Request(flatten.Options.preset("fast"), formulation))
+    return solution.points, solution.cut
 
 
 def strains_of(surface: Mesh, each: Each = here) -> dict[str, float]:

@@ -41,7 +41,7 @@ FORMULATIONS = ("strain", "lengths", "isometry", "minimax")
 IMPLIES = {"jiang2020": "isometry"}
 BLOCK = "flat"
 
-__all__ = ["BLOCK", "FORMULATIONS", "IMPLIES", "Options", "metrics", "plan"]
+__all__ = ["BLOCK", "FAR_FROM_FLAT", "FORMULATIONS", "IMPLIES", "Options", "metrics", "plan"]
 
 
 def plan(analysis: Analysis, request: Request) -> Plan:
