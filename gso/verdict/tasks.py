@@ -34,8 +34,7 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
     """
     design, mesh = result.design, result.mesh
     scale = metrics.unit(design)
-    far = metrics.surface_distance(design, mesh)
-    deviation = max(far.there_max, far.back_max)
+    deviation = metrics.largest_distance(design, mesh)
     before, after = (asked_curvature(m, scale=scale) for m in (design, mesh))
     strain = None
     found = {"deviation": deviation, **asked.limits}
