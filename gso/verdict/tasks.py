@@ -35,7 +35,7 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
     design, mesh = result.design, result.mesh
     scale = metrics.unit(design)
     deviation = metrics.largest_distance(design, mesh)
-    before, after = (asked_curvature(m, scale=scale) for m in (design, mesh))
+    after = asked_curvature(mesh, scale=scale)
     strain = None
     found = {"deviation": deviation, **asked.limits}
     if result.pattern is not None:
@@ -74,6 +74,7 @@ def developable(result: Result, asked: Asked) -> Iterator[str]:
 
     if asked.moved > 0 or after <= max(Options().developable_below, target or 0.0):
         return
+    before = asked_curvature(design, scale=scale)
     if after > (1.0 + _SAME) * before:
         yield f"mean |K| is {after:.3g}, worse than the {before:.3g} of the input"
     elif after > (1.0 - _SAME) * before and not (strain is not None and strain <= DEVELOPABLE):
