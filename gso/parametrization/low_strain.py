@@ -29,7 +29,7 @@ _FIRST, _FINER = 30, 10
 #: number of iterations there.
 _DETAILED, _DETAILS = 20_000, 6
 #: Relative decrease of the energy at which to stop, on coarse meshes and on the finest.
-_ROUGH, _CLOSE = 1e-2, 1e-3
+_ROUGH, _CLOSE = 1e-2, 3e-3
 #: Smaller typical strains are rounding errors.
 _SMALLEST = 1e-7
 

@@ -42,20 +42,18 @@ class _Strain:
     """Strain of the maps of triangles (t, 3) of a surface (n, 3) to plane images (2, n)."""
 
     def __init__(self, vertices: Array, triangles: Ints):
-        from scipy.sparse import csr_matrix
+        from scipy.sparse import csc_matrix
 
         t = len(triangles)
         self.corners = np.ascontiguousarray(triangles.T)
         self.rest = geometry.rest_frame(*geometry.corners(vertices, triangles))
-        #: Adds forces (2 t) along the sides to the vertices (n).
-        own, (p, q, r) = np.arange(t), self.corners
-        self.sides = csr_matrix(
-            (
-                np.repeat([1.0, -1.0], 2 * t),
-                (np.r_[q, r, p, p], np.r_[own, own + t, own, own + t]),
-            ),
+        p, q, r = self.corners
+        ends = np.stack([np.r_[p, p], np.r_[q, r]], axis=1).ravel()
+        #: Adds forces (2 t) on the sides p q and p r to the vertices (n).
+        self.sides = csc_matrix(
+            (np.tile([-1.0, 1.0], 2 * t), ends, 2 * np.arange(2 * t + 1)),
             shape=(len(vertices), 2 * t),
-        )
+        ).tocsr()
 
     def energy(
         self, flat: Array, loss: StrainLoss, good: NDArray[np.bool_] | None = None
@@ -71,18 +69,17 @@ class _Strain:
             at = slice(start, min(start + _BLOCK, t))
             p, q, r = (tuple(flat.take(k, axis=1)) for k in self.corners[:, at])
             m11, m12, m22 = (m[at] for m in self.rest)
-            turn, c, d = geometry.turn_and_shear(p, q, r, (m11, m12, m22))
-            scale, shear2 = geometry.norm(turn), c * c + d * d
+            (a, b), c, d = geometry.turn_and_shear(p, q, r, (m11, m12, m22))
+            scale, shear2 = geometry.norm((a, b)), c * c + d * d
             kept[at] = scale * scale > shear2
-            if good is not None and not kept[at][good[at]].all():
+            if good is not None and not (kept[at] >= good[at]).all():
                 return np.inf, force, slope, kept
             strain = scale - 1.0
             value, slope[at] = loss(strain * strain + shear2)
             total += float(value.sum())
             pull = slope[at] * strain / scale
-            a, b = pull * turn[0], pull * turn[1]
-            c, d = slope[at] * c, slope[at] * d
-            # Half the derivatives by the entries of the map, F11, F21, F12, F22.
+            a, b, c, d = pull * a, pull * b, slope[at] * c, slope[at] * d
+            # Half the derivatives by the entries of the map, F11 and F12, then F21 and F22.
             for row, along, across in ((0, a + c, d - b), (1, b + d, a - c)):
                 force[row, at] = m11 * along + m12 * across
                 force[row, start + t : start + t + len(m11)] = m22 * across
@@ -95,24 +92,22 @@ class _Strain:
 
         n, t = self.sides.shape[0], self.corners.shape[1]
         m11, m12, m22 = self.rest
-        # Gradients of the three corners' hat functions.
-        hats = ((-m11, -m12 - m22), (m11, m12), (0.0 * m22, m22))
-        values, rows, columns = [], [], []
-        for i in range(3):
-            for j in range(i + 1):
-                values.append(weights * geometry.dot(hats[i], hats[j]))
-                rows.append(np.maximum(self.corners[i], self.corners[j]))
-                columns.append(np.minimum(self.corners[i], self.corners[j]))
-        every = np.arange(n)
-        at = (np.concatenate([*rows, every]), np.concatenate([*columns, every]))
-        lower = coo_matrix((np.concatenate([*values, np.zeros(n)]), at), shape=(n, n)).tocsc()
+        p, q, r = self.corners
+        # Products of the gradients of the hat functions of two corners. The rows sum to zero.
+        across = weights * m22 * (m12 + m22)
+        pairs = np.concatenate([-weights * (m11 * m11 + m12 * m12) - weights * m12 * m22, -across])
+        pairs = np.concatenate([pairs, weights * m12 * m22])
+        one, two, every = np.r_[p, p, q], np.r_[q, r, r], np.arange(n)
+        rows, columns = (np.r_[f(one, two), every] for f in (np.maximum, np.minimum))
+        values = np.concatenate([pairs, np.zeros(n)]) * (0.5 / t)
+        lower = coo_matrix((values, (rows, columns)), shape=(n, n)).tocsc()
         lower.sort_indices()
         pattern = Pattern(n, lower.indptr.astype(np.int64), lower.indices.astype(np.int64))
-        matrix = lower.data * (0.5 / t)
+        total = lower @ np.ones(n) + lower.T @ np.ones(n)
         # Translations of each component are a null space; a little damping makes it regular.
-        matrix[pattern.indptr[:-1]] += 1e-9 * matrix.max()
+        lower.data[pattern.indptr[:-1]] = 1e-9 * np.abs(total).max() - total
         solver = choose(pattern)
-        solver.factor(matrix)
+        solver.factor(lower.data)
         return lambda gradient: solver.solve(gradient.T).T
 
     def diagonal(self, weights: Array) -> Callable[[Array], Array]:
