@@ -53,6 +53,10 @@ def test_results_write_meshes_and_those_with_one_patterns(tmp_path):
 def test_seconds_and_backend_are_reported():
     result = gso.tno.optimize(saddle(12))
     assert result.seconds["total"] >= result.seconds["factor"] > 0
+    phases = sum(result.seconds[k] for k in ("setup", "evaluate", "factor", "search"))
+    assert result.seconds["solve"] == pytest.approx(phases)
+    parts = sum(result.seconds[k] for k in ("solve", "pattern", "verdict"))
+    assert 0 < result.seconds["pattern"] < parts <= result.seconds["total"]
     assert result.backend in gso.linalg.backends()
     assert result.history[0].iteration == 0
 

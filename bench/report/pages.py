@@ -82,7 +82,7 @@ def quality_table(columns: Sequence[str], rows: Sequence[Row]) -> Table:
 def timing_table(timings: Sequence[Timing]) -> Table:
     """Return a table of time against size."""
     head = ["task", "method", "grid", "median", "fastest", "slowest", "solves", "iterations"]
-    head += ["peak MB", *(f"{p} %" for p in PHASES), "limit", "time / limit", "backend"]
+    head += ["peak MB", *(f"{p} %" for p in PHASES), "limit", "solve / limit", "backend"]
     rows = []
     for t in timings:
         grid = f"{t.size} x {t.size}"
@@ -91,7 +91,7 @@ def timing_table(timings: Sequence[Timing]) -> Table:
             continue
         spread = [duration(v) for v in (t.median, min(t.seconds), max(t.seconds))]
         parts = [f"{100.0 * t.shares[p]:.0f}" if p in t.shares else "" for p in PHASES]
-        bound = [duration(t.limit), number(t.median / t.limit) if t.limit else "", t.backend]
+        bound = [duration(t.limit), number(t.solve / t.limit) if t.limit else "", t.backend]
         done = [str(len(t.seconds)), str(t.iterations or "")]
         rows.append([t.task, t.method, grid, *spread, *done, f"{t.peak_mb:.0f}", *parts, *bound])
     return Table(head, rows, ["package"] * len(rows))

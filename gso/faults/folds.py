@@ -74,9 +74,7 @@ def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
     return np.unique(np.concatenate(bad))
 
 
-def _sharp(
-    normals: tuple[Array, ...], left: Ints, right: Ints, below: float
-) -> NDArray[np.bool_]:
+def _sharp(normals: tuple[Array, ...], left: Ints, right: Ints, below: float) -> NDArray[np.bool_]:
     """Mark the edges between two faces (e,) of which some corner triangles may make a fold.
 
     The angle between two of them is at most that between the faces' mean normals and, on each

@@ -118,10 +118,7 @@ class _Search:
         gap = np.maximum(self.low - p.max(axis=0), p.min(axis=0) - self.high).clip(0.0)
         near = np.argwhere(_length(gap) <= most * (1.0 + _ROUND))
         cells = np.concatenate(
-            [
-                self.cells[i : i + _BLOCK, j : j + _BLOCK].reshape(-1, 4)
-                for i, j in near * _BLOCK
-            ]
+            [self.cells[i : i + _BLOCK, j : j + _BLOCK].reshape(-1, 4) for i, j in near * _BLOCK]
         )
         triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
         return Nearest.of(self.vertices, triangles).distances(p)

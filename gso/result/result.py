@@ -62,7 +62,10 @@ class Result:
     history : list of Progress
         One entry per iteration.
     seconds : dict of str to float
-        Time by phase.
+        Time by part: "solve"; "pattern", of `developable`, to lay the result flat; "verdict", to
+        judge it; "total", these and what is left. The parts of "solve" are "setup", "evaluate"
+        and "factor" (of the equations), "search" (along lines), and "strips" for the formulation
+        "ruled".
     backend : str
         Linear solver of the last stage, and where it ran.
     warm_start : str

@@ -50,7 +50,7 @@ class Options(BaseOptions):
         Weight of the squared shear of the corner triangles. Much above `w_scale`, the shear term
         dominates the result.
     relax_iterations : int
-        Largest number of as-rigid-as-possible (local/global) iterations before the solve.
+        Largest number of as-rigid-as-possible iterations before the solve.
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {

@@ -66,6 +66,7 @@ def packed(
         )
         mesh, pattern = ruled.mesh, ruled.pattern
         flat = None if pattern.is_cut else pattern.flat
+    seconds["solve"] = sum(seconds.values())
     spline, details = None, dict(solution.details)
     lengths = getattr(tasks.get(task), "LENGTHS", ())
     details |= {name: details[name] * frame.frame.scale for name in lengths if name in details}

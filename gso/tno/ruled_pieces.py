@@ -160,6 +160,7 @@ def _merged(
     status = worst([joint.status, *(result.status for result in strips)])
     seconds = dict(joint.seconds)
     seconds["strips"] = sum(result.seconds["total"] for result in strips)
+    seconds["solve"] += seconds["strips"]
     notes = (
         *joint.notes,
         f"both sides of a seam are up to {length(apart)} apart, as strips follow the joint result "

@@ -103,7 +103,7 @@ class Run:
         self.guarded = guarded
         self.budget = budget
         self.tolerance = tolerance
-        self.lay_out = lay_out
+        self._lay_out = lay_out
         self.start_refused = ""
         self._planned: tuple[Request, Plan] | None = None
         self._problem: Problem | None = None
@@ -111,6 +111,13 @@ class Run:
         self.timings = Timings()
         self.iterations = 0
         self.converting = 0.0
+
+    def lay_out(self, surface: Mesh) -> Pattern | None:
+        """Flatten a surface."""
+        clock = time.perf_counter()
+        pattern = self._lay_out(surface)
+        self.timings.setup += time.perf_counter() - clock
+        return pattern
 
     def __call__(self, request: Request) -> Solution:
         """Plan and solve the stages."""

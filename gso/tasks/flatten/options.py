@@ -41,7 +41,7 @@ class Options(BaseOptions):
     coarse_size : int
         Largest side of the coarsest grid.
     relax_iterations : int
-        Largest number of as-rigid-as-possible (local/global) iterations before the first stage.
+        Largest number of as-rigid-as-possible iterations before the first stage.
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {
