@@ -162,7 +162,7 @@ def _mean(records: list[Record], where: list[int], metric: str) -> float | None:
 
 
 def against_limit(timings: Sequence[Timing]) -> list[str]:
-    """Compare the time of each solve, without pattern and verdict, with that of its factorisations alone."""
+    """Compare the time of each solve, without its pattern, with that of its factorisations alone."""
     return [
         f"{t.task} {t.method}, {t.size} x {t.size}: {t.solve:.3g} s, "
         f"{t.solve / t.limit:.1f} times one numeric factorisation per iteration ({t.fastest})"

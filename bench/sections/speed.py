@@ -112,7 +112,7 @@ def grids(largest: int = 1024) -> dict[str, Any]:
             row = {"s": total, "solve": solve, "pattern": pattern, "verdict": verdict}
             row |= {"by factor": solve / factor, "energy": energy}
             row["peak GB"] = peak[0] if peak else ""
-            row["exponent"] = np.log2(seconds / before["s"]) / 2.0 if before else ""
+            row["exponent"] = np.log2(total / before["s"]) / 2.0 if before else ""
             out[f"{task} {size}"] = before = row
     rows = [[name, *row.values()] for name, row in out.items()]
     table("Grids", ["solve", *before], rows)
