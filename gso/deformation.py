@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.components import Component, several, split
 from gso.energy import fairness
@@ -13,7 +12,7 @@ from gso.geometry import closest_motion
 from gso.linalg import spd
 from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Weights of a field's slope and of its size, relative to its bending. They only select a
 #: solution where the handles leave the thin plate free.
@@ -55,7 +54,7 @@ class ThinPlateField:
         n = len(mesh.vertices)
         self.mesh, self.ids = mesh, ids
         #: Per component: the component, a mask of its handles, and its own field.
-        self.parts: list[tuple[Component, NDArray[np.bool_], ThinPlateField]] = []
+        self.parts: list[tuple[Component, Flags, ThinPlateField]] = []
         if several(mesh):
             for part in split(mesh):
                 own = np.searchsorted(part.vertices, ids).clip(max=len(part.vertices) - 1)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.energy import Term, Weighted, curve, equation, length, planarity, position
@@ -18,7 +17,7 @@ from gso.energy.multipliers import STIFF, hardened
 from gso.hierarchy import Transfer
 from gso.mesh import Frame
 from gso.mesh.polyline import Polylines
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class Part:
         """Return the part in the unit of a frame, with vertex i numbered ``order[i]``."""
         raise NotImplementedError
 
-    def kept(self, rows: NDArray[np.bool_]) -> Part:
+    def kept(self, rows: Flags) -> Part:
         """Return the part with only those equations that a mask (k,) selects."""
         raise NotImplementedError
 
@@ -109,7 +108,7 @@ class Pins(Part):
     def mapped(self, frame: Frame, order: Ints) -> Pins:
         return replace(self, ids=order[self.ids], positions=frame.to_unit(self.positions))
 
-    def kept(self, rows: NDArray[np.bool_]) -> Pins:
+    def kept(self, rows: Flags) -> Pins:
         return replace(self, ids=self.ids[rows], positions=self.positions[rows])
 
     def on(self, transfer: Transfer) -> Pins | None:
@@ -159,7 +158,7 @@ class Relations(Part):
             anchor=frame.to_unit(self.anchor),
         )
 
-    def kept(self, rows: NDArray[np.bool_]) -> Relations:
+    def kept(self, rows: Flags) -> Relations:
         return replace(self, first=self.first[rows], second=self.second[rows])
 
     def on(self, transfer: Transfer) -> Relations | None:
@@ -214,7 +213,7 @@ class OnPlane(Part):
         """The value of ``normal . x`` on the plane."""
         return float(self.anchor @ self.normal)
 
-    def kept(self, rows: NDArray[np.bool_]) -> OnPlane:
+    def kept(self, rows: Flags) -> OnPlane:
         return replace(self, ids=self.ids[rows])
 
     def on(self, transfer: Transfer) -> OnPlane:
@@ -248,7 +247,7 @@ class OnLines(Part):
     def mapped(self, frame: Frame, order: Ints) -> OnLines:
         return replace(self, ids=order[self.ids], lines=self.lines.mapped(frame))
 
-    def kept(self, rows: NDArray[np.bool_]) -> OnLines:
+    def kept(self, rows: Flags) -> OnLines:
         return replace(self, ids=self.ids[rows])
 
     def on(self, transfer: Transfer) -> OnLines | None:
@@ -295,7 +294,7 @@ class Planar(Part):
     def mapped(self, frame: Frame, order: Ints) -> Planar:
         return replace(self, quads=order[self.quads])
 
-    def kept(self, rows: NDArray[np.bool_]) -> Planar:
+    def kept(self, rows: Flags) -> Planar:
         return replace(self, quads=self.quads[rows])
 
     def on(self, transfer: Transfer) -> Planar | None:
@@ -334,7 +333,7 @@ class Lengths(Part):
     def mapped(self, frame: Frame, order: Ints) -> Lengths:
         return replace(self, pairs=order[self.pairs], lengths=self.lengths / frame.scale)
 
-    def kept(self, rows: NDArray[np.bool_]) -> Lengths:
+    def kept(self, rows: Flags) -> Lengths:
         return replace(self, pairs=self.pairs[rows], lengths=self.lengths[rows])
 
     def on(self, transfer: Transfer) -> Lengths | None:
@@ -379,7 +378,7 @@ class Lengths(Part):
         return length.build(self.pairs, self.lengths, block=block)
 
 
-def _kept(transfer: Transfer, ids: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+def _kept(transfer: Transfer, ids: Ints) -> tuple[Ints, Flags]:
     """Return the vertices of a copy that stand for some of the vertices `ids`, and which."""
     places = transfer.place(ids)
     rows = places >= 0

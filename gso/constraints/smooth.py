@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.parts import Part
 from gso.energy import Weighted, smooth_curve
 from gso.mesh import Frame
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ class Smooth(Part):
     def mapped(self, frame: Frame, order: Ints) -> Smooth:
         return replace(self, triples=order[self.triples], steps=self.steps / frame.scale)
 
-    def kept(self, rows: NDArray[np.bool_]) -> Smooth:
+    def kept(self, rows: Flags) -> Smooth:
         return replace(self, triples=self.triples[rows], steps=self.steps[rows])
 
     def violation(self, points: Array) -> Array:

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.errors import DatasetError
+from gso.typing import Ints
 
-Rows = slice | NDArray[np.int64]
+Rows = slice | Ints
 
 
 def pack(arrays: dict[str, np.ndarray]) -> bytes:

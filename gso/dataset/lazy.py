@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from gso.typing import Ints
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class LazyArray:
         out = rows.reshape((*wanted.shape, *self.shape[1:]))
         return out[(slice(None),) * wanted.ndim + tuple(rest)]
 
-    def _rows(self, wanted: NDArray[np.int64]) -> np.ndarray:
+    def _rows(self, wanted: Ints) -> np.ndarray:
         out = np.empty((len(wanted), *self.shape[1:]), self.dtype)
         owner = np.searchsorted(self._ends, wanted, side="right") - 1
         for number in np.unique(owner):

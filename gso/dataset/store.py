@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.dataset import folder, hdf, manifest, noise
 from gso.dataset.lazy import LazyArray, Part
 from gso.dataset.screen import FEATURES, features
 from gso.errors import DatasetError
 from gso.spelling import choices
+from gso.typing import Array
 
 if TYPE_CHECKING:
     from gso.dataset.torch_data import TorchData
@@ -70,7 +70,7 @@ class Split:
         return f"Split({self.name!r}, {len(self)} surfaces: {', '.join(self.arrays)})"
 
     @property
-    def features(self) -> dict[str, NDArray[np.float64]]:
+    def features(self) -> dict[str, Array]:
         """K_P, K_N, K_A and sigma^2 of every surface, by name."""
         if "features" in self.arrays:
             table = self.arrays["features"][:]
@@ -83,9 +83,9 @@ class Split:
         return dict(zip(FEATURES, table.T, strict=True))
 
     @property
-    def metrics(self) -> dict[str, dict[str, NDArray[np.float64]]]:
+    def metrics(self) -> dict[str, dict[str, Array]]:
         """Metrics of the labels: an array over the surfaces by kind of label and metric."""
-        found: dict[str, dict[str, NDArray[np.float64]]] = {}
+        found: dict[str, dict[str, Array]] = {}
         for name, array in self.arrays.items():
             if name.startswith("metrics/"):
                 _, kind, metric = name.split("/")
@@ -218,5 +218,5 @@ def _noisy(surface: LazyArray, unit: LazyArray, level: float) -> LazyArray:
     return LazyArray(parts, surface.shape[1:], surface.dtype)
 
 
-def _sum(surface: Any, unit: Any, level: float, rows: hdf.Rows) -> NDArray[np.float64]:
+def _sum(surface: Any, unit: Any, level: float, rows: hdf.Rows) -> Array:
     return surface(rows) + level * unit(rows).astype(float)

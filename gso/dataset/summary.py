@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.dataset.screen import CURVATURE, CURVED, SHAPE
 from gso.dataset.store import Dataset, Split
+from gso.typing import Array
 
 #: Intervals of the features; K_N is counted by its absolute value. Those of K_A and sigma^2
 #: start with the intervals of :mod:`gso.dataset.screen`; the rest is for hard and named splits.
@@ -62,7 +62,7 @@ def _split(split: Split) -> dict[str, Any]:
     }
 
 
-def counts(feature: str, values: NDArray[np.float64]) -> list[int]:
+def counts(feature: str, values: Array) -> list[int]:
     """Count the surfaces in each interval of a feature; an interval contains its upper end.
 
     >>> counts("sigma2", np.array([0.0, 0.03, 0.04, 2.0]))
@@ -73,7 +73,7 @@ def counts(feature: str, values: NDArray[np.float64]) -> list[int]:
     return np.bincount(place, minlength=len(edges) - 1).tolist()
 
 
-def _statistics(values: NDArray[np.float64]) -> dict[str, float | None]:
+def _statistics(values: Array) -> dict[str, float | None]:
     """Compute mean, median and 90th percentile of the finite values."""
     known = values[np.isfinite(values)]
     if not known.size:

@@ -95,7 +95,8 @@ class Prolongation:
             np.linalg.norm(largest, axis=1).max(initial=0.0),
             np.linalg.norm(base, axis=1, keepdims=True),
         )
-        return field * np.minimum(1.0, most / np.maximum(length, 1e-300))
+        limited: Array = field * np.minimum(1.0, most / np.maximum(length, 1e-300))
+        return limited
 
 
 def _bending(mesh: Mesh) -> Any:

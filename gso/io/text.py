@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import BinaryIO, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.errors import MeshError
 from gso.io.source import Array, Ints
+from gso.typing import Flags
 
 # Integers with more digits may overflow 64 bits, and are no valid vertex indices.
 _DIGITS = 18
@@ -129,7 +129,7 @@ class Words:
         values, bad = self._parsed(self.start[words], self.stop[words])
         return np.where(bad, otherwise, values)
 
-    def _parsed(self, start: Ints, stop: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+    def _parsed(self, start: Ints, stop: Ints) -> tuple[Ints, Flags]:
         """Parse integers in parts of the text; also return which parts are invalid."""
         sign = self._text[np.minimum(start, self._text.size - 1)]
         start = start + ((sign == ord("-")) | (sign == ord("+")))

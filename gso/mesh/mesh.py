@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso import geometry
 from gso.errors import MeshError
@@ -26,7 +24,7 @@ from gso.mesh.validation import (
     welding_advice,
 )
 from gso.mesh.welding import seams
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 
 @dataclass(frozen=True)
@@ -152,13 +150,6 @@ class Mesh:
         )
         return other
 
-    def __getattr__(self, name: str) -> Any:
-        new = _RENAMED.get(name)
-        if new is None:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        warnings.warn(f"Mesh.{name} is now called {new}", DeprecationWarning, stacklevel=2)
-        return getattr(self, new)
-
     def __repr__(self) -> str:
         if self.grid_shape:
             kind = f"grid {self.grid_shape[0]} x {self.grid_shape[1]}"
@@ -188,7 +179,7 @@ class Mesh:
         return topology.triangulate(self.faces, self._quad_splits)
 
     @cached_property
-    def _quad_splits(self) -> NDArray[np.bool_]:
+    def _quad_splits(self) -> Flags:
         return topology.quad_splits(self.faces, self.half_edges)
 
     @cached_property
@@ -219,7 +210,7 @@ class Mesh:
         return topology.edges(self.half_edges)
 
     @cached_property
-    def boundary_edges(self) -> NDArray[np.bool_]:
+    def boundary_edges(self) -> Flags:
         """Mask over :attr:`edges`: boundary edges."""
         return topology.boundary_edges(self.half_edges)
 
@@ -237,10 +228,11 @@ class Mesh:
         n = len(self.vertices)
         e = self.edges
         links = coo_matrix((np.ones(len(e)), (e[:, 0], e[:, 1])), shape=(n, n))
-        return connected_components(links, directed=False)[1].astype(np.int64)
+        number: Ints = connected_components(links, directed=False)[1].astype(np.int64)
+        return number
 
     @property
-    def seams(self) -> NDArray[np.bool_]:
+    def seams(self) -> Flags:
         """Mask over half-edges: boundary edges that coincide with another boundary edge."""
         he = self.half_edges
         mask = he.twin < 0
@@ -281,7 +273,7 @@ class Mesh:
     @property
     def is_triangles(self) -> bool:
         """Whether all faces are triangles."""
-        return self.faces.shape[1] == 3
+        return int(self.faces.shape[1]) == 3
 
     @property
     def grid_shape(self) -> tuple[int, int] | None:
@@ -309,7 +301,7 @@ class Mesh:
         return Frame(*geometry.ball(self.vertices[self.used]))
 
     @cached_property
-    def used(self) -> NDArray[np.bool_]:
+    def used(self) -> Flags:
         """Mask over vertices: those that belong to a face."""
         return self.half_edges.face_count > 0
 
@@ -340,9 +332,6 @@ def _grid_template(height: int, width: int) -> Mesh:
         del mesh.__dict__["half_edges"]
     return mesh
 
-
-#: Attributes that were renamed, by their former names.
-_RENAMED = {"splits": "stars_by_triangulation", "rim": "boundary_edges"}
 
 #: Cached attributes that meshes of the same faces share.
 _CONNECTIVITY = (

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.errors import MeshError
 from gso.mesh import topology
 from gso.metrics.surfaces import faces_of, image_of, in_range, points_of
-from gso.typing import Array
+from gso.typing import Array, Flags, Ints
 
 if TYPE_CHECKING:
     from gso.mesh import Mesh
@@ -38,7 +37,7 @@ def area_error(surface: Any, flat: Any) -> float:
     return float(np.abs(after[keep] / before[keep] - 1.0).mean())
 
 
-def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None, *, surface: Any = None) -> int:
+def flipped_cells(flat: Any, faces: Ints | None = None, *, surface: Any = None) -> int:
     """Count the inverted cells in a flat image.
 
     A grid cell (`flat` is (H, W, 2)) is inverted when any of its four corner triangles has
@@ -56,9 +55,7 @@ def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None, *, surface:
     return int(_flipped(points, table, space, grid=faces is None).sum())
 
 
-def _flipped(
-    points: Array, faces: NDArray[np.int64], space: Array | None, *, grid: bool
-) -> NDArray[np.bool_]:
+def _flipped(points: Array, faces: Ints, space: Array | None, *, grid: bool) -> Flags:
     """Mark the faces (m,) that are inverted in an image (n, 2), quads first."""
     quads, tris = topology.by_size(faces)
     # Corners 1 and 3 are the split along the diagonal 0-2, corners 0 and 2 the other one.
@@ -72,7 +69,7 @@ def _flipped(
     return flipped
 
 
-def flipped_faces(mesh: Mesh, flat: Array) -> NDArray[np.int64]:
+def flipped_faces(mesh: Mesh, flat: Array) -> Ints:
     """Find the faces of a mesh that are inverted in its flat image (n, 2).
 
     These are the faces that :func:`flips` counts.
@@ -93,11 +90,11 @@ def flips(mesh: Mesh, flat: Array) -> int:
     return len(flipped_faces(mesh, flat))
 
 
-def space_areas(points: Array, faces: NDArray[np.int64]) -> Array:
+def space_areas(points: Array, faces: Ints) -> Array:
     """Return the doubled areas of the corner triangles of faces in space."""
     return geometry.doubled_areas(points, topology.corner_triangles(faces))
 
 
-def corner_areas(flat: Array, faces: NDArray[np.int64]) -> Array:
+def corner_areas(flat: Array, faces: Ints) -> Array:
     """Return the doubled signed areas of the faces' corner triangles in a flat image (n, 2)."""
     return geometry.signed_areas(flat, topology.corner_triangles(faces))

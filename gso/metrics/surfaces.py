@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.errors import MeshError
 from gso.mesh import topology
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 if TYPE_CHECKING:
     from gso.mesh import Mesh
@@ -48,14 +47,14 @@ def mesh_of(surface: Any) -> Mesh:
     return surface if isinstance(surface, Mesh) else Mesh.from_grid(surface)
 
 
-def cells_of(surface: Any) -> NDArray[np.int64]:
+def cells_of(surface: Any) -> Ints:
     """Return the quad faces of a mesh or grid."""
     if not hasattr(surface, "faces"):
         return topology.grid_faces(*np.asarray(surface).shape[:2])
     return topology.by_size(surface.faces)[0]
 
 
-def faces_of(surface: Any) -> NDArray[np.int64]:
+def faces_of(surface: Any) -> Ints:
     return surface.faces if hasattr(surface, "faces") else cells_of(surface)
 
 

@@ -13,13 +13,12 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.io import check_writable, replacing
 from gso.mesh import topology
 from gso.plot.heat import Heat, Scale
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
@@ -78,7 +77,7 @@ class Panel:
     """
 
     points: Array
-    faces: NDArray[np.int64]
+    faces: Ints
     title: str = ""
     heat: Heat | None = None
     tint: Array | None = None
@@ -88,7 +87,7 @@ class Panel:
     circle: float = 0.0
 
     @property
-    def corners(self) -> NDArray[np.int64]:
+    def corners(self) -> Ints:
         """Faces (m, 4); a triangle repeats its first corner."""
         return topology.four_corners(self.faces)
 

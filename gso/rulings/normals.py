@@ -14,13 +14,12 @@ from math import comb
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.io import as_mesh
 from gso.mesh import Mesh, topology
 from gso.metrics import components
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Rings of vertices in a fit, inside and on the boundary, where they lie on one side only.
 RINGS, RIM_RINGS = 2, 3
@@ -105,7 +104,7 @@ def _mean_normals(mesh: Mesh, corners: Any) -> Array:
     return np.divide(total, length, out=up.copy(), where=length > 0)
 
 
-def _blocks(centre: Ints, around: Any) -> Iterator[tuple[Ints, Ints, NDArray[np.bool_]]]:
+def _blocks(centre: Ints, around: Any) -> Iterator[tuple[Ints, Ints, Flags]]:
     """Yield blocks of vertices, their neighbours (b, k), and a mask that is false for padding."""
     count = np.diff(around.indptr)
     order = np.argsort(count, kind="stable")
@@ -123,9 +122,7 @@ def _blocks(centre: Ints, around: Any) -> Iterator[tuple[Ints, Ints, NDArray[np.
         start = stop
 
 
-def _jet_normals(
-    points: Array, normals: Array, centre: Ints, near: Ints, there: NDArray[np.bool_]
-) -> Array:
+def _jet_normals(points: Array, normals: Array, centre: Ints, near: Ints, there: Flags) -> Array:
     """Compute normals of cubic height fields over the planes normal to `normals` at `centre`."""
     up = normals[centre]
     # The coordinate axis farthest from the normal completes a frame.

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.errors import OptionError
@@ -14,7 +13,7 @@ from gso.io import as_mesh
 from gso.mesh import Mesh, topology
 from gso.metrics import components
 from gso.rulings.normals import gauss_image
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Curvature times size below which a face counts as flat.
 FLAT = 0.01
@@ -54,7 +53,7 @@ class ShapeOperator:
     H: Array
     curvatures: Array
     directions: Array
-    flat: NDArray[np.bool_]
+    flat: Flags
 
     @property
     def rulings(self) -> Array:

@@ -14,10 +14,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.errors import MeshError
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 # Largest number of vertices in a fit; more, as around a pole with hundreds of faces, are sampled.
 LARGEST = 64
@@ -110,7 +109,7 @@ class Rings:
     """Padded vertex lists: `index` (p, k) of vertices, `real` (p, k) false for padding."""
 
     index: Ints
-    real: NDArray[np.bool_]
+    real: Flags
 
 
 def rings(near: Any, size: int) -> Rings:

@@ -23,7 +23,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 # Parameters are (a, log m, log n, log q, log p). A weak Gaussian prior regularises the fit on
 # tiny grids; on larger ones it has little effect.
@@ -49,7 +49,7 @@ WAVES = WAVES[WAVES[:, 1:3].max(axis=1) > STARTS[:, 1].max()]
 
 
 @lru_cache(maxsize=64)
-def bins(n: int) -> tuple[NDArray[np.int64], Array, Array]:
+def bins(n: int) -> tuple[Ints, Array, Array]:
     """Compute start, size and centre of bins of neighbouring modes.
 
     Modes below 12 have a bin each; the width of later bins is about an eighth of their mode
