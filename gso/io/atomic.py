@@ -7,13 +7,13 @@ import secrets
 import stat
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
-from os import PathLike
 from typing import BinaryIO
 
 from gso.errors import MeshError
+from gso.typing import AnyPath
 
 
-def check_writable(path: str | PathLike[str], suffixes: Collection[str] | None = None) -> None:
+def check_writable(path: AnyPath, suffixes: Collection[str] | None = None) -> None:
     """Reject an output path that cannot be written, before anything is computed.
 
     Parameters
@@ -56,7 +56,7 @@ def check_writable(path: str | PathLike[str], suffixes: Collection[str] | None =
 
 
 @contextmanager
-def replacing(path: str | PathLike[str]) -> Iterator[BinaryIO]:
+def replacing(path: AnyPath) -> Iterator[BinaryIO]:
     """Open a temporary file beside `path` that replaces it when the block ends normally.
 
     When the block raises, KeyboardInterrupt included, the temporary file is deleted and

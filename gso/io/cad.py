@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import os
 from collections.abc import Sequence
-from os import PathLike
 from typing import Any, NamedTuple
 
 from gso.errors import GSOError, MeshError, OptionError
@@ -14,6 +13,7 @@ from gso.io.svg import MILLIMETRES
 from gso.mesh import Mesh
 from gso.spelling import choices
 from gso.spline import BSplineSurface, TrimmedSpline
+from gso.typing import AnyPath
 
 
 class _Format(NamedTuple):
@@ -37,7 +37,7 @@ SPLINE_SUFFIXES = tuple(_FORMATS)
 """Suffixes of the CAD files that are written."""
 
 
-def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
+def check_spline(path: AnyPath, unit: str = "mm") -> None:
     """Reject a CAD file that cannot be written, before anything is computed.
 
     Raises
@@ -68,7 +68,7 @@ def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
         ) from None
 
 
-def save_spline(spline: BSplineSurface, path: str | PathLike[str], *, unit: str = "mm") -> None:
+def save_spline(spline: BSplineSurface, path: AnyPath, *, unit: str = "mm") -> None:
     """Write a B-spline surface to a CAD file: the same control net, knots and degrees.
 
     An existing file is replaced only when the new one is complete.
@@ -108,7 +108,7 @@ def save_spline(spline: BSplineSurface, path: str | PathLike[str], *, unit: str 
     _write(path, unit, "write", spline)
 
 
-def save_faces(mesh: Mesh, path: str | PathLike[str], *, unit: str = "mm") -> None:
+def save_faces(mesh: Mesh, path: AnyPath, *, unit: str = "mm") -> None:
     """Write the planar faces of a mesh to a CAD file, as faces that share their edges.
 
     An existing file is replaced only when the new one is complete.
@@ -136,9 +136,7 @@ def save_faces(mesh: Mesh, path: str | PathLike[str], *, unit: str = "mm") -> No
     _write(path, unit, "faces", mesh)
 
 
-def save_patches(
-    patches: Sequence[TrimmedSpline], path: str | PathLike[str], *, unit: str = "mm"
-) -> None:
+def save_patches(patches: Sequence[TrimmedSpline], path: AnyPath, *, unit: str = "mm") -> None:
     """Write trimmed splines to a CAD file, such as those of :func:`gso.smooth_strips`.
 
     In STEP files they share their edges. In 3DM files the surfaces are whole, and their
@@ -169,7 +167,7 @@ def save_patches(
     _write(path, unit, "trimmed", patches)
 
 
-def _write(path: str | PathLike[str], unit: str, kind: str, content: Any) -> None:
+def _write(path: AnyPath, unit: str, kind: str, content: object) -> None:
     check_spline(path, unit)
     form = _FORMATS[_suffix(path)]
     write: Any = getattr(importlib.import_module(f"gso.io.{form.module}"), getattr(form, kind))
@@ -180,5 +178,5 @@ def _write(path: str | PathLike[str], unit: str, kind: str, content: Any) -> Non
             raise MeshError(f"{os.fsdecode(path)}: {error}") from None
 
 
-def _suffix(path: str | PathLike[str]) -> str:
+def _suffix(path: AnyPath) -> str:
     return os.path.splitext(os.fsdecode(path))[1].lower()

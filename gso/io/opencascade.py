@@ -3,19 +3,46 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
+from OCP import collections
+from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_MakeEdge,
+    BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakePolygon,
+    BRepBuilderAPI_MakeWire,
+    BRepBuilderAPI_Sewing,
+)
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepLib import BRepLib
+from OCP.Geom import Geom_BSplineSurface
+from OCP.Geom2d import Geom2d_BSplineCurve
+from OCP.GeomToIGES import GeomToIGES_GeomSurface
+from OCP.gp import gp_Pnt, gp_Pnt2d
+from OCP.IGESControl import IGESControl_Writer
+from OCP.IGESData import IGESData_IGESWriter
+from OCP.IGESSelect import IGESSelect_WorkLibrary
+from OCP.Interface import Interface_Static
+from OCP.Message import Message, Message_Gravity
+from OCP.STEPControl import (
+    STEPControl_Controller,
+    STEPControl_StepModelType,
+    STEPControl_Writer,
+)
+from OCP.StepData import StepData_StepWriter
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Wire
+from scipy.interpolate import make_interp_spline
 
 from gso.errors import MeshError
 from gso.io.svg import MILLIMETRES
 from gso.mesh import Mesh
 from gso.spline import BSplineSurface, TrimmedSpline
 from gso.spline.trimmed import Loop
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 #: OpenCASCADE's names of the units that both formats know; IGES has another one for inches.
 _UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
@@ -30,11 +57,11 @@ _TOLERANCE = 1e-7
 #: Distance, relative to the size of the largest patch, within which edges are joined.
 _SEWN = 1e-5
 
+A = TypeVar("A", collections.Array1_double, collections.Array1_int)
+
 
 def step(spline: BSplineSurface, unit: str) -> bytes:
     """Return the contents of a STEP file with one face, bounded by the edges of the surface."""
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
-
     surface, name = _converted(spline, unit)
     content = _step(BRepBuilderAPI_MakeFace(surface, _TOLERANCE).Shape(), name)
     if b"B_SPLINE_SURFACE_WITH_KNOTS" not in content:
@@ -55,21 +82,16 @@ def iges_faces(mesh: Mesh, unit: str) -> bytes:
     return _iges_shell(*_shell(mesh, unit))
 
 
-def _iges_shell(shell: Any, name: str) -> bytes:
+def _iges_shell(shell: TopoDS_Shape, name: str) -> bytes:
     """Return the contents of an IGES file of a shell in a unit."""
-    from OCP.IGESControl import IGESControl_Writer
-
     with _quiet():
         session = IGESControl_Writer("IN" if name == "INCH" else name, 1)
         session.AddShape(shell)
         return _iges(session)
 
 
-def _step(shape: Any, name: str) -> bytes:
+def _step(shape: TopoDS_Shape, name: str) -> bytes:
     """Return the contents of a STEP file of a shape in a unit."""
-    from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
-    from OCP.StepData import StepData_StepWriter
-
     kind = STEPControl_StepModelType.STEPControl_ShellBasedSurfaceModel
     with _quiet(), _settings({"write.step.unit": name, "xstep.cascade.unit": name}):
         session = STEPControl_Writer()
@@ -80,26 +102,16 @@ def _step(shape: Any, name: str) -> bytes:
     return _printed(writer)
 
 
-def _iges(session: Any) -> bytes:
+def _iges(session: IGESControl_Writer) -> bytes:
     """Return the contents of the IGES file of a session."""
-    from OCP.IGESData import IGESData_IGESWriter
-    from OCP.IGESSelect import IGESSelect_WorkLibrary
-
     writer = IGESData_IGESWriter(session.Model())
     writer.FloatWriter().SetFormat(_FORMAT, True)
     writer.SendModel(IGESSelect_WorkLibrary.DefineProtocol_s())
     return _printed(writer)
 
 
-def _shell(mesh: Mesh, unit: str) -> tuple[Any, str]:
+def _shell(mesh: Mesh, unit: str) -> tuple[TopoDS_Shape, str]:
     """Return a shell of planar faces, and the name of its unit."""
-    from OCP.BRepBuilderAPI import (
-        BRepBuilderAPI_MakeFace,
-        BRepBuilderAPI_MakePolygon,
-        BRepBuilderAPI_Sewing,
-    )
-    from OCP.gp import gp_Pnt
-
     known = unit in _UNITS
     points = mesh.vertices if known else mesh.vertices * MILLIMETRES[unit]
     sewing = BRepBuilderAPI_Sewing(_TOLERANCE)
@@ -129,10 +141,8 @@ def iges_trimmed(patches: Sequence[TrimmedSpline], unit: str) -> bytes:
     return _iges_shell(*_trimmed_shell(patches, unit))
 
 
-def _trimmed_shell(patches: Sequence[TrimmedSpline], unit: str) -> tuple[Any, str]:
+def _trimmed_shell(patches: Sequence[TrimmedSpline], unit: str) -> tuple[TopoDS_Shape, str]:
     """Return a shell of trimmed splines, and the name of its unit."""
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
-
     known = unit in _UNITS
     size = max(patch.spline.size for patch in patches)
     sewing = BRepBuilderAPI_Sewing(_SEWN * size * (1.0 if known else MILLIMETRES[unit]))
@@ -144,15 +154,12 @@ def _trimmed_shell(patches: Sequence[TrimmedSpline], unit: str) -> tuple[Any, st
     return sewing.SewedShape(), _UNITS[unit if known else "mm"]
 
 
-def _trimmed_face(surface: Any, loops: Sequence[Loop]) -> Any:
+def _trimmed_face(surface: Geom_BSplineSurface, loops: Sequence[Loop]) -> TopoDS_Face:
     """Return a face of a surface inside loops of its parameters.
 
     Where smooth curves through the points of the loops cross each other, straight segments
     between the points are used.
     """
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
-    from OCP.BRepCheck import BRepCheck_Analyzer
-
     for straight in (False, True):
         wires = [_wire(surface, loop, straight) for loop in loops]
         if any(wire is None for wire in wires):
@@ -165,11 +172,8 @@ def _trimmed_face(surface: Any, loops: Sequence[Loop]) -> Any:
     raise MeshError("a surface has an outline that crosses itself or is not closed")
 
 
-def _wire(surface: Any, loop: Loop, straight: bool) -> Any:
+def _wire(surface: Geom_BSplineSurface, loop: Loop, straight: bool) -> TopoDS_Wire | None:
     """Return the wire of a loop, of smooth curves or of straight segments; None if it is open."""
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeWire
-    from OCP.BRepLib import BRepLib
-
     wire = BRepBuilderAPI_MakeWire()
     for curve in loop:
         new = np.r_[True, (np.diff(curve, axis=0) != 0).any(axis=1)]
@@ -185,13 +189,8 @@ def _wire(surface: Any, loop: Loop, straight: bool) -> Any:
     return wire.Wire()
 
 
-def _plane_curve(points: Array) -> Any:
+def _plane_curve(points: Array) -> Geom2d_BSplineCurve:
     """Return the curve through points (k, 2) of the parameters of a surface."""
-    from OCP import collections
-    from OCP.Geom2d import Geom2d_BSplineCurve
-    from OCP.gp import gp_Pnt2d
-    from scipy.interpolate import make_interp_spline
-
     step = np.hypot(*np.diff(points, axis=0).T)
     along = np.r_[0.0, np.cumsum(step)]
     spline = make_interp_spline(along / along[-1], points, k=min(3, len(points) - 1))
@@ -205,9 +204,6 @@ def _plane_curve(points: Array) -> Any:
 
 def iges(spline: BSplineSurface, unit: str) -> bytes:
     """Return the contents of an IGES file with one B-spline surface (entity 128)."""
-    from OCP.GeomToIGES import GeomToIGES_GeomSurface
-    from OCP.IGESControl import IGESControl_Writer
-
     surface, name = _converted(spline, unit)
     with _quiet():
         session = IGESControl_Writer("IN" if name == "INCH" else name, 0)
@@ -219,12 +215,8 @@ def iges(spline: BSplineSurface, unit: str) -> bytes:
         return _iges(session)
 
 
-def _converted(spline: BSplineSurface, unit: str) -> tuple[Any, str]:
+def _converted(spline: BSplineSurface, unit: str) -> tuple[Geom_BSplineSurface, str]:
     """Return the OpenCASCADE surface in a supported unit, and the name of that unit."""
-    from OCP import collections
-    from OCP.Geom import Geom_BSplineSurface
-    from OCP.gp import gp_Pnt
-
     known = unit in _UNITS
     net = spline.net if known else spline.net * MILLIMETRES[unit]
     n, m = net.shape[:2]
@@ -241,14 +233,14 @@ def _converted(spline: BSplineSurface, unit: str) -> tuple[Any, str]:
     return surface, _UNITS[unit if known else "mm"]
 
 
-def _array(kind: Any, values: Any) -> Any:
+def _array(kind: type[A], values: Array | Ints) -> A:
     out = kind(1, len(values))
     for k, value in enumerate(values.tolist(), 1):
         out.SetValue(k, value)
     return out
 
 
-def _printed(writer: Any) -> bytes:
+def _printed(writer: StepData_StepWriter | IGESData_IGESWriter) -> bytes:
     """Return the text of a file writer."""
     text = io.BytesIO()
     if not writer.Print(text):
@@ -259,9 +251,6 @@ def _printed(writer: Any) -> bytes:
 @contextmanager
 def _settings(wanted: dict[str, str]) -> Iterator[None]:
     """Set global parameters of OpenCASCADE inside a block and restore them after it."""
-    from OCP.Interface import Interface_Static
-    from OCP.STEPControl import STEPControl_Controller
-
     STEPControl_Controller.Init_s()
     before = {name: Interface_Static.CVal_s(name) for name in wanted}
     try:
@@ -276,9 +265,7 @@ def _settings(wanted: dict[str, str]) -> Iterator[None]:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Suppress OpenCASCADE's messages of success on standard output."""
-    from OCP.Message import Message, Message_Gravity
-
-    printers: Iterable[Any] = list(Message.DefaultMessenger_s().Printers())
+    printers = list(Message.DefaultMessenger_s().Printers())
     levels = [printer.GetTraceLevel() for printer in printers]
     try:
         for printer in printers:

@@ -7,8 +7,7 @@ from typing import BinaryIO, NoReturn
 import numpy as np
 
 from gso.errors import MeshError
-from gso.io.source import Array, Ints
-from gso.typing import Flags
+from gso.typing import Array, Flags, Ints
 
 # Integers with more digits may overflow 64 bits, and are no valid vertex indices.
 _DIGITS = 18

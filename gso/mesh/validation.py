@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,7 +35,7 @@ def numbers(values: ArrayLike, expected: str) -> Array:
         given = np.asarray(values)
         if given.dtype.kind not in "c":
             return np.array(given, dtype=np.float64)
-        error: Any = "complex numbers"
+        error: Exception | str = "complex numbers"
     except (TypeError, ValueError, OverflowError) as caught:
         error = caught
     raise MeshError(f"{expected}: {error}")
@@ -54,7 +54,7 @@ def checked_vertices(vertices: ArrayLike) -> Array:
     return points
 
 
-def checked_faces(faces: Any, points: Array) -> tuple[Ints, Flags, tuple[str, ...]]:
+def checked_faces(faces: ArrayLike, points: Array) -> tuple[Ints, Flags, tuple[str, ...]]:
     """Check and orient faces; return them, a mask of the reversed ones, and notes."""
     try:
         given = np.asarray(faces)

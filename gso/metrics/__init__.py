@@ -10,9 +10,6 @@ they are. :data:`INFO` lists the meaning, unit and direction of every metric.
 
 from __future__ import annotations
 
-import warnings
-from typing import Any
-
 from gso.metrics.areas import area, area_error, corner_areas, flipped_cells, flipped_faces, flips
 from gso.metrics.curvature import (
     K_A_r,
@@ -49,7 +46,7 @@ from gso.metrics.strain import (
     strains,
     stretches,
 )
-from gso.metrics.surfaces import components, unit
+from gso.metrics.surfaces import SurfaceLike, components, unit
 
 __all__ = [
     "INFO",
@@ -58,6 +55,7 @@ __all__ = [
     "K_A_r",
     "K_A_r_worst",
     "Strains",
+    "SurfaceLike",
     "area",
     "area_error",
     "boundary_distance",
@@ -100,14 +98,3 @@ __all__ = [
     "unit",
     "worst_curvature",
 ]
-
-#: Functions that were renamed, by their former names.
-_RENAMED = {"folds": dihedral_angles, "loss_gc_both": loss_gc_mean}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _RENAMED:
-        raise AttributeError(f"module 'gso.metrics' has no attribute {name!r}")
-    new = _RENAMED[name]
-    warnings.warn(f"{name} is now called {new.__name__}", DeprecationWarning, stacklevel=2)
-    return new
