@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from gso import faults, metrics
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.typing import Array, Ints
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 #: Rounds in which folded triangles are smoothed, and the one from which their neighbours move too.
 _ROUNDS, _WIDER = 20, 4
@@ -88,7 +93,7 @@ def _unfolded(light: Mesh, surface: Nearest, original: Mesh) -> Mesh:
     return original
 
 
-def _means(edges: Ints, count: int):
+def _means(edges: Ints, count: int) -> csr_matrix:
     """Return the matrix (n, n) that gives the mean of each vertex's neighbours."""
     from scipy.sparse import coo_matrix, diags
 

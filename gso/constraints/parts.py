@@ -118,7 +118,8 @@ class Pins(Part):
         return replace(self, ids=ids, positions=self.positions[rows] + transfer.shift[ids])
 
     def violation(self, points: Array) -> Array:
-        return np.linalg.norm(points[self.ids] - self.positions, axis=1)
+        distance: Array = np.linalg.norm(points[self.ids] - self.positions, axis=1)
+        return distance
 
     @property
     def linear(self) -> tuple[Part, ...]:
@@ -170,7 +171,8 @@ class Relations(Part):
 
     def violation(self, points: Array) -> Array:
         image = self.anchor + (points[self.first] - self.anchor) @ self.matrix.T
-        return np.linalg.norm(points[self.second] - image, axis=1)
+        distance: Array = np.linalg.norm(points[self.second] - image, axis=1)
+        return distance
 
     @property
     def is_glue(self) -> bool:
@@ -255,9 +257,10 @@ class OnLines(Part):
         return replace(self, ids=ids) if len(ids) else None
 
     def violation(self, points: Array) -> Array:
-        return np.linalg.norm(
+        distance: Array = np.linalg.norm(
             points[self.ids] - self.lines.nearest(points[self.ids]).points, axis=1
         )
+        return distance
 
     def items(self, block: str) -> list[Weighted]:
         term = curve.build(self.ids, self.lines, block=block, weight=self.weight)
@@ -308,7 +311,8 @@ class Planar(Part):
 
     def violation(self, points: Array) -> Array:
         corners = (tuple(points[self.quads[:, k]].T) for k in range(4))
-        return np.abs(geometry.diagonal_distance(*corners))
+        gap: Array = np.abs(geometry.diagonal_distance(*corners))
+        return gap
 
     @property
     def anchored(self) -> bool:
@@ -363,7 +367,8 @@ class Lengths(Part):
 
     def violation(self, points: Array) -> Array:
         a, b = (points[self.pairs[:, k]] for k in (0, 1))
-        return np.abs(np.linalg.norm(a - b, axis=1) - self.lengths)
+        change: Array = np.abs(np.linalg.norm(a - b, axis=1) - self.lengths)
+        return change
 
     @property
     def anchored(self) -> bool:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso.mesh import Mesh
 from gso.typing import Array, Flags, Ints
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 #: Cost of a right-angled turn on a quad mesh, in mean edge lengths.
 _TURN = 4.0
@@ -33,7 +36,7 @@ class Paths:
         self._plain = self._graph(self.length)
         self._turns = None if mesh.has_triangles else _Turns(mesh, self.ends, self.length)
 
-    def _graph(self, weight: Array) -> Any:
+    def _graph(self, weight: Array) -> csr_matrix:
         from scipy.sparse import coo_matrix
 
         keep = np.isfinite(weight)

@@ -11,8 +11,7 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +19,7 @@ from numpy.typing import ArrayLike
 from gso import metrics
 from gso.components import average
 from gso.errors import GSOError, OptionError
-from gso.io import as_mesh
+from gso.io import MeshLike, as_mesh
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.plot.draw import GRAZING, SUFFIXES, Panel, draw, facing, write
@@ -32,6 +31,7 @@ from gso.plot.view import View
 from gso.result import Result
 from gso.segmentation import Segmentation
 from gso.spelling import choices, known_keywords
+from gso.typing import AnyPath
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -70,13 +70,13 @@ def require() -> None:
 
 @known_keywords()
 def plot_surface(
-    mesh: Any,
+    mesh: MeshLike,
     values: str | ArrayLike = "none",
     *,
-    path: str | PathLike[str] | None = None,
+    path: AnyPath | None = None,
     title: str = "",
     label: str = "",
-    before: Any = None,
+    before: MeshLike | None = None,
 ) -> Figure:
     """Draw a surface, coloured by a quantity.
 
@@ -164,7 +164,7 @@ def _flattened(design: Mesh, pattern: Pattern, scale: np.ndarray | None = None) 
     return [surface, sheet]
 
 
-def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figure:
+def plot_result(result: Result, path: AnyPath | None = None) -> Figure:
     """Draw a result beside its design.
 
     `developable`: the curvature before and after in one colour scale, the distance between the
@@ -221,7 +221,7 @@ def _curved(design: Mesh, mesh: Mesh) -> float:
     return metrics.mean_abs_K(mesh, scale=metrics.unit(design))
 
 
-def plot_pieces(found: Segmentation, path: str | PathLike[str] | None = None) -> Figure:
+def plot_pieces(found: Segmentation, path: AnyPath | None = None) -> Figure:
     """Draw a design in pieces from both sides, with its seams, beside the patterns.
 
     Parameters
@@ -248,11 +248,11 @@ def plot_pieces(found: Segmentation, path: str | PathLike[str] | None = None) ->
 
 @known_keywords()
 def plot_rulings(
-    mesh: Any,
+    mesh: MeshLike,
     *,
-    path: str | PathLike[str] | None = None,
+    path: AnyPath | None = None,
     count: int = 24,
-    before: Any = None,
+    before: MeshLike | None = None,
 ) -> Figure:
     """Draw a surface with its ruling lines, and its Gauss image beside it.
 

@@ -10,7 +10,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from gso.plot.heat import Heat, Scale
 from gso.typing import Array, Ints
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
@@ -151,7 +152,7 @@ def _segments(lines: Sequence[Array]) -> Array:
     return np.concatenate([np.empty((0, 2, 3)), *(np.stack([p[:-1], p[1:]], 1) for p in lines)])
 
 
-def _paint(ax: Any, panel: Panel, span: Array) -> ScalarMappable | None:
+def _paint(ax: Axes, panel: Panel, span: Array) -> ScalarMappable | None:
     """Draw a panel; return the mappable of its colour bar."""
     from matplotlib.patches import Circle
 
@@ -220,7 +221,8 @@ def _shading(panel: Panel, ambient: float) -> Array:
     normal = geometry.quad_area_vectors(panel.points, panel.corners)
     length = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
     lit = np.abs(normal @ panel.light) / (length * np.linalg.norm(panel.light))
-    return ambient + (1.05 - ambient) * lit
+    brightness: Array = ambient + (1.05 - ambient) * lit
+    return brightness
 
 
 def write(figure: Figure, path: str | PathLike[str] | None) -> Figure:

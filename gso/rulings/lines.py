@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import MeshError, OptionError
-from gso.io import as_mesh
+from gso.io import MeshLike, as_mesh
 from gso.mesh import Mesh
 from gso.rulings.shape import FLAT, checked_flat
 from gso.rulings.spread import chosen, region_areas, spread
@@ -93,7 +92,7 @@ class Rulings:
 
 
 def trace(
-    mesh: Any, *, count: int = 24, seeds: ArrayLike | None = None, flat: float = FLAT
+    mesh: MeshLike, *, count: int = 24, seeds: ArrayLike | None = None, flat: float = FLAT
 ) -> Rulings:
     """Trace evenly spread ruling lines across a surface.
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from gso import geometry
 from gso.errors import OptionError
-from gso.io import as_mesh
+from gso.io import MeshLike, as_mesh
 from gso.mesh import Mesh, topology
 from gso.metrics import components
 from gso.rulings.normals import gauss_image
@@ -82,7 +81,7 @@ class ShapeOperator:
         return float(width / length) if areas.size else 0.0
 
 
-def shape_operator(mesh: Any, *, flat: float = FLAT) -> ShapeOperator:
+def shape_operator(mesh: MeshLike, *, flat: float = FLAT) -> ShapeOperator:
     """Compute curvatures and principal directions of every face.
 
     The shape operator of a quad maps its diagonals to those of its image in the discrete
@@ -153,7 +152,7 @@ def shape_operator(mesh: Any, *, flat: float = FLAT) -> ShapeOperator:
 
 def face_matrices(
     points: Array, normals: Array, corners: Ints
-) -> tuple[geometry.Matrix, tuple[Array, Array, Array], Array]:
+) -> tuple[geometry.Matrix[Array], tuple[Array, Array, Array], Array]:
     """Compute shape operators, tangent frames and areas of faces with four corners.
 
     A triangle repeats its first corner as the last one, so that its diagonals are two sides.
@@ -180,4 +179,7 @@ def checked_flat(flat: float) -> float:
 
 def _midpoints(mesh: Mesh) -> Array:
     there = mesh.faces >= 0
-    return (mesh.vertices[mesh.faces] * there[..., None]).sum(axis=1) / there.sum(axis=1)[:, None]
+    middles: Array = (mesh.vertices[mesh.faces] * there[..., None]).sum(axis=1) / there.sum(axis=1)[
+        :, None
+    ]
+    return middles

@@ -174,7 +174,8 @@ class _Front:
         ahead = np.maximum(self.weights + length[:, None] * self.rates, 0.0)
         ahead[rows, corner] = 0.0
         self.weights = ahead / ahead.sum(axis=1, keepdims=True)
-        return (corner + 1) % 3
+        edge: Ints = (corner + 1) % 3
+        return edge
 
     def cross(self, mesh: Mesh, field: Field, side: Ints, across: Ints, go: Flags) -> Ints:
         """Cross the next triangle to the edge ahead; drop lines that end before it.
