@@ -478,11 +478,3 @@ def test_neither_casadi_nor_the_solver_is_loaded():
 
 def test_public_names():
     assert gso.net.predict is predict
-
-
-def test_former_names_of_methods_still_work(coarse):
-    surface = torch.zeros(1, 8, 8, 3)
-    with pytest.warns(DeprecationWarning, match="initial_geometry"):
-        assert coarse.start(surface) is surface
-    with pytest.raises(AttributeError, match="nonsense"):
-        coarse.nonsense  # noqa: B018

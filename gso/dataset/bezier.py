@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 
+from gso.metrics import curvature_grid
 from gso.typing import Array, Ints
 
 #: Control points along a side of the recipe's nets.
@@ -54,13 +55,15 @@ def bernstein(degree: int, t: Array) -> Array:
 
     k = np.arange(degree + 1)
     t = np.asarray(t, float)[:, None]
-    return comb(degree, k) * t**k * (1.0 - t) ** (degree - k)
+    values: Array = comb(degree, k) * t**k * (1.0 - t) ** (degree - k)
+    return values
 
 
 def normalise(points: Array) -> Array:
     """Subtract the centroid and divide by the largest vertex norm."""
     centred = points - points.reshape(-1, 3).mean(axis=0)
-    return centred / np.sqrt((centred**2).sum(axis=-1).max())
+    unit: Array = centred / np.sqrt((centred**2).sum(axis=-1).max())
+    return unit
 
 
 def boundary_length_variance(points: Array) -> float:
@@ -92,7 +95,8 @@ def _binomials(count: int) -> Array:
     """Return binomial coefficients (degree, k), zero where k exceeds the degree."""
     from scipy.special import comb
 
-    return comb(*np.ogrid[:count, :count])
+    table: Array = comb(*np.ogrid[:count, :count])
+    return table
 
 
 def _padded_bernstein(counts: Ints, ranges: Array, samples: int, width: int) -> Array:
@@ -100,7 +104,8 @@ def _padded_bernstein(counts: Ints, ranges: Array, samples: int, width: int) -> 
     t = np.linspace(ranges[:, 0], ranges[:, 1], samples, axis=1)[..., None]
     k = np.arange(width)
     rest = np.maximum(counts[:, None] - 1 - k, 0)[:, None]
-    return _binomials(width)[counts - 1][:, None] * t**k * (1.0 - t) ** rest
+    values: Array = _binomials(width)[counts - 1][:, None] * t**k * (1.0 - t) ** rest
+    return values
 
 
 def sample_many(surfaces: Sequence[BezierSurface], size: int = 64) -> Array:
@@ -151,8 +156,6 @@ def generate(
     max_loss_gc : float
         Largest ``loss_gc`` that is accepted; infinity disables this criterion.
     """
-    from gso.metrics import curvature_grid
-
     rng = np.random.default_rng(seed)
     kept: list[BezierSurface] = []
     while len(kept) < count:

@@ -14,11 +14,9 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
 from importlib.util import find_spec
-from os import PathLike
 from pathlib import Path
-from typing import Any
 
-from gso import cluster
+from gso import cluster, tno
 from gso.dataset import hdf, manifest, shard
 from gso.dataset.claim import claimed
 from gso.dataset.labels import KINDS, REFERENCES
@@ -31,6 +29,7 @@ from gso.io import replacing
 from gso.linalg import blas_threads
 from gso.parallel import Done
 from gso.spelling import choices, known_keywords
+from gso.typing import AnyPath, Json
 
 _OTHER_RECIPE = "give its own options, or another folder"
 _OTHER_VERSIONS = "install what it was begun with, or build in another folder"
@@ -43,7 +42,7 @@ Spread = Callable[[Callable[..., bytes], Sequence[shard.Task]], Generator[Done, 
 
 @known_keywords()
 def build(
-    folder: str | PathLike[str],
+    folder: AnyPath,
     recipe: Recipe | None = None,
     *,
     reference: Iterable[str] = (),
@@ -166,7 +165,7 @@ def tasks(
             yield from (shard.Task(split, number, some, part) for part in parts)
 
 
-def _begin(folder: Path, recipe: Recipe, device: str | None) -> dict[str, Any]:
+def _begin(folder: Path, recipe: Recipe, device: str | None) -> Json:
     """Return the existing manifest, or write and return that of a new dataset.
 
     Raises
@@ -174,7 +173,7 @@ def _begin(folder: Path, recipe: Recipe, device: str | None) -> dict[str, Any]:
     DatasetError
         The existing manifest has another recipe, or labels made on another device.
     """
-    record = {
+    record: Json = {
         "format": manifest.FORMAT,
         "recipe": recipe.as_dict(),
         "versions": versions(device),
@@ -201,9 +200,7 @@ def _begin(folder: Path, recipe: Recipe, device: str | None) -> dict[str, Any]:
     return there
 
 
-def _check_same(
-    folder: Path, there: dict[str, Any], what: str, new: dict[str, Any], hint: str
-) -> None:
+def _check_same(folder: Path, there: Json, what: str, new: Json, hint: str) -> None:
     """Raise a DatasetError if `new` differs from the existing manifest's entry `what`."""
     old = there[what]
     said = [f"{k} {old.get(k)!r}, not {v!r}" for k, v in new.items() if old.get(k) != v]
@@ -215,8 +212,6 @@ def _references(
     recipe: Recipe, names: Iterable[str], splits: Iterable[str]
 ) -> set[tuple[str, str]]:
     """Return the requested pairs of reference and split, checked."""
-    from gso import tno
-
     asked = {(name, split) for name in names for split in splits}
     for name, split in sorted(asked):
         if name not in REFERENCES:
@@ -322,12 +317,12 @@ def _kept(so_far: str = "") -> Iterator[None]:
 
 def _listed(
     folder: Path,
-    record: dict[str, Any],
+    record: Json,
     recipe: Recipe,
     todo: Iterable[shard.Task],
     references: manifest.References,
     drawn: int,
-) -> dict[str, Any]:
+) -> Json:
     """Return the manifest of a dataset whose files all exist, without its statistics."""
     files = []
     for task in todo:

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from gso import parallel
 from gso.dataset import bezier
 from gso.errors import DatasetError
 
@@ -42,8 +43,6 @@ def draw_many(
     >>> draw_many([(2, 7), (1, 8)], 16).shape
     (3, 16, 16, 3)
     """
-    from gso import parallel
-
     counts = [count for count, _ in pieces]
     ends = np.cumsum(counts, dtype=int)
     drawn = np.empty((sum(counts), size, size, 3), np.float32)

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -16,8 +16,11 @@ from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
 from gso.metrics import unit
 from gso.result import Result
-from gso.typing import Array
+from gso.typing import Array, Json
 from gso.unknowns.spline import spline_matrix
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 #: Control points along each side of the spline fitted to the normal offsets.
 CONTROLS = 16
@@ -68,7 +71,7 @@ class Kind:
     metrics: tuple[str, ...]
 
     @property
-    def options(self) -> dict[str, Any]:
+    def options(self) -> Json:
         """Settings of the solver, by the names that files have had from the beginning."""
         settings = tno.check(**self.arguments)[2]
         former = {new: old for old, new in settings.RENAMED.items()}
@@ -152,7 +155,7 @@ def solve_many(
     return [x if isinstance(x, Label) else _failed(kind, points.shape[1]) for x in labels]
 
 
-def _or_error(function: Callable[..., Any], *given: Any, **keywords: Any) -> Any:
+def _or_error(function: Callable[P, T], *given: P.args, **keywords: P.kwargs) -> T | GSOError:
     """Call a function, and return what it raises on purpose."""
     try:
         return function(*given, **keywords)
@@ -178,7 +181,8 @@ def _measured(result: Result) -> dict[str, float]:
     if result.flat is None or result.task == "flatten":
         return result.metrics
     flatten = tasks.get("flatten").metrics
-    return flatten(result.mesh, None, result.flat, unit(result.design)) | result.metrics
+    flat: dict[str, float] = flatten(result.mesh, None, result.flat, unit(result.design))
+    return flat | result.metrics
 
 
 def shapes(kind: str, size: int) -> dict[str, tuple[int, ...]]:

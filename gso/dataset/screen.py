@@ -154,7 +154,8 @@ def _sound(points: Array) -> Flags:
     b = metrics.components(points[:, :-1, 1:] - points[:, 1:, :-1])
     normal = np.stack(geometry.cross(a, b), axis=-1)
     with np.errstate(invalid="ignore"):
-        return np.sqrt((normal**2).sum(axis=-1)).min(axis=(1, 2)) > _SMALLEST_CELL
+        sound: Flags = np.sqrt((normal**2).sum(axis=-1)).min(axis=(1, 2)) > _SMALLEST_CELL
+        return sound
 
 
 def _cell(values: Array) -> Ints:

@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gso.net.catalogue import available
+    from gso.net.inference.prediction import predict
+    from gso.net.models.coarse import CoarseNet
+    from gso.net.models.gsonet import GSONet
+    from gso.net.tasks import add_task
+    from gso.net.training.loop import train
+    from gso.net.weights import add_kind, load, save
 
 # Imported on first use, so that torch is loaded only when a net is used.
 _NAMES = {
@@ -18,10 +27,20 @@ _NAMES = {
     "train": "gso.net.training.loop",
 }
 
-__all__ = list(_NAMES)
+__all__ = [
+    "CoarseNet",
+    "GSONet",
+    "add_kind",
+    "add_task",
+    "available",
+    "load",
+    "predict",
+    "save",
+    "train",
+]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _NAMES:
         raise AttributeError(f"module 'gso.net' has no attribute {name!r}")
     value = getattr(importlib.import_module(_NAMES[name]), name)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import warnings
 from abc import abstractmethod
 from contextlib import AbstractContextManager
-from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -15,12 +13,6 @@ from gso.net.models.grids import planes, rectangle
 
 #: Samples along each side at which nets are trained.
 SIZE = 64
-#: Former names of methods, which still work.
-_OLD_NAMES = {
-    "start": "initial_geometry",
-    "carried": "displacements_at",
-    "begin_with": "copy_weights_from",
-}
 
 
 class Net(nn.Module):
@@ -46,17 +38,10 @@ class Net(nn.Module):
     passes = 1
     multiple = 1
 
-    def __init__(self, task: str, **settings: Any):
+    def __init__(self, task: str, **settings: object):
         super().__init__()
         self.kind = tasks.get(task)
         self.task, self.settings, self.bf16 = task, {"task": task, **settings}, False
-
-    def __getattr__(self, name: str) -> Any:
-        if name not in _OLD_NAMES:
-            return super().__getattr__(name)
-        new = _OLD_NAMES[name]
-        warnings.warn(f"Net.{name} is now called {new}", DeprecationWarning, stacklevel=2)
-        return getattr(self, new)
 
     def copy_weights_from(self, other: Net) -> None:
         """Copy the weights of a net of this kind and size; RuntimeError if they do not fit."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from types import ModuleType
-from typing import Any
 
 from gso.errors import OptionError
 from gso.net.tasks.base import NetTask
@@ -24,11 +23,12 @@ def names() -> list[str]:
     return _FILES.names()
 
 
-def get(name: Any) -> NetTask:
+def get(name: object) -> NetTask:
     """Return the task of a name; an OptionError if there is none."""
     if name not in names():
         raise OptionError(f"no task {name!r} for a net; {choices(name, names())}")
-    return _FILES.get(name).TASK
+    task: NetTask = _FILES.get(str(name)).TASK
+    return task
 
 
 def add_task(task: NetTask) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -13,12 +12,13 @@ from torch import Tensor
 from gso.errors import WeightsError
 from gso.io import replacing
 from gso.net.models.base import Net
+from gso.typing import Json
 
 _DAMAGED = "{} is no checkpoint of this run ({}); remove it to begin anew"
 Optimisers = Sequence[torch.optim.Optimizer]
 
 
-def save(path: Path, net: Net, average: Net, optimisers: Optimisers, state: dict[str, Any]) -> None:
+def save(path: Path, net: Net, average: Net, optimisers: Optimisers, state: Json) -> None:
     """Write the net, its moving average, the optimisers' moments, and the JSON `state`."""
     from safetensors.torch import save as packed
 
@@ -34,7 +34,7 @@ def save(path: Path, net: Net, average: Net, optimisers: Optimisers, state: dict
         file.write(data)
 
 
-def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> dict[str, Any]:
+def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> Json:
     """Restore what :func:`save` wrote into the nets and optimisers, and return `state`.
 
     Raises
@@ -61,7 +61,7 @@ def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> dict[str
     return state
 
 
-def numbers(path: Path) -> dict[str, Any]:
+def numbers(path: Path) -> Json:
     """Read the JSON `state` that :func:`save` wrote, without the tensors.
 
     Raises
