@@ -25,6 +25,9 @@ AnyPath = str | PathLike[str]
 #: Content of a JSON object.
 Json = dict[str, Any]
 
+#: Keyword arguments that are passed on.
+Keywords = dict[str, Any]
+
 
 class Scalar(Protocol):
     """What geometry and energy compute with: a number, an array, a tensor, a CasADi symbol."""

@@ -144,7 +144,8 @@ def _boundary(mesh: Mesh) -> tuple[Ints, Array, Array]:
 
 def _lengths(points: Array) -> Array:
     """Return the edge lengths of a closed polygon; edge k starts at vertex k."""
-    return np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    lengths: Array = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    return lengths
 
 
 def _surface_on_left(mesh: Mesh, loop: Ints) -> bool:

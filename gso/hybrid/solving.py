@@ -19,16 +19,18 @@ from gso.constraints import Compiled, compile_constraints, listed
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.hybrid.prediction import Prediction, predictions
 from gso.hybrid.time_model import net_saves_time
+from gso.io import MeshLike, as_mesh
 from gso.mesh import Mesh
+from gso.net.catalogue import NetLike
 from gso.pattern import Pattern
 from gso.result import Result
 from gso.spelling import known_keywords
-from gso.status import Status
+from gso.status import Progress, Status
 from gso.tno import Start, check, components, optimize
 from gso.tno.batch import Item
 from gso.tno.job import Job
 from gso.tno.normalise import Canonical
-from gso.typing import Array
+from gso.typing import Array, Keywords
 
 #: Surfaces that are read and predicted together.
 _BATCH = 64
@@ -42,10 +44,10 @@ _NEARLY = 2e-3
 
 @known_keywords(optimize)
 def solve(
-    mesh: Any,
+    mesh: MeshLike,
     *,
     task: str = "developable",
-    net: Any = None,
+    net: NetLike | None = None,
     polish: bool | int = True,
     sparing: bool = False,
     **keywords: Any,
@@ -109,8 +111,6 @@ def solve(
     >>> result.warm_start in ("net", "cold"), result.usable
     (True, True)
     """
-    from gso.io import as_mesh
-
     clock = time.perf_counter()
     polish = _checked(task, polish, keywords)
     design = as_mesh(mesh)
@@ -122,8 +122,9 @@ def solve(
         return result
     prediction = Prediction()
     if not sparing or net_saves_time(design, task, keywords):
-        asked = {"task": task, "net": net, "passes": _passes(polish), "alone": polish is False}
-        (prediction,) = predictions([design], **asked)
+        (prediction,) = predictions(
+            [design], task=task, net=net, passes=_passes(polish), alone=polish is False
+        )
     result = _finished(design, prediction, task, polish, keywords)
     result.seconds["total"] = time.perf_counter() - clock
     return result
@@ -131,10 +132,10 @@ def solve(
 
 @known_keywords(optimize)
 def solve_many(
-    meshes: Iterable[Any],
+    meshes: Iterable[MeshLike],
     *,
     task: str = "developable",
-    net: Any = None,
+    net: NetLike | None = None,
     polish: bool | int = True,
     sparing: bool = False,
     workers: int | None = None,
@@ -178,7 +179,7 @@ def solve_many(
             yield Item(done.index, done.value, done.error)
 
 
-def _pieces(design: Mesh, task: str, sparing: bool, keywords: dict[str, Any]) -> list[Component]:
+def _pieces(design: Mesh, task: str, sparing: bool, keywords: Keywords) -> list[Component]:
     """Return the components that are predicted one by one; none for the design as a whole."""
     if not several(design):
         return []
@@ -191,11 +192,11 @@ def _pieces(design: Mesh, task: str, sparing: bool, keywords: dict[str, Any]) ->
     return pieces
 
 
-def _each(design: Mesh, pieces: list[Component], task: str, keywords: dict[str, Any]) -> Result:
+def _each(design: Mesh, pieces: list[Component], task: str, keywords: Keywords) -> Result:
     """Solve every component from its own prediction, where there is one."""
     callback, compiled = keywords.pop("callback", None), keywords.pop("constraints")
 
-    def one(job: Job, told: Any) -> Result:
+    def one(job: Job, told: Callable[[Progress], object] | None) -> Result:
         kept = () if job.constraints.empty else job.constraints
         return solve(job.design, task=task, constraints=kept, callback=told, **keywords)
 
@@ -217,7 +218,7 @@ class _Started:
 
 
 def _started(
-    meshes: Iterable[Any],
+    meshes: Iterable[MeshLike],
     worth: Callable[[Mesh], bool] | None,
     ask: Callable[[list[Mesh]], list[Prediction]],
 ) -> Iterator[_Started]:
@@ -237,16 +238,14 @@ def _passes(polish: bool | int) -> int | None:
     return _PASSES if polish is True else None
 
 
-def _read(mesh: Any) -> Mesh | GSOError:
-    from gso.io import as_mesh
-
+def _read(mesh: MeshLike) -> Mesh | GSOError:
     try:
         return as_mesh(mesh)
     except GSOError as error:
         return error
 
 
-def _one(task: str, polish: bool | int, keywords: dict[str, Any], started: _Started) -> Result:
+def _one(task: str, polish: bool | int, keywords: Keywords, started: _Started) -> Result:
     if isinstance(started.design, GSOError):
         raise started.design
     result = _finished(started.design, started.prediction, task, polish, keywords)
@@ -254,7 +253,7 @@ def _one(task: str, polish: bool | int, keywords: dict[str, Any], started: _Star
     return result
 
 
-def _checked(task: str, polish: Any, keywords: dict[str, Any]) -> bool | int:
+def _checked(task: str, polish: bool | int, keywords: Keywords) -> bool | int:
     """Check the arguments that need no mesh, make the constraints a list, return `polish`."""
     if not isinstance(polish, bool | np.bool_ | int | np.integer) or polish < 0:
         raise OptionError(f"polish is {polish!r}; take True, False, or a number of iterations")
@@ -279,7 +278,7 @@ def _finished(
     prediction: Prediction,
     task: str,
     polish: bool | int,
-    keywords: dict[str, Any],
+    keywords: Keywords,
 ) -> Result:
     """Solve from a prediction if it is valid, else from a cold start."""
     refused, result = prediction.refused, None
@@ -316,7 +315,7 @@ def _polished(
     points: Array,
     task: str,
     polish: bool | int,
-    keywords: dict[str, Any],
+    keywords: Keywords,
 ) -> Result:
     """Solve from a net's result."""
     # Without iterations the net's result itself is wanted, whatever its energy.
