@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from gso.errors import MeshError, OptionError
 from gso.io.atomic import check_writable, replacing
 from gso.io.lines import polyline
-from gso.io.source import Array, Ints
 from gso.mesh import Mesh
 from gso.pattern import Bend
 from gso.spelling import choices, known_keywords
+from gso.typing import Array, Ints
 
 MILLIMETRES = {
     "um": 1e-3,
