@@ -10,7 +10,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from gso import metrics as measure
-from gso.mesh import Mesh
+from gso.mesh import Mesh, topology
 from gso.metrics import INFO, Info
 from gso.typing import Array, Ints
 
@@ -63,16 +63,11 @@ def labels(mesh: Mesh, links: Iterable[tuple[int, int]] | Ints = ()) -> Ints:
     >>> labels(mesh).tolist(), labels(mesh, [(1, 5)]).tolist()
     ([0, 0, 0, 1, 1, 1], [0, 0, 0, 0, 0, 0])
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     own = mesh.components
     pairs = np.asarray(links, np.int64).reshape(-1, 2)
     if len(pairs):
         a, b = own[pairs.T]
-        count = int(own.max()) + 1
-        graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
-        own = connected_components(graph, directed=False)[1].astype(np.int64)[own]
+        own = topology.component_labels(int(own.max()) + 1, a, b)[own]
     out = np.full(len(own), -1)
     used = mesh.used
     found, first, number = np.unique(own[used], return_index=True, return_inverse=True)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix, diags
 
 from gso import faults, metrics
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.typing import Array, Ints
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
 
 #: Rounds in which folded triangles are smoothed, and the one from which their neighbours move too.
 _ROUNDS, _WIDER = 20, 4
@@ -95,8 +91,6 @@ def _unfolded(light: Mesh, surface: Nearest, original: Mesh) -> Mesh:
 
 def _means(edges: Ints, count: int) -> csr_matrix:
     """Return the matrix (n, n) that gives the mean of each vertex's neighbours."""
-    from scipy.sparse import coo_matrix, diags
-
     rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
     joined: Array = np.ones(len(rows))
     matrix = coo_matrix((joined, (rows, columns)), shape=(count, count)).tocsr()

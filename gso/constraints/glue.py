@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.parts import Part, Relations
+from gso.mesh.topology.graph import component_labels
 from gso.typing import Ints
 
 
@@ -45,12 +46,8 @@ class Glue(Constraint):
 
 def _check_faces(subject: Subject, pairs: Ints) -> None:
     """Refuse glue that joins two corners of a face, directly or through other vertices."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     n, faces = subject.count, subject.mesh.faces
-    links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    label = connected_components(links, directed=False)[1]
+    label = component_labels(n, *pairs.T)
     order = np.argsort(label[faces] + n * (faces < 0), axis=1)
     corners = np.take_along_axis(faces, order, axis=1)
     same = (label[corners[:, 1:]] == label[corners[:, :-1]]) & (corners[:, 1:] >= 0)

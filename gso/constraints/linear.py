@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gso.constraints.parts import OnPlane, Part, Pins, Relations
+from gso.mesh.topology.graph import component_labels
 from gso.typing import Array, Ints
 
 if TYPE_CHECKING:
@@ -193,12 +194,10 @@ def _follow(count: int, joints: _Joints, dim: int) -> tuple[Ints, Array, Array]:
 def _forest(count: int, joints: _Joints) -> tuple[Ints, Ints, Ints]:
     """Return the children, parents and joints of a spanning forest."""
     from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
+    from scipy.sparse.csgraph import breadth_first_order
 
     a, b = joints.first, joints.second
-    links = coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
-    label = connected_components(links, directed=False)[1]
-    roots = np.unique(label, return_index=True)[1]
+    roots = np.unique(component_labels(count, a, b), return_index=True)[1]
     # An extra vertex, linked to one vertex of every component, makes the forest a tree.
     tied = coo_matrix(
         (np.ones(len(a) + len(roots)), (np.r_[a, np.full(len(roots), count)], np.r_[b, roots])),

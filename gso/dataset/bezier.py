@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy.special import comb
 
 from gso.metrics import curvature_grid
 from gso.typing import Array, Ints
@@ -51,8 +52,6 @@ def bernstein(degree: int, t: Array) -> Array:
     >>> bernstein(2, np.array([0.5]))
     array([[0.25, 0.5 , 0.25]])
     """
-    from scipy.special import comb
-
     k = np.arange(degree + 1)
     t = np.asarray(t, float)[:, None]
     values: Array = comb(degree, k) * t**k * (1.0 - t) ** (degree - k)
@@ -93,8 +92,6 @@ def draw(rng: np.random.Generator) -> BezierSurface:
 @cache
 def _binomials(count: int) -> Array:
     """Return binomial coefficients (degree, k), zero where k exceeds the degree."""
-    from scipy.special import comb
-
     table: Array = comb(*np.ogrid[:count, :count])
     return table
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg.lapack import dpbtrf, dpbtrs
 
 from gso.linalg.base import Pattern, SingularError
 from gso.typing import Array
@@ -39,8 +40,6 @@ class Solver:
 
     def factor(self, values: Array) -> None:
         """Factor the matrix with these values of the lower triangle."""
-        from scipy.linalg.lapack import dpbtrf
-
         band = np.zeros(self._shape[0] * self._shape[1])
         band[self._at] = values
         self._factor, info = dpbtrf(band.reshape(self._shape, order="F"), lower=1, overwrite_ab=1)
@@ -49,7 +48,5 @@ class Solver:
 
     def solve(self, rhs: Array) -> Array:
         """Solve for one right-hand side (n,) or several (n, k)."""
-        from scipy.linalg.lapack import dpbtrs
-
         solution: Array = dpbtrs(self._factor, rhs, lower=1)[0]
         return solution

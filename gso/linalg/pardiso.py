@@ -6,6 +6,7 @@ from functools import cache
 from importlib.util import find_spec
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from gso.linalg.base import Pattern, SingularError
 from gso.typing import Array
@@ -32,7 +33,6 @@ class Solver:
 
     def __init__(self, pattern: Pattern):
         from pypardiso import PyPardisoSolver
-        from scipy.sparse import csr_matrix
 
         # Lower columns of a symmetric matrix are its upper rows.
         self._matrix = csr_matrix(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csc_matrix
 
 from gso.linalg.base import Pattern, SingularError
 from gso.linalg.spd import spd
@@ -28,8 +29,6 @@ class Solver:
     name = "superlu"
 
     def __init__(self, pattern: Pattern):
-        from scipy.sparse import csc_matrix
-
         n, nnz = pattern.size, pattern.nnz
         i, j = pattern.indices, pattern.columns
         off = i != j

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
+from gso.mesh.topology.graph import component_labels
 from gso.typing import Ints
 
 #: Relative difference below which two path lengths count as equal.
@@ -75,9 +76,6 @@ def cut(mesh: Mesh, edges: ArrayLike) -> Cut:
     >>> slit.seams.tolist()
     [[[4, 5], [4, 9]]]
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     he, n = mesh.half_edges, len(mesh.vertices)
     wanted = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
     keys, own = edge_keys(wanted[:, 0], wanted[:, 1], n), edge_keys(he.origin, he.dest, n)
@@ -92,8 +90,7 @@ def cut(mesh: Mesh, edges: ArrayLike) -> Cut:
     after = he.twin[he.prev]
     joined = np.flatnonzero((after >= 0) & ~divided[he.prev])
     corners = len(own)
-    links = coo_matrix((np.ones(joined.size), (joined, after[joined])), shape=(corners, corners))
-    _, fan = connected_components(links, directed=False)
+    fan = component_labels(corners, joined, after[joined])
     _, first = np.unique(fan, return_index=True)
     owner = he.origin[first]
     order = np.lexsort((first, owner))

@@ -222,14 +222,7 @@ class Mesh:
     @cached_property
     def components(self) -> Ints:
         """Component number of each vertex, (n,)."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
-        n = len(self.vertices)
-        e = self.edges
-        links = coo_matrix((np.ones(len(e)), (e[:, 0], e[:, 1])), shape=(n, n))
-        number: Ints = connected_components(links, directed=False)[1].astype(np.int64)
-        return number
+        return topology.component_labels(len(self.vertices), *self.edges.T)
 
     @property
     def seams(self) -> Flags:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gso.errors import MeshError
+from gso.mesh.topology.graph import component_labels
 from gso.typing import Array, Flags, Ints
 
 # With more pairs per vertex than this the tolerance is larger than the edges.
@@ -43,8 +44,6 @@ def near(points: Array, tolerance: float, names: Ints | None = None) -> Ints:
     first = equal(points)
     if not tolerance > 0:
         return first
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     kept, index = np.unique(first, return_inverse=True)
@@ -59,9 +58,7 @@ def near(points: Array, tolerance: float, names: Ints | None = None) -> Ints:
             "give a length well below that of the edges"
         )
     pairs = tree.query_pairs(tolerance, output_type="ndarray")
-    shape = (len(apart), len(apart))
-    links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=shape)
-    label = connected_components(links, directed=False)[1]
+    label = component_labels(len(apart), *pairs.T)
     order = np.argsort(label, kind="stable")
     begin = np.flatnonzero(np.diff(label[order], prepend=-1))
     low = np.minimum.reduceat(apart[order], begin)

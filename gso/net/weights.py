@@ -8,6 +8,9 @@ from functools import lru_cache
 from pathlib import Path
 
 import torch
+from safetensors import SafetensorError
+from safetensors.torch import load as unpacked
+from safetensors.torch import save as packed
 
 from gso.errors import GSOError, OptionError, WeightsError
 from gso.io import replacing
@@ -100,8 +103,6 @@ def save(
     dict
         The card.
     """
-    from safetensors.torch import save as packed
-
     tensors = {k: v.detach().to("cpu", dtype).contiguous() for k, v in net.state_dict().items()}
     data = packed(tensors)
     record = {
@@ -163,9 +164,6 @@ def placed(net: Net, device: str | torch.device) -> Net:
 
 def _filled(settings: Json, data: bytes, path: Path) -> Net:
     """Make a net with the weights of a file."""
-    from safetensors import SafetensorError
-    from safetensors.torch import load as unpacked
-
     try:
         # On the meta device, which allocates no memory: compare the card with the file first.
         with torch.device("meta"):

@@ -10,7 +10,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,11 +17,11 @@ from numpy.typing import ArrayLike
 
 from gso import metrics
 from gso.components import average
-from gso.errors import GSOError, OptionError
+from gso.errors import OptionError
 from gso.io import MeshLike, as_mesh
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.plot.draw import GRAZING, SUFFIXES, Panel, draw, facing, write
+from gso.plot.draw import GRAZING, SUFFIXES, Panel, available, draw, facing, require, write
 from gso.plot.heat import curvatures, distance, numbers, scales, strain, stretch
 from gso.plot.pieces import pieces
 from gso.plot.rulings import gauss, ruled
@@ -49,23 +48,6 @@ __all__ = [
 
 COLOURS = ("curvature", "distance", "strain", "none")
 """Names that :func:`plot_surface` takes for its values."""
-
-
-def available() -> bool:
-    """Tell whether Matplotlib is installed."""
-    return find_spec("matplotlib") is not None
-
-
-def require() -> None:
-    """Raise an error if Matplotlib is not installed.
-
-    Raises
-    ------
-    GSOError
-        With instructions to install it.
-    """
-    if not available():
-        raise GSOError('plots need Matplotlib: pip install ".[plot]" in the folder of gso')
 
 
 @known_keywords()

@@ -9,12 +9,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso import geometry
+from gso.errors import GSOError
 from gso.io import check_writable, replacing
 from gso.mesh import topology
 from gso.plot.heat import Heat, Scale
@@ -91,6 +93,23 @@ class Panel:
     def corners(self) -> Ints:
         """Faces (m, 4); a triangle repeats its first corner."""
         return topology.four_corners(self.faces)
+
+
+def available() -> bool:
+    """Tell whether Matplotlib is installed."""
+    return find_spec("matplotlib") is not None
+
+
+def require() -> None:
+    """Raise an error if Matplotlib is not installed.
+
+    Raises
+    ------
+    GSOError
+        With instructions to install it.
+    """
+    if not available():
+        raise GSOError('plots need Matplotlib: pip install ".[plot]" in the folder of gso')
 
 
 def draw(panels: Sequence[Panel]) -> Figure:

@@ -7,6 +7,7 @@ a vertex or the side of a grid, never over elements.
 
 from __future__ import annotations
 
+from gso.mesh.topology.graph import component_labels
 from gso.mesh.topology.grid import grid_faces, recognise_grid
 from gso.mesh.topology.half_edges import (
     HalfEdges,
@@ -38,6 +39,7 @@ __all__ = [
     "boundary_loops",
     "by_size",
     "check_vertices",
+    "component_labels",
     "corner_triangles",
     "edge_keys",
     "edges",

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from gso.errors import MeshError
+from gso.mesh.topology.graph import component_labels
 from gso.typing import Flags, Ints
 
 
@@ -85,13 +86,12 @@ def _tree_parity(count: int, a: Ints, b: Ints, odd: Flags) -> tuple[Flags, Ints]
     log2(depth) vectorised passes.
     """
     from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
+    from scipy.sparse.csgraph import breadth_first_order
 
     _, once = np.unique(edge_keys(a, b, count), return_index=True)
     a, b, odd = a[once], b[once], odd[once]
-    parts, label = connected_components(
-        coo_matrix((np.ones(a.size), (a, b)), shape=(count, count)), directed=False
-    )
+    label = component_labels(count, a, b)
+    parts = int(label.max(initial=-1)) + 1
     roots = np.zeros(parts, np.int64)
     roots[label[::-1]] = np.arange(count)[::-1]
     # An extra node, joined to a root of every component, turns the forest into a tree.
@@ -181,15 +181,11 @@ def check_vertices(he: HalfEdges) -> None:
     MeshError
         There is such a vertex; the message names the first one.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     count = he.origin.size
     turn = he.twin[he.prev]
     inner = np.flatnonzero(turn >= 0)
-    links = coo_matrix((np.ones(inner.size), (inner, turn[inner])), shape=(count, count))
-    fans, label = connected_components(links, directed=False)
-    if fans == np.count_nonzero(he.face_count):
+    label = component_labels(count, inner, turn[inner])
+    if label.max(initial=-1) + 1 == np.count_nonzero(he.face_count):
         return
     _, one = np.unique(label, return_index=True)
     per_vertex = np.bincount(he.origin[one], minlength=he.vertex_count)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso.mesh.topology.graph import component_labels
 from gso.mesh.topology.half_edges import HalfEdges
 from gso.typing import Ints
 
@@ -55,7 +56,7 @@ def hinges(he: HalfEdges) -> Ints:
 def boundary_loops(he: HalfEdges) -> list[Ints]:
     """List the vertex ids of the boundary loops, anticlockwise round the surface, longest first."""
     from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components, depth_first_order
+    from scipy.sparse.csgraph import depth_first_order
 
     rim = np.flatnonzero(he.twin < 0)
     if rim.size == 0:
@@ -66,8 +67,7 @@ def boundary_loops(he: HalfEdges) -> list[Ints]:
     while (he.twin[ahead] >= 0).any():
         ahead = np.where(he.twin[ahead] >= 0, he.next[he.twin[ahead]], ahead)
     n, after = rim.size, np.searchsorted(rim, ahead)
-    links = coo_matrix((np.ones(n), (np.arange(n), after)), shape=(n, n))
-    _, label = connected_components(links, directed=False)
+    label = component_labels(n, np.arange(n), after)
     order = np.lexsort((he.origin[rim], label))
     starts = order[np.unique(label[order], return_index=True)[1]]
     # An extra node, joined to a start of every loop, makes one depth-first walk visit all.

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save as packed
 from torch import Tensor
 
 from gso.errors import WeightsError
@@ -20,8 +22,6 @@ Optimisers = Sequence[torch.optim.Optimizer]
 
 def save(path: Path, net: Net, average: Net, optimisers: Optimisers, state: Json) -> None:
     """Write the net, its moving average, the optimisers' moments, and the JSON `state`."""
-    from safetensors.torch import save as packed
-
     tensors: dict[str, Tensor] = {}
     for prefix, module in (("net", net), ("average", average)):
         tensors |= {f"{prefix}.{k}": v for k, v in module.state_dict().items()}
@@ -42,8 +42,6 @@ def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> Json:
     WeightsError
         The file is damaged, or belongs to another net.
     """
-    from safetensors import SafetensorError, safe_open
-
     state = numbers(path)
     try:
         with safe_open(path, framework="pt") as file:
@@ -69,8 +67,6 @@ def numbers(path: Path) -> Json:
     WeightsError
         The file is damaged.
     """
-    from safetensors import SafetensorError, safe_open
-
     try:
         with safe_open(path, framework="pt") as file:
             return dict(json.loads((file.metadata() or {})["state"]))
