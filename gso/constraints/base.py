@@ -95,11 +95,10 @@ class Subject:
             return np.zeros((0, 2)[:ndim], np.int64)
         if ids.ndim != ndim or (ndim == 2 and ids.shape[1] != 2) or ids.dtype.kind not in "iu":
             raise self.refuse(f"needs {what}")
-        ids = ids.astype(np.int64)
-        bad = ids[(ids < 0) | (ids >= count)]
+        index: Ints = ids.astype(np.int64)
+        bad = index[(index < 0) | (index >= count)]
         if bad.size:
             raise self.refuse(f"names {kind} {bad[0]}; the mesh has {count}")
-        index: Ints = ids
         return index
 
     def points(self, given: ArrayLike, what: str, count: int | None = None) -> Array:

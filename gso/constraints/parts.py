@@ -118,8 +118,7 @@ class Pins(Part):
         return replace(self, ids=ids, positions=self.positions[rows] + transfer.shift[ids])
 
     def violation(self, points: Array) -> Array:
-        distance: Array = np.linalg.norm(points[self.ids] - self.positions, axis=1)
-        return distance
+        return np.asarray(np.linalg.norm(points[self.ids] - self.positions, axis=1))
 
     @property
     def linear(self) -> tuple[Part, ...]:
@@ -171,8 +170,7 @@ class Relations(Part):
 
     def violation(self, points: Array) -> Array:
         image = self.anchor + (points[self.first] - self.anchor) @ self.matrix.T
-        distance: Array = np.linalg.norm(points[self.second] - image, axis=1)
-        return distance
+        return np.asarray(np.linalg.norm(points[self.second] - image, axis=1))
 
     @property
     def is_glue(self) -> bool:
@@ -311,8 +309,7 @@ class Planar(Part):
 
     def violation(self, points: Array) -> Array:
         corners = (tuple(points[self.quads[:, k]].T) for k in range(4))
-        gap: Array = np.abs(geometry.diagonal_distance(*corners))
-        return gap
+        return np.asarray(np.abs(geometry.diagonal_distance(*corners)))
 
     @property
     def anchored(self) -> bool:
@@ -367,8 +364,7 @@ class Lengths(Part):
 
     def violation(self, points: Array) -> Array:
         a, b = (points[self.pairs[:, k]] for k in (0, 1))
-        change: Array = np.abs(np.linalg.norm(a - b, axis=1) - self.lengths)
-        return change
+        return np.asarray(np.abs(np.linalg.norm(a - b, axis=1) - self.lengths))
 
     @property
     def anchored(self) -> bool:

@@ -54,15 +54,13 @@ def bernstein(degree: int, t: Array) -> Array:
     """
     k = np.arange(degree + 1)
     t = np.asarray(t, float)[:, None]
-    values: Array = comb(degree, k) * t**k * (1.0 - t) ** (degree - k)
-    return values
+    return np.asarray(comb(degree, k) * t**k * (1.0 - t) ** (degree - k))
 
 
 def normalise(points: Array) -> Array:
     """Subtract the centroid and divide by the largest vertex norm."""
     centred = points - points.reshape(-1, 3).mean(axis=0)
-    unit: Array = centred / np.sqrt((centred**2).sum(axis=-1).max())
-    return unit
+    return np.asarray(centred / np.sqrt((centred**2).sum(axis=-1).max()))
 
 
 def boundary_length_variance(points: Array) -> float:
@@ -92,8 +90,7 @@ def draw(rng: np.random.Generator) -> BezierSurface:
 @cache
 def _binomials(count: int) -> Array:
     """Return binomial coefficients (degree, k), zero where k exceeds the degree."""
-    table: Array = comb(*np.ogrid[:count, :count])
-    return table
+    return np.asarray(comb(*np.ogrid[:count, :count]))
 
 
 def _padded_bernstein(counts: Ints, ranges: Array, samples: int, width: int) -> Array:
@@ -101,8 +98,7 @@ def _padded_bernstein(counts: Ints, ranges: Array, samples: int, width: int) -> 
     t = np.linspace(ranges[:, 0], ranges[:, 1], samples, axis=1)[..., None]
     k = np.arange(width)
     rest = np.maximum(counts[:, None] - 1 - k, 0)[:, None]
-    values: Array = _binomials(width)[counts - 1][:, None] * t**k * (1.0 - t) ** rest
-    return values
+    return np.asarray(_binomials(width)[counts - 1][:, None] * t**k * (1.0 - t) ** rest)
 
 
 def sample_many(surfaces: Sequence[BezierSurface], size: int = 64) -> Array:

@@ -67,8 +67,7 @@ def rows(path: Path, shape: tuple[int, ...], some: Rows) -> Array:
     grid = load(path)
     if grid.shape != shape:
         raise DatasetError(f"{path} holds a grid {grid.shape}; the split's first one has {shape}")
-    chosen: Array = grid[None][some]
-    return chosen
+    return np.asarray(grid[None][some])
 
 
 def unit(grids: Array) -> Array:

@@ -154,8 +154,7 @@ def _sound(points: Array) -> Flags:
     b = metrics.components(points[:, :-1, 1:] - points[:, 1:, :-1])
     normal = np.stack(geometry.cross(a, b), axis=-1)
     with np.errstate(invalid="ignore"):
-        sound: Flags = np.sqrt((normal**2).sum(axis=-1)).min(axis=(1, 2)) > _SMALLEST_CELL
-        return sound
+        return np.asarray(np.sqrt((normal**2).sum(axis=-1)).min(axis=(1, 2)) > _SMALLEST_CELL)
 
 
 def _cell(values: Array) -> Ints:

@@ -221,5 +221,4 @@ def _noisy(surface: LazyArray, unit: LazyArray, level: float) -> LazyArray:
 
 
 def _sum(surface: Read, unit: Read, level: float, rows: Rows) -> Array:
-    noisy: Array = surface(rows) + level * unit(rows).astype(float)
-    return noisy
+    return np.asarray(surface(rows) + level * unit(rows).astype(float))

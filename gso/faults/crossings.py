@@ -73,8 +73,7 @@ def _heights(base: Array, other: Array) -> tuple[Array, Array]:
 
 
 def _both_sides(height: Array, depth: Array) -> Flags:
-    mask: Flags = (height.min(axis=1) < -depth) & (height.max(axis=1) > depth)
-    return mask
+    return np.asarray((height.min(axis=1) < -depth) & (height.max(axis=1) > depth))
 
 
 def _extent(triangle: Array, height: Array, line: Array) -> tuple[Array, Array]:

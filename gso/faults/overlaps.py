@@ -61,15 +61,13 @@ def overlapping(mesh: Mesh, flat: Array) -> Ints:
 def _other_diagonal(points: Array, faces: Ints) -> Flags:
     """Mark the quads that have an inverted triangle when split along the diagonal 0-2."""
     triangles, _ = split(faces)
-    mask: Flags = are_quads(faces) & (_areas(points, triangles).min(axis=1) <= 0)
-    return mask
+    return np.asarray(are_quads(faces) & (_areas(points, triangles).min(axis=1) <= 0))
 
 
 def _areas(points: Array, triangles: Ints) -> Array:
     """Return the doubled signed areas of triangles (..., 3)."""
     corners = (tuple(points[triangles[..., k]].T) for k in range(3))
-    areas: Array = geometry.corner_area2(*corners).T
-    return areas
+    return np.asarray(geometry.corner_area2(*corners).T)
 
 
 def _meet(a: Array, b: Array, depth: Array) -> Flags:
@@ -97,5 +95,4 @@ def _wound(points: Array, faces: Ints, triangles: Ints, count: Ints) -> Ints:
     face = np.r_[np.arange(len(faces)), np.flatnonzero(count == 2)]
     angles = geometry.corner_angles(points, every)
     turn = np.bincount(every.ravel(), angles.ravel(), minlength=len(points))
-    wound: Ints = face[(turn[every] > _TURN).any(axis=1)]
-    return wound
+    return np.asarray(face[(turn[every] > _TURN).any(axis=1)])

@@ -22,8 +22,7 @@ def area_vectors(points: Array, triangles: Ints) -> Array:
 
 def doubled_areas(points: Array, triangles: Ints) -> Array:
     """Return the doubled areas (t,) of triangles of points (n, 3)."""
-    areas: Array = np.linalg.norm(area_vectors(points, triangles), axis=1)
-    return areas
+    return np.asarray(np.linalg.norm(area_vectors(points, triangles), axis=1))
 
 
 def signed_areas(flat: Array, triangles: Ints) -> Array:

@@ -52,8 +52,7 @@ def resample(values: Array, height: int, width: int) -> Array:
     """
     h, w = values.shape[:2]
     along = (_matrix(h, height) @ values.reshape(h, -1)).reshape(height, w, -1)
-    fine: Array = np.matmul(_matrix(w, width), along)
-    return fine
+    return np.asarray(np.matmul(_matrix(w, width), along))
 
 
 def prolong_displacement(coarse: Mesh, fine: Mesh, points: Array) -> Array:

@@ -100,8 +100,7 @@ class Prolongation:
             np.linalg.norm(largest, axis=1).max(initial=0.0),
             np.linalg.norm(base, axis=1, keepdims=True),
         )
-        limited: Array = field * np.minimum(1.0, most / np.maximum(length, 1e-300))
-        return limited
+        return np.asarray(field * np.minimum(1.0, most / np.maximum(length, 1e-300)))
 
 
 def _bending(mesh: Mesh) -> csr_matrix:

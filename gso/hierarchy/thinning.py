@@ -191,8 +191,7 @@ def _links(faces: Ints, n: int) -> _Links:
 def _among(sorted_keys: Ints, keys: Ints) -> Flags:
     """Return which keys are among sorted ones."""
     at = np.minimum(np.searchsorted(sorted_keys, keys), len(sorted_keys) - 1)
-    mask: Flags = sorted_keys[at] == keys
-    return mask
+    return np.asarray(sorted_keys[at] == keys)
 
 
 def _collapsed(
@@ -222,8 +221,7 @@ def _straight(points: Array, links: _Links, border: Flags) -> Flags:
     after = points[links.open_out] - points
     along = np.einsum("nd,nd->n", before, after)
     sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    mask: Flags = border & (along > _STRAIGHT * sizes)
-    return mask
+    return np.asarray(border & (along > _STRAIGHT * sizes))
 
 
 def _independent(links: _Links, order: Ints, may: Flags, n: int) -> Flags:
@@ -296,8 +294,7 @@ def _shape(area: Array, *sides: Array) -> Array:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    products: Array = np.einsum("kd,kd->k", a, b)
-    return products
+    return np.asarray(np.einsum("kd,kd->k", a, b))
 
 
 def _cross(a: Array, b: Array) -> Array:

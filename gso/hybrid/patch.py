@@ -144,8 +144,7 @@ def _boundary(mesh: Mesh) -> tuple[Ints, Array, Array]:
 
 def _lengths(points: Array) -> Array:
     """Return the edge lengths of a closed polygon; edge k starts at vertex k."""
-    lengths: Array = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
-    return lengths
+    return np.asarray(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))
 
 
 def _surface_on_left(mesh: Mesh, loop: Ints) -> bool:

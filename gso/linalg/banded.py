@@ -48,5 +48,4 @@ class Solver:
 
     def solve(self, rhs: Array) -> Array:
         """Solve for one right-hand side (n,) or several (n, k)."""
-        solution: Array = dpbtrs(self._factor, rhs, lower=1)[0]
-        return solution
+        return np.asarray(dpbtrs(self._factor, rhs, lower=1)[0])

@@ -47,8 +47,7 @@ class Solver:
 
         self._solver.set_phase(phase)
         try:
-            solution: Array = self._solver._call_pardiso(self._matrix, rhs)
-            return solution
+            return np.asarray(self._solver._call_pardiso(self._matrix, rhs))
         except PyPardisoError as error:
             raise SingularError(str(error)) from None
 

@@ -106,10 +106,8 @@ class Polylines:
 
 def turns(way: Array) -> Array:
     """Angle in degrees between each direction (m, dim) of a closed line and the one before."""
-    angles: Array = np.degrees(geometry.angle(tuple(way.T), tuple(np.roll(way, 1, axis=0).T)))
-    return angles
+    return np.asarray(np.degrees(geometry.angle(tuple(way.T), tuple(np.roll(way, 1, axis=0).T))))
 
 
 def _unit(vectors: Array) -> Array:
-    unit: Array = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)
-    return unit
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))

@@ -73,8 +73,7 @@ def near(points: Array, tolerance: float, names: Ints | None = None) -> Ints:
             f"{first_one if names is None else names[first_one]}); give a length "
             "well below that of the edges"
         )
-    target: Ints = kept[order[begin]][label][index]
-    return target
+    return np.asarray(kept[order[begin]][label][index])
 
 
 @dataclass(frozen=True)

@@ -84,8 +84,7 @@ def edge_ratios(before: SurfaceLike, after: SurfaceLike) -> Array:
     here, there = mesh_of(before), points_of(after)
     a, b = here.edges.T
     was, now = (np.linalg.norm(p[a] - p[b], axis=1) for p in (here.vertices, there))
-    ratios: Array = np.divide(now, was, out=np.full(len(was), np.nan), where=was > 0)
-    return ratios
+    return np.asarray(np.divide(now, was, out=np.full(len(was), np.nan), where=was > 0))
 
 
 def loop_ratios(before: SurfaceLike, after: SurfaceLike) -> Array:
@@ -98,8 +97,7 @@ def loop_ratios(before: SurfaceLike, after: SurfaceLike) -> Array:
     here, there = mesh_of(before), points_of(after)
     loops = here.boundary_loops
     was, now = (np.array([_around(p[loop]) for loop in loops]) for p in (here.vertices, there))
-    ratios: Array = now / was
-    return ratios
+    return np.asarray(now / was)
 
 
 def _around(points: Array) -> float:

@@ -29,8 +29,7 @@ def isometry_defect(
     q = image_of(surface, flat) / scale
     a, b = geometry.diagonals(*(components(p[cells[:, k]]) for k in range(4)))
     a2, b2 = geometry.diagonals(*(components(q[cells[:, k]]) for k in range(4)))
-    defect: Array = np.abs(np.stack(geometry.isometry_defect(a, b, a2, b2))).sum(axis=0)
-    return defect
+    return np.asarray(np.abs(np.stack(geometry.isometry_defect(a, b, a2, b2))).sum(axis=0))
 
 
 def loss_iso_cell(surface: SurfaceLike, flat: SurfaceLike, *, scale: float | None = None) -> float:

@@ -16,8 +16,7 @@ def face_normals(surface: SurfaceLike) -> Array:
     a, b = geometry.diagonals(*(components(p[c]) for c in topology.four_corners(faces).T))
     normal = np.stack(geometry.cross(a, b), axis=1)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    unit: Array = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
-    return unit
+    return np.asarray(np.divide(normal, length, out=np.zeros_like(normal), where=length > 0))
 
 
 def dihedral_angles(surface: SurfaceLike) -> Array:
@@ -31,8 +30,7 @@ def dihedral_angles(surface: SurfaceLike) -> Array:
     he, normal = mesh.half_edges, face_normals(mesh)
     inner = np.flatnonzero(he.twin > np.arange(he.twin.size))
     a, b = (components(normal[he.face[h]]) for h in (inner, he.twin[inner]))
-    angles: Array = np.degrees(geometry.angle(a, b))
-    return angles
+    return np.asarray(np.degrees(geometry.angle(a, b)))
 
 
 def normal_angle(clean: SurfaceLike, denoised: SurfaceLike) -> float:

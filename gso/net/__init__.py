@@ -6,13 +6,15 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from gso.net.catalogue import available
-    from gso.net.inference.prediction import predict
-    from gso.net.models.coarse import CoarseNet
-    from gso.net.models.gsonet import GSONet
-    from gso.net.tasks import add_task
-    from gso.net.training.loop import train
-    from gso.net.weights import add_kind, load, save
+    from gso.net.catalogue import available as available
+    from gso.net.inference.prediction import predict as predict
+    from gso.net.models.coarse import CoarseNet as CoarseNet
+    from gso.net.models.gsonet import GSONet as GSONet
+    from gso.net.tasks import add_task as add_task
+    from gso.net.training.loop import train as train
+    from gso.net.weights import add_kind as add_kind
+    from gso.net.weights import load as load
+    from gso.net.weights import save as save
 
 # Imported on first use, so that torch is loaded only when a net is used.
 _NAMES = {
@@ -27,17 +29,7 @@ _NAMES = {
     "train": "gso.net.training.loop",
 }
 
-__all__ = [
-    "CoarseNet",
-    "GSONet",
-    "add_kind",
-    "add_task",
-    "available",
-    "load",
-    "predict",
-    "save",
-    "train",
-]
+__all__ = list(_NAMES)
 
 
 def __getattr__(name: str) -> object:

@@ -76,8 +76,7 @@ def settle(mesh: Mesh, flat: Array, constraints: Compiled) -> Array:
 def _turn(flat: Array, k: int) -> Array:
     angle = 2.0 * np.pi * k / _TURNS
     c, s = np.cos(angle), np.sin(angle)
-    turned: Array = flat @ np.array([[c, s], [-s, c]])
-    return turned
+    return np.asarray(flat @ np.array([[c, s], [-s, c]]))
 
 
 def _closer(image: Array, ids: Ints, flat: Array, held: Compiled) -> tuple[float, Array]:
@@ -101,8 +100,7 @@ def _closer(image: Array, ids: Ints, flat: Array, held: Compiled) -> tuple[float
 def _moved(image: Array, p: Array, q: Array) -> Array:
     """Apply to an image the rigid motion that brings points p closest to q."""
     turn, shift = geometry.closest_motion(p, q)
-    moved: Array = image @ turn.T + shift
-    return moved
+    return np.asarray(image @ turn.T + shift)
 
 
 def _targets(flat: Array, held: Compiled) -> tuple[Ints, Array]:

@@ -136,8 +136,7 @@ def _scaled(mesh: Mesh, image: Array) -> Array:
     v, t = mesh.vertices, mesh.triangles
     space = geometry.doubled_areas(v, t)
     plane = np.abs(geometry.signed_areas(image, t)).sum()
-    scaled: Array = (image - image.mean(axis=0)) * np.sqrt(space.sum() / max(plane, 1e-300))
-    return scaled
+    return np.asarray((image - image.mean(axis=0)) * np.sqrt(space.sum() / max(plane, 1e-300)))
 
 
 def _circle(points: Array) -> Array:

@@ -28,5 +28,4 @@ def rectangle(grid: Array) -> Array:
     array([2., 6.])
     """
     sides = geometry.side_lengths(tuple(np.moveaxis(grid, -1, 0)))
-    flat: Array = geometry.unit_rectangle(*grid.shape[:2]) * np.array(sides)
-    return flat
+    return np.asarray(geometry.unit_rectangle(*grid.shape[:2]) * np.array(sides))

@@ -48,8 +48,7 @@ def closest_motion(flat: Array, target: Array) -> Array:
            [0., 1.]])
     """
     turn, shift = geometry.closest_motion(flat, target)
-    moved: Array = flat @ turn.T + shift
-    return moved
+    return np.asarray(flat @ turn.T + shift)
 
 
 def upright(flat: Array) -> Array:

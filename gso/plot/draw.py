@@ -240,8 +240,7 @@ def _shading(panel: Panel, ambient: float) -> Array:
     normal = geometry.quad_area_vectors(panel.points, panel.corners)
     length = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
     lit = np.abs(normal @ panel.light) / (length * np.linalg.norm(panel.light))
-    brightness: Array = ambient + (1.05 - ambient) * lit
-    return brightness
+    return np.asarray(ambient + (1.05 - ambient) * lit)
 
 
 def write(figure: Figure, path: str | PathLike[str] | None) -> Figure:

@@ -104,8 +104,7 @@ def _mean_normals(mesh: Mesh, corners: csr_matrix) -> Array:
     total = corners @ np.stack(geometry.cross(*sides), axis=1)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     up = np.broadcast_to([0.0, 0.0, 1.0], total.shape)
-    unit: Array = np.divide(total, length, out=up.copy(), where=length > 0)
-    return unit
+    return np.asarray(np.divide(total, length, out=up.copy(), where=length > 0))
 
 
 def _blocks(centre: Ints, around: csr_matrix) -> Iterator[tuple[Ints, Ints, Flags]]:
@@ -143,5 +142,4 @@ def _jet_normals(points: Array, normals: Array, centre: Ints, near: Ints, there:
     gram = weighted @ basis + weight.sum(axis=1)[:, None, None] * np.diag(_RIDGE)
     slope = np.linalg.solve(gram, weighted @ z[..., None])[:, 1:3, 0]
     out = up - (frame[..., :2] @ slope[..., None])[..., 0]
-    unit: Array = out / np.linalg.norm(out, axis=1, keepdims=True)
-    return unit
+    return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))

@@ -174,8 +174,7 @@ class _Front:
         ahead = np.maximum(self.weights + length[:, None] * self.rates, 0.0)
         ahead[rows, corner] = 0.0
         self.weights = ahead / ahead.sum(axis=1, keepdims=True)
-        edge: Ints = (corner + 1) % 3
-        return edge
+        return np.asarray((corner + 1) % 3)
 
     def cross(self, mesh: Mesh, field: Field, side: Ints, across: Ints, go: Flags) -> Ints:
         """Cross the next triangle to the edge ahead; drop lines that end before it.

@@ -46,8 +46,7 @@ def clamped_knots(controls: int) -> Array:
     """
     degree = min(DEGREE, controls - 1)
     inner = np.linspace(0.0, 1.0, controls - degree + 1)
-    knots: Array = np.r_[np.zeros(degree), inner, np.ones(degree)]
-    return knots
+    return np.asarray(np.r_[np.zeros(degree), inner, np.ones(degree)])
 
 
 def basis_matrix(knots: Array, controls: int, t: Array) -> csr_matrix:
@@ -168,8 +167,7 @@ class BSplineSurface:
         n, m = self.net.shape[:2]
         rows = np.tensordot(basis(self.knots_u, n, a.ravel(), du), self.net, axes=1)
         points = np.einsum("pj,pjk->pk", basis(self.knots_v, m, b.ravel(), dv), rows)
-        values: Array = points.reshape(*a.shape, 3)
-        return values
+        return np.asarray(points.reshape(*a.shape, 3))
 
     def sample(self, height: int, width: int) -> Array:
         """Sample points at uniform parameters, both ends included, (height, width, 3).
@@ -191,8 +189,7 @@ class BSplineSurface:
         """
         n = np.cross(self.evaluate(u, v, du=1), self.evaluate(u, v, dv=1))
         length = np.linalg.norm(n, axis=-1, keepdims=True)
-        unit: Array = np.divide(n, length, out=np.zeros_like(n), where=length > 0)
-        return unit
+        return np.asarray(np.divide(n, length, out=np.zeros_like(n), where=length > 0))
 
     def gaussian_curvature(self, u: ArrayLike, v: ArrayLike) -> Array:
         """Return the Gaussian curvature of the smooth surface at parameters, 1 / length^2."""
@@ -240,8 +237,7 @@ class BSplineSurface:
         """Evaluate points or derivatives at all pairs of parameters, (len(u), len(v), 3)."""
         n, m = self.net.shape[:2]
         a, b = basis(self.knots_u, n, u, du), basis(self.knots_v, m, v, dv)
-        values: Array = np.einsum("ia,jb,abk->ijk", a, b, self.net, optimize=True)
-        return values
+        return np.asarray(np.einsum("ia,jb,abk->ijk", a, b, self.net, optimize=True))
 
 
 def _curvature(derivatives: list[Array]) -> Array:

@@ -26,5 +26,4 @@ def component_labels(count: int, a: Ints, b: Ints) -> Ints:
     from scipy.sparse.csgraph import connected_components
 
     links = coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
-    label: Ints = connected_components(links, directed=False)[1].astype(np.int64)
-    return label
+    return np.asarray(connected_components(links, directed=False)[1], np.int64)

@@ -61,8 +61,7 @@ def _half_edge_table(faces: Ints) -> tuple[Ints, Ints, Ints, Ints]:
 
 def edge_keys(origin: Ints, dest: Ints, vertex_count: int) -> Ints:
     """Encode undirected edges as integers."""
-    keys: Ints = np.minimum(origin, dest) * np.int64(vertex_count) + np.maximum(origin, dest)
-    return keys
+    return np.asarray(np.minimum(origin, dest) * np.int64(vertex_count) + np.maximum(origin, dest))
 
 
 def half_edges(faces: Ints, vertex_count: int) -> HalfEdges:

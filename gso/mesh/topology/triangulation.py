@@ -25,8 +25,7 @@ def by_size(faces: Ints) -> tuple[Ints, Ints]:
 def four_corners(faces: Ints) -> Ints:
     """Pad faces to four corners (m, 4): a triangle repeats its first corner at the end."""
     first, last = faces[:, :1], faces[:, 3:]
-    padded: Ints = np.c_[faces[:, :3], np.where(last < 0, first, last) if last.size else first]
-    return padded
+    return np.asarray(np.c_[faces[:, :3], np.where(last < 0, first, last) if last.size else first])
 
 
 def triangulate(faces: Ints, turned: Flags) -> Ints:
@@ -88,8 +87,7 @@ def quad_splits(faces: Ints, he: HalfEdges) -> Flags:
 def _place_in_face(he: HalfEdges, quad: Flags) -> Ints:
     """Return the index within its face, 0 to 3, of the corner where each half-edge starts."""
     first = np.concatenate([[0], np.cumsum(np.where(quad, 4, 3))[:-1]])
-    place: Ints = np.arange(he.face.size) - first[he.face]
-    return place
+    return np.asarray(np.arange(he.face.size) - first[he.face])
 
 
 def _clashing_splits(quads: Ints, turn: Flags, he: HalfEdges) -> Flags:
