@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso.constraints import Compiled
 from gso.errors import MeshError
 from gso.mesh import Frame, Mesh, topology
-from gso.typing import Array, Ints, MeshLike
+from gso.typing import Array, Ints
+
+if TYPE_CHECKING:
+    from gso.io.convert import MeshLike
 
 
 class Canonical:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict
-from os import PathLike
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +18,16 @@ from gso.pattern import Pattern
 from gso.result.result import Result
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
-from gso.typing import Array
+from gso.typing import AnyPath, Array, Ints, Json
+
+#: Arrays of any type by name.
+Arrays: TypeAlias = dict[str, NDArray[Any]]
 
 _FORMAT = 1
 _PATTERN = ("flat", "faces", "vertex", "seams")
 
 
-def _record(result: Result) -> dict[str, Any]:
+def _record(result: Result) -> Json:
     """Collect everything but the arrays, as JSON-compatible values."""
     return {
         "format": _FORMAT,
@@ -48,10 +49,10 @@ def _record(result: Result) -> dict[str, Any]:
     }
 
 
-def arrays(result: Result) -> dict[str, Any]:
+def arrays(result: Result) -> Arrays:
     """Return everything of a result as arrays by name; the record is JSON."""
     record = _record(result)
-    out = {
+    out: Arrays = {
         "record": np.frombuffer(json.dumps(record, default=float).encode(), np.uint8),
         "design": result.design.vertices,
         "vertices": result.mesh.vertices,
@@ -81,7 +82,7 @@ def arrays(result: Result) -> dict[str, Any]:
     return out
 
 
-def _pieces_arrays(pieces: Pieces) -> dict[str, Any]:
+def _pieces_arrays(pieces: Pieces) -> Arrays:
     return {
         "pieces_design": pieces.design.vertices,
         "pieces_faces": pieces.design.faces,
@@ -91,7 +92,7 @@ def _pieces_arrays(pieces: Pieces) -> dict[str, Any]:
     }
 
 
-def _read_pieces(data: Mapping[str, Any], opened: Mesh) -> Pieces | None:
+def _read_pieces(data: Arrays, opened: Mesh) -> Pieces | None:
     if "pieces_design" not in data:
         return None
     vertex, seams = data["pieces_vertex"].astype(np.int64), data["pieces_seams"].astype(np.int64)
@@ -107,7 +108,7 @@ def _read_pieces(data: Mapping[str, Any], opened: Mesh) -> Pieces | None:
     return Pieces(design, Cut(surface, vertex, seams), names)
 
 
-def read(path: str | PathLike[str]) -> Result:
+def read(path: AnyPath) -> Result:
     """Read a result; see :meth:`gso.Result.load`."""
     from gso.io.arrays import read_arrays
     from gso.io.source import read_bytes
@@ -129,8 +130,8 @@ def read(path: str | PathLike[str]) -> Result:
             record,
             design,
             design.replaced(data["vertices"]) if same or pattern is None else pattern.mesh,
-            None if "ruled_faces" in data else _checked(data, "flat", (len(design.vertices), 2)),
-            _checked(data, "cell_scale", (len(design.faces),)),
+            None if "ruled_faces" in data else _read_array(data, "flat", (len(design.vertices), 2)),
+            _read_array(data, "cell_scale", (len(design.faces),)),
             pattern,
         )
         result.ruled = RuledSurface.from_arrays(data, result.mesh.vertices)
@@ -139,7 +140,7 @@ def read(path: str | PathLike[str]) -> Result:
             result.flat = None if result.pattern.is_cut else result.pattern.flat
         result.spline = BSplineSurface.from_arrays(data)
         result.pieces = _read_pieces(data, design)
-        label = _checked(data, "component", (len(design.vertices),))
+        label = _read_array(data, "component", (len(design.vertices),))
         if label is not None:
             _divide(result, record.get("components", []), label.astype(np.int64))
     except (KeyError, TypeError, ValueError) as error:
@@ -150,7 +151,7 @@ def read(path: str | PathLike[str]) -> Result:
 
 
 def _read(
-    record: Mapping[str, Any],
+    record: Json,
     design: Mesh,
     mesh: Mesh,
     flat: Array | None,
@@ -182,7 +183,7 @@ def _read(
     return result
 
 
-def _divide(result: Result, records: list[Mapping[str, Any]], label: NDArray[np.int64]) -> None:
+def _divide(result: Result, records: list[Json], label: Ints) -> None:
     """Restore the component results from the arrays of the whole mesh."""
     from gso.components import split
 
@@ -198,7 +199,7 @@ def _divide(result: Result, records: list[Mapping[str, Any]], label: NDArray[np.
         result.components.append(part)
 
 
-def _pattern(data: Mapping[str, Any], design: Mesh) -> Pattern | None:
+def _pattern(data: Arrays, design: Mesh) -> Pattern | None:
     """Read and check the pattern that a file stores besides the flat image; None without one."""
     if "pattern_flat" not in data:
         return None
@@ -220,7 +221,7 @@ def _pattern(data: Mapping[str, Any], design: Mesh) -> Pattern | None:
     return Pattern(flat, faces, vertex, seams)
 
 
-def _checked(data: Mapping[str, Array], name: str, shape: tuple[int, ...]) -> Array | None:
+def _read_array(data: Arrays, name: str, shape: tuple[int, ...]) -> Array | None:
     """Return an array of a file after checking its shape; None if the file has none."""
     array = data.get(name)
     if array is not None and array.shape != shape:

@@ -6,18 +6,16 @@ import os
 import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
-from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
-from gso.typing import Array
+from gso.typing import AnyPath, Array, Ints, Keywords
 
 if TYPE_CHECKING:
     from gso.cut_pieces import Pieces
@@ -120,7 +118,7 @@ class Result:
     reasons: tuple[str, ...] = ()
     pattern: Pattern | None = None
     components: list[Result] = field(default_factory=list)
-    names: NDArray[np.int64] | None = None
+    names: Ints | None = None
     ruled: RuledSurface | None = None
     pieces: Pieces | None = None
 
@@ -209,7 +207,7 @@ class Result:
         found = strains(surface, pattern.flat)
         return found | {k: v for k, v in known.items() if k not in found}
 
-    def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
+    def save(self, path: AnyPath, *, unit: str = "mm") -> None:
         """Write the result to a file; the suffix selects the format.
 
         ``.npz`` stores the whole result, to be read by :meth:`load`. ``.svg`` is the flat
@@ -226,8 +224,9 @@ class Result:
 
         suffix = os.path.splitext(os.fsdecode(path))[1].lower()[1:]
         if suffix == "npz":
+            whole: Keywords = arrays(self)
             with io.replacing(path) as file:
-                np.savez(file, **arrays(self))
+                np.savez(file, **whole)
         elif suffix == "svg":
             if self.pattern is None:
                 raise MeshError(
@@ -256,7 +255,7 @@ class Result:
             io.write(self.mesh, path)
         self.notes += tuple(n for n in io.left_out(self.mesh, path) if n not in self.notes)
 
-    def _save_strips(self, ruled: RuledSurface, path: str | PathLike[str], unit: str) -> None:
+    def _save_strips(self, ruled: RuledSurface, path: AnyPath, unit: str) -> None:
         """Write a ruled surface to a CAD file."""
         from gso import io
         from gso.ruled.smooth.smooth_surface import smooth_strips
@@ -287,7 +286,7 @@ class Result:
         self.notes += (note,)
 
     @classmethod
-    def load(cls, path: str | PathLike[str]) -> Result:
+    def load(cls, path: AnyPath) -> Result:
         """Read a result written as ``.npz``; nothing is unpickled.
 
         Raises

@@ -19,8 +19,7 @@ from gso.seams.joint_solve import gap
 from gso.solver import Callback
 from gso.status import Status
 from gso.tasks.base import Options
-from gso.tasks.request import Limits
-from gso.tasks.start import Start
+from gso.tasks.request import Limits, Start
 from gso.verdict import judge
 from gso.wording import length
 

@@ -63,7 +63,7 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
     )
 
 
-def _smoothed(mesh: Mesh, request: Request[Options]) -> tuple[Array, dict[str, Any]]:
+def _smoothed(mesh: Mesh, request: Request[Options]) -> tuple[Array, dict[str, float]]:
     """Compute smoothed vertices (n, 3), and the order, weight, sigma and degrees of freedom."""
     options = request.options
     order, weight = options.order, options.weight

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any, Generic, TypeVar
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
 from gso import linalg, tasks
 from gso.errors import OptionError
 from gso.tasks.options import Options
-from gso.tasks.start import Start
-from gso.typing import Array, MeshLike
+from gso.typing import Array
+
+if TYPE_CHECKING:
+    from gso.io.convert import MeshLike
 
 #: The settings of a formulation.
 O = TypeVar("O", bound=Options, covariant=True)
@@ -63,6 +65,61 @@ class Limits:
         return self if far is None else replace(self, max_deviation=far / unit)
 
 
+@dataclass(frozen=True)
+class Start:
+    """A warm start for :func:`gso.tno.optimize`, with settings on how it is used.
+
+    Attributes
+    ----------
+    points : Mesh, array_like or None
+        As `x0`; None for the optimiser's own start.
+    source : str
+        Origin of the start, reported as the result's `warm_start`.
+    guarded : bool
+        "developable", "flatten": drop the start if its energy is above that of the
+        optimiser's own start, or if it has inverted cells in a flat image. The result is then
+        the same as without it.
+    iterations : int, optional
+        Largest number of iterations over all stages. With `points`, they are reserved for the
+        last stage first.
+    tolerance : float
+        With `points`, stages stop when an iteration lowers the energy by less than this share
+        of it, or than the options' tolerance where that is larger.
+
+    Raises
+    ------
+    OptionError
+        `iterations` is not a whole number of 0 or more, or `tolerance` is negative or no number.
+
+    Examples
+    --------
+    >>> import gso
+    >>> u, v = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9), indexing="ij")
+    >>> saddle = np.stack([u, v, 0.3 * u * v], axis=-1)
+    >>> guess = Start(2 * saddle, source="guess", guarded=True, iterations=5)
+    >>> result = gso.tno.optimize(saddle, x0=guess)
+    >>> result.warm_start, result.iterations <= 5
+    ('cold', True)
+    """
+
+    points: MeshLike | None = None
+    source: str = "x0"
+    guarded: bool = False
+    iterations: int | None = None
+    tolerance: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.tolerance, int | float | np.number) and self.tolerance >= 0):
+            raise OptionError(f"tolerance is {self.tolerance!r}; take a number, 0 or more")
+        most = self.iterations
+        if most is None:
+            return
+        if isinstance(most, bool) or not isinstance(most, int | np.integer) or most < 0:
+            raise OptionError(
+                f"iterations is {most!r}; take a whole number from 0 up, or None for no limit"
+            )
+
+
 @dataclass(frozen=True, eq=False)
 class Request(Generic[O]):
     """What is asked of a solve, for any design; :func:`check` makes it.
@@ -93,7 +150,7 @@ class Request(Generic[O]):
     formulation: str
     options: O
     limits: Limits = Limits()
-    start: Start = field(default_factory=Start)
+    start: Start = Start()
     formulation_given: bool = True
     verdict: bool = True
     x0: Array | None = None

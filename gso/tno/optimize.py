@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from gso.constraints import Constraint
 from gso.cut_pieces import Pieces
@@ -16,9 +17,10 @@ from gso.seams import joint_solve, strips_of_pieces
 from gso.solver import Callback
 from gso.spelling import known_keywords
 from gso.tasks.base import Options
-from gso.tasks.request import check
-from gso.tasks.start import Start
-from gso.typing import MeshLike
+from gso.tasks.request import Start, check
+
+if TYPE_CHECKING:
+    from gso.io.convert import MeshLike
 
 
 @known_keywords()

@@ -6,12 +6,16 @@ from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gso import cluster
 from gso.result import Result
 from gso.spelling import known_keywords
 from gso.tno.optimize import optimize
+from gso.typing import Keywords
+
+if TYPE_CHECKING:
+    from gso.io.convert import MeshLike
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,7 @@ class Item:
         return self.result is not None
 
 
-def _one(keywords: dict[str, Any], mesh: Any) -> Result:
+def _one(keywords: Keywords, mesh: MeshLike) -> Result:
     result = optimize(mesh, **keywords)
     result.metrics  # noqa: B018 - computed here, in the worker process
     return result
@@ -36,7 +40,7 @@ def _one(keywords: dict[str, Any], mesh: Any) -> Result:
 
 @known_keywords(optimize)
 def optimize_many(
-    meshes: Iterable[Any],
+    meshes: Iterable[MeshLike],
     *,
     workers: int | None = None,
     scheduler: str | None = None,

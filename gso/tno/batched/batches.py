@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from gso import tasks
 from gso.constraints import Compiled
@@ -22,7 +23,9 @@ from gso.tno.batched import stage_groups
 from gso.tno.batched.gathered import TooLarge, Unbatchable
 from gso.tno.batched.stage_groups import Minimise, Structure
 from gso.tno.optimize import optimize
-from gso.typing import MeshLike
+
+if TYPE_CHECKING:
+    from gso.io.convert import MeshLike
 
 
 @dataclass(frozen=True)

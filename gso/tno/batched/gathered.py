@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from gso.energy.base import Residual, Weighted
+from gso.energy.base import Residual, Vectors, Weighted
 from gso.energy.losses import Loss
 from gso.parametrization.orientation import Orientation
 from gso.solver import Timings
 from gso.solver.elements import kind
 from gso.tasks.base import Stage
 from gso.typing import Array, Ints
-from gso.unknowns import Layout
+from gso.unknowns import Layout, Variables
 
 #: Codes of the reasons to stop.
 MAX_ITERATIONS, CONVERGED, STALLED = 0, 1, 2
@@ -50,7 +49,7 @@ class GatheredTerm:
 
     name: str
     residual: Residual
-    vectors: Residual | None
+    vectors: Vectors | None
     shape: tuple[int, ...]
     quadratic: bool
     gather: Ints
@@ -197,7 +196,7 @@ def _term(items: Sequence[Weighted], layout: Layout) -> GatheredTerm:
     )
 
 
-def _single(each: Sequence[Any]) -> tuple[Ints | None, Array | None, Array | None]:
+def _single(each: Sequence[Variables]) -> tuple[Ints | None, Array | None, Array | None]:
     """Return the unknown of each coordinate, and the shares and offsets of each surface."""
     first = each[0]
     if first.basis is None:

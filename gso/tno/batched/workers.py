@@ -265,7 +265,7 @@ def _work(connection: Connection) -> None:
 def _elsewhere(connection: Connection, gathered: Gathered) -> Solved:
     """Have a stage minimised by the other process."""
     send(connection, ("minimise", gathered))
-    answer = receive(connection)
+    answer: Solved | Exception = receive(connection)
     if isinstance(answer, Exception):
         raise answer
     return answer
