@@ -140,10 +140,10 @@ def solve_many(
     good = [d for d in designs if isinstance(d, Mesh)]
     if minimise is None:
         # PyTorch is not loaded where another process minimises.
-        from gso.tno.batched.device import checked
+        from gso.tno.batched.device import check_device
         from gso.tno.batched.many import solve_all
 
-        checked(device)
+        check_device(device)
         results = solve_all(batch, good)
     else:
         results = iter(solve_batch(batch, good, minimise))

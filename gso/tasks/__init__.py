@@ -12,7 +12,15 @@ if TYPE_CHECKING:
     from gso.tasks.base import Formulation, Task
     from gso.tasks.options import Options
 
-_SUPPORT = ("base", "constrained", "evaluation", "imposed", "options", "per_component", "request")
+_SUPPORT = (
+    "base",
+    "constrained",
+    "evaluation",
+    "options",
+    "per_component",
+    "request",
+    "stage_constraints",
+)
 _FILES = Registry(__name__, __path__, _SUPPORT)
 _ADDED: dict[str, Task] = {}
 

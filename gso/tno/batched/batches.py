@@ -20,7 +20,7 @@ from gso.result import Result
 from gso.tasks.base import Options, Plan
 from gso.tasks.request import Request, check
 from gso.tno.batched import stage_groups
-from gso.tno.batched.gathered import TooLarge, Unbatchable
+from gso.tno.batched.stage_batch import TooLarge, Unbatchable
 from gso.tno.batched.stage_groups import Minimise, Structure
 from gso.tno.optimize import optimize
 

@@ -16,7 +16,7 @@ from gso.parallel import Done, processors
 from gso.result import Result
 from gso.tno.batched import device
 from gso.tno.batched.batches import BatchRequest, solve_batch
-from gso.tno.batched.gathered import Gathered, Solved
+from gso.tno.batched.stage_batch import StageBatch, StageMinima
 from gso.tno.batched.workers import BatchWorkers
 
 #: Surfaces solved together on a processor.
@@ -120,7 +120,7 @@ def _batch(batch: BatchRequest, designs: Sequence[Any]) -> list[Result | GSOErro
         return solve_batch(batch, designs, partial(_minimised, batch.device))
 
 
-def _minimised(where: str, gathered: Gathered) -> Solved:
+def _minimised(where: str, gathered: StageBatch) -> StageMinima:
     return device.solve([gathered], where)[0]
 
 

@@ -90,7 +90,7 @@ def optimize_batch(
             f"workers is {workers!r}; it must be a whole number of 0 or more, or BatchWorkers"
         )
     designs = _designs(points)
-    devices.checked(device)
+    devices.check_device(device)
     batch = check_batch(task, formulation, options, device, verdict)
     out: list[Result] = []
     for index, found in enumerate(solve_all(batch, list(designs), workers)):

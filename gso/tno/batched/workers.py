@@ -14,10 +14,10 @@ from typing import Any, cast
 from gso.errors import OptionError
 from gso.parallel import DIED, Done, attempt, nameless, prepare_worker, processors
 from gso.tno.batched.exchange import Ended, receive, send
-from gso.tno.batched.gathered import Gathered, Solved, TooLarge, Unbatchable
+from gso.tno.batched.stage_batch import StageBatch, StageMinima, TooLarge, Unbatchable
 
 #: Minimises the stages of several workers, of one key, together.
-Together = Callable[[Sequence[Gathered]], list[Solved]]
+Together = Callable[[Sequence[StageBatch]], list[StageMinima]]
 
 
 class BatchWorkers:
@@ -166,7 +166,7 @@ class BatchWorkers:
         most: int,
         enough: float,
     ) -> Generator[Done, None, None]:
-        given, waiting = self._given, dict[Connection, Gathered]()
+        given, waiting = self._given, dict[Connection, StageBatch]()
         todo, lost = deque(range(len(pieces))), deque[int]()
         alone = False
         processes = self._count if together is None else 2 * self._count
@@ -215,7 +215,7 @@ class BatchWorkers:
                     yield value
 
 
-def _group(waiting: dict[Connection, Gathered], most: int) -> list[Connection]:
+def _group(waiting: dict[Connection, StageBatch], most: int) -> list[Connection]:
     """Choose processes whose stages have one key, and that have the most surfaces."""
     by_key: dict[bytes, list[Connection]] = {}
     for connection, gathered in waiting.items():
@@ -234,7 +234,7 @@ def _group(waiting: dict[Connection, Gathered], most: int) -> list[Connection]:
     return best
 
 
-def _minimised(parts: Sequence[Gathered], together: Together) -> list[Any]:
+def _minimised(parts: Sequence[StageBatch], together: Together) -> list[Any]:
     """Minimise parts together, in halves where memory is short; return results or exceptions."""
     try:
         return list(together(parts))
@@ -262,10 +262,10 @@ def _work(connection: Connection) -> None:
                 send(connection, ("done", failed))
 
 
-def _elsewhere(connection: Connection, gathered: Gathered) -> Solved:
+def _elsewhere(connection: Connection, gathered: StageBatch) -> StageMinima:
     """Have a stage minimised by the other process."""
     send(connection, ("minimise", gathered))
-    answer: Solved | Exception = receive(connection)
+    answer: StageMinima | Exception = receive(connection)
     if isinstance(answer, Exception):
         raise answer
     return answer
