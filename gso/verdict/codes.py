@@ -290,7 +290,7 @@ class Code(str, enum.Enum):
         Kind.SHARE,
         "Largest strain of the pattern; its bound is 0.5 % where only max_deviation is given.",
         "the largest strain of the pattern is {value}, more than {bound}",
-        "allow more strain (max_strain), distance (max_deviation) or narrow necks (min_neck), or use "
+        "allow more strain (max_strain), distance (max_deviation) or narrow necks (min_neck), or "
         "gso pieces",
     )
     TARGET_CURVATURE = _limit(

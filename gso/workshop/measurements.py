@@ -114,7 +114,7 @@ def judge(made: Made, ask: Ask) -> tuple[Reason, ...]:
     later = compare(measured, limits)
     # The solve may have had another design in its place, or less room; and a strain that is too
     # large is said as the record has it.
-    decided = {Code.DEVIATION} | ({Code.STRAIN_P99} & {reason.code for reason in later})
+    decided = {Code.DEVIATION} | ({Code.STRAIN} & {reason.code for reason in later})
     return merge(made.reasons, later, decided)
 
 
