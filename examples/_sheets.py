@@ -6,16 +6,12 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
-from _write import grid_faces
-from numpy.typing import NDArray
+from _write import Faces, Points, grid_faces
 from scipy.optimize import minimize
 from scipy.sparse import coo_array, csc_array, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
-
-Points = NDArray[np.float64]
-Faces = NDArray[np.int64]
 
 
 def strip(counts: Sequence[int]) -> tuple[Faces, Points, Faces]:
@@ -141,7 +137,20 @@ def join(parts: Sequence[Points], faces: Sequence[Faces]) -> tuple[Points, Faces
     return points[kept], number[numbered]
 
 
-def rim(faces: Faces) -> NDArray[np.int64]:
+def edges_of(faces: Faces) -> tuple[Faces, Faces]:
+    """Edges of a mesh, and the number of that from each corner of a face to the next.
+
+    Returns
+    -------
+    edges : ndarray, (e, 2)
+    number : ndarray, (m, k)
+    """
+    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+    edges, number = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
+    return edges, number.reshape(faces.shape)
+
+
+def rim(faces: Faces) -> Faces:
     """Vertices on the boundary of a mesh with one boundary loop, in order along it.
 
     They start at the lowest number and leave the mesh on their left.
@@ -168,21 +177,17 @@ def relax(points: Points, faces: Faces, steps: int = 30) -> Points:
     steps : int
         Steps of reweighted least squares.
     """
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-    ends = np.unique(np.sort(ends, axis=1), axis=0)
-    edge, one = np.arange(len(ends)), np.ones(len(ends))
-    shape = (len(ends), len(points))
-    spring = csc_array((one, (edge, ends[:, 1])), shape) - csc_array(
-        (one, (edge, ends[:, 0])), shape
-    )
+    ends, _ = edges_of(faces)
+    edge, one, shape = np.arange(len(ends)), np.ones(len(ends)), (len(ends), len(points))
+    start, stop = (csc_array((one, (edge, end)), shape) for end in ends.T)
+    spring = stop - start
     fixed = rim(faces)
     inner = np.setdiff1d(np.arange(len(points)), fixed)
     points, stiff = points.copy(), one
     for _ in range(steps):
         pull = spring[:, inner].T @ diags_array(stiff)
-        points[inner] = spsolve(
-            (pull @ spring[:, inner]).tocsc(), -(pull @ (spring[:, fixed] @ points[fixed]))
-        )
+        given = pull @ (spring[:, fixed] @ points[fixed])
+        points[inner] = spsolve((pull @ spring[:, inner]).tocsc(), -given)
         square = np.sum((spring @ points) ** 2, axis=1)
         # Half way, for without it the steps swing to and fro.
         stiff = np.sqrt(stiff * square / square.mean())

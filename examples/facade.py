@@ -7,18 +7,14 @@ faces the street, -y.
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
 import numpy as np
-from _write import grid_faces, write_obj
-from numpy.typing import NDArray
+from _write import Points, grid_faces, parser, write_obj
 
 COLUMNS, ROWS = 50, 4
 WIDTH, HEIGHT, JOINT = 1200.0, 1500.0, 20.0
 
 
-def wall(s: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
+def wall(s: Points, z: Points) -> Points:
     """Return points (..., 3) of the wall at lengths along it and heights."""
     turn = s / 40_000.0
     out = 600.0 * np.sin(z / 2500.0) + 350.0 * np.sin(s / 4500.0) * np.cos(z / 4000.0)
@@ -26,7 +22,7 @@ def wall(s: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([radius * np.sin(turn), -radius * np.cos(turn) + 40_000.0, z], axis=-1)
 
 
-def panels(n: int = 13) -> NDArray[np.float64]:
+def panels(n: int = 13) -> Points:
     """Return the panels, (200, n, n, 3), row by row."""
     t = np.linspace(0.0, 1.0, n)
     out = []
@@ -40,11 +36,9 @@ def panels(n: int = 13) -> NDArray[np.float64]:
 
 def main() -> None:
     """Write all panels as one OBJ of 200 components."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    default = Path(__file__).resolve().parent / "out" / "facade.obj"
-    parser.add_argument("-o", "--out", type=Path, default=default)
-    parser.add_argument("-n", type=int, default=13, help="samples per side (default 13)")
-    args = parser.parse_args()
+    command = parser(__doc__, "facade.obj")
+    command.add_argument("-n", type=int, default=13, help="samples per side (default 13)")
+    args = command.parse_args()
     grids = panels(args.n)
     faces = grid_faces(args.n, args.n)
     every = np.concatenate([faces + k * args.n**2 for k in range(len(grids))])

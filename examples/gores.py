@@ -5,20 +5,17 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from _write import Faces, Points, parser, write_obj
 
 RADIUS = 500.0
 #: Columns of faces of a gore, and rows.
 COLUMNS, ROWS = 4, 16
 
 
-def hemisphere(
-    count: int = 12, radius: float = RADIUS
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+def hemisphere(count: int = 12, radius: float = RADIUS) -> tuple[Points, Faces, Faces]:
     """Return vertices (n, 3), triangles (m, 3) and the gore (m,) of each triangle."""
     around = count * COLUMNS
     a = 2.0 * np.pi * np.arange(around) / around
@@ -44,22 +41,15 @@ def hemisphere(
 def write(path: Path, count: int = 12, radius: float = RADIUS) -> None:
     """Write the hemisphere as OBJ, each gore a group."""
     points, faces, gore = hemisphere(count, radius)
-    lines = [f"# hemisphere of {count} gores, millimetres"]
-    lines += ["v " + " ".join(f"{c:.6f}" for c in p) for p in np.round(points, 6) + 0.0]
-    for k in range(count):
-        lines.append(f"g gore{k + 1}")
-        lines += ["f " + " ".join(str(i + 1) for i in f) for f in faces[gore == k]]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+    title = f"hemisphere of {count} gores, millimetres"
+    write_obj(path, points, faces, title, [f"gore{k + 1}" for k in gore])
 
 
 def main() -> None:
     """Write the hemisphere."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    default = Path(__file__).resolve().parent / "out" / "gores.obj"
-    parser.add_argument("-o", "--out", type=Path, default=default)
-    parser.add_argument("-n", type=int, default=12, help="number of gores (default 12)")
-    args = parser.parse_args()
+    command = parser(__doc__, "gores.obj")
+    command.add_argument("-n", type=int, default=12, help="number of gores (default 12)")
+    args = command.parse_args()
     write(args.out, args.n)
 
 

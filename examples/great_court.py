@@ -11,12 +11,9 @@ the origin, which is the Reading Room. Units are metres, z is up and +y is north
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
 import numpy as np
-from _write import grid_faces, write_grid, write_obj
-from numpy.typing import ArrayLike, NDArray
+from _write import Faces, Points, grid_faces, parser, write_grid, write_obj
+from numpy.typing import ArrayLike
 
 A = 22.245
 B = 36.625
@@ -36,7 +33,7 @@ SIDES = {
 }
 
 
-def height(x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
+def height(x: ArrayLike, y: ArrayLike) -> Points:
     """Height of the roof over plan points, z1 + z2 + z3 of Williams (2001).
 
     Parameters
@@ -54,20 +51,16 @@ def height(x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
     return _level_change(x, y, r) + _smooth_corners(x, y, r) + _conical_corners(x, y, r)
 
 
-def _psi(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+def _psi(x: Points, y: Points) -> Points:
     return (1 - x / B) * (1 + x / B) * (1 - y / C) * (1 + y / D)
 
 
-def _level_change(
-    x: NDArray[np.float64], y: NDArray[np.float64], r: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _level_change(x: Points, y: Points, r: Points) -> Points:
     eta = _psi(x, y) / _psi(A * x / r, A * y / r)
     return (HEIGHT_CENTRE - HEIGHT_EDGE) * eta + HEIGHT_EDGE
 
 
-def _smooth_corners(
-    x: NDArray[np.float64], y: NDArray[np.float64], r: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _smooth_corners(x: Points, y: Points, r: Points) -> Points:
     psi = _psi(x, y)
     alpha = (r / A - 1) * psi
     sin = y / r
@@ -80,9 +73,7 @@ def _smooth_corners(
     return alpha * ((1 - LAMBDA) * first - 10 * east_west + second)
 
 
-def _conical_corners(
-    x: NDArray[np.float64], y: NDArray[np.float64], r: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _conical_corners(x: Points, y: Points, r: Points) -> Points:
     e, w, n, s = B - x, B + x, C - y, D + y
     # The paper divides 1 - a/r by four terms of the form hypot(e, n) / (e n). Both sides
     # are multiplied by e w n s here, so that the edge needs no division by zero; in the
@@ -102,7 +93,7 @@ def _conical_corners(
     return beta * (LAMBDA * first + 1.05 * corner)
 
 
-def quarter(side: str = "south", shape: tuple[int, int] = (33, 65)) -> NDArray[np.float64]:
+def quarter(side: str = "south", shape: tuple[int, int] = (33, 65)) -> Points:
     """Sample the roof between the circle and one side of the rectangle as a grid.
 
     The two ends of the grid run towards the corners of the rectangle. Grid points are
@@ -133,9 +124,7 @@ def quarter(side: str = "south", shape: tuple[int, int] = (33, 65)) -> NDArray[n
     return np.concatenate([plan, height(plan[..., 0], plan[..., 1])[..., None]], axis=-1)
 
 
-def roof(
-    across: int = 16, short: int = 24, long: int = 32
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def roof(across: int = 16, short: int = 24, long: int = 32) -> tuple[Points, Faces]:
     """Mesh the whole roof with quads: a ring, all of whose inner vertices have valence 4.
 
     Parameters
@@ -163,10 +152,7 @@ def roof(
 
 def main() -> None:
     """Write the roof and its four quarters as OBJ quads."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    default = Path(__file__).resolve().parent / "out" / "great_court"
-    parser.add_argument("-o", "--out", type=Path, default=default)
-    args = parser.parse_args()
+    args = parser(__doc__, "great_court").parse_args()
     title = "Great Court roof (Williams 2001), metres"
     write_obj(args.out / "roof.obj", *roof(), title)
     for side in SIDES:

@@ -14,17 +14,12 @@ and yet a cone fits it within one percent of its size.
 
 from __future__ import annotations
 
-import argparse
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import teapot
-from _write import write_obj
-from numpy.typing import NDArray
-
-Points = NDArray[np.float64]
-Faces = NDArray[np.int64]
+from _sheets import edges_of
+from _write import Faces, Points, parser, write_obj
 
 UPPER_BODY = 4
 STEPS = 3
@@ -116,14 +111,14 @@ def _ring_of_triangles(counts: tuple[int, ...]) -> tuple[Points, Faces]:
     return points[kept], number[faces]
 
 
-def _subdivide(points: Points, faces: Faces, corners: NDArray[np.int64]) -> tuple[Points, Faces]:
+def _subdivide(points: Points, faces: Faces, corners: Faces) -> tuple[Points, Faces]:
     # A step keeps the numbers of the vertices it starts from, so corners stay valid.
     for _ in range(STEPS):
         points, faces = catmull_clark(points, faces, corners)
     return points, faces
 
 
-def catmull_clark(points: Points, faces: Faces, corners: NDArray[np.int64]) -> tuple[Points, Faces]:
+def catmull_clark(points: Points, faces: Faces, corners: Faces) -> tuple[Points, Faces]:
     """One step of Catmull and Clark (1978), with a cubic B-spline along the boundary.
 
     Parameters
@@ -141,12 +136,8 @@ def catmull_clark(points: Points, faces: Faces, corners: NDArray[np.int64]) -> t
     faces : ndarray, (m k, 4)
     """
     n = len(points)
-    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1)
-    edges, edge_of_side, uses = np.unique(
-        np.sort(sides, axis=-1).reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
-    )
-    edge_of_side = edge_of_side.reshape(faces.shape)
-    inner = uses == 2
+    edges, edge_of_side = edges_of(faces)
+    inner = np.bincount(edge_of_side.ravel()) == 2
 
     centre = points[faces].mean(axis=1)
     middle = points[edges].mean(axis=1)
@@ -164,20 +155,13 @@ def catmull_clark(points: Points, faces: Faces, corners: NDArray[np.int64]) -> t
     moved[on_rim] = points[on_rim] / 2 + rim_middles[on_rim] / 4
     moved[corners] = points[corners]
 
-    face_vertex = n + len(edges) + np.arange(len(faces))
-    quads = np.stack(
-        [
-            faces,
-            n + edge_of_side,
-            np.broadcast_to(face_vertex[:, None], faces.shape),
-            n + np.roll(edge_of_side, 1, axis=1),
-        ],
-        axis=-1,
-    )
+    to_next, from_last = n + edge_of_side, n + np.roll(edge_of_side, 1, axis=1)
+    in_face = np.broadcast_to(n + len(edges) + np.c_[np.arange(len(faces))], faces.shape)
+    quads = np.stack([faces, to_next, in_face, from_last], axis=-1)
     return np.concatenate([moved, on_edge, centre]), quads.reshape(-1, 4)
 
 
-def _scatter(index: NDArray[np.int64], values: Points, size: int) -> Points:
+def _scatter(index: Faces, values: Points, size: int) -> Points:
     total = np.zeros((size, values.shape[1]))
     np.add.at(total, index, values)
     return total
@@ -198,10 +182,7 @@ def _on_teapot(points: Points, faces: Faces) -> tuple[Points, Faces]:
 
 def main() -> None:
     """Write the meshes as OBJ quads."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    default = Path(__file__).resolve().parent / "out" / "irregular"
-    parser.add_argument("-o", "--out", type=Path, default=default)
-    args = parser.parse_args()
+    args = parser(__doc__, "irregular").parse_args()
     title = "Upper body of the Utah teapot (Newell 1975), irregular quads"
     write_obj(args.out / "with_hole.obj", *with_hole(), title)
     write_obj(args.out / "disk.obj", *disk(), title)

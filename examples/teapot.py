@@ -12,13 +12,12 @@ Newell's; the height is 3.15.
 
 from __future__ import annotations
 
-import argparse
 from functools import cache
 from pathlib import Path
 
 import numpy as np
-from _write import write_grid
-from numpy.typing import ArrayLike, NDArray
+from _write import Points, parser, write_grid
+from numpy.typing import ArrayLike
 
 HERE = Path(__file__).resolve().parent
 PATCH_COUNT = 32
@@ -27,7 +26,7 @@ PANEL = 4
 
 
 @cache
-def control_net() -> NDArray[np.float64]:
+def control_net() -> Points:
     """Return the control points of all patches, shape (32, 4, 4, 3), rows as published."""
     vertices = np.loadtxt(HERE / "teapot_vertices.csv", delimiter=",")
     numbers = np.loadtxt(HERE / "teapot_patches.csv", delimiter=",", dtype=np.int64)
@@ -36,7 +35,7 @@ def control_net() -> NDArray[np.float64]:
     return net
 
 
-def point(k: int, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
+def point(k: int, u: ArrayLike, v: ArrayLike) -> Points:
     """Evaluate patch `k` at parameters in [0, 1].
 
     Parameters
@@ -56,7 +55,7 @@ def point(k: int, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
     return np.einsum("...a,...b,abc->...c", _bernstein(u), _bernstein(v), control_net()[k])
 
 
-def patch(k: int, n: int = 64) -> NDArray[np.float64]:
+def patch(k: int, n: int = 64) -> Points:
     """Sample patch `k` as an (n, n, 3) grid, uniform in the parameters.
 
     Rows are the published ones. Columns run against the published order, so that the
@@ -72,12 +71,12 @@ def patch(k: int, n: int = 64) -> NDArray[np.float64]:
     return point(k, t[:, None], t[::-1])
 
 
-def patches(n: int = 64) -> NDArray[np.float64]:
+def patches(n: int = 64) -> Points:
     """Sample all patches, shape (32, n, n, 3)."""
     return np.stack([patch(k, n) for k in range(PATCH_COUNT)])
 
 
-def _bernstein(t: ArrayLike) -> NDArray[np.float64]:
+def _bernstein(t: ArrayLike) -> Points:
     t = np.asarray(t, float)
     s = 1.0 - t
     return np.stack([s**3, 3 * s**2 * t, 3 * s * t**2, t**3], axis=-1)
@@ -85,13 +84,12 @@ def _bernstein(t: ArrayLike) -> NDArray[np.float64]:
 
 def main() -> None:
     """Write every patch, or the panel only, as OBJ quads."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--out", type=Path, default=HERE / "out" / "teapot")
-    parser.add_argument("-n", type=int, default=64, help="samples per side (default 64)")
-    parser.add_argument(
+    command = parser(__doc__, "teapot")
+    command.add_argument("-n", type=int, default=64, help="samples per side (default 64)")
+    command.add_argument(
         "--panel", type=Path, metavar="FILE", help=f"write 32 x 32 quads of patch {PANEL} to FILE"
     )
-    args = parser.parse_args()
+    args = command.parse_args()
     title = "Utah teapot (Newell 1975), patch {} of 0-31"
     if args.panel is not None:
         write_grid(args.panel, patch(PANEL, 33), title.format(PANEL))

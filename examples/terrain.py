@@ -7,20 +7,16 @@ Kington, 2014). It is read from the installed package; nothing is downloaded.
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
 import numpy as np
-from _write import write_grid
+from _write import Points, parser, write_grid
 from matplotlib.cbook import get_sample_data
-from numpy.typing import NDArray
 
 # WGS 84 (NIMA TR 8350.2, 2000): equatorial radius in metres, first eccentricity squared.
 EQUATORIAL_RADIUS = 6378137.0
 ECCENTRICITY_SQUARED = 6.69437999014e-3
 
 
-def terrain(window: tuple[int, int, int, int] | None = None, step: int = 1) -> NDArray[np.float64]:
+def terrain(window: tuple[int, int, int, int] | None = None, step: int = 1) -> Points:
     """Sample the terrain as a grid of points in metres.
 
     Degrees become metres by the two radii of curvature of the WGS 84 ellipsoid at the
@@ -72,12 +68,10 @@ def metres_per_degree(latitude: float) -> tuple[float, float]:
 
 def main() -> None:
     """Write the terrain as NPY and as OBJ quads."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    default = Path(__file__).resolve().parent / "out" / "terrain"
-    parser.add_argument("-o", "--out", type=Path, default=default)
-    parser.add_argument("--step", type=int, default=4, help="keep every n-th sample (default 4)")
-    parser.add_argument("--window", type=int, nargs=4, metavar=("ROW0", "ROW1", "COL0", "COL1"))
-    args = parser.parse_args()
+    command = parser(__doc__, "terrain")
+    command.add_argument("--step", type=int, default=4, help="keep every n-th sample (default 4)")
+    command.add_argument("--window", type=int, nargs=4, metavar=("ROW0", "ROW1", "COL0", "COL1"))
+    args = command.parse_args()
     grid = terrain(None if args.window is None else tuple(args.window), args.step)
     write_grid(args.out / "terrain.obj", grid, "Jacksboro fault (SRTM 2000), metres")
     np.save(args.out / "terrain.npy", grid)

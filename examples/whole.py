@@ -6,15 +6,13 @@ formulas of our own, given with each function. Units are millimetres; z is up.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from itertools import permutations
-from pathlib import Path
 
 import numpy as np
 import teapot as newell
-from _sheets import Faces, Points, beside, disc, even, hexagon, join, quad_disc, relax, rim, strip
-from _write import write_obj
+from _sheets import beside, disc, edges_of, even, hexagon, join, quad_disc, relax, rim, strip
+from _write import Faces, Points, parser, write_obj
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial import cKDTree
 
@@ -47,21 +45,12 @@ def sphere(steps: int = 4) -> tuple[Points, Faces]:
     points *= SPHERE_RADIUS / np.hypot(1, golden)
     near = np.linalg.norm(points[:, None] - points, axis=-1) < 1.1 * SPHERE_RADIUS
     # Of the two orders of each triangle, the one that is anticlockwise from outside.
-    faces = np.array(
-        [
-            (i, j, k)
-            for i, j, k in permutations(range(12), 3)
-            if i < min(j, k)
-            and near[i, j]
-            and near[j, k]
-            and near[k, i]
-            and np.linalg.det(points[[i, j, k]]) > 0
-        ]
-    )
+    turns = np.array([t for t in permutations(range(12), 3) if t[0] == min(t)])
+    joined = near[turns, np.roll(turns, -1, axis=1)].all(axis=1)
+    faces = turns[joined & (np.linalg.det(points[turns]) > 0)]
     for _ in range(steps):
-        sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)
-        edges, number = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
-        middle = len(points) + number.reshape(faces.shape)
+        edges, number = edges_of(faces)
+        middle = len(points) + number
         points = np.concatenate([points, points[edges].mean(axis=1)])
         points *= SPHERE_RADIUS / np.linalg.norm(points, axis=1)[:, None]
         outer = np.stack([faces, middle, np.roll(middle, 1, axis=1)], axis=-1)
@@ -265,26 +254,17 @@ def _lengths(line: Points) -> Points:
     return np.insert(np.linalg.norm(np.diff(line, axis=0), axis=1).cumsum(), 0, 0.0)
 
 
-DESIGNS = {
-    "sphere": sphere,
-    "helmet": helmet,
-    "hull": hull,
-    "canopy": canopy,
-    "quad_dome": quad_dome,
-    "teapot": teapot,
-}
+DESIGNS = {make.__name__: make for make in (sphere, helmet, hull, canopy, quad_dome, teapot)}
 
 
 def main() -> None:
     """Write all designs, or those named, as OBJ."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    default = Path(__file__).resolve().parent / "out" / "whole"
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(DESIGNS)}")
-    parser.add_argument("-o", "--out", type=Path, default=default)
-    args = parser.parse_args()
+    command = parser(__doc__, "whole")
+    command.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(DESIGNS)}")
+    args = command.parse_args()
     for name in args.names:
         if name not in DESIGNS:
-            parser.error(f"there is no design {name!r}; there are {', '.join(DESIGNS)}")
+            command.error(f"there is no design {name!r}; there are {', '.join(DESIGNS)}")
     for name in args.names or DESIGNS:
         write_obj(args.out / f"{name}.obj", *DESIGNS[name](), f"{name}, whole, millimetres")
 

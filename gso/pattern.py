@@ -83,7 +83,7 @@ class Pattern:
     @property
     def is_cut(self) -> bool:
         """Whether some vertex of the surface has several copies in the pattern."""
-        return bool(np.bincount(self.vertex).max(initial=0) > 1)
+        return np.unique(self.vertex).size < len(self.vertex)
 
     @cached_property
     def mesh(self) -> Mesh:

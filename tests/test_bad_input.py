@@ -414,7 +414,7 @@ def test_outputs_are_checked_before_anything_is_computed(tmp_path, monkeypatch):
 def test_flat_patterns_that_cannot_be_drawn(tmp_path):
     mesh, path = Mesh.from_grid(grid_points()), tmp_path / "a.svg"
     flat = mesh.vertices[:, :2].copy()
-    with pytest.raises(gso.OptionError, match="unknown unit 'parsec'; there are um, mm"):
+    with pytest.raises(gso.OptionError, match="unknown unit 'parsec'; there are mm, um"):
         gso.io.save_flat(flat, mesh, path, unit="parsec")
     with pytest.raises(MeshError, match=r"array \(3, 2\), but the mesh needs \(20, 2\)"):
         gso.io.save_flat(flat[:3], mesh, path)

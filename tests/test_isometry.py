@@ -291,7 +291,7 @@ class TestOptions:
             ({"formulation": "curvature", "options": "jiang2020"}, "those of the formulation"),
             (
                 {"formulation": "isometry", "options": gso.DevelopableOptions()},
-                r"developable\.isometry\.Options.*not gso\.tasks\.developable\.options\.Options",
+                r"joint_isometry\.Options.*not gso\.tasks\.developable\.options\.Options",
             ),
             (
                 {"formulation": "isometry", "max_deviation": 0.1, "target_curvature": 0.1},

@@ -142,10 +142,8 @@ def test_closed_surfaces_with_handles_become_disks(mesh):
 
 def test_opening_cuts_to_disks():
     for mesh in (torus(), plate_with_handles(), cube(), ball()):
-        cut = gso.cut(mesh, opening(mesh)) if len(opening(mesh)) else None
-        if cut is not None:
-            (piece,) = cut
-            assert piece.is_disk
+        (piece,) = gso.cut(mesh, opening(mesh))
+        assert piece.is_disk
     # The shortest cut of a torus: once around the tube, once around the hole.
     short = gso.cut(torus(), opening(torus())).lengths.sum()
     assert short == pytest.approx(2 * np.pi * (0.4 + 0.6), rel=0.1)
@@ -231,16 +229,16 @@ def test_seams_that_are_kept_and_followed_and_avoided():
     assert kept <= {tuple(sorted(e)) for e in found.edges.tolist()}
     again = gso.pieces(mesh, max_strain=0.05, keep=found, darts=True)
     assert len(again.edges) >= len(found.edges)
-    region = np.abs(mesh.vertices[mesh.faces].mean(axis=1)[:, 0]) < 0.3
+    region = np.abs(mesh.vertices[mesh.faces].mean(axis=1)[:, 1]) < 0.3
     plain, spared = (
         gso.pieces(mesh, max_strain=0.02, avoid=faces, darts=True) for faces in (None, region)
     )
 
     def inside(found):
-        middle = np.abs(mesh.vertices[found.edges].mean(axis=1)[:, 0]) < 0.25
+        middle = np.abs(mesh.vertices[found.edges].mean(axis=1)[:, 1]) < 0.25
         return found.lengths[middle].sum()
 
-    assert inside(spared) <= inside(plain)
+    assert inside(spared) < 0.5 * inside(plain)
 
 
 def test_pieces_fit_on_the_sheet():
@@ -552,7 +550,7 @@ def test_bounds_on_the_joint_solve_hold():
 
 
 def test_pieces_become_exactly_ruled(tmp_path):
-    cut = gso.pieces(ball(26), max_strain=0.035, darts=False)
+    cut = gso.pieces(ball(26), max_strain=0.042, darts=False)
     options = gso.RuledOptions(strips=2, starts=("design",))
     result = gso.tno.optimize(cut, formulation="ruled", options=options)
     assert result.ruled.strips == 2 * len(cut)

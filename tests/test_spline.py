@@ -16,8 +16,8 @@ import gso
 from gso import metrics
 from gso.cli import main
 from gso.energy import Weighted, congruence, fairness
-from gso.io.flat_svg import MILLIMETRES
 from gso.mesh import Mesh
+from gso.quantities import MILLIMETRES
 from gso.solver import minimise
 from gso.solver.problem import Problem
 from gso.spline import BSplineSurface, clamped_knots

@@ -302,6 +302,7 @@ class TestParts:
         whole = made(Design("dome", design), Ask(max_deviation=0.03 * design.diagonal))
         for part in parts_of(whole, 100.0, Finish(notches=30.0, labels=None)):
             shape = shapely.Polygon(part.outline)
+            assert part.notches
             for notch in part.notches:
                 assert shape.exterior.distance(shapely.Point(notch.at)) < 1e-6
                 assert shape.contains(shapely.Point(notch.at + 0.05 * notch.inward))

@@ -9,7 +9,7 @@ from gso.errors import MeshError
 from gso.linalg import spd
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_graph
-from gso.parametrization.relaxation import strain_level
+from gso.parametrization.arap import strain_level
 from gso.typing import Array, Ints
 
 
@@ -60,10 +60,9 @@ def flattens(mesh: Mesh) -> bool:
     >>> flattens(Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
     True
     """
-    every = parts(mesh)
     try:
-        for ids in every:
-            _check(mesh.restricted(ids)[0] if len(every) > 1 else mesh, int(ids[0]))
+        for ids in parts(mesh):
+            _check(mesh.restricted(ids)[0], int(ids[0]))
     except MeshError:
         return False
     return True

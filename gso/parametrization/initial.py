@@ -12,13 +12,13 @@ from gso.errors import MeshError
 from gso.hierarchy import coarser, resample
 from gso.mesh import Mesh
 from gso.mesh.topology import corner_triangles
+from gso.parametrization.arap import Relaxed, relax, strain_level
 from gso.parametrization.embedding import embeddings
 from gso.parametrization.rectangle import rectangle
-from gso.parametrization.relaxation import Relaxed, relax, strain_level
 from gso.typing import Array, Ints
 
 #: Largest side of a grid whose image starts from a rectangle.
-COARSE = 40
+_COARSE = 40
 #: Strain above which an initial image may be a bad one.
 DOUBTFUL = 0.1
 
@@ -61,9 +61,7 @@ def strain(mesh: Mesh, flat: Array) -> float:
     return strain_level(mesh.vertices, strained_triangles(mesh), flat)
 
 
-def begin(
-    mesh: Mesh, *, iterations: int = 100, tolerance: float = 1e-3, doubtful: float = DOUBTFUL
-) -> Relaxed:
+def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> Relaxed:
     """Compute an image of low squared strain without inverted triangles, and its strain.
 
     Grids start from their rectangle, fine ones from the image of a coarser copy; other meshes
@@ -76,7 +74,7 @@ def begin(
     mesh : Mesh
         Components with a boundary and without handles.
     iterations : int
-        Largest number of iterations of :func:`gso.parametrization.relaxation`.
+        Largest number of iterations of :func:`gso.parametrization.arap`.
     doubtful : float
         Strain above which the other embeddings are tried.
 
@@ -86,12 +84,10 @@ def begin(
         A component is closed or has handles.
     """
     strained, kept = strained_triangles(mesh), oriented_triangles(mesh)
-    relaxed = partial(
-        relax, mesh.vertices, strained, oriented=kept, iterations=iterations, tolerance=tolerance
-    )
+    relaxed = partial(relax, mesh.vertices, strained, oriented=kept, iterations=iterations)
     if mesh.grid is not None:
         first = relaxed(_grid_image(mesh, mesh.grid, iterations))
-        if first.level <= doubtful or max(mesh.grid.shape) > COARSE:
+        if first.level <= doubtful or max(mesh.grid.shape) > _COARSE:
             return first
         images = [flat for flat in embeddings(mesh, strained, kept) if not flips(mesh, flat)]
     else:
@@ -103,7 +99,7 @@ def begin(
 
 
 def _grid_image(mesh: Mesh, grid: Array, iterations: int) -> Array:
-    levels = coarser(mesh, COARSE) if max(grid.shape) > COARSE else []
+    levels = coarser(mesh, _COARSE) if max(grid.shape) > _COARSE else []
     if levels:
         image = _interpolated(begin(levels[-1], iterations=iterations).flat, levels[-1], mesh)
         if not flips(mesh, image):

@@ -85,7 +85,7 @@ def opened(mesh: Mesh, *, iterations: int = 100) -> Opened:
     mesh : Mesh
         Components with a boundary and without handles; a grid is numbered row by row.
     iterations : int
-        Largest number of iterations of :func:`gso.parametrization.relaxation`, for each way.
+        Largest number of iterations of :func:`gso.parametrization.arap`, for each way.
 
     Raises
     ------

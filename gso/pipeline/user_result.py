@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from gso.constraints import TIGHT
-from gso.mesh.cut import Cut
 from gso.pattern import Pattern
 from gso.pipeline.case import Case
 from gso.pipeline.run import Run
@@ -13,7 +12,6 @@ from gso.result import Result
 from gso.spline.fit import describe_spline
 from gso.status import Status
 from gso.tasks.base import Solution
-from gso.typing import Array
 
 
 def _record_violations(case: Case, solution: Solution) -> None:
@@ -34,12 +32,9 @@ def _record_violations(case: Case, solution: Solution) -> None:
 
 def pattern_of(case: Case, solution: Solution) -> Pattern | None:
     """Return the flat image of a solution in the user's unit and numbering; None without one."""
-    flat = solution.blocks.get("flat")
-    return None if flat is None else in_user_frame(case, flat, solution.cut)
-
-
-def in_user_frame(case: Case, flat: Array, cut: Cut | None) -> Pattern:
-    """Return a flat image of the design, or of the design cut open, in the user's frame."""
+    flat, cut = solution.blocks.get("flat"), solution.cut
+    if flat is None:
+        return None
     if cut is None:
         return Pattern.whole(case.design, case.frame.back("flat", flat) * case.frame.scale)
     # The numbering of a cut mesh begins with the user's.

@@ -1,6 +1,6 @@
 """The result of a solve, and its files."""
 
+from gso.result.in_words import headline
 from gso.result.result import Result
-from gso.result.summary import headline
 
 __all__ = ["Result", "headline"]

@@ -128,7 +128,7 @@ class Result:
             self.pattern = Pattern.whole(self.design, self.flat)
 
     def __repr__(self) -> str:
-        from gso.result.summary import summary
+        from gso.result.in_words import summary
 
         return summary(self)
 

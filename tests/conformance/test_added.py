@@ -152,7 +152,7 @@ def lifted():
     )
     gso.net.add_kind("lift", Lift)
     yield Lift
-    net_tasks._FILES._added.clear()
+    net_tasks._ADDED.clear()
     weights.KINDS.pop("lift")
 
 

@@ -152,4 +152,5 @@ def _ended(best: Solution, last: Solution) -> Solution:
 
 def _distance(analysis: Analysis, solution: Solution) -> float:
     """Return the largest distance between the design and a solution, in both directions."""
-    return metrics.largest_distance(analysis.mesh, analysis.mesh.replaced(solution.points))
+    found = metrics.surface_distance(analysis.mesh, analysis.mesh.replaced(solution.points))
+    return max(found.there_max, found.back_max)
