@@ -120,7 +120,7 @@ def times() -> dict[str, Any]:
             for what, x in (("s", v.seconds), ("n", len(v)))
         }
         _, row["one joint solve s"] = timed(
-            quietly, gso.tno.optimize, found["no darts"], verdict=False
+            quietly, gso.tno.optimize, found["changed"], verdict=False
         )
         rows[str(len(mesh.faces))] = row
     return tabulate("times", ["triangles"], rows)
