@@ -19,7 +19,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from gso import Options, metrics, tasks
+from gso import Options, RuledOptions, metrics, tasks
 from gso.net import catalogue
 from gso.verdict import Code
 
@@ -42,6 +42,8 @@ def tables() -> dict[str, str]:
             if formulation.options is not own:
                 table = option_table(formulation.options, shared=shared)
                 found[f"options-{task}-{name}"] = table
+    # Strips are no formulation of the task, although they are called like one.
+    found["options-developable-ruled"] = option_table(RuledOptions, shared=shared)
     for task, metric in (("developable", "K_A_r_worst"), ("flatten", "strain_mean")):
         found[f"splits-{task}"] = split_table(task, metric)
     if RESULTS.exists():

@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from gso.mesh import Mesh, topology
     from gso.result import Result
     from gso.ruled.loft import loft
+    from gso.ruled.paneling.lay_strips import strips
+    from gso.ruled.paneling.options import Options as RuledOptions
     from gso.ruled.smooth.smooth_surface import smooth_strips
     from gso.seams import cut, pieces
     from gso.spline import BSplineSurface
@@ -52,7 +54,6 @@ if TYPE_CHECKING:
     from gso.tasks.denoise import Options as DenoiseOptions
     from gso.tasks.developable import Options as DevelopableOptions
     from gso.tasks.developable.joint_isometry import Options as IsometryOptions
-    from gso.tasks.developable.ruled import Options as RuledOptions
     from gso.tasks.flatten import Options as FlattenOptions
     from gso.tasks.options import Options
     from gso.workshop.fabricate import fabricate
@@ -112,6 +113,7 @@ __all__ = [
     "save_spline",
     "seams",
     "smooth_strips",
+    "strips",
     "tno",
     "topology",
     "verdict",
@@ -130,6 +132,7 @@ _PLACES = {
     "gso.mesh": "Mesh topology",
     "gso.result": "Result",
     "gso.ruled.loft": "loft",
+    "gso.ruled.paneling.lay_strips": "strips",
     "gso.ruled.smooth.smooth_surface": "smooth_strips",
     "gso.seams": "cut pieces",
     "gso.spline": "BSplineSurface",
@@ -146,7 +149,7 @@ _OPTIONS = {
     "DevelopableOptions": "gso.tasks.developable",
     "FlattenOptions": "gso.tasks.flatten",
     "IsometryOptions": "gso.tasks.developable.joint_isometry",
-    "RuledOptions": "gso.tasks.developable.ruled",
+    "RuledOptions": "gso.ruled.paneling.options",
 }
 
 

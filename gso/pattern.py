@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gso.mesh import Mesh
 from gso.typing import Array, Ints
+
+#: Names of the arrays in files.
+_ARRAYS = ("flat", "faces", "vertex", "seams")
 
 
 def _no_seams() -> Ints:
@@ -43,6 +47,26 @@ class Bend(NamedTuple):
         name = "mountain" if self.angle > 0 else "valley"
         radius = f", radius {self.radius:.4g} mm" if np.isfinite(self.radius) else ""
         return f"{name} {abs(np.degrees(self.angle)):.4g} degrees{radius}"
+
+
+class Folded(NamedTuple):
+    """Edges of a pattern to bend along.
+
+    Attributes
+    ----------
+    edges : ndarray of int, (k, 2)
+    angles, radii : ndarray, (k,)
+        As of a :class:`Bend`.
+    """
+
+    edges: Ints = np.empty((0, 2), np.int64)
+    angles: Array = np.empty(0)
+    radii: Array = np.empty(0)
+
+    def lines(self, flat: Array) -> list[Bend]:
+        """Return them as lines, for positions (p, 2) of the pattern's vertices."""
+        every = zip(flat[self.edges], self.angles.tolist(), self.radii.tolist(), strict=True)
+        return [Bend(line, angle, radius) for line, angle, radius in every]
 
 
 @dataclass(frozen=True)
@@ -99,3 +123,34 @@ class Pattern:
             The surface that the pattern belongs to.
         """
         return Mesh(mesh.vertices[self.vertex], self.faces) if self.is_cut else mesh
+
+    def arrays(self, prefix: str = "pattern_") -> dict[str, Any]:
+        """Return the pattern as arrays by name; see :meth:`from_arrays`."""
+        return {f"{prefix}{name}": getattr(self, name) for name in _ARRAYS}
+
+    @classmethod
+    def from_arrays(
+        cls, data: Mapping[str, Any], surface: Mesh, prefix: str = "pattern_"
+    ) -> Pattern:
+        """Return the pattern of a surface that :meth:`arrays` describes.
+
+        Raises
+        ------
+        KeyError, ValueError
+            Arrays are missing, or do not fit each other or the surface.
+        """
+        flat, faces, vertex, seams = (data[f"{prefix}{name}"] for name in _ARRAYS)
+        count, kept = len(flat), faces >= 0
+        fits = flat.shape == (count, 2) and vertex.shape == (count,) and seams.shape[1:] == (2, 2)
+        if not fits or faces.shape != surface.faces.shape or (kept != (surface.faces >= 0)).any():
+            raise ValueError("the arrays of the pattern do not fit each other")
+        for name, ids, end in (
+            ("faces", faces[kept], count),
+            ("vertex", vertex, len(surface.vertices)),
+            ("seams", seams, count),
+        ):
+            if ids.dtype.kind not in "iu" or (ids.size and not 0 <= ids.min() <= ids.max() < end):
+                raise ValueError(f"{prefix}{name} points outside")
+        if (vertex[faces[kept]] != surface.faces[kept]).any():
+            raise ValueError("the pattern's vertices are not those of the surface's faces")
+        return cls(flat, faces, vertex, seams)

@@ -246,7 +246,10 @@ def test_unreachable_bounds_are_said():
         result = gso.tno.optimize(points, options=options, max_deviation=1e-4)
     assert not result.usable
     assert result.status is gso.Status.TARGET_MISSED
-    assert codes(result.reasons) == [Code.TARGET_MISSED, Code.DEVIATION, Code.FAR]
+    found = codes(result.reasons)
+    assert found[0] is Code.TARGET_MISSED
+    # A single strip so far from its design may be folded, too.
+    assert found[-2:] == [Code.DEVIATION, Code.FAR]
     assert result.reasons[1].value == result.details["verdict"]["deviation"] > 1e-4
 
 
@@ -514,7 +517,7 @@ def test_what_cannot_be_ruled_is_refused():
         gso.tno.optimize(
             Mesh(two, np.concatenate([faces, faces + tube[..., 0].size])), formulation="ruled"
         )
-    with pytest.raises(gso.OptionError, match=r"takes Fixed.*Ruling"):
+    with pytest.raises(gso.OptionError, match=r"take Fixed.*Ruling"):
         planar = gso.PlanarFaces()
         gso.tno.optimize(saddle(9), formulation="ruled", constraints=[planar])
     for wrong in ({"strips": 0}, {"strips": "many"}, {"rulings": 3}, {"starts": ("x",)}):

@@ -18,6 +18,7 @@ from gso.quantities import MILLIMETRES, as_length, as_strain
 COMMANDS = dict(main.commands)
 FUNCTIONS = {
     "optimize": gso.tno.optimize,
+    "strips": gso.strips,
     "pieces": gso.pieces,
     "fabricate": gso.fabricate,
 }

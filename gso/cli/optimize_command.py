@@ -175,8 +175,9 @@ def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
     ruled = {name: value for name, value in ruled.items() if value is not None}
     if ruled and given["formulation"] is None:
         given["formulation"] = "ruled"
-    formulation, chosen = tasks.choose(given["task"], given["formulation"], given["preset"])
-    settings: Any = chosen.options.coerce(given["preset"])
+    begun = check(given["task"], given["formulation"], given["preset"])
+    formulation = begun.formulation
+    settings: Any = begun.options
     if ruled and formulation != "ruled":
         name = "--" + next(iter(ruled)).replace("_", "-")
         raise OptionError(f"{name} goes with --formulation ruled, not {formulation!r}")

@@ -115,12 +115,8 @@ class Job:
 
     def write(self, result: Result, out: str, plot: str | None = None) -> None:
         """Write a result and its picture."""
-        if is_cad(out) and result.spline is None and result.ruled is None:
-            from gso.spline.fit import fit_spline
-
-            result.spline = fit_spline(result.mesh)
-            far = max(result.spline.gap or (0.0,))
-            result.notes += (f"the spline was fitted to the result, {far:.3g} away at most",)
+        if is_cad(out):
+            result.add_spline()
         result.save(out, unit=self.unit)
         if plot is not None:
             from gso.plot import plot_result

@@ -44,7 +44,7 @@ def principal_strains(surface: Any, flat: Any) -> Strains:
 
 
 def strains(surface: Any, flat: Any) -> dict[str, float]:
-    """Return mean, 99th percentile and maximum of :func:`principal_strains`, by metric name.
+    """Return maximum, 99th percentile and mean of :func:`principal_strains`, by metric name.
 
     >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
     >>> strains(grid, grid[..., :2] * 1.5)["strain_max"]

@@ -11,7 +11,7 @@ import numpy as np
 from gso import tasks
 from gso.components import Component, labels, several, split
 from gso.constraints import Compiled, Constraint, compile_constraints
-from gso.errors import GSOError, MeshError
+from gso.errors import GSOError
 from gso.executors import open_executor
 from gso.executors.base import useful_workers
 from gso.mesh import Mesh
@@ -46,11 +46,6 @@ def solve_mesh(
     flat = tasks.get(request.task).flat
     whole = Case(request, design, compile_constraints(constraints, design, flat=flat))
     pieces = parts(design, whole.constraints)
-    if pieces and request.formulation == "ruled":
-        raise MeshError(
-            f"the formulation 'ruled' takes one surface, and this mesh has {len(pieces)} "
-            "components: solve each on its own"
-        )
     if pieces:
         return solve_components(solve_case, whole, pieces, callback)
     return solve_case(whole, callback)

@@ -15,7 +15,7 @@ from gso.result import Result
 from gso.status import Status
 from gso.tasks.base import Solution
 from gso.tasks.request import Limits
-from gso.verdict import judge
+from gso.verdict import Reason, judge
 
 #: Distance of a quad's diagonals over the mean edge length: up to the first value quads count
 #: as planar, above the second they are visibly not.
@@ -25,10 +25,12 @@ _PLANAR, _BENT = 1e-6, 1e-3
 def conclude(run: Run, solution: Solution) -> Result:
     """Return the result of a run in the user's frame, judged if that was asked for."""
     result, request = pack(run, solution), run.case.request
-    return add_verdict(result, request.limits, _violation(run.case)) if request.verdict else result
+    return (
+        add_verdict(result, request.limits, violation_of(run.case)) if request.verdict else result
+    )
 
 
-def _violation(case: Case) -> float:
+def violation_of(case: Case) -> float:
     """Return the largest violation of a constraint by the design, in its unit."""
     constraints = case.analysis.constraints
     if constraints.empty or constraints.flat:
@@ -53,18 +55,22 @@ def add_verdict(result: Result, limits: Limits, violation: float = 0.0) -> Resul
     violation : float
         Largest violation of a constraint by the design, see :func:`gso.verdict.judge`.
     """
-    known = result.ruled is not None
-    if result.task == "developable" and not known and np.isfinite(result.mesh.vertices).all():
+    if result.task == "developable" and np.isfinite(result.mesh.vertices).all():
         clock = time.perf_counter()
         result.pattern = lay_out(result.mesh, result.pattern)
         result.seconds["pattern"] = time.perf_counter() - clock
         result.notes += _planarity(result)
     clock = time.perf_counter()
-    result.reasons = judge(result, limits, violation)
-    if result.reasons and not result.status.is_failure:
-        result.status = Status.UNUSABLE
+    add_reasons(result, judge(result, limits, violation))
     result.seconds["verdict"] = time.perf_counter() - clock
     return result
+
+
+def add_reasons(result: Result, reasons: tuple[Reason, ...]) -> None:
+    """Add reasons to a result; its status then refuses it."""
+    result.reasons = reasons
+    if result.reasons and not result.status.is_failure:
+        result.status = Status.UNUSABLE
 
 
 def _planarity(result: Result) -> tuple[str, ...]:

@@ -16,7 +16,6 @@ from gso.pipeline.case import Case
 from gso.solver import Callback, Minimum, Timings, minimise
 from gso.solver.augmented_lagrangian import tighten
 from gso.solver.elements import Kind
-from gso.solver.minimiser import says_no
 from gso.solver.problem import Problem, energies, largest_counts
 from gso.status import Progress, Status
 from gso.tasks.base import Analysis, Options, Plan, Solution, Stage, same
@@ -77,8 +76,6 @@ class Run:
     ----------
     start_refused : str
         Why the start was not used; empty if it was.
-    converting : float
-        Seconds that plans took to make their results from the solutions of their stages.
     """
 
     def __init__(
@@ -97,7 +94,6 @@ class Run:
         self.history: list[Progress] = []
         self.timings = Timings()
         self.iterations = 0
-        self.converting = 0.0
 
     @property
     def analysis(self) -> Analysis:
@@ -126,16 +122,8 @@ class Run:
             solution = solution_at(plan, plan.start, plan.status or Status.CONVERGED)
         else:
             solution = self.conclude(plan, self.solve_stages(plan, request.options))
-        if plan.convert is not None and solution.status is not Status.CANCELLED:
-            clock = time.perf_counter()
-            solution = plan.convert(solution, self._tell)
-            self.converting += time.perf_counter() - clock
         solution.formulation = request.formulation
         return solution
-
-    def _tell(self, progress: Progress) -> bool:
-        """Report an iteration of a conversion; return whether to go on."""
-        return self.callback is None or not says_no(self.callback(progress))
 
     def conclude(self, plan: Plan, state: PlanState) -> Solution:
         """Return the solution of a plan whose stages have been solved."""

@@ -14,20 +14,23 @@ from gso.status import Status
 from gso.tasks.base import Solution
 
 
-def _record_violations(case: Case, solution: Solution) -> None:
-    """Record the violation of each constraint, in the user's unit; note missed hard ones."""
+def record_violations(case: Case, points: Array, out: Solution | Result) -> None:
+    """Record the violation of each constraint, in the user's unit; note missed hard ones.
+
+    `points` are the vertices or the flat image, in the solver's frame and numbering.
+    """
     constraints, frame = case.analysis.constraints, case.frame
     if not constraints.names:
         return
-    misses = constraints.violations(solution.blocks[constraints.block])
+    misses = constraints.violations(points)
     lengths = {name: frame.scale * miss.length for name, miss in misses.items()}
-    solution.details = {**solution.details, "constraints": lengths}
+    out.details = {**out.details, "constraints": lengths}
     broken = [k for k, miss in misses.items() if miss.hard and not miss.length <= TIGHT]
     for name in broken:
         where = ", ".join(map(str, frame.names[misses[name].vertices]))
-        solution.notes += (f"{name} is missed by {lengths[name]:.3g} (vertices {where})",)
-    if broken and solution.status is not Status.CANCELLED:
-        solution.status = Status.CONSTRAINTS_MISSED
+        out.notes += (f"{name} is missed by {lengths[name]:.3g} (vertices {where})",)
+    if broken and out.status is not Status.CANCELLED:
+        out.status = Status.CONSTRAINTS_MISSED
 
 
 def pattern_of(case: Case, solution: Solution) -> Pattern | None:
@@ -44,7 +47,7 @@ def pattern_of(case: Case, solution: Solution) -> Pattern | None:
 def pack(run: Run, solution: Solution) -> Result:
     """Convert a solution to a result in the user's frame and numbering."""
     case, design, frame = run.case, run.case.design, run.case.frame
-    _record_violations(case, solution)
+    record_violations(case, solution.points, solution)
     pattern = pattern_of(case, solution)
     flat = None if pattern is None or solution.cut is not None else pattern.flat
     surface, ratios = (solution.blocks.get(name) for name in ("surface", "scale"))
@@ -57,14 +60,6 @@ def pack(run: Run, solution: Solution) -> Result:
     else:
         mesh = design if pattern is None else pattern.mesh
     seconds = run.timings.as_dict()
-    ruled = None
-    if solution.ruled is not None:
-        seconds["strips"] = run.converting
-        ruled = solution.ruled.transformed(
-            frame.frame.to_user, frame.scale, lambda rows: frame.back("surface", rows)
-        )
-        mesh, pattern = ruled.mesh, ruled.pattern
-        flat = None if pattern.is_cut else pattern.flat
     details = dict(solution.details)
     details |= {k: details[k] * frame.scale for k in case.task.lengths if k in details}
     spline = None
@@ -95,5 +90,4 @@ def pack(run: Run, solution: Solution) -> Result:
         notes=notes,
         details=details,
         spline=spline,
-        ruled=ruled,
     )

@@ -2,5 +2,6 @@
 
 from gso.result.in_words import headline
 from gso.result.result import Result
+from gso.result.strips_result import StripsResult
 
-__all__ = ["Result", "headline"]
+__all__ = ["Result", "StripsResult", "headline"]

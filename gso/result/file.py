@@ -16,21 +16,22 @@ from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.attributes import Attributes
 from gso.mesh.cut import Cut
-from gso.pattern import Pattern
 from gso.result.result import Result
+from gso.result.strips_result import StripsResult
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
-from gso.typing import Array
 from gso.verdict.reason import Reason
 
-_FORMAT = 2
-_PATTERN = ("flat", "faces", "vertex", "seams")
+_FORMAT = 3
+#: Classes of results by their kind.
+_KINDS: dict[str, type[Result]] = {kind.KIND: kind for kind in (Result, StripsResult)}
 
 
 def _record(result: Result) -> dict[str, Any]:
     """Collect everything but the arrays, as JSON-compatible values."""
     return {
         "format": _FORMAT,
+        "kind": result.KIND,
         "task": result.task,
         "formulation": result.formulation,
         "status": result.status.name,
@@ -55,17 +56,10 @@ def arrays(result: Result) -> dict[str, Any]:
     out = {
         "record": np.frombuffer(json.dumps(record, default=float).encode(), np.uint8),
         "design": result.design.vertices,
-        "vertices": result.mesh.vertices,
+        "vertices": result.on_design().vertices,
         "faces": result.design.faces,
+        **result.arrays(),
     }
-    if result.ruled is not None:
-        out |= result.ruled.arrays()
-        out["vertices"] = result.ruled.moved
-    if result.flat is not None:
-        out["flat"] = result.flat
-    own = result.pattern is not None and result.pattern.flat is not result.flat
-    if result.pattern is not None and own and result.ruled is None:
-        out |= {f"pattern_{name}": getattr(result.pattern, name) for name in _PATTERN}
     if result.cell_scale is not None:
         out["cell_scale"] = result.cell_scale
     if result.spline is not None:
@@ -86,25 +80,25 @@ def _pieces_arrays(pieces: Pieces) -> dict[str, Any]:
     return {
         "pieces_design": pieces.design.vertices,
         "pieces_faces": pieces.design.faces,
+        "pieces_opened": pieces.opened.mesh.faces,
         "pieces_vertex": pieces.opened.vertex,
         "pieces_seams": pieces.opened.seams,
         "pieces_names": np.frombuffer(json.dumps(pieces.names).encode(), np.uint8),
     }
 
 
-def _read_pieces(data: Mapping[str, Any], opened: Mesh) -> Pieces | None:
+def _read_pieces(data: Mapping[str, Any]) -> Pieces | None:
     if "pieces_design" not in data:
         return None
     vertex, seams = data["pieces_vertex"].astype(np.int64), data["pieces_seams"].astype(np.int64)
-    count = len(opened.vertices)
-    good = vertex.shape == (count,) and seams.shape[1:] == (2, 2)
-    if not good or not ((seams >= 0) & (seams < count)).all():
+    count = len(vertex)
+    if seams.shape[1:] != (2, 2) or not ((seams >= 0) & (seams < count)).all():
         raise MeshError("the seams do not fit the surface")
     design = Mesh(data["pieces_design"], data["pieces_faces"])
     if not ((vertex >= 0) & (vertex < len(design.vertices))).all():
         raise MeshError("the seams do not fit the design")
     names = tuple(map(str, json.loads(data["pieces_names"].tobytes())))
-    surface = opened.replaced(design.vertices[vertex])
+    surface = Mesh(design.vertices[vertex], data["pieces_opened"])
     return Pieces(design, Cut(surface, vertex, seams), names)
 
 
@@ -112,7 +106,6 @@ def read(path: str | PathLike[str]) -> Result:
     """Read a result; see :meth:`gso.Result.load`."""
     from gso.io.arrays import read_arrays
     from gso.io.source import read_bytes
-    from gso.ruled.ruled_surface import RuledSurface
 
     try:
         data = read_arrays(read_bytes(path))
@@ -124,24 +117,17 @@ def read(path: str | PathLike[str]) -> Result:
             raise MeshError(f"{path} was written by another version (format {record['format']})")
         said = Attributes.from_arrays(data, data["faces"])
         design = Mesh(data["design"], data["faces"], attributes=said)
-        pattern = None if "ruled_faces" in data else _pattern(data, design)
-        same = len(data["vertices"]) == len(design.vertices)
-        result = _read(
-            record,
-            design,
-            design.replaced(data["vertices"]) if same or pattern is None else pattern.mesh,
-            None if "ruled_faces" in data else _checked(data, "flat", (len(design.vertices), 2)),
-            _checked(data, "cell_scale", (len(design.faces),)),
-            pattern,
-        )
-        result.ruled = RuledSurface.from_arrays(data, result.mesh.vertices)
-        if result.ruled is not None:
-            result.mesh, result.pattern = result.ruled.mesh, result.ruled.pattern
-            result.flat = None if result.pattern.is_cut else result.pattern.flat
+        kind = _KINDS[record["kind"]]
+        scale = data.get("cell_scale")
+        if scale is not None and scale.shape != (len(design.faces),):
+            raise ValueError(f"cell_scale is an array {scale.shape}, not one value a face")
+        result = _read(record, kind, design, cell_scale=scale, **kind.shape(data, design))
         result.spline = BSplineSurface.from_arrays(data)
-        result.pieces = _read_pieces(data, design)
-        label = _checked(data, "component", (len(design.vertices),))
+        result.pieces = _read_pieces(data)
+        label = data.get("component")
         if label is not None:
+            if label.shape != (len(design.vertices),):
+                raise ValueError(f"component is an array {label.shape}, not one value a vertex")
             _divide(result, record.get("components", []), label.astype(np.int64))
     except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, MeshError):
@@ -150,33 +136,23 @@ def read(path: str | PathLike[str]) -> Result:
     return result
 
 
-def _read(
-    record: Mapping[str, Any],
-    design: Mesh,
-    mesh: Mesh,
-    flat: Array | None,
-    cell_scale: Array | None,
-    pattern: Pattern | None = None,
-) -> Result:
-    """Build a result from its record and arrays."""
-    result = Result(
-        record["task"],
-        record["formulation"],
-        design,
-        mesh,
-        flat,
-        Status[record["status"]],
-        record["iterations"],
-        record["energy"],
-        [Progress(**p) for p in record["history"]],
-        record["seconds"],
-        record["backend"],
-        record["warm_start"],
-        tuple(record["notes"]),
-        record["details"],
-        cell_scale=cell_scale,
-        pattern=pattern,
+def _read(record: Mapping[str, Any], kind: type[Result], design: Mesh, **shape: Any) -> Result:
+    """Build a result from its record, and its surface and flat images by attribute."""
+    result = kind(
+        task=record["task"],
+        formulation=record["formulation"],
+        design=design,
+        status=Status[record["status"]],
+        iterations=record["iterations"],
+        energy=record["energy"],
+        history=[Progress(**p) for p in record["history"]],
+        seconds=record["seconds"],
+        backend=record["backend"],
+        warm_start=record["warm_start"],
+        notes=tuple(record["notes"]),
+        details=record["details"],
         reasons=tuple(map(Reason.read, record["reasons"])),
+        **shape,
     )
     result.__dict__["metrics"] = record["metrics"]
     return result
@@ -189,40 +165,11 @@ def _divide(result: Result, records: list[Mapping[str, Any]], label: NDArray[np.
     for record, piece in zip(records, split(result.design, label), strict=True):
         part = _read(
             record,
+            Result,
             piece.mesh,
-            piece.of(result.mesh),
-            None if result.flat is None else result.flat[piece.vertices],
-            None if result.cell_scale is None else result.cell_scale[piece.faces],
+            mesh=piece.of(result.mesh),
+            flat=None if result.flat is None else result.flat[piece.vertices],
+            cell_scale=None if result.cell_scale is None else result.cell_scale[piece.faces],
         )
         part.names = piece.vertices
         result.components.append(part)
-
-
-def _pattern(data: Mapping[str, Any], design: Mesh) -> Pattern | None:
-    """Read and check the pattern that a file stores besides the flat image; None without one."""
-    if "pattern_flat" not in data:
-        return None
-    flat, faces, vertex, seams = (data[f"pattern_{name}"] for name in _PATTERN)
-    count = len(flat)
-    fits = flat.shape == (count, 2) and vertex.shape == (count,) and seams.shape[1:] == (2, 2)
-    kept = faces >= 0
-    if not fits or faces.shape != design.faces.shape or (kept != (design.faces >= 0)).any():
-        raise ValueError("the arrays of the pattern do not fit each other")
-    for name, ids, end in (
-        ("faces", faces[kept], count),
-        ("vertex", vertex, len(design.vertices)),
-        ("seams", seams, count),
-    ):
-        if ids.dtype.kind not in "iu" or (ids.size and not 0 <= ids.min() <= ids.max() < end):
-            raise ValueError(f"pattern_{name} points outside")
-    if (vertex[faces[kept]] != design.faces[kept]).any():
-        raise ValueError("the pattern's vertices are not those of the surface's faces")
-    return Pattern(flat, faces, vertex, seams)
-
-
-def _checked(data: Mapping[str, Array], name: str, shape: tuple[int, ...]) -> Array | None:
-    """Return an array of a file after checking its shape; None if the file has none."""
-    array = data.get(name)
-    if array is not None and array.shape != shape:
-        raise ValueError(f"{name} is an array {array.shape}, not {shape}")
-    return array

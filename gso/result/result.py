@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gso.errors import MeshError
 from gso.mesh import Mesh
-from gso.pattern import Pattern
+from gso.pattern import Folded, Pattern
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
 from gso.typing import Array
@@ -20,12 +21,9 @@ from gso.verdict.reason import Reason
 
 if TYPE_CHECKING:
     from gso.cut_pieces import Pieces
+    from gso.metrics import Distances
     from gso.ruled.fold_lines import Folds
     from gso.ruled.ruled_surface import RuledSurface
-
-#: Largest distance of smooth strips from planar faces, relative to the diagonal, up to which they
-#: are written in their place.
-_SMOOTHED = 0.04
 
 
 @dataclass(repr=False)
@@ -91,14 +89,14 @@ class Result:
         solved once.
     names : ndarray of int, (n,), or None
         In the result of a component: indices of its vertices in the whole mesh.
-    ruled : RuledSurface or None
-        For the formulation "ruled": the surface with its rulings, creases and exact pattern. Then
-        `mesh` is a mesh of its own, `pattern` its unrolling, and :meth:`on_design` has the
-        design's vertices moved onto it.
     pieces : Pieces or None
         For a design in pieces: the pieces of the result, and the whole surface with its seams
-        closed, ``pieces.design``. `design` and `mesh` are cut open along the seams.
+        closed, ``pieces.design``. `design` and `mesh` are cut open along the seams, but for
+        strips.
     """
+
+    #: Kind of result, in files and for its verdict; empty for those that are judged by their task.
+    KIND: ClassVar[str] = ""
 
     task: str
     formulation: str
@@ -120,7 +118,6 @@ class Result:
     pattern: Pattern | None = None
     components: list[Result] = field(default_factory=list)
     names: NDArray[np.int64] | None = None
-    ruled: RuledSurface | None = None
     pieces: Pieces | None = None
 
     def __post_init__(self) -> None:
@@ -154,13 +151,35 @@ class Result:
         )
 
     @property
+    def ruled(self) -> RuledSurface | None:
+        """The surface of strips with its rulings, creases and exact pattern; None without."""
+        return None
+
+    @property
     def rulings(self) -> Folds | None:
-        """The lines to bend along, for the formulation "ruled"; otherwise None."""
-        return None if self.ruled is None else self.ruled.rulings
+        """The lines to bend strips along; None without strips."""
+        return None
+
+    @property
+    def folded(self) -> Folded:
+        """The edges of the pattern to bend along."""
+        return Folded()
+
+    @property
+    def piece_of_face(self) -> NDArray[np.int64]:
+        """The piece of each face of `mesh` (m,), for a design in pieces."""
+        return np.zeros(len(self.mesh.faces), np.int64)
+
+    @property
+    def distances(self) -> Distances:
+        """Distances between design and result in both directions, in the mesh's unit."""
+        from gso.metrics import surface_distance
+
+        return surface_distance(self.design, self.mesh)
 
     def on_design(self) -> Mesh:
         """Return the design with its vertices moved onto the result."""
-        return self.mesh if self.ruled is None else self.design.replaced(self.ruled.moved)
+        return self.mesh
 
     @property
     def grid(self) -> Array | None:
@@ -185,10 +204,6 @@ class Result:
         if self.components:
             areas = [area(part.design) for part in self.components]
             return combined([part.metrics for part in self.components], areas)
-        if self.ruled is not None:
-            from gso.tasks.developable.developable_metrics import ruled_metrics
-
-            return ruled_metrics(self.design, self.ruled)
         task, pattern = tasks.get(self.task), self.pattern
         if task.flat and pattern is not None and pattern.is_cut:
             surface = pattern.surface(self.design)
@@ -229,55 +244,62 @@ class Result:
                 )
             surface = self.mesh if self.task == "developable" else self.design
             outline = self.pattern.surface(surface)
-            bends = () if self.ruled is None else self.ruled.bends
+            bends = self.folded.lines(self.pattern.flat)
             io.save_flat(self.pattern.flat, outline, path, unit=unit, bends=bends)
-        elif suffix in io.SPLINE_SUFFIXES and self.ruled is not None:
-            self._save_strips(self.ruled, path, unit)
         elif suffix in io.SPLINE_SUFFIXES:
-            if any(part.spline is not None for part in self.components):
-                raise MeshError(
-                    f"{path}: every component has a spline of its own; write them one by one, "
-                    "result.components[k].save(...)"
-                )
-            if self.spline is None:
-                raise MeshError(
-                    f"{path}: this result is a mesh; solve with the option variables='surface', "
-                    "or give its mesh to gso.fit_spline and gso.save_spline"
-                )
-            io.save_spline(self.spline, path, unit=unit)
+            self._save_cad(path, unit)
         else:
             io.write(self.mesh, path)
         self.notes += tuple(n for n in io.left_out(self.mesh, path) if n not in self.notes)
 
-    def _save_strips(self, ruled: RuledSurface, path: str | PathLike[str], unit: str) -> None:
-        """Write a ruled surface to a CAD file."""
-        from gso import io
-        from gso.ruled.smooth.smooth_surface import smooth_strips
+    def add_spline(self) -> None:
+        """Fit a spline to the surface where the solve made none, for CAD files."""
+        from gso.spline.fit import fit_spline
 
-        io.check_spline(path, unit)
-        if ruled.untrimmed is None:
-            io.save_faces(self.mesh, path, unit=unit)
-            self.notes += (f"{path} has planar faces",)
-            return
-        # Constraints may have moved the strips away from the design.
-        design = None if "constraints" in self.details else self.design
-        strips = smooth_strips(ruled, design)
-        far = strips.distances[1]
-        if strips.is_torsal and far <= _SMOOTHED * self.design.diagonal:
-            io.save_patches(strips.patches, path, unit=unit)
-            note = (
-                f"{path} has smooth strips, whose normals turn by {strips.turning:.2g} degrees at "
-                f"most along rulings; they are {far:.3g} {unit} at most from the "
-                "planar faces that the pattern belongs to"
+        if self.spline is None:
+            self.spline = fit_spline(self.mesh)
+            far = max(self.spline.gap or (0.0,))
+            self.notes += (f"the spline was fitted to the result, {far:.3g} away at most",)
+
+    def _save_cad(self, path: str | PathLike[str], unit: str) -> None:
+        """Write the surface to a CAD file."""
+        from gso import io
+
+        if any(part.spline is not None for part in self.components):
+            raise MeshError(
+                f"{path}: every component has a spline of its own; write them one by one, "
+                "result.components[k].save(...)"
             )
-        else:
-            io.save_faces(self.mesh, path, unit=unit)
-            turn = max(strips.turning, strips.kink)
-            note = (
-                f"{path} has planar faces: smooth strips would be {far:.3g} {unit} from them at "
-                f"most, and their normals would turn by {turn:.2g} degrees at rulings"
+        if self.spline is None:
+            raise MeshError(
+                f"{path}: this result is a mesh; solve with the option variables='surface', "
+                "or give its mesh to gso.fit_spline and gso.save_spline"
             )
-        self.notes += (note,)
+        io.save_spline(self.spline, path, unit=unit)
+
+    def arrays(self) -> dict[str, Any]:
+        """Return flat image and pattern as arrays by name, for files."""
+        out: dict[str, Any] = {} if self.flat is None else {"flat": self.flat}
+        if self.pattern is not None and self.pattern.flat is not self.flat:
+            out |= self.pattern.arrays()
+        return out
+
+    @classmethod
+    def shape(cls, data: Mapping[str, Any], design: Mesh) -> dict[str, Any]:
+        """Return surface, flat image and pattern from the arrays of a file, by attribute.
+
+        Raises
+        ------
+        KeyError, ValueError
+            Arrays are missing or do not fit each other.
+        """
+        flat = data.get("flat")
+        if flat is not None and flat.shape != (len(design.vertices), 2):
+            raise ValueError(f"flat is an array {flat.shape}, not {(len(design.vertices), 2)}")
+        pattern = Pattern.from_arrays(data, design) if "pattern_flat" in data else None
+        same = len(data["vertices"]) == len(design.vertices)
+        mesh = design.replaced(data["vertices"]) if same or pattern is None else pattern.mesh
+        return {"mesh": mesh, "flat": flat, "pattern": pattern}
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Result:

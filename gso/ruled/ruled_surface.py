@@ -13,7 +13,7 @@ from gso import faults, metrics
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
-from gso.pattern import Bend, Pattern
+from gso.pattern import Bend, Folded, Pattern
 from gso.ruled.fold_lines import Folds, folds
 from gso.ruled.sheet import unrolled_pattern
 from gso.ruled.strip_fit import Fit, Job
@@ -25,7 +25,6 @@ from gso.typing import Array, Flags, Ints
 
 #: Names of the arrays in files.
 _FOLDS, _PARTS = ("rulings", "creases"), ("edges", "angles", "radii")
-_PATTERN = ("flat", "faces", "vertex", "seams")
 #: Spacing of the samples by which distances are measured, relative to the diagonal.
 _FINE = 0.012
 
@@ -74,6 +73,12 @@ class RuledSurface:
         """Number of strips side by side."""
         return int(self.strip.max()) + 1
 
+    @property
+    def farthest(self) -> float:
+        """The largest distance from the design, both ways; 0 where it is not known."""
+        far = self.deviation
+        return 0.0 if far is None else max(far.there_max, far.back_max)
+
     @cached_property
     def sound(self) -> bool:
         """Whether neither surface nor pattern is folded or meets itself, and no rulings cross."""
@@ -86,9 +91,11 @@ class RuledSurface:
             or faults.crossings(self.mesh).size
         )
 
-    @property
-    def bend_edges(self) -> tuple[Ints, Ints]:
-        """The rulings in the pattern: edges (k, 2) of it, and the number of the ruling of each."""
+    @cached_property
+    def folded(self) -> Folded:
+        """The rulings in the pattern."""
+        if not len(self.rulings.edges):
+            return Folded()
         pattern = self.pattern
         inner = pattern.mesh.half_edges
         k = np.flatnonzero((inner.twin >= 0) & (inner.origin < inner.dest))
@@ -100,17 +107,13 @@ class RuledSurface:
         order = np.argsort(rulings)
         at = order[np.minimum(np.searchsorted(rulings[order], key), len(order) - 1)]
         found = np.isin(key, rulings)
-        return ends[found], at[found]
+        at = at[found]
+        return Folded(ends[found], self.rulings.angles[at], self.rulings.radii[at])
 
     @property
     def bends(self) -> list[Bend]:
-        """The rulings in the pattern."""
-        if not len(self.rulings.edges):
-            return []
-        ends, at = self.bend_edges
-        lines = self.pattern.flat[ends]
-        angles, radii = self.rulings.angles[at].tolist(), self.rulings.radii[at].tolist()
-        return [Bend(*bend) for bend in zip(lines, angles, radii, strict=True)]
+        """The rulings in the pattern, as lines."""
+        return self.folded.lines(self.pattern.flat)
 
     def arrays(self) -> dict[str, Array]:
         """Return the surface as arrays by name, except `moved`; see :meth:`from_arrays`."""
@@ -126,33 +129,26 @@ class RuledSurface:
             out |= {f"ruled_{name}_{part}": getattr(folds, part) for part in _PARTS}
         if self.untrimmed is not None:
             out |= {f"ruled_strips_{k}": x for k, x in self.untrimmed.arrays().items()}
-        return out | {f"ruled_pattern_{part}": getattr(self.pattern, part) for part in _PATTERN}
+        return out | self.pattern.arrays("ruled_pattern_")
 
     @classmethod
-    def from_arrays(cls, data: Mapping[str, Any], moved: Array) -> RuledSurface | None:
-        """Return the surface that :meth:`arrays` describes; None if there is none.
+    def from_arrays(cls, data: Mapping[str, Any], moved: Array) -> RuledSurface:
+        """Return the surface that :meth:`arrays` describes.
 
         Raises
         ------
         KeyError, ValueError
             Arrays are missing or do not fit each other.
         """
-        if "ruled_faces" not in data:
-            return None
         mesh = Mesh(data["ruled_vertices"], data["ruled_faces"])
-        pattern = Pattern(*(data[f"ruled_pattern_{part}"] for part in _PATTERN))
+        pattern = Pattern.from_arrays(data, mesh, "ruled_pattern_")
         folds = [Folds(*(data[f"ruled_{name}_{part}"] for part in _PARTS)) for name in _FOLDS]
-        for ids, end in (
-            (pattern.faces, len(pattern.flat)),
-            (pattern.vertex, len(mesh.vertices)),
-            (pattern.seams, len(pattern.flat)),
-            *((fold.edges, len(mesh.vertices)) for fold in folds),
-        ):
-            if ids.dtype.kind not in "iu" or (ids.size and not -1 <= ids.min() <= ids.max() < end):
-                raise ValueError("the arrays of the ruled surface do not fit each other")
-        if pattern.faces.shape != mesh.faces.shape or any(
-            len(data[f"ruled_{name}"]) != len(mesh.faces) for name in ("strip", "flat")
-        ):
+        for ids in (fold.edges for fold in folds):
+            if ids.dtype.kind not in "iu" or (
+                ids.size and not 0 <= ids.min() <= ids.max() < len(mesh.vertices)
+            ):
+                raise ValueError("the edges of the ruled surface point outside")
+        if any(len(data[f"ruled_{name}"]) != len(mesh.faces) for name in ("strip", "flat")):
             raise ValueError("the arrays of the ruled surface do not fit each other")
         crossed = int(data["ruled_crossed"])
         flat = np.asarray(data["ruled_flat"], bool)

@@ -23,8 +23,6 @@ _POINTS = (500, 1000)
 _COARSE = 16
 #: Cost of a flat triangle in the first rulings.
 _FLAT = 1e-5
-#: Largest number of strips that are tried.
-MOST = 64
 #: Number of strips from which doubling has to lower the largest distance, to this share of it.
 _PAYING, _LESS = 8, 0.95
 #: Relative tolerance of a bound on the distance.
@@ -53,22 +51,28 @@ class Wanted:
         Largest number of strips that is tried.
     """
 
-    strips: int | None = 1
-    rulings: int = 33
-    flats: bool = False
-    max_deviation: float | None = None
-    max_crease: float | None = None
-    min_radius: float | None = None
-    most: int = MOST
+    strips: int | None
+    rulings: int
+    flats: bool
+    max_deviation: float | None
+    max_crease: float | None
+    min_radius: float | None
+    most: int
 
-    def met(self, found: Found) -> bool:
-        """Return whether a surface is sound and meets the bounds."""
+    @property
+    def bounded(self) -> bool:
+        """Whether there are bounds."""
+        bounds = (self.max_deviation, self.max_crease, self.min_radius)
+        return any(bound is not None for bound in bounds)
+
+    def met(self, surface: RuledSurface) -> bool:
+        """Return whether a surface with known deviation is sound and meets the bounds."""
         far, turn, radius = self.max_deviation, self.max_crease, self.min_radius
         return (
-            found.surface.sound
-            and (radius is None or found.surface.rulings.smallest_radius >= radius)
-            and (far is None or found.deviation <= far * (1.0 + _TIGHT))
-            and (turn is None or found.surface.creases.largest_angle <= turn)
+            surface.sound
+            and (radius is None or surface.rulings.smallest_radius >= radius)
+            and (far is None or surface.farthest <= far * (1.0 + _TIGHT))
+            and (turn is None or surface.creases.largest_angle <= turn)
         )
 
 
@@ -79,15 +83,14 @@ class Found:
     Attributes
     ----------
     surface : RuledSurface
-    mean, deviation : float
-        Mean and largest distance; the larger of both directions each.
+    mean : float
+        Mean distance, the larger of both directions.
     start : str
         Name of the normals that the first rulings came from.
     """
 
     surface: RuledSurface
     mean: float
-    deviation: float
     start: str
 
     @property
@@ -99,7 +102,7 @@ class Found:
     @property
     def order(self) -> tuple[bool, float]:
         """Sort key: sound surfaces first, then by distance."""
-        return not self.surface.sound, self.mean + 0.2 * self.deviation
+        return not self.surface.sound, self.mean + 0.2 * self.surface.farthest
 
 
 def solve(
@@ -142,7 +145,7 @@ def solve(
     search = _Search(jobs, wanted)
     with contextlib.suppress(Stopped):
         search.run(starts)
-    return search.best, {k: f.deviation for k, f in search.results.items()}
+    return search.best, {k: f.surface.farthest for k, f in search.results.items()}
 
 
 class _Search:
@@ -158,13 +161,13 @@ class _Search:
     def best(self) -> Found | None:
         """The wanted number of strips, the smallest that meets the bounds, or the nearest."""
         results, wanted = self.results, self.wanted
-        met = [k for k in sorted(results) if wanted.met(results[k])]
+        met = [k for k in sorted(results) if wanted.met(results[k].surface)]
         if wanted.strips in results:
             return results[wanted.strips]
         if wanted.strips is None and met:
             return results[met[0]]
         every = results.values()
-        return min(every, key=lambda f: (not f.surface.sound, f.deviation), default=None)
+        return min(every, key=lambda f: (not f.surface.sound, f.surface.farthest), default=None)
 
     def run(self, starts: dict[str, Array]) -> None:
         """Fit one strip from each start, and halve strips until the bounds are met."""
@@ -182,16 +185,16 @@ class _Search:
             count = more
             if wanted.strips is None or count == most:
                 self.results[count] = self._found(job, self.fits[count], self.start)
-        if wanted.strips is None and wanted.met(self.results[count]):
+        if wanted.strips is None and wanted.met(self.results[count].surface):
             self._bisect(job, count)
 
     def _enough(self, count: int) -> bool:
         """Return whether there are enough strips, or more of them are of no use."""
         if self.wanted.strips is not None:
             return False
-        found = self.results[count]
+        found = self.results[count].surface
         return self.wanted.met(found) or (
-            count > _PAYING and found.deviation > _LESS * self.results[count // 2].deviation
+            count > _PAYING and found.farthest > _LESS * self.results[count // 2].surface.farthest
         )
 
     def _bisect(self, job: Job, count: int) -> None:
@@ -202,7 +205,7 @@ class _Search:
             middle = (low + high) // 2
             fit = halved(job, self.fits[base], _worst(job, self.fits[base], middle - base))
             self.results[middle] = self._found(job, fit, self.start)
-            if self.wanted.met(self.results[middle]):
+            if self.wanted.met(self.results[middle].surface):
                 high = middle
             else:
                 low = middle
@@ -214,7 +217,6 @@ class _Search:
         return Found(
             replace(surface, deviation=far),
             max(far.there_mean, far.back_mean),
-            max(far.there_max, far.back_max),
             start,
         )
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gso.mesh import Mesh
+from gso.mesh.closest_point import Nearest
 from gso.mesh.validation import have_area
 from gso.parametrization import beside
 from gso.pattern import Pattern
@@ -16,16 +17,14 @@ from gso.ruled.ruled_surface import RuledSurface
 from gso.typing import Array, Ints
 
 
-def together(surfaces: Sequence[RuledSurface], rows: Sequence[Ints], count: int) -> RuledSurface:
+def together(surfaces: Sequence[RuledSurface], design: Mesh) -> RuledSurface:
     """Merge ruled surfaces that share nothing, with their patterns side by side.
 
     Parameters
     ----------
     surfaces : sequence of RuledSurface
-    rows : sequence of ndarray of int, (n_k,)
-        For each vertex of each one's design, its number in the whole design.
-    count : int
-        Number of vertices of the whole design.
+    design : Mesh
+        The whole design.
     """
     meshes = [surface.mesh for surface in surfaces]
     start = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])[:-1].tolist()
@@ -36,9 +35,6 @@ def together(surfaces: Sequence[RuledSurface], rows: Sequence[Ints], count: int)
     kept = have_area(table, vertices) & have_area(pattern.faces, pattern.flat)
     mesh = Mesh(vertices, table[kept])
     strips = np.cumsum([0, *(surface.strips for surface in surfaces)])[:-1]
-    moved = np.zeros((count, 3))
-    for surface, own in zip(surfaces, rows, strict=True):
-        moved[own] = surface.moved
     return RuledSurface(
         mesh=mesh,
         strip=np.concatenate([s.strip + k for s, k in zip(surfaces, strips, strict=True)])[kept],
@@ -46,7 +42,7 @@ def together(surfaces: Sequence[RuledSurface], rows: Sequence[Ints], count: int)
         rulings=_folds([surface.rulings for surface in surfaces], start),
         creases=_folds([surface.creases for surface in surfaces], start),
         pattern=replace(pattern, faces=pattern.faces[kept]),
-        moved=moved,
+        moved=Nearest(mesh).locate(design.vertices)[2],
         crossed=sum(surface.crossed for surface in surfaces),
     )
 

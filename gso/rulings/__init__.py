@@ -16,8 +16,8 @@ True
 
 from __future__ import annotations
 
-from gso.rulings.face_curvature import ShapeOperator, shape_operator
+from gso.rulings.face_curvature import ShapeOperator, shape_operator, smallest_radius
 from gso.rulings.gauss_image import gauss_image
 from gso.rulings.ruling_lines import Rulings, trace
 
-__all__ = ["Rulings", "ShapeOperator", "gauss_image", "shape_operator", "trace"]
+__all__ = ["Rulings", "ShapeOperator", "gauss_image", "shape_operator", "smallest_radius", "trace"]

@@ -18,6 +18,9 @@ from gso.typing import Array, Ints
 
 #: Curvature times size below which a face counts as flat.
 FLAT = 0.01
+#: Share of the area whose curvature counts for the smallest radius, and the curvature, times the
+#: diagonal, up to which a surface is flat.
+_MOST, _STRAIGHT = 0.99, 1e-6
 
 
 @dataclass(frozen=True)
@@ -182,3 +185,22 @@ def checked_flat(flat: float) -> float:
 def _midpoints(mesh: Mesh) -> Array:
     there = mesh.faces >= 0
     return (mesh.vertices[mesh.faces] * there[..., None]).sum(axis=1) / there.sum(axis=1)[:, None]
+
+
+def smallest_radius(surface: Mesh) -> float:
+    """Return the smallest radius that a surface is bent to, in its unit; infinite if it is flat.
+
+    The 1 % of the area that is curved most is left out, as the curvature of single faces is not
+    accurate.
+
+    >>> t = np.linspace(0, 1, 33)
+    >>> arch = np.stack(np.broadcast_arrays(2 * np.cos(t), 2 * np.sin(t), 2 * t[:, None]), axis=-1)
+    >>> round(smallest_radius(Mesh.from_grid(arch)), 2)
+    2.0
+    """
+    shape = shape_operator(surface)
+    curved = np.abs(shape.curvatures).max(axis=1)
+    order = np.argsort(curved)
+    share = np.cumsum(shape.areas[order]) / shape.areas.sum()
+    most = curved[order[min(int(np.searchsorted(share, _MOST)), len(order) - 1)]]
+    return float(1.0 / most) if most * surface.diagonal > _STRAIGHT else np.inf

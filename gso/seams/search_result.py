@@ -78,7 +78,16 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
             f"{percent(numbers['neck_share'])} of the root of its area"
         )
     return Segmentation(
-        own.design, own.opened, own.names, sheets, numbers, reasons, tuple(notes), result
+        own.design,
+        own.opened,
+        own.names,
+        sheets,
+        numbers,
+        reasons,
+        tuple(notes),
+        result,
+        ground.mesh,
+        ground.kept,
     )
 
 

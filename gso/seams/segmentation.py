@@ -14,6 +14,7 @@ from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.result import Result
 from gso.seams.sheets import Sheet
+from gso.typing import Ints
 from gso.verdict import Reason
 
 
@@ -40,6 +41,10 @@ class Segmentation(Pieces):
         Remarks.
     result : Result or None
         The solve that changed the shape, where `max_deviation` was given.
+    given : Mesh or None
+        The design as it was given, from which distances count.
+    kept : ndarray of int, (k, 2)
+        The edges of it that were to be cut in any case.
     seconds : float
         Time it took.
     """
@@ -49,6 +54,8 @@ class Segmentation(Pieces):
     reasons: tuple[Reason, ...] = ()
     notes: tuple[str, ...] = ()
     result: Result | None = None
+    given: Mesh | None = None
+    kept: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
     seconds: float = 0.0
 
     @property

@@ -14,14 +14,13 @@ from gso.energy.losses import Loss
 from gso.mesh import Mesh
 from gso.mesh.cut import Cut
 from gso.pattern import Pattern
-from gso.status import Progress, Status
+from gso.status import Status
 from gso.tasks.imposed import Imposed
 from gso.tasks.options import Options
 from gso.typing import Array
 from gso.unknowns import Layout, Variables
 
 if TYPE_CHECKING:
-    from gso.ruled.ruled_surface import RuledSurface
     from gso.tasks.request import Request
 
 #: The settings of a formulation.
@@ -172,9 +171,6 @@ class Plan:
     cut : Cut, optional
         The cuts made to open the design. The flat image is then that of the cut mesh, in its
         numbering.
-    convert : callable, optional
-        Makes the result from the solution of the stages, unless the solve was cancelled. Its
-        second argument is told each iteration, and returns whether to go on.
     edited : Stage, optional
         What a session iterates while handles move; the last stage where not given.
     """
@@ -192,7 +188,6 @@ class Plan:
     cold_start: Callable[[], Array] | None = None
     start_refused: str = ""
     cut: Cut | None = None
-    convert: Callable[[Solution, Callable[[Progress], bool]], Solution] | None = None
     edited: Stage | None = None
 
 
@@ -218,9 +213,6 @@ class Solution:
         Vertices that the first spline of that stage was fitted to.
     cut : Cut, optional
         As in the plan.
-    ruled : RuledSurface, optional
-        The result as a ruled surface, where it is one; the block "surface" has the design's
-        vertices moved onto it.
     stage : Stage, optional
         The stage that was solved last; None if none was.
     coordinates : ndarray
@@ -240,7 +232,6 @@ class Solution:
     fitted: Array | None = None
     cut: Cut | None = None
     stage: Stage | None = None
-    ruled: RuledSurface | None = None
     formulation: str = ""
 
     @property

@@ -1,8 +1,7 @@
 """The traditional numerical optimiser: sparse Gauss-Newton on CasADi's derivatives."""
 
-from gso.tasks.request import check
 from gso.tasks.start import Start
-from gso.tno.optimize import optimize
+from gso.tno.optimize import check, optimize
 from gso.tno.optimize_many import optimize_many
 from gso.tno.session import Session
 

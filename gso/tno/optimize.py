@@ -5,18 +5,24 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 
+from gso import linalg
 from gso.constraints import Constraint
 from gso.cut_pieces import Pieces
-from gso.errors import ConvergenceWarning
+from gso.errors import ConvergenceWarning, OptionError
 from gso.pipeline.component_solves import solve_mesh
 from gso.pipeline.judgement import warning
 from gso.quantities import Length, Strain
 from gso.result import Result
-from gso.seams import joint_solve, strips_of_pieces
+from gso.ruled.paneling.options import RULED
+from gso.ruled.paneling.options import Options as StripsOptions
+from gso.ruled.paneling.strips_request import StripsRequest
+from gso.seams import joint_solve
 from gso.solver import Callback
+from gso.tasks import request as requests
 from gso.tasks.base import Options
-from gso.tasks.request import check
+from gso.tasks.request import Request
 from gso.tasks.start import Start
 from gso.typing import MeshLike
 
@@ -47,13 +53,12 @@ def optimize(
     mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, path, or Pieces
         The design, in any unit of length. A design that :func:`gso.cut` or :func:`gso.pieces` has
         cut into pieces is solved as a whole: each piece becomes developable, the seams stay
-        closed, and may become creases. The result's `pieces` has its pieces. By "ruled" each
-        piece then becomes strips that follow that result: their seams are closed up to the
-        distance in ``details["seam_gap"]``.
+        closed, and may become creases. The result's `pieces` has its pieces.
     task : {"developable", "flatten", "denoise", "bend", "conformal"}
         What to do.
     formulation : str, optional
-        Which energy; the task's first when not given.
+        Which energy; the task's first when not given. `developable` by "ruled" is
+        :func:`gso.strips`.
     options : str or Options, optional
         "fast", "balanced" (default), "accurate", or an options dataclass of the task.
         "jiang2020" (`developable`, `flatten`) is the classical reference, by isometry.
@@ -64,8 +69,7 @@ def optimize(
     max_deviation : float or str, optional
         `developable`: the largest distance between design and result, both ways: a number in the
         mesh's unit, or a text such as "5mm" or "0.5%" (of the diagonal of the bounding box). The
-        result is as developable as this bound allows; by "ruled" it has as
-        few strips as it allows.
+        result is as developable as this bound allows.
     max_strain : float or str, optional
         `developable`: the largest principal strain, max ``|s - 1|``, of the result's flat
         pattern, such as 0.005 or "0.5%". The displacement is the smallest that reaches it, or stays
@@ -130,12 +134,23 @@ def optimize(
         diagonal=design.diagonal,
         unit=unit,
     )
-    if isinstance(mesh, Pieces) and not isinstance(options, Options):
-        request = request.with_options(request.options.for_pieces())
-    if isinstance(mesh, Pieces) and request.formulation == "ruled":
-        ask = strips_of_pieces.Ask(request.options, request.limits.max_deviation, verdict)
-        result = strips_of_pieces.solved(mesh, ask, constraints, request.start, callback, optimize)
+    settings = request.options
+    if isinstance(settings, StripsOptions):
+        # Imported here, as it imports SciPy.
+        from gso.ruled.paneling.lay_strips import lay_strips
+
+        wanted = StripsRequest(
+            settings,
+            request.limits,
+            constraints=constraints,
+            start=request.start,
+            verdict=verdict,
+            callback=callback,
+        )
+        result = lay_strips(mesh, wanted)
     elif isinstance(mesh, Pieces):
+        if not isinstance(options, Options):
+            request = request.with_options(settings.for_pieces())
         result = joint_solve.solve_pieces(mesh, request, constraints, callback)
     else:
         design.check_joined()
@@ -144,3 +159,45 @@ def optimize(
     if said := warning(result):
         warnings.warn(said, ConvergenceWarning, stacklevel=2)
     return result
+
+
+def check(
+    task: str,
+    formulation: str | None = None,
+    options: str | Options | None = None,
+    *,
+    max_deviation: Length | None = None,
+    max_strain: Strain | None = None,
+    target_curvature: float | None = None,
+    x0: MeshLike | Start | None = None,
+    verdict: bool = True,
+    diagonal: float = 1.0,
+    unit: str = "mm",
+) -> Request[Options]:
+    """Check what :func:`optimize` is asked for, as far as it does not depend on the mesh.
+
+    Parameters, result and errors are those of :func:`gso.tasks.request.check`; ``"ruled"`` stands
+    for strips, with their own settings.
+    """
+    strips = formulation == RULED or (formulation is None and isinstance(options, StripsOptions))
+    strips &= task == "developable"
+    request = requests.check(
+        task,
+        None if strips else formulation,
+        None if strips else options,
+        max_deviation=max_deviation,
+        max_strain=max_strain,
+        target_curvature=target_curvature,
+        x0=x0,
+        verdict=verdict,
+        diagonal=diagonal,
+        unit=unit,
+    )
+    if not strips:
+        return request
+    if target_curvature is not None:
+        raise OptionError(f"target_curvature belongs to the formulation 'curvature', not {RULED!r}")
+    settings = StripsOptions.coerce(options)
+    if settings.backend is not None:
+        linalg.find(settings.backend)
+    return replace(request.with_options(settings), formulation=RULED)

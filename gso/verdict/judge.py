@@ -13,7 +13,7 @@ from gso.verdict.codes import Code
 from gso.verdict.compare import Measurement, compare, failure
 from gso.verdict.reason import Reason, ordered
 from gso.verdict.surface_checks import Measured, of_pattern, of_surface
-from gso.verdict.task_checks import TASKS, Bounds, ruled
+from gso.verdict.task_checks import CHECKS, Bounds
 
 if TYPE_CHECKING:
     from gso.result import Result
@@ -58,14 +58,11 @@ def _measured(result: Result, limits: Limits, violation: float) -> tuple[Measure
         surface = result.design
     else:
         surface = result.mesh
-        if result.ruled is not None:
-            # Its faces are not those of the design.
-            measured |= of_surface(None, surface)
-        elif result.status is not Status.ALREADY_GOOD:
+        if result.status is not Status.ALREADY_GOOD:
             measured |= of_surface(result.design, surface)
     if pattern is not None:
         measured |= of_pattern(surface, pattern, lengths=result.task not in _STRETCHED)
-    check = ruled if result.ruled is not None else TASKS.get(result.task)
+    check = CHECKS.get(result.KIND or result.task)
     if check is None:
         return measured, {}
     own, bounds = check(result, limits, violation)

@@ -15,23 +15,24 @@ from gso.verdict.compare import Measurement
 Measured = dict[Code, Measurement]
 
 
-def of_surface(design: Mesh | None, surface: Mesh) -> Measured:
+def of_surface(design: Mesh, surface: Mesh) -> Measured:
     """Find folds, self-intersections and collapsed edges of a surface.
 
-    Folds and self-intersections that the design has already are ignored; without a design with
-    the same faces all of them count, and edges are not measured.
+    Folds and self-intersections that the design has already are ignored, and edges are measured,
+    if the surface has its faces.
     """
+    same = np.array_equal(design.faces, surface.faces)
     bad = faults.folded(surface)
-    if bad.size and design is not None:
+    if same and bad.size:
         bad = np.setdiff1d(bad, faults.folded(design))
     pairs = faults.crossings(surface)
-    if pairs.size and design is not None:
+    if same and pairs.size:
         pairs = pairs[~_known(design, pairs)]
     found = {
         Code.FOLDED: Measurement.count("face", bad),
         Code.CROSSES_ITSELF: Measurement.count("face", np.unique(pairs)),
     }
-    if design is not None:
+    if same:
         found[Code.COLLAPSED] = _shortest(design, surface.vertices)
     return found
 

@@ -23,7 +23,7 @@ Bounds = dict[Code, float | None]
 
 #: Distance from the design, relative to the diagonal of its bounding box, beyond which a result is
 #: refused whatever limit was given, and the same for strips, where more of them are the remedy.
-_FAR, _RULED = 0.5, 0.1
+_FAR, _STRIPS = 0.5, 0.1
 
 
 def developable(result: Result, limits: Limits, violation: float) -> tuple[Measured, Bounds]:
@@ -62,13 +62,12 @@ def developable(result: Result, limits: Limits, violation: float) -> tuple[Measu
     return measured, bounds
 
 
-def ruled(result: Result, limits: Limits, violation: float) -> tuple[Measured, Bounds]:
+def strips(result: Result, limits: Limits, violation: float) -> tuple[Measured, Bounds]:
     """Measure deviation and strain of strips, and count rulings that cross."""
     surface = result.ruled
     if surface is None:
         return {}, {}
-    far = surface.deviation or surface.distances(result.design)
-    measured, bounds = _away(result, far, limits, violation, _RULED)
+    measured, bounds = _away(result, result.distances, limits, violation, _STRIPS)
     measured[Code.RULINGS_CROSS] = Measurement(float(surface.crossed))
     measured[Code.STRAIN] = Measurement(_strains(result.mesh, surface.pattern).max())
     bounds[Code.STRAIN] = limits.max_strain
@@ -109,8 +108,9 @@ def _remember(result: Result, measured: Measured, limits: Limits) -> None:
     result.details = {**result.details, "verdict": found | limits.given}
 
 
-#: Checks by task; other tasks only have the checks of surface and pattern.
-TASKS: dict[str, Callable[[Result, Limits, float], tuple[Measured, Bounds]]] = {
+#: Checks by task, or by kind of result; others only have the checks of surface and pattern.
+CHECKS: dict[str, Callable[[Result, Limits, float], tuple[Measured, Bounds]]] = {
     "developable": developable,
     "denoise": denoise,
+    "strips": strips,
 }

@@ -50,23 +50,21 @@ def of_pattern(points: Array, pattern: Pattern, label: Ints, local: Ints) -> lis
 
 
 def across(
-    pieces: Pieces, moved: Array, owner: Sequence[int], panels: Sequence[Panel], rims: list[Ints]
+    pieces: Pieces, owner: Sequence[int], panels: Sequence[Panel], rims: list[Ints]
 ) -> list[Mating]:
     """Find the seams between pieces whose panels follow them within a distance.
 
     Parameters
     ----------
     pieces : Pieces
-        The design cut open.
-    moved : ndarray, (p, 3)
-        For each vertex of the opened design, its place on its own panels.
+        The surface that the panels follow.
     owner : sequence of int
         The piece of each panel.
     panels : sequence of Panel
     rims : list of ndarray of int, (e, 2)
         The edges of each panel's outline that are no seam within its piece.
     """
-    opened = pieces.opened
+    opened, points = pieces.opened, pieces.opened.mesh.vertices
     label = np.full(len(opened.vertex), -1)
     for number, part in enumerate(pieces.parts):
         label[part.vertices] = number
@@ -76,7 +74,7 @@ def across(
         feet = []
         for side in (seam.one, seam.two):
             own = [k for k, piece in enumerate(owner) if piece == side.panel]
-            feet.append(_nearest(moved[side.edges[:, 0]], own, panels, rims))
+            feet.append(_nearest(points[side.edges[:, 0]], own, panels, rims))
         change = np.flatnonzero(np.diff(feet[0][0]) | np.diff(feet[1][0])) + 1
         for a, b in pairwise([0, *change.tolist(), len(seam.along)]):
             if b - a > 1:

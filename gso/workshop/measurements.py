@@ -6,51 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from gso import faults, metrics, parametrization, rulings
+from gso import faults, metrics, rulings
 from gso.errors import MeshError
 from gso.mesh import Mesh
-from gso.mesh.validation import have_area
 from gso.pattern import Pattern
 from gso.seams.sheets import rectangle
 from gso.verdict import Code, Measurement, Reason, compare, merge
 from gso.workshop.asking import Ask
 from gso.workshop.panels import Made, Panel
 
-#: Share of the area whose curvature counts, and the curvature, times the diagonal, up to which a
-#: panel is flat.
-_MOST, _STRAIGHT = 0.99, 1e-6
-
-
-def of_panels(design: Mesh, panels: list[Panel], ask: Ask, allowed: float) -> dict[str, Any]:
-    """Measure panels together, against the whole design."""
-    start = np.cumsum([0, *(len(p.flat) for p in panels)])[:-1].tolist()
-    wide = max(p.surface.faces.shape[1] for p in panels)
-    faces = []
-    for panel, first in zip(panels, start, strict=True):
-        table = panel.surface.faces
-        table = np.pad(table, ((0, 0), (0, wide - table.shape[1])), constant_values=-1)
-        faces.append(np.where(table < 0, -1, table + first))
-    points, table = np.concatenate([p.surface.vertices for p in panels]), np.concatenate(faces)
-    flat = np.concatenate(parametrization.beside([p.flat for p in panels]))
-    # Slivers of a small panel may have no area relative to the whole.
-    mesh = Mesh(points, table[have_area(table, points) & have_area(table, flat)])
-    return of_pattern(design, mesh, Pattern.whole(mesh, flat), ask, allowed)
-
 
 def bend_radius(panel: Panel) -> float:
-    """Return the smallest radius that a panel is bent to, in its unit.
-
-    Of a panel with bend lines it is that of the bends; otherwise the 1 % of the area that is
-    curved most is left out, as the curvature of single faces is not accurate.
-    """
+    """Return the smallest radius of a panel's bends, or of its surface if it has none."""
     if len(panel.bends):
         return float(panel.radii.min())
-    shape = rulings.shape_operator(panel.surface)
-    curved = np.abs(shape.curvatures).max(axis=1)
-    order = np.argsort(curved)
-    share = np.cumsum(shape.areas[order]) / shape.areas.sum()
-    most = curved[order[min(int(np.searchsorted(share, _MOST)), len(order) - 1)]]
-    return float(1.0 / most) if most * panel.surface.diagonal > _STRAIGHT else np.inf
+    return rulings.smallest_radius(panel.surface)
 
 
 def of_pattern(

@@ -12,7 +12,7 @@ import numpy as np
 
 from gso.errors import MeshError
 from gso.mesh import Mesh
-from gso.pattern import Bend
+from gso.pattern import Bend, Folded
 from gso.typing import Array, Ints
 from gso.verdict import Places, Reason
 
@@ -46,9 +46,7 @@ class Panel:
     @property
     def lines(self) -> list[Bend]:
         """The bends as lines of the pattern."""
-        ends = self.flat[self.bends]
-        every = zip(ends, self.angles.tolist(), self.radii.tolist(), strict=True)
-        return [Bend(line, angle, radius) for line, angle, radius in every]
+        return Folded(self.bends, self.angles, self.radii).lines(self.flat)
 
     @cached_property
     def loops(self) -> list[Ints]:

@@ -9,13 +9,13 @@ import gso
 from gso import tasks
 from tests.conftest import rotation, saddle
 
-CASES = [
+#: Without strips, which have vertices of their own: see tests/test_ruled.py.
+ON_DESIGN = [
     pytest.param(task, formulation, id=f"{task}-{formulation}")
     for task in tasks.names()
     for formulation in tasks.get(task).formulations
 ]
-#: Without ruled surfaces, which have vertices of their own: see tests/test_ruled.py.
-ON_DESIGN = [case for case in CASES if case.values[1] != "ruled"]
+CASES = [*ON_DESIGN, pytest.param("developable", "ruled", id="strips")]
 DESIGN = gso.Mesh.from_grid(saddle(9, 8))
 
 

@@ -6,20 +6,15 @@ from dataclasses import replace
 from functools import partial
 
 from gso.tasks.base import Formulation, Plan, Task
-from gso.tasks.developable import joint_isometry, ruled, schedule
+from gso.tasks.developable import joint_isometry, schedule
 from gso.tasks.developable.analysis import Analysis
-from gso.tasks.developable.bound_search import count_strips, search
+from gso.tasks.developable.bound_search import search
 from gso.tasks.developable.developable_metrics import flat_metrics, metrics
 from gso.tasks.developable.options import Options
 from gso.tasks.request import Request
 from gso.unknowns import ALONG
 
 __all__ = ["TASK", "Options"]
-
-
-def _before_ruled(analysis: Analysis, request: Request[ruled.Options]) -> Plan:
-    """Plan the curvature solve whose normals the first rulings follow."""
-    return schedule.plan(analysis, request.with_options(Options()))
 
 
 def _before_isometry(analysis: Analysis, request: Request[joint_isometry.Options]) -> Plan:
@@ -44,12 +39,6 @@ TASK = Task(
             presets=("jiang2020",),
             limits=("max_deviation", "max_strain"),
             search=search,
-        ),
-        "ruled": Formulation(
-            ruled.Options,
-            partial(ruled.plan, before=_before_ruled),
-            limits=("max_deviation", "max_strain"),
-            search=count_strips,
         ),
     },
     metrics,

@@ -15,7 +15,7 @@ from gso import metrics, parametrization
 from gso.status import Status
 from gso.tasks.base import Analysis, Runner, Solution
 from gso.tasks.base import Options as BaseOptions
-from gso.tasks.developable import joint_isometry, ruled
+from gso.tasks.developable import joint_isometry
 from gso.tasks.developable.options import DEVELOPABLE, Options
 from gso.tasks.developable.target import (
     PROGRESS,
@@ -31,12 +31,6 @@ R = TypeVar("R", bound=Request[BaseOptions])
 
 #: Weights tried in turn within a bound, until the strain is small enough.
 _HARDER = (1.0, 6.0, 36.0)
-
-
-def count_strips(run: Runner, request: Request[ruled.Options]) -> Solution:
-    """Solve for strips within given limits: the solve itself finds their number."""
-    request = _with_usable_start(run, request)
-    return run(replace(request, max_displacement=request.limits.max_deviation))
 
 
 def search(run: Runner, request: SearchRequest) -> Solution:

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from gso import metrics as measure
 from gso.mesh import Mesh
 from gso.typing import Array
-
-if TYPE_CHECKING:
-    from gso.ruled.ruled_surface import RuledSurface
 
 
 def flat_metrics(surface: Mesh, flat: Array) -> dict[str, float]:
@@ -48,33 +43,6 @@ def curvature_metrics(before: Mesh, after: Mesh, scale: float) -> dict[str, floa
             "nonplanarity_max_before": float(measure.nonplanarity(before).max()),
         }
     return {name: value for name, value in found.items() if not np.isnan(value)}
-
-
-def ruled_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
-    """Compute the metrics of a ruled surface.
-
-    It has no Gaussian curvature, so there is none here. Distances are measured all over both
-    surfaces; each is the larger one of both directions.
-    """
-    true = surface.deviation or surface.distances(design)
-    percent = 100.0 / design.diagonal
-    flat, sheet = surface.pattern.flat, surface.pattern.surface(surface.mesh)
-    turns = surface.creases.turns(surface.mesh.vertices)
-    return measure.strains(sheet, flat) | {
-        "distance_mean": percent * max(true.there_mean, true.back_mean),
-        "distance_max": percent * max(true.there_max, true.back_max),
-        "deviation_max": percent * true.there_max,
-        "d_H": measure.d_H(design, design.replaced(surface.moved)),
-        "fold_max": float(measure.dihedral_angles(surface.mesh).max(initial=0.0)),
-        "flipped_cells": float(measure.flips(sheet, flat)),
-        "strips": float(surface.strips),
-        "rulings": float(len(surface.rulings.edges)),
-        "flats": float(np.count_nonzero(surface.flat)),
-        "rulings_crossed": float(surface.crossed),
-        "bend_radius_min": surface.rulings.smallest_radius,
-        "crease_angle_max": float(np.degrees(surface.creases.largest_angle)),
-        "crease_turn_max": float(np.degrees(turns.max(initial=0.0))),
-    }
 
 
 def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict[str, float]:

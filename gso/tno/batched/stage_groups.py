@@ -47,7 +47,7 @@ def structure(plan: Plan) -> Structure:
     Unbatchable
         There is nothing to solve, or something that batches do not have.
     """
-    if not plan.stages or plan.spline is not None or plan.convert is not None:
+    if not plan.stages or plan.spline is not None:
         raise Unbatchable
     parts = [part for stage in plan.stages for part in _describe(stage)]
     return [plan.fallback is None, *parts]

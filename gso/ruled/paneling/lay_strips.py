@@ -1,0 +1,327 @@
+"""Strips of a design: as a whole, and where that does not hold the limits, in pieces."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gso.components import split
+from gso.constraints import Constraint
+from gso.cut_pieces import Pieces
+from gso.errors import ConvergenceWarning, GSOError, MeshError
+from gso.io import as_mesh
+from gso.mesh import Mesh
+from gso.pipeline.judgement import add_reasons, violation_of, warning
+from gso.quantities import Length, Strain, as_length, as_strain
+from gso.result import Result
+from gso.ruled.paneling.light_design import LightDesign
+from gso.ruled.paneling.options import MOST, Options
+from gso.ruled.paneling.piece_strips import of_pieces
+from gso.ruled.paneling.strips_request import StripsRequest
+from gso.ruled.paneling.surface_strips import case_of, check_whole, of_surface
+from gso.seams.cutting import cut
+from gso.seams.kinds import Edges
+from gso.seams.options import as_sheet
+from gso.seams.segmentation import Segmentation
+from gso.seams.sheets import rectangle
+from gso.solver import Callback
+from gso.status import Status
+from gso.tasks.request import Limits
+from gso.tasks.start import Start
+from gso.typing import MeshLike
+from gso.verdict import Code, Measurement, Reason, compare, judge, ordered
+
+
+def strips(
+    mesh: MeshLike | Pieces,
+    *,
+    strips: int | str | None = None,
+    max_deviation: Length | None = None,
+    max_strain: Strain | None = None,
+    max_strips: int = MOST,
+    max_crease: float | None = None,
+    min_radius: Length | None = None,
+    flats: bool | None = None,
+    rulings: int | None = None,
+    options: str | Options = "balanced",
+    constraints: Sequence[Constraint] = (),
+    sheet: tuple[Length, Length] | None = None,
+    unit: str = "mm",
+    x0: MeshLike | Start | None = None,
+    workers: int | None = 0,
+    callback: Callback | None = None,
+    verdict: bool = True,
+) -> Result:
+    """Make strips of planar faces near a design: exactly developable, with straight bend lines.
+
+    The design is tried as one surface, with as few strips side by side as hold `max_deviation`.
+    Where that does not hold it, the design is cut into pieces without darts, which become
+    developable together, and each piece becomes strips that follow it. The result that holds the
+    limits is returned, or else the closest.
+
+    Parameters
+    ----------
+    mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, path, or Pieces
+        The design, one surface, in any unit of length. Pieces that :func:`gso.cut` made stay: each
+        of them becomes strips. Those that :func:`gso.pieces` found are used where the whole
+        surface does not hold the limits; their darts are not.
+    strips : int, "auto" or None
+        Number of strips side by side, which share creases and are separate parts of the pattern:
+        of the whole surface, or of each piece that was given. "auto": as few as hold
+        `max_deviation` and `max_crease`. None: "auto" where there is such a limit, else 1.
+    max_deviation : float or str, optional
+        The largest distance between result and design, both ways: a number in the mesh's unit, or
+        a text such as "5mm" or "0.5%" (of the diagonal of the bounding box). Without it the design
+        is not cut.
+    max_strain : float or str, optional
+        Largest strain of pieces that no strips follow closely, such as 0.01 or "1%": they keep a
+        pattern without bend lines. 0.1 % by default.
+    max_strips : int
+        Largest number of strips that "auto" tries.
+    max_crease : float, optional
+        Largest angle at a crease between strips, in degrees.
+    min_radius : float or str, optional
+        Smallest radius of the bends, as for `max_deviation`.
+    flats : bool, optional
+        Whether a single strip may branch at flat triangles.
+    rulings : int, optional
+        Number of rulings of a strip, 33 by default.
+    options : str or RuledOptions
+        "fast", "balanced", "accurate", or all settings in one record, which the keywords replace.
+    constraints : sequence of Constraint
+        `Fixed`, `FixedBoundary`, `Handle`, `Ruling` and one `SymmetryPlane`; with them a mesh is
+        not cut. Those of a design in pieces are met by the solve that the strips follow.
+    sheet : (float, float), optional
+        Length and width of a sheet that every part must fit on, in millimetres, or texts such
+        as "3m".
+    unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
+        Unit of the coordinates.
+    x0 : Mesh, array or Start, optional
+        A surface near the design whose normals give first rulings too.
+    workers : int, optional
+        Number of processes for the strips of many pieces; one for each processor when None.
+    callback : callable, optional
+        Called with a :class:`gso.Progress` after each iteration; returning False stops the
+        solve, and the strips so far are returned.
+    verdict : bool
+        Judge the result (:mod:`gso.verdict`).
+
+    Returns
+    -------
+    Result
+        `ruled` has the strips, `pattern` their exact unrolling, `rulings` the lines to bend along,
+        ``details["strips"]`` their number, or that of each piece, and `pieces` the pieces if the
+        design is in pieces. Where the callback ended the solve before there were strips, `ruled`
+        is None.
+
+    Raises
+    ------
+    MeshError
+        The design cannot be used: it has several components, or it is closed, or has a handle,
+        and may not be cut.
+    OptionError
+        An option or constraint is wrong.
+
+    Examples
+    --------
+    >>> import numpy as np, gso
+    >>> t = np.linspace(0, np.pi / 2, 17)
+    >>> arch = np.stack(np.broadcast_arrays(np.cos(t), np.sin(t), 2 * t[:, None]), axis=-1)
+    >>> result = gso.strips(arch, max_deviation=0.02)
+    >>> result.usable, result.ruled.strips, round(result.rulings.smallest_radius, 1)
+    (True, 1, 1.0)
+    """
+    diagonal = _read(mesh).diagonal
+
+    def length(value: Length | None, name: str) -> float | None:
+        return None if value is None else as_length(value, name, diagonal=diagonal, unit=unit)
+
+    named: dict[str, Any] = {
+        "strips": strips,
+        "max_strips": None if max_strips == MOST else max_strips,
+        "max_crease": max_crease,
+        "min_radius": length(min_radius, "min_radius"),
+        "flats": flats,
+        "rulings": rulings,
+    }
+    given = {name: value for name, value in named.items() if value is not None}
+    request = StripsRequest(
+        replace(Options.coerce(options), **given),
+        Limits(
+            length(max_deviation, "max_deviation"),
+            None if max_strain is None else as_strain(max_strain, "max_strain"),
+        ),
+        as_sheet(sheet, unit),
+        constraints=constraints,
+        start=x0 if isinstance(x0, Start) else Start(x0),
+        verdict=verdict,
+        workers=workers,
+        callback=callback,
+    )
+    result = lay_strips(mesh, request)
+    if said := warning(result):
+        warnings.warn(said, ConvergenceWarning, stacklevel=2)
+    return result
+
+
+def lay_strips(given: MeshLike | Pieces, request: StripsRequest) -> Result:
+    """Make strips near a design, or near pieces of it; see :func:`strips`."""
+    clock = time.perf_counter()
+    task = _Task.of(given, request)
+    result = task.solved()
+    result.seconds["total"] = time.perf_counter() - clock
+    return result
+
+
+@dataclass(frozen=True)
+class _Task:
+    """A design, what was asked of its strips, and how it may be divided.
+
+    Attributes
+    ----------
+    design : Mesh
+    request : StripsRequest
+    division : Pieces or None
+        The pieces that it is divided into; None where they are to be found.
+    whole : bool
+        Whether it is tried as one surface.
+    """
+
+    design: Mesh
+    request: StripsRequest
+    division: Pieces | None
+    whole: bool
+
+    @classmethod
+    def of(cls, given: MeshLike | Pieces, request: StripsRequest) -> _Task:
+        """Read a design, or pieces of one."""
+        design, fixed = _read(given), True
+        if not isinstance(given, Pieces):
+            design.check_joined()
+            return cls(design, request, None, not len(request.kept))
+        if isinstance(given, Segmentation):
+            # Its pieces were found, and the whole is better if it holds the limit.
+            named = request.options.number is not None or len(given.kept) > 0
+            fixed = named or request.max_deviation is None
+            given = _without_darts(given)
+        if len(given) == 1 and _is_whole(design):
+            return cls(design, request, None, True)
+        return cls(design, request, given, not fixed)
+
+    @property
+    def divisible(self) -> bool:
+        """Whether pieces are tried where the whole does not hold the limits."""
+        asked = self.request
+        named = asked.options.number is not None or asked.constraints
+        return self.division is not None or (asked.max_deviation is not None and not named)
+
+    def solved(self) -> Result:
+        """Return the whole or the pieces: what holds the limits, or else the closest."""
+        asked = self.request
+        light = LightDesign.of(self.design, asked.max_deviation, named=asked.names_vertices)
+        tried = []
+        if self.whole and (not self.divisible or _is_whole(light.mesh)):
+            tried.append(self._as_a_whole(light))
+            if not self.divisible or tried[0].ended or tried[0].holds:
+                return self._answer(tried)
+        try:
+            tried.append(self._in_pieces(light))
+        except GSOError:
+            if not tried:
+                raise
+        return self._answer(tried)
+
+    def _answer(self, tried: Sequence[_Tried]) -> Result:
+        best = min(tried, key=lambda one: (not one.holds, one.far))
+        if self.request.verdict:
+            add_reasons(best.result, best.reasons)
+        return best.result
+
+    def _as_a_whole(self, light: LightDesign) -> _Tried:
+        asked = self.request
+        asked.say("as a whole")
+        check_whole(light.mesh)
+        result = light.whole(of_surface(light.mesh, asked, light.allowed), asked)
+        clock = time.perf_counter()
+        reasons: tuple[Reason, ...] = ()
+        if asked.verdict or self.divisible:
+            violation = violation_of(case_of(self.design, asked)) if asked.constraints else 0.0
+            own = judge(result, asked.limits, violation)
+            reasons = ordered([*own, *against_sheet(result, asked)])
+        result.seconds["verdict"] = time.perf_counter() - clock
+        return _Tried(result, reasons)
+
+    def _in_pieces(self, light: LightDesign) -> _Tried:
+        asked = self.request
+        if self.division is not None:
+            light = LightDesign(self.design, self.design, asked.max_deviation)
+        result, reasons = of_pieces(light, asked, self.division)
+        return _Tried(result, ordered([*reasons, *against_sheet(result, asked)]))
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A result, and the reasons against it."""
+
+    result: Result
+    reasons: tuple[Reason, ...]
+
+    @property
+    def ended(self) -> bool:
+        """Whether the callback ended the solve."""
+        return self.result.status is Status.CANCELLED
+
+    @property
+    def holds(self) -> bool:
+        """Whether it is what was asked for."""
+        return not (self.reasons or self.result.status.is_failure)
+
+    @property
+    def far(self) -> float:
+        """The largest distance from the design; infinite without strips."""
+        surface = self.result.ruled
+        return np.inf if surface is None else surface.farthest
+
+
+def _read(given: MeshLike | Pieces) -> Mesh:
+    """Return the design from which distances count."""
+    if isinstance(given, Segmentation) and given.given is not None:
+        return given.given
+    return given.design if isinstance(given, Pieces) else as_mesh(given)
+
+
+def _is_whole(mesh: Mesh) -> bool:
+    """Tell whether a mesh is one surface that can be made of strips."""
+    try:
+        check_whole(mesh)
+    except MeshError:
+        return False
+    return True
+
+
+def _without_darts(found: Segmentation) -> Pieces:
+    """Return pieces of the design as it was given, without darts where that leaves disks."""
+    points = found.design.vertices.copy()
+    if found.result is not None and found.result.pieces is not None:
+        points[found.result.pieces.opened.vertex] = found.result.design.vertices
+    design, sides = found.design.replaced(points), found.sides
+    pieces = cut(design, Edges(found.edges[sides[:, 0] != sides[:, 1]]))
+    # A seam within a piece may open a ring or a handle.
+    whole = len(pieces) == 1 or all(piece.is_disk for piece in pieces)
+    return pieces if whole else cut(design, Edges(found.edges))
+
+
+def against_sheet(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
+    """Return the reasons if parts of the pattern are larger than the sheet."""
+    pattern, sheet = result.pattern, request.sheet
+    if pattern is None or sheet is None:
+        return ()
+    sizes = [rectangle(pattern.flat[part.vertices])[1] for part in split(pattern.mesh)]
+    long, wide = np.array(sizes).T
+    measured = {Code.TOO_LONG: Measurement(long), Code.TOO_WIDE: Measurement(wide)}
+    return compare(measured, {Code.TOO_LONG: max(sheet), Code.TOO_WIDE: min(sheet)})

@@ -1,0 +1,324 @@
+"""Strips of a design in pieces: the joint solve, and then strips that follow its pieces."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from gso import faults, metrics
+from gso.cut_pieces import Pieces
+from gso.errors import GSOError, MeshError
+from gso.executors import open_executor
+from gso.mesh import Mesh
+from gso.pattern import Pattern
+from gso.pipeline.component_results import renumber, worst_status
+from gso.result import Result, StripsResult
+from gso.ruled.fold_lines import Folds
+from gso.ruled.paneling.light_design import LightDesign
+from gso.ruled.paneling.options import RULED
+from gso.ruled.paneling.strips_request import StripsRequest, silent
+from gso.ruled.paneling.surface_strips import check_whole, of_surface, wanted
+from gso.ruled.ruled_surface import RuledSurface
+from gso.ruled.together import together
+from gso.rulings import smallest_radius
+from gso.seams.joint_solve import gap, solve_pieces
+from gso.seams.search import pieces as search
+from gso.seams.sheets import Sheet, flattened
+from gso.solver import Callback
+from gso.status import Progress, Status
+from gso.tasks.request import Limits, check
+from gso.tasks.start import Start
+from gso.verdict import Code, Measurement, Reason, compare, judge, ordered
+from gso.wording import length
+
+#: Shares of the allowed distance: what the joint solve of the pieces may use, and within what
+#: strips follow its result, so that the two sides of a seam stay together.
+_JOINT, _FOLLOW = 0.9, 0.1
+#: Distance within which strips follow the joint result where none is given, relative to the
+#: diagonal.
+_NEAR = 0.01
+#: Number of pieces from which on processes make their strips.
+_MANY = 8
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """The joint solve of a design in pieces.
+
+    Attributes
+    ----------
+    design : Mesh
+        The whole design, from which distances count.
+    shape : Pieces
+        Its pieces, made developable; their seams are closed.
+    result : Result or None
+        The solve; None if the shape stays as it is.
+    sheets : sequence of Sheet or None
+        Patterns of the pieces, as far as they are known.
+    """
+
+    design: Mesh
+    shape: Pieces
+    result: Result | None
+    sheets: Sequence[Sheet | None]
+
+    @property
+    def first(self) -> Result:
+        """The solve, or the design as the result of none."""
+        if self.result is not None:
+            return self.result
+        return Result("developable", RULED, self.design, self.design, None, Status.CONVERGED)
+
+    def pattern(self, number: int) -> Sheet | None:
+        """Return the flat pattern of a piece; None if it has none."""
+        known = self.sheets[number] if self.sheets else None
+        return flattened(self.shape[number].mesh) if known is None else known
+
+
+def of_pieces(
+    light: LightDesign, request: StripsRequest, division: Pieces | None
+) -> tuple[Result, tuple[Reason, ...]]:
+    """Make strips of a design in pieces.
+
+    Strips follow the joint result within a distance, so seams are closed up to that distance. A
+    piece that no strips follow keeps the pattern of the joint solve, unless the number of strips
+    was named or no distance from the design was given.
+
+    Parameters
+    ----------
+    light : LightDesign
+    request : StripsRequest
+    division : Pieces or None
+        The pieces of the design; their seams are searched for if there are none.
+
+    Returns
+    -------
+    result : Result
+        A :class:`StripsResult`, or none if the callback ended the solve. Its `details` have
+        "strips", their number in each piece or 0 for pieces without, and "seam_gap", the largest
+        distance between both sides of a seam, in the mesh's unit.
+    reasons : tuple of Reason
+        Why it is not usable.
+
+    Raises
+    ------
+    MeshError
+        The pieces cannot be solved, or one of them is no disk.
+    """
+    clock = time.perf_counter()
+    if division is None:
+        joint = _searched(light, request)
+    else:
+        joint = _together(light, request, division)
+    if joint.result is not None and joint.result.status is Status.CANCELLED:
+        return _cancelled(joint), ()
+    seconds = time.perf_counter() - clock
+    follow = _distance_left(joint, request, light)
+    parts = []
+    for number, made in enumerate(_of_each(joint.shape, request, follow)):
+        if isinstance(made, Result) and made.status is Status.CANCELLED:
+            return _cancelled(joint), ()
+        parts.append(_part(joint, request, number, made))
+    result = _merged(joint, request, parts)
+    result.seconds |= {"pieces": seconds, "strips": time.perf_counter() - clock - seconds}
+    return result, _reasons(result, request, parts)
+
+
+def _searched(light: LightDesign, request: StripsRequest) -> _Joint:
+    """Search for seams without darts, and solve the pieces together."""
+    found = search(
+        # On triangles seams need not follow edge rows.
+        Mesh(light.mesh.vertices, light.mesh.triangles),
+        max_strain=request.max_strain,
+        max_deviation=None if light.allowed is None else _JOINT * light.allowed,
+        darts=False,
+        # All lengths are in the design's unit, whatever that is.
+        sheet=request.sheet,
+        keep=request.kept if len(request.kept) else None,
+        workers=request.workers,
+        callback=request.say,
+    )
+    if any(sheet is None for sheet in found.sheets):
+        raise MeshError(f"a piece cannot be laid flat; {'; '.join(map(str, found.reasons))}")
+    return _Joint(light.design, found, found.result, found.sheets)
+
+
+def _together(light: LightDesign, request: StripsRequest, division: Pieces) -> _Joint:
+    """Solve given pieces together."""
+    request.say("joint solve")
+    far = None if light.allowed is None else _JOINT * light.allowed
+    joint = check("developable", max_deviation=far, x0=request.start, verdict=False)
+    joint = joint.with_options(joint.options.for_pieces())
+    result = solve_pieces(division, joint, request.constraints, request.callback)
+    return _Joint(light.design, division if result.pieces is None else result.pieces, result, ())
+
+
+def _distance_left(joint: _Joint, request: StripsRequest, light: LightDesign) -> float | None:
+    """Return the distance within which strips follow the pieces; None for any."""
+    allowed = light.allowed
+    if allowed is None:
+        return None if request.options.number else _NEAR * joint.design.diagonal
+    away = metrics.surface_distance(light.mesh, joint.shape.design)
+    return max(allowed - max(away.there_max, away.back_max), _FOLLOW * allowed)
+
+
+def _of_each(
+    shape: Pieces, request: StripsRequest, follow: float | None
+) -> list[Result | GSOError]:
+    """Make strips of each piece."""
+    # The pieces are developable already: their own normals give the rulings.
+    options = replace(request.options, starts=("design",))
+    own = replace(request, options=options, constraints=(), start=Start(None))
+    meshes = [piece.mesh for piece in shape]
+    if request.callback is not None or len(meshes) < _MANY:
+        out = []
+        for number, mesh in enumerate(meshes):
+            request.say(f"strips of piece {number + 1} of {len(meshes)}")
+            told = _numbered(request.callback, number, len(meshes))
+            out.append(_strips(replace(own, callback=told), follow, mesh))
+        return out
+    work = partial(_strips, replace(own, say=silent), follow)
+    found: dict[int, Result | GSOError] = {}
+    with open_executor(request.workers) as executor:
+        for done in executor.as_completed(work, meshes):
+            found[done.index] = done.result or MeshError(str(done.error))
+            request.say(f"strips of piece {len(found)} of {len(meshes)}")
+    return [found[k] for k in range(len(meshes))]
+
+
+def _strips(request: StripsRequest, follow: float | None, mesh: Mesh) -> Result | GSOError:
+    """Make strips of one piece; return an error, so that it keeps its type."""
+    try:
+        check_whole(mesh)
+        return of_surface(mesh, request, follow)
+    except GSOError as error:
+        return error
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What a piece became: its surface, how many strips it has, and the reasons against it."""
+
+    surface: RuledSurface
+    strips: int
+    status: Status
+    reasons: tuple[Reason, ...]
+    iterations: int = 0
+
+
+def _part(joint: _Joint, request: StripsRequest, number: int, made: Result | GSOError) -> _Part:
+    """Choose between the strips of a piece and the pattern of the joint solve."""
+    name, sheet = joint.shape.name(number), None
+    free = request.options.number is None and request.max_deviation is not None
+    good = isinstance(made, StripsResult) and not made.status.is_failure
+    if free and not good:
+        sheet = joint.pattern(number)
+    if sheet is not None:
+        return _as_it_is(name, sheet, request)
+    if not isinstance(made, StripsResult):
+        why = made if isinstance(made, GSOError) else MeshError("the solve was ended")
+        raise type(why)(f"piece {name}: {why}")
+    # What counts is the distance of the whole from the design.
+    met = wanted(request.options, None, 1.0).met(made.ruled)
+    status = Status.CONVERGED if met and made.status is Status.TARGET_MISSED else made.status
+    made = replace(made, status=status)
+    reasons = tuple(why.within(f"piece {name}") for why in judge(made, Limits()))
+    return _Part(made.ruled, made.ruled.strips, status, reasons, made.iterations)
+
+
+def _as_it_is(name: str, sheet: Sheet, request: StripsRequest) -> _Part:
+    """Return a piece with the pattern of the joint solve, without rulings."""
+    count = len(sheet.mesh.faces)
+    none = Folds(np.empty((0, 2), np.int64), np.empty(0), np.empty(0))
+    surface = RuledSurface(
+        mesh=sheet.mesh,
+        strip=np.zeros(count, np.int64),
+        flat=np.zeros(count, bool),
+        rulings=none,
+        creases=none,
+        pattern=Pattern.whole(sheet.mesh, sheet.flat),
+        moved=sheet.mesh.vertices,
+        crossed=0,
+    )
+    measured = {
+        Code.PATTERN_INVERTED: Measurement.count("face", sheet.inverted),
+        Code.PATTERN_OVERLAPS: Measurement.count("face", faults.overlaps(sheet.mesh, sheet.flat)),
+        Code.STRAIN: Measurement(sheet.strain),
+        Code.BEND_RADIUS: Measurement(smallest_radius(sheet.mesh)),
+    }
+    limits = {Code.STRAIN: request.max_strain, Code.BEND_RADIUS: request.options.min_radius}
+    reasons = tuple(why.within(f"piece {name}") for why in compare(measured, limits))
+    return _Part(surface, 0, Status.CONVERGED, reasons)
+
+
+def _merged(joint: _Joint, request: StripsRequest, parts: Sequence[_Part]) -> StripsResult:
+    """Merge the parts into one result, and judge it as a whole."""
+    design, opened = joint.design, joint.shape.opened
+    surface = together([part.surface for part in parts], design)
+    surface = replace(surface, deviation=_distances(design, surface))
+    points = opened.mesh.vertices.copy()
+    for own, part in zip(joint.shape.parts, parts, strict=True):
+        points[own.vertices] = part.surface.moved
+    apart = gap(opened.mesh.replaced(points), opened.seams)
+    numbers = [part.strips for part in parts]
+    first = joint.first
+    note = (
+        f"both sides of a seam are up to {length(apart)} apart, as strips follow the joint result "
+        f"within a distance; number of strips of each piece: {', '.join(map(str, numbers))}"
+    )
+    return StripsResult(
+        task="developable",
+        formulation=RULED,
+        design=design,
+        status=worst_status([first.status, *(part.status for part in parts)]),
+        iterations=first.iterations + sum(part.iterations for part in parts),
+        energy=first.energy,
+        history=first.history,
+        backend=first.backend,
+        warm_start=first.warm_start,
+        notes=(*design.notes, note),
+        details={**first.details, "strips": numbers, "seam_gap": apart},
+        pieces=joint.shape,
+        **StripsResult.attributes(surface),
+    )
+
+
+def _reasons(
+    result: StripsResult, request: StripsRequest, parts: Sequence[_Part]
+) -> tuple[Reason, ...]:
+    """Return why strips of pieces are not usable as what was asked for."""
+    whole = {Code.DEVIATION: result.ruled.farthest, Code.SEAM_GAP: result.details["seam_gap"]}
+    own = [why for part in parts for why in part.reasons]
+    return ordered([*own, *compare(whole, dict.fromkeys(whole, request.max_deviation))])
+
+
+def _cancelled(joint: _Joint) -> Result:
+    """Return the joint result, as the solve was ended before there were strips."""
+    notes = (*joint.first.notes, "the solve was ended before there were strips")
+    return replace(joint.first, formulation=RULED, status=Status.CANCELLED, notes=notes)
+
+
+def _distances(design: Mesh, surface: RuledSurface) -> metrics.Distances:
+    """Measure the distances between strips and the whole design; gaps at seams are apart."""
+    points, weight = surface.samples()
+    there = metrics.point_to_surface(points, design)
+    back = metrics.point_to_surface(design.vertices[design.used], surface.mesh)
+    rim = metrics.boundary_distance(design, surface.mesh)[1] if design.boundary_loops else 0.0
+    return metrics.Distances(
+        float(weight @ there), float(there.max()), float(back.mean()), max(float(back.max()), rim)
+    )
+
+
+def _numbered(callback: Callback | None, place: int, count: int) -> Callback | None:
+    if callback is None:
+        return None
+
+    def call(progress: Progress) -> Any:
+        return callback(renumber(progress, place, count, "piece"))
+
+    return call

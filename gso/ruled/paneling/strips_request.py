@@ -1,0 +1,77 @@
+"""What is asked of strips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gso.constraints import Constraint
+from gso.ruled.paneling.options import Options
+from gso.seams.options import CHANGES
+from gso.solver import Callback
+from gso.tasks.request import Limits
+from gso.tasks.start import Start
+from gso.typing import Ints
+
+
+def _no_edges() -> Ints:
+    return np.empty((0, 2), np.int64)
+
+
+def silent(said: str) -> None:
+    """Say nothing."""
+
+
+@dataclass(frozen=True)
+class StripsRequest:
+    """What is asked of strips, in the design's unit.
+
+    Attributes
+    ----------
+    options : Options
+    limits : Limits
+        The strain is that of pieces that no strips follow.
+    sheet : (float, float) or None
+        Length and width of a sheet that every part must fit on.
+    kept : ndarray of int, (k, 2)
+        Edges of the design that are cut in any case.
+    constraints : sequence of Constraint
+    start : Start
+    verdict : bool
+        Whether to judge the result.
+    workers : int or None
+        Number of processes for the pieces of a design; None for one for each processor.
+    callback : callable or None
+        Called after every iteration.
+    say : callable
+        Called with what is being done, in words.
+    """
+
+    options: Options
+    limits: Limits = field(default_factory=Limits)
+    sheet: tuple[float, float] | None = None
+    kept: Ints = field(default_factory=_no_edges)
+    constraints: Sequence[Constraint] = ()
+    start: Start = field(default_factory=Start)
+    verdict: bool = True
+    workers: int | None = 0
+    callback: Callback | None = None
+    say: Callable[[str], None] = silent
+
+    @property
+    def max_deviation(self) -> float | None:
+        """Largest distance from the design, both ways."""
+        return self.limits.max_deviation
+
+    @property
+    def max_strain(self) -> float:
+        """Largest strain of pieces that no strips follow, which keep their joint pattern."""
+        given = self.limits.max_strain
+        return CHANGES if given is None else given
+
+    @property
+    def names_vertices(self) -> bool:
+        """Whether it refers to vertices of the design."""
+        return bool(len(self.kept) or self.constraints or self.start.points is not None)

@@ -1,0 +1,252 @@
+"""Strips of one surface: first rulings from its normals and from those of a developable surface."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from gso import parametrization
+from gso.constraints import Compiled, compile_constraints
+from gso.constraints.equations import OnPlane, Pins, Relations, Straight
+from gso.errors import MeshError, OptionError
+from gso.mesh import Mesh
+from gso.mesh.normals import vertex_normals
+from gso.pipeline.case import Case
+from gso.pipeline.run import Run
+from gso.pipeline.user_result import pack, record_violations
+from gso.result import Result, StripsResult
+from gso.ruled.conditions import Conditions
+from gso.ruled.domain import Domain
+from gso.ruled.paneling.options import RULED, Options
+from gso.ruled.paneling.strips_request import StripsRequest
+from gso.ruled.ruled_surface import RuledSurface
+from gso.ruled.solve import Found, Wanted, solve
+from gso.ruled.strip_mirror import Mirror
+from gso.solver.minimiser import says_no
+from gso.status import Progress, Status
+from gso.tasks.base import Solution
+from gso.tasks.developable import Options as DevelopableOptions
+from gso.tasks.request import Request
+from gso.typing import Array
+
+#: Distance of vertices from their places, relative to the diagonal, that counts as zero.
+_SAME = 1e-9
+#: Angle of a fold, in degrees, that a note is made of.
+_SHARP = 45.0
+#: Radius that the solve keeps, relative to the smallest one.
+_SAFE = 1.6
+
+
+def wanted(options: Options, bound: float | None, size: float) -> Wanted:
+    """Return what strips have to be, with lengths relative to a size."""
+    number = options.number
+    if options.strips is None and bound is None and options.max_crease is None:
+        number = 1
+    return Wanted(
+        number,
+        options.rulings,
+        options.flats,
+        None if bound is None else bound / size,
+        None if options.max_crease is None else float(np.radians(options.max_crease)),
+        None if options.min_radius is None else options.min_radius / size,
+        options.max_strips,
+    )
+
+
+def check_whole(mesh: Mesh) -> None:
+    """Raise a MeshError unless a surface is a disk, possibly with holes."""
+    if len(np.unique(mesh.components[mesh.used])) > 1:
+        raise MeshError(
+            f"strips take one surface, and this mesh has {mesh.components.max() + 1} components: "
+            "make those of each on its own"
+        )
+    if not parametrization.flattens(mesh) or parametrization.opened(mesh).cut is not None:
+        raise MeshError(
+            "strips need a surface with a boundary that does not close around itself and has no "
+            "handles; cut it open (gso.cut), give max_deviation, so that it is cut into pieces, or "
+            "take the formulation 'curvature'"
+        )
+
+
+def of_surface(design: Mesh, request: StripsRequest, bound: float | None) -> Result:
+    """Make strips near a surface, without a verdict.
+
+    Parameters
+    ----------
+    design : Mesh
+        A disk, possibly with holes; see :func:`check_whole`.
+    request : StripsRequest
+    bound : float or None
+        Largest distance from the design, in its unit, that the number of strips is chosen for.
+
+    Returns
+    -------
+    Result
+        A :class:`StripsResult`, or none if the callback ended the solve before there were strips.
+
+    Raises
+    ------
+    OptionError
+        A constraint is none that strips can meet.
+    """
+    options = request.options
+    case = case_of(design, request)
+    frame, compiled = case.frame, case.analysis.constraints
+    _check(compiled, options)
+    begun, run = _begin(case, request)
+    if begun.status is Status.CANCELLED:
+        return pack(run, begun)
+    clock = time.perf_counter()
+    size, mesh, near = frame.mesh.diagonal, frame.mesh, begun.points
+    pins, targets = compiled.pinned_positions
+    # Where constraints move vertices, the surface that meets them is the design.
+    same = np.abs(targets - mesh.vertices[pins]).max(initial=0.0) <= _SAME * size
+    target = _symmetric(compiled, mesh.vertices if same else near)
+    scaled = mesh.replaced(target / size)
+    domain = Domain(scaled, parametrization.begin(scaled).flat)
+    starts = {"design": domain.normals} if "design" in options.starts else {}
+    if not np.array_equal(near, target):
+        name = "curvature" if request.start.points is None else "x0"
+        starts[name] = vertex_normals(mesh.replaced(near))
+    aim = wanted(options, bound, size * frame.scale)
+    conditions = _conditions(compiled, domain, size, aim.min_radius)
+    stopped = False
+
+    def told(iteration: int, iterations: int, energy: float, count: int) -> bool:
+        nonlocal stopped
+        progress = Progress(0, 1, iteration, iterations, energy, {}, 1.0, f"strips: {count}")
+        stopped = request.callback is not None and says_no(request.callback(progress))
+        return not stopped
+
+    found, tried = solve(domain, starts or {"design": domain.normals}, aim, told, conditions)
+    if found is None:
+        begun.status = Status.CANCELLED
+        return pack(run, begun)
+    status = (
+        Status.TARGET_MISSED if aim.bounded and not aim.met(found.surface) else Status.CONVERGED
+    )
+    surface = _placed(found, compiled, conditions, size)
+    moved = surface.moved
+    surface = surface.transformed(
+        frame.frame.to_user, frame.scale, lambda rows: frame.back("surface", rows)
+    )
+    sharpest = np.degrees(surface.rulings.largest_angle)
+    notes = design.notes
+    if sharpest > _SHARP:
+        notes += (
+            f"the surface folds by {sharpest:.0f} degrees at one ruling; more strips, or "
+            "min_radius, bend it more gently",
+        )
+    result = StripsResult(
+        task="developable",
+        formulation=RULED,
+        design=design,
+        status=Status.CANCELLED if stopped else status,
+        iterations=run.iterations,
+        energy={"distance": found.mean},
+        history=run.history,
+        seconds=run.timings.as_dict() | {"strips": time.perf_counter() - clock},
+        backend=begun.backend,
+        warm_start="cold" if request.start.points is None else request.start.source,
+        notes=notes,
+        details={"strips": surface.strips, "rulings_from": found.start, "tried": _said(tried)},
+        **StripsResult.attributes(surface),
+    )
+    record_violations(case, moved, result)
+    return result
+
+
+def case_of(design: Mesh, request: StripsRequest) -> Case:
+    """Return the solve for a surface near a design whose normals the first rulings follow."""
+    options = request.options
+    settings = DevelopableOptions(
+        method=options.method, backend=options.backend, threads=options.threads
+    )
+    own = Request("developable", "curvature", settings, start=request.start, verdict=False)
+    return Case(own, design, compile_constraints(request.constraints, design, flat=False))
+
+
+def _begin(case: Case, request: StripsRequest) -> tuple[Solution, Run]:
+    """Return a surface near the design whose normals rulings may follow, in the solver's frame."""
+    run, points = Run(case, request.callback), case.solver_request.x0
+    needed = "curvature" in request.options.starts or not case.constraints.empty
+    if points is None and needed:
+        solution = run(case.solver_request)
+    else:
+        points = case.analysis.mesh.vertices if points is None else points
+        energy = {"objective": 0.0}
+        solution = Solution({"surface": points}, Status.CONVERGED, energy, points.ravel())
+    solution.formulation = RULED
+    return solution, run
+
+
+def _check(compiled: Compiled, options: Options) -> None:
+    """Raise an OptionError if there are constraints that strips cannot meet."""
+    plane = _mirror(compiled)
+    for part in compiled.parts:
+        mirrored = plane is not None and isinstance(part, OnPlane | Relations)
+        if not (isinstance(part, Pins | Straight) or mirrored):
+            raise OptionError(
+                f"{compiled.names[part.owner]}: strips take Fixed, FixedBoundary, Handle, Ruling "
+                "and one SymmetryPlane; leave it out, or take the formulation 'curvature'"
+            )
+    if plane is not None and options.flats:
+        raise OptionError("flats=True does not go with a SymmetryPlane; leave one of them out")
+
+
+def _conditions(
+    compiled: Compiled, domain: Domain, size: float, radius: float | None
+) -> Conditions:
+    """Return constraints and the smallest radius as conditions, relative to the diagonal."""
+    targets = compiled.pinned_positions[1]
+    beams = [part for part in compiled.parts if isinstance(part, Straight)]
+    plane = _mirror(compiled)
+    return Conditions(
+        points=targets / size if len(targets) else None,
+        lines=np.array([b.ends for b in beams]) / size if beams else None,
+        chords=np.array([domain.flat[b.ids[[0, -1]]] for b in beams]) if beams else None,
+        mirror=None if plane is None else Mirror(plane.normal, plane.offset / size),
+        radius=None if radius is None else _SAFE * radius,
+    )
+
+
+def _placed(found: Found, compiled: Compiled, conditions: Conditions, size: float) -> RuledSurface:
+    """Return a surface in the solver's frame, with the design's vertices where constraints say."""
+    surface = found.surface.transformed(lambda points: size * points, size, lambda rows: rows)
+    moved = surface.moved.copy()
+    for part in compiled.parts:
+        if isinstance(part, Straight):
+            moved[part.ids] = surface.on_ruling(part.ends, moved[part.ids])
+    if conditions.mirror is not None and conditions.mirror.partners(found.ends) is not None:
+        # Vertices on the plane may be as near to a point as to its image.
+        moved = _symmetric(compiled, moved)
+    return replace(surface, moved=moved)
+
+
+def _mirror(compiled: Compiled) -> OnPlane | None:
+    """Return the plane of a single symmetry; None if there is none."""
+    owners = {p.owner for p in compiled.parts if isinstance(p, Relations) and not p.is_glue}
+    planes = [p for p in compiled.parts if isinstance(p, OnPlane) and p.owner in owners]
+    return planes[0] if len(owners) == len(planes) == 1 else None
+
+
+def _symmetric(compiled: Compiled, points: Array) -> Array:
+    """Return points moved to the nearest symmetric places, if there is a plane of symmetry."""
+    out = points.copy()
+    for part in compiled.parts if _mirror(compiled) is not None else ():
+        if isinstance(part, Relations):
+            one, other = points[part.first], points[part.second]
+            image = part.anchor + (other - part.anchor) @ part.matrix
+            out[part.first] = 0.5 * (one + image)
+            out[part.second] = part.anchor + (out[part.first] - part.anchor) @ part.matrix.T
+        elif isinstance(part, OnPlane):
+            off = (points[part.ids] - part.anchor) @ part.normal
+            out[part.ids] -= np.outer(off, part.normal)
+    return out
+
+
+def _said(tried: dict[int, float]) -> str:
+    """Format the largest distances by number of strips."""
+    return "; ".join(f"{k}: {100 * far:.3g} %" for k, far in sorted(tried.items()))

@@ -1,0 +1,91 @@
+"""Panels of a pattern: one for each of its connected parts."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gso.components import split
+from gso.errors import MeshError
+from gso.mesh import Mesh
+from gso.pattern import Folded, Pattern
+from gso.result import Result
+from gso.typing import Array, Ints
+from gso.workshop.matings import across, numbered, of_pattern
+from gso.workshop.panels import Made, Panel
+
+
+def of_surface(name: str, surface: Mesh, pattern: Pattern, record: dict[str, Any]) -> Made:
+    """Divide a surface with a pattern into panels.
+
+    Parameters
+    ----------
+    name : str
+        Panels are called NAME-1, NAME-2 and so on, the largest first; a single one NAME.
+    surface : Mesh
+    pattern : Pattern
+    record : dict
+        What was measured.
+    """
+    panels, label, local = _divided(surface.vertices, pattern, Folded())
+    matings = of_pattern(surface.vertices, pattern, label, local)
+    return Made(name, _named(panels, [name] * len(panels)), numbered(matings), record)
+
+
+def of_result(name: str, result: Result, record: dict[str, Any]) -> Made:
+    """Divide a result into panels with bend lines; of piece A of several they are NAME-A-1 etc."""
+    pattern, points, pieces = result.pattern, result.mesh.vertices, result.pieces
+    if pattern is None:
+        raise MeshError(f"{name}: there is no pattern")
+    panels, label, local = _divided(points, pattern, result.folded)
+    matings, names = of_pattern(points, pattern, label, local), [name] * len(panels)
+    if pieces is not None:
+        first = [np.flatnonzero(label[pattern.faces[:, 0]] == k)[0] for k in range(len(panels))]
+        owner = result.piece_of_face[first].tolist()
+        matings += across(pieces, owner, panels, _rims(panels, pattern, label, local))
+        if len(pieces) > 1:
+            names = [f"{name}-{pieces.name(k)}" for k in owner]
+    return Made(name, _named(panels, names), numbered(matings), record)
+
+
+def _named(panels: list[Panel], names: list[str]) -> tuple[Panel, ...]:
+    """Name panels; those with the same name are numbered from 1 on."""
+    count, seen = Counter(names), Counter[str]()
+    out = []
+    for panel, name in zip(panels, names, strict=True):
+        seen[name] += 1
+        out.append(replace(panel, name=f"{name}-{seen[name]}" if count[name] > 1 else name))
+    return tuple(out)
+
+
+def _divided(points: Array, pattern: Pattern, folded: Folded) -> tuple[list[Panel], Ints, Ints]:
+    """Return the panels of a pattern, and the panel and the number in it of each vertex."""
+    parts = sorted(split(pattern.mesh), key=lambda part: -part.area)
+    label, local = (np.full(len(pattern.flat), -1) for _ in range(2))
+    for number, part in enumerate(parts):
+        label[part.vertices], local[part.vertices] = number, np.arange(len(part.vertices))
+    panels = []
+    for number, part in enumerate(parts):
+        own = label[folded.edges[:, 0]] == number
+        surface = part.mesh.replaced(points[pattern.vertex[part.vertices]])
+        lines = local[folded.edges[own]], folded.angles[own], folded.radii[own]
+        panels.append(Panel("", surface, pattern.flat[part.vertices], *lines))
+    return panels, label, local
+
+
+def _rims(panels: list[Panel], pattern: Pattern, label: Ints, local: Ints) -> list[Ints]:
+    """Return the edges of each panel's outline that are no seam of the pattern."""
+    ends = pattern.seams.reshape(-1, 2)
+    out = []
+    for number, panel in enumerate(panels):
+        n = len(panel.flat)
+        rim = np.concatenate(
+            [np.stack([loop, np.roll(loop, -1)], axis=1) for loop in panel.surface.boundary_loops]
+        )
+        own = np.sort(local[ends[label[ends[:, 0]] == number]], axis=1) @ np.array([n, 1])
+        keys = np.sort(rim, axis=1) @ np.array([n, 1])
+        out.append(rim[~np.isin(keys, own)])
+    return out
