@@ -43,7 +43,7 @@ def tables() -> dict[str, str]:
                 table = option_table(formulation.options, shared=shared)
                 found[f"options-{task}-{name}"] = table
     # Strips are no formulation of the task, although they are called like one.
-    found["options-developable-ruled"] = option_table(RuledOptions, shared=shared)
+    found["options-strips"] = option_table(RuledOptions, shared=shared)
     for task, metric in (("developable", "K_A_r_worst"), ("flatten", "strain_mean")):
         found[f"splits-{task}"] = split_table(task, metric)
     if RESULTS.exists():

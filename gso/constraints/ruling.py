@@ -16,13 +16,13 @@ from gso.mesh.polyline import Polylines
 class Ruling(Constraint):
     """Vertices that lie on the straight line from the first to the last, such as those on a beam.
 
-    The line goes through the places of both ends in the design. In the formulation "ruled" it is
+    The line goes through the places of both ends in the design. In :func:`gso.strips` it is
     a ruling, or a part of one, also between and beyond the vertices.
 
     Parameters
     ----------
     ids : array_like of int, (k,)
-        Vertex indices, two or more; for the formulation "ruled" both ends are enough.
+        Vertex indices, two or more; for strips both ends are enough.
 
     Examples
     --------
@@ -30,7 +30,7 @@ class Ruling(Constraint):
     >>> u, v = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
     >>> roof = gso.as_mesh(np.stack([u, v, 0.2 * u * u - 0.05 * v], axis=-1))
     >>> beam = gso.Ruling([5 * 17, 5 * 17 + 16])
-    >>> result = gso.tno.optimize(roof, formulation="ruled", constraints=[beam])
+    >>> result = gso.strips(roof, constraints=[beam])
     >>> max(result.details["constraints"].values()) < 1e-6
     True
     """

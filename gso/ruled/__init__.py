@@ -6,5 +6,6 @@ A design is a function on its flat image (:mod:`~gso.ruled.domain`), continued b
 (:mod:`~gso.ruled.strip_energy`) of the strips (:mod:`~gso.ruled.strip_layout`), which are then cut
 along the outline (:mod:`~gso.ruled.trim`) and unrolled (:mod:`~gso.ruled.unroll`). Constraints are
 :mod:`~gso.ruled.conditions` on the strips. :mod:`gso.ruled.smooth` makes smooth strips of them.
-:func:`gso.ruled.solve.solve` does all of it; formulation "ruled" of the developable task calls it.
+:func:`gso.ruled.solve.solve` does all of it; :mod:`gso.ruled.paneling` asks it, with designs and
+pieces of designs.
 """

@@ -188,20 +188,23 @@ class RuledSurface:
         weight = np.r_[(area / count)[at], np.zeros(len(border))]
         return np.concatenate([inner, border, v]), np.r_[weight, np.zeros(len(v))] / area.sum()
 
-    def distances(self, design: Mesh) -> metrics.Distances:
+    def distances(self, design: Mesh, *, parts: bool = False) -> metrics.Distances:
         """Measure the distances from a design, in its unit, all over both surfaces.
 
         "There" is from the surface to the design, "back" from the design's vertices to it. The
         largest distances include those between the boundary curves, so that a slit counts with
-        its depth.
+        its depth; with `parts`, for surfaces that meet inside the design, only those from the
+        design's boundary.
         """
         points, weight = self.samples()
         there = metrics.point_to_surface(points, design)
         back = metrics.point_to_surface(design.vertices[design.used], self.mesh)
-        rim_there, rim_back = metrics.boundary_distance(design, self.mesh)
+        rim_there, rim_back = 0.0, 0.0
+        if not parts or design.boundary_loops:
+            rim_there, rim_back = metrics.boundary_distance(design, self.mesh)
         return metrics.Distances(
             float(weight @ there),
-            max(float(there.max()), rim_there),
+            float(there.max()) if parts else max(float(there.max()), rim_there),
             float(back.mean()),
             max(float(back.max()), rim_back),
         )

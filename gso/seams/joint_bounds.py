@@ -51,8 +51,8 @@ def within(
 
     if not isinstance(options, Options):
         raise OptionError(
-            "max_deviation of a design in pieces goes with the formulations 'curvature' and "
-            "'ruled'; take one of them"
+            "max_deviation of a design in pieces goes with the formulation 'curvature', or with "
+            "gso.strips"
         )
     tried: dict[float, Result] = {}
 

@@ -42,6 +42,8 @@ _JOINT, _FOLLOW = 0.9, 0.1
 #: Distance within which strips follow the joint result where none is given, relative to the
 #: diagonal.
 _NEAR = 0.01
+_MOST = 64
+_UPTO = 0.25
 #: Number of pieces from which on processes make their strips.
 _MANY = 8
 
@@ -164,7 +166,8 @@ def _distance_left(joint: _Joint, request: StripsRequest, light: LightDesign) ->
     if allowed is None:
         return None if request.options.number else _NEAR * joint.design.diagonal
     away = metrics.surface_distance(light.mesh, joint.shape.design)
-    return max(allowed - max(away.there_max, away.back_max), _FOLLOW * allowed)
+    left = allowed - max(away.there_max, away.back_max)
+    return float(np.clip(left, _FOLLOW * allowed, _UPTO * allowed))
 
 
 def _of_each(
@@ -172,7 +175,9 @@ def _of_each(
 ) -> list[Result | GSOError]:
     """Make strips of each piece."""
     # The pieces are developable already: their own normals give the rulings.
-    options = replace(request.options, starts=("design",))
+    options = replace(
+        request.options, starts=("design",), max_strips=min(_MOST, request.options.max_strips)
+    )
     own = replace(request, options=options, constraints=(), start=Start(None))
     meshes = [piece.mesh for piece in shape]
     if request.callback is not None or len(meshes) < _MANY:
@@ -260,17 +265,23 @@ def _merged(joint: _Joint, request: StripsRequest, parts: Sequence[_Part]) -> St
     """Merge the parts into one result, and judge it as a whole."""
     design, opened = joint.design, joint.shape.opened
     surface = together([part.surface for part in parts], design)
-    surface = replace(surface, deviation=_distances(design, surface))
+    surface = replace(surface, deviation=surface.distances(design, parts=True))
     points = opened.mesh.vertices.copy()
     for own, part in zip(joint.shape.parts, parts, strict=True):
         points[own.vertices] = part.surface.moved
     apart = gap(opened.mesh.replaced(points), opened.seams)
     numbers = [part.strips for part in parts]
     first = joint.first
-    note = (
+    notes = [
         f"both sides of a seam are up to {length(apart)} apart, as strips follow the joint result "
         f"within a distance; number of strips of each piece: {', '.join(map(str, numbers))}"
-    )
+    ]
+    if 0 in numbers:
+        bare = ", ".join(joint.shape.name(k) for k, n in enumerate(numbers) if n == 0)
+        notes.append(
+            f"no strips follow these pieces closely enough: {bare}; they have no bend lines, and "
+            "are nearly developable"
+        )
     return StripsResult(
         task="developable",
         formulation=RULED,
@@ -281,7 +292,7 @@ def _merged(joint: _Joint, request: StripsRequest, parts: Sequence[_Part]) -> St
         history=first.history,
         backend=first.backend,
         warm_start=first.warm_start,
-        notes=(*design.notes, note),
+        notes=(*design.notes, *notes),
         details={**first.details, "strips": numbers, "seam_gap": apart},
         pieces=joint.shape,
         **StripsResult.attributes(surface),
@@ -301,17 +312,6 @@ def _cancelled(joint: _Joint) -> Result:
     """Return the joint result, as the solve was ended before there were strips."""
     notes = (*joint.first.notes, "the solve was ended before there were strips")
     return replace(joint.first, formulation=RULED, status=Status.CANCELLED, notes=notes)
-
-
-def _distances(design: Mesh, surface: RuledSurface) -> metrics.Distances:
-    """Measure the distances between strips and the whole design; gaps at seams are apart."""
-    points, weight = surface.samples()
-    there = metrics.point_to_surface(points, design)
-    back = metrics.point_to_surface(design.vertices[design.used], surface.mesh)
-    rim = metrics.boundary_distance(design, surface.mesh)[1] if design.boundary_loops else 0.0
-    return metrics.Distances(
-        float(weight @ there), float(there.max()), float(back.mean()), max(float(back.max()), rim)
-    )
 
 
 def _numbered(callback: Callback | None, place: int, count: int) -> Callback | None:

@@ -1,0 +1,212 @@
+"""Strips of designs: one way for all callers, as a whole or in pieces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gso
+from gso.components import split
+from gso.mesh import Mesh
+from gso.result import StripsResult
+from gso.ruled.paneling.lay_strips import lay_strips
+from gso.ruled.paneling.light_design import LightDesign
+from gso.ruled.paneling.options import Options
+from gso.ruled.paneling.strips_request import StripsRequest
+from tests.conftest import cylinder, saddle
+from tests.test_pieces import ball, dome
+
+FAST = {"options": "fast"}
+
+
+def cap(count: int = 21) -> Mesh:
+    """A dome that one strip does not follow within 2 % of its diagonal, and three do."""
+    u, v = np.meshgrid(*[np.linspace(-1.0, 1.0, count)] * 2, indexing="ij")
+    return gso.as_mesh(np.stack([u, v, 0.5 - 0.25 * (u * u + v * v)], axis=-1))
+
+
+def areas(result: gso.Result) -> np.ndarray:
+    """Areas of the parts of the pattern, in order."""
+    return np.sort([part.area for part in split(result.pattern.mesh)])
+
+
+@pytest.fixture(scope="module")
+def made():
+    """Strips of a dome within 2 %, and that distance."""
+    design = cap()
+    allowed = 0.02 * design.diagonal
+    return gso.strips(design, max_deviation=allowed), allowed
+
+
+@pytest.fixture(scope="module")
+def pieces():
+    """Strips of a closed surface, which is cut into pieces, and the distance allowed."""
+    allowed = 0.05 * ball(10).diagonal
+    return gso.strips(ball(10), max_deviation=allowed), allowed
+
+
+def ways(design: Mesh, allowed: float):
+    yield gso.tno.optimize(design, formulation="ruled", max_deviation=allowed)
+    yield gso.tno.optimize(design, options=gso.RuledOptions(), max_deviation=allowed)
+    for darts in (True, False):
+        found = gso.pieces(design, max_strain=1e-3, max_deviation=allowed, darts=darts)
+        yield gso.strips(found, max_deviation=allowed)
+
+
+def test_all_ways_give_the_same_strips_and_one_verdict(made, tmp_path):
+    wanted, allowed = made
+    assert wanted.usable and wanted.pieces is None
+    assert 1 < wanted.ruled.strips < 6
+    assert wanted.ruled.farthest <= allowed
+    for other in ways(wanted.design, allowed):
+        assert (other.usable, other.reasons, other.status) == (True, (), wanted.status)
+        np.testing.assert_array_equal(other.mesh.vertices, wanted.mesh.vertices)
+        np.testing.assert_array_equal(other.pattern.flat, wanted.pattern.flat)
+        assert other.metrics == wanted.metrics
+    job = gso.fabricate(wanted.design, tmp_path, max_deviation=allowed, formats=("svg",), workers=0)
+    assert job.usable
+    (record,) = job.certificate["designs"]
+    assert record["strips"] == [wanted.ruled.strips]
+    assert record["deviation_max"] == pytest.approx(wanted.ruled.farthest, rel=1e-12)
+    np.testing.assert_allclose(np.sort([part.area for part in job.parts]), areas(wanted), rtol=1e-9)
+
+
+def test_a_closed_design_is_cut_into_pieces_without_darts(pieces, tmp_path):
+    result, allowed = pieces
+    assert isinstance(result, StripsResult)
+    assert result.usable, result.reasons
+    numbers = result.details["strips"]
+    assert len(result.pieces) == len(numbers) > 1
+    assert (result.pieces.sides[:, 0] != result.pieces.sides[:, 1]).all()
+    assert result.ruled.strips == sum(max(n, 1) for n in numbers)
+    assert result.details["seam_gap"] <= allowed
+    away = gso.metrics.surface_distance(result.design, result.mesh)
+    assert away.there_max <= result.ruled.farthest * (1 + 1e-9) <= allowed
+    # Its vertices are those of the design, in their order.
+    assert result.on_design().vertices.shape == result.design.vertices.shape
+    assert gso.metrics.point_to_surface(result.on_design().vertices, result.mesh).max() < 1e-9
+    owner = result.piece_of_face
+    assert np.unique(owner).tolist() == list(range(len(numbers)))
+    strained = max(result.metrics["strain_max"], 0.0)
+    assert strained < (1e-6 if all(numbers) else 0.01)
+    result.save(tmp_path / "a.npz")
+    again = gso.Result.load(tmp_path / "a.npz")
+    assert isinstance(again, StripsResult)
+    assert again.usable and len(again.pieces) == len(numbers)
+    np.testing.assert_array_equal(again.pieces.opened.seams, result.pieces.opened.seams)
+    np.testing.assert_array_equal(again.on_design().vertices, result.on_design().vertices)
+    assert again.metrics == pytest.approx(result.metrics)
+
+
+def test_a_closed_design_needs_a_distance():
+    with pytest.raises(gso.MeshError, match=r"boundary.*max_deviation"):
+        gso.strips(ball(8))
+
+
+def test_given_pieces_stay_and_one_piece_is_the_whole():
+    design = dome(9, height=0.3)
+    middle = gso.cut(design, gso.seams.Path([4, 76]))
+    allowed = 0.05 * design.diagonal
+    halves = gso.strips(middle, max_deviation=allowed, **FAST)
+    assert len(halves.pieces) == 2
+    assert len(halves.details["strips"]) == 2
+    named = gso.strips(middle, strips=2, **FAST)
+    assert named.details["strips"] == [2, 2] and named.ruled.strips == 4
+    # A dart divides nothing.
+    dart = gso.cut(design, gso.seams.Path([4, 40]))
+    assert len(dart) == 1
+    one, whole = (gso.strips(d, max_deviation=allowed, **FAST) for d in (dart, design))
+    assert one.pieces is None
+    np.testing.assert_array_equal(one.mesh.vertices, whole.mesh.vertices)
+
+
+def test_edges_that_are_kept_are_cut():
+    design = cap(9)
+    kept = gso.cut(design, gso.seams.Path([4, 76])).edges
+    request = Request(Options.preset("fast"), 0.05 * design.diagonal, kept=kept)
+    result = lay_strips(design, request)
+    assert len(result.pieces) >= 2
+    ends = result.pieces.design.vertices[result.pieces.edges].mean(axis=1)
+    assert np.abs(ends[:, 1]).min() < 0.05
+
+
+def test_a_named_number_of_strips_is_not_exceeded():
+    design = cap(11)
+    with pytest.warns(gso.ConvergenceWarning):
+        result = gso.strips(design, strips=1, max_deviation=1e-4, **FAST)
+    assert result.ruled.strips == 1 and result.pieces is None
+    assert result.status is gso.Status.TARGET_MISSED
+
+
+def test_the_closest_is_returned_where_nothing_holds():
+    design = cap(9)
+    allowed = 1e-5 * design.diagonal
+    with pytest.warns(gso.ConvergenceWarning):
+        result = gso.strips(design, max_deviation=allowed, max_strips=2, **FAST)
+    assert not result.usable and result.reasons
+    with pytest.warns(gso.ConvergenceWarning):
+        whole = gso.strips(design, strips=2, max_deviation=allowed, **FAST)
+    assert result.ruled.farthest <= whole.ruled.farthest
+
+
+def test_parts_have_to_fit_on_the_sheet():
+    design = gso.as_mesh(cylinder(17, turn=0.4))
+    allowed = 0.02 * design.diagonal
+    free = gso.strips(design, max_deviation=allowed, **FAST)
+    assert free.usable
+    long, wide = (float(x) for x in sorted(np.ptp(free.pattern.flat, axis=0), reverse=True))
+    enough = gso.strips(design, max_deviation=allowed, sheet=(1.5 * long, 1.5 * wide), **FAST)
+    np.testing.assert_array_equal(enough.mesh.vertices, free.mesh.vertices)
+    cut = gso.strips(design, max_deviation=allowed, sheet=(0.8 * long, 1.5 * wide), **FAST)
+    assert cut.usable, cut.reasons
+    assert len(cut.pieces) > 1
+    with pytest.warns(gso.ConvergenceWarning):
+        one = gso.strips(design, strips=1, sheet=(0.1 * long, wide), **FAST)
+    assert any("sheet" in why for why in one.reasons)
+
+
+def test_large_designs_are_decimated_and_measured_as_they_are():
+    u, v = np.meshgrid(*[np.linspace(-1.0, 1.0, 81)] * 2, indexing="ij")
+    design = gso.as_mesh(np.stack([u, v, 0.3 * u * u], axis=-1))
+    allowed = 0.02 * design.diagonal
+    light = LightDesign.of(design, allowed)
+    assert 2 * len(light.mesh.triangles) <= len(design.triangles)
+    assert LightDesign.of(design, allowed, named=True).mesh is design
+    result = gso.strips(design, max_deviation=allowed, **FAST)
+    assert result.usable and result.design is design
+    assert result.on_design().grid.shape == (81, 81, 3)
+    again = result.ruled.distances(design)
+    assert result.ruled.farthest == max(again.there_max, again.back_max) <= allowed
+
+
+def test_a_callback_ends_strips_of_pieces():
+    seen = []
+
+    def watch(progress):
+        seen.append(progress.name)
+        return not progress.name.startswith("piece 1")
+
+    halves = gso.cut(dome(9, height=0.3), gso.seams.Path([4, 76]))
+    with pytest.warns(gso.ConvergenceWarning):
+        result = gso.strips(halves, callback=watch, **FAST)
+    assert result.status is gso.Status.CANCELLED
+    assert result.ruled is None and not result.usable
+    assert seen[-1].startswith("piece 1")
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"strips": 0}, {"max_deviation": -1.0}, {"max_strain": 0.0}, {"rulings": 3}]
+)
+def test_wrong_options_are_refused(wrong):
+    with pytest.raises(gso.OptionError):
+        gso.strips(saddle(9), **wrong)
+
+
+def test_constraints_hold_and_nothing_is_cut():
+    mesh = gso.as_mesh(saddle(11, strength=0.3))
+    beam = gso.Ruling([55, 65])
+    with pytest.warns(gso.ConvergenceWarning):
+        result = gso.strips(mesh, max_deviation=1e-5, max_strips=2, constraints=[beam], **FAST)
+    assert result.pieces is None
+    (missed,) = result.details["constraints"].values()
+    assert missed < 1e-6 * mesh.diagonal
