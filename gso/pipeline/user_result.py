@@ -12,6 +12,7 @@ from gso.result import Result
 from gso.spline.fit import describe_spline
 from gso.status import Status
 from gso.tasks.base import Solution
+from gso.typing import Array
 
 
 def record_violations(case: Case, points: Array, out: Solution | Result) -> None:

@@ -36,14 +36,14 @@ from gso.tasks.start import Start
 from gso.verdict import Code, Measurement, Reason, compare, judge, ordered
 from gso.wording import length
 
-#: Shares of the allowed distance: what the joint solve of the pieces may use, and within what
-#: strips follow its result, so that the two sides of a seam stay together.
-_JOINT, _FOLLOW = 0.9, 0.1
+#: Shares of the allowed distance: what the joint solve of the pieces may use, and the least and the
+#: most within which strips follow its result, so that the two sides of a seam stay together.
+_JOINT, _LEAST, _MOST = 0.5, 0.1, 0.5
 #: Distance within which strips follow the joint result where none is given, relative to the
 #: diagonal.
 _NEAR = 0.01
-_MOST = 64
-_UPTO = 0.25
+#: Largest number of strips of a piece that "auto" tries: it is developable, so that one should do.
+_STRIPS = 8
 #: Number of pieces from which on processes make their strips.
 _MANY = 8
 
@@ -121,14 +121,20 @@ def of_pieces(
         return _cancelled(joint), ()
     seconds = time.perf_counter() - clock
     follow = _distance_left(joint, request, light)
-    parts = []
-    for number, made in enumerate(_of_each(joint.shape, request, follow)):
-        if isinstance(made, Result) and made.status is Status.CANCELLED:
-            return _cancelled(joint), ()
-        parts.append(_part(joint, request, number, made))
-    result = _merged(joint, request, parts)
+    strips = _of_each(joint.shape, request, follow)
+    if any(isinstance(made, Result) and made.status is Status.CANCELLED for made in strips):
+        return _cancelled(joint), ()
+    # What counts is the distance of the whole from the design, and between both sides of a seam.
+    tried = []
+    for strict in (False, True) if request.may_leave_pieces else (False,):
+        parts = [_part(joint, request, k, made, strict) for k, made in enumerate(strips)]
+        result = _merged(joint, parts)
+        tried.append((result, _reasons(result, request, parts)))
+        if not tried[-1][1]:
+            break
+    result, reasons = min(tried, key=lambda one: (len(one[1]) > 0, one[0].ruled.farthest))
     result.seconds |= {"pieces": seconds, "strips": time.perf_counter() - clock - seconds}
-    return result, _reasons(result, request, parts)
+    return result, reasons
 
 
 def _searched(light: LightDesign, request: StripsRequest) -> _Joint:
@@ -167,17 +173,16 @@ def _distance_left(joint: _Joint, request: StripsRequest, light: LightDesign) ->
         return None if request.options.number else _NEAR * joint.design.diagonal
     away = metrics.surface_distance(light.mesh, joint.shape.design)
     left = allowed - max(away.there_max, away.back_max)
-    return float(np.clip(left, _FOLLOW * allowed, _UPTO * allowed))
+    return float(np.clip(left, _LEAST * allowed, _MOST * allowed))
 
 
 def _of_each(
     shape: Pieces, request: StripsRequest, follow: float | None
 ) -> list[Result | GSOError]:
     """Make strips of each piece."""
-    # The pieces are developable already: their own normals give the rulings.
-    options = replace(
-        request.options, starts=("design",), max_strips=min(_MOST, request.options.max_strips)
-    )
+    asked = request.options
+    # Their own normals give the rulings of developable pieces.
+    options = replace(asked, starts=("design",), max_strips=min(asked.max_strips, _STRIPS))
     own = replace(request, options=options, constraints=(), start=Start(None))
     meshes = [piece.mesh for piece in shape]
     if request.callback is not None or len(meshes) < _MANY:
@@ -216,24 +221,25 @@ class _Part:
     iterations: int = 0
 
 
-def _part(joint: _Joint, request: StripsRequest, number: int, made: Result | GSOError) -> _Part:
-    """Choose between the strips of a piece and the pattern of the joint solve."""
-    name, sheet = joint.shape.name(number), None
-    free = request.options.number is None and request.max_deviation is not None
-    good = isinstance(made, StripsResult) and not made.status.is_failure
-    if free and not good:
-        sheet = joint.pattern(number)
+def _part(
+    joint: _Joint, request: StripsRequest, number: int, made: Result | GSOError, strict: bool
+) -> _Part:
+    """Choose between the strips of a piece and the pattern of the joint solve.
+
+    Strips that do not follow the piece closely enough are taken unless this is `strict`.
+    """
+    name, leave = joint.shape.name(number), request.may_leave_pieces
+    if isinstance(made, StripsResult) and not (strict and made.status.is_failure):
+        met = wanted(request.options, None, 1.0).met(made.ruled)
+        if met or not leave:
+            made = replace(made, status=Status.CONVERGED if met else Status.TARGET_MISSED)
+            reasons = tuple(why.within(f"piece {name}") for why in judge(made, Limits()))
+            return _Part(made.ruled, made.ruled.strips, made.status, reasons, made.iterations)
+    sheet = joint.pattern(number) if leave else None
     if sheet is not None:
         return _as_it_is(name, sheet, request)
-    if not isinstance(made, StripsResult):
-        why = made if isinstance(made, GSOError) else MeshError("the solve was ended")
-        raise type(why)(f"piece {name}: {why}")
-    # What counts is the distance of the whole from the design.
-    met = wanted(request.options, None, 1.0).met(made.ruled)
-    status = Status.CONVERGED if met and made.status is Status.TARGET_MISSED else made.status
-    made = replace(made, status=status)
-    reasons = tuple(why.within(f"piece {name}") for why in judge(made, Limits()))
-    return _Part(made.ruled, made.ruled.strips, status, reasons, made.iterations)
+    why = made if isinstance(made, GSOError) else MeshError("it cannot be laid flat")
+    raise type(why)(f"piece {name}: {why}")
 
 
 def _as_it_is(name: str, sheet: Sheet, request: StripsRequest) -> _Part:
@@ -261,8 +267,8 @@ def _as_it_is(name: str, sheet: Sheet, request: StripsRequest) -> _Part:
     return _Part(surface, 0, Status.CONVERGED, reasons)
 
 
-def _merged(joint: _Joint, request: StripsRequest, parts: Sequence[_Part]) -> StripsResult:
-    """Merge the parts into one result, and judge it as a whole."""
+def _merged(joint: _Joint, parts: Sequence[_Part]) -> StripsResult:
+    """Merge the parts into one result."""
     design, opened = joint.design, joint.shape.opened
     surface = together([part.surface for part in parts], design)
     surface = replace(surface, deviation=surface.distances(design, parts=True))

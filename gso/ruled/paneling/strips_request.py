@@ -72,6 +72,11 @@ class StripsRequest:
         return CHANGES if given is None else given
 
     @property
+    def may_leave_pieces(self) -> bool:
+        """Whether pieces that no strips follow may keep the pattern of the joint solve."""
+        return self.options.number is None and self.max_deviation is not None
+
+    @property
     def names_vertices(self) -> bool:
         """Whether it refers to vertices of the design."""
         return bool(len(self.kept) or self.constraints or self.start.points is not None)
