@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import gso
+from gso.cli import main
 from gso.components import split
 from gso.mesh import Mesh
 from gso.result import StripsResult
@@ -212,3 +214,17 @@ def test_constraints_hold_and_nothing_is_cut():
     assert result.pieces is None
     (missed,) = result.details["constraints"].values()
     assert missed < 1e-6 * mesh.diagonal
+
+
+def test_the_command_makes_the_same_strips(tmp_path):
+    design = cap(9)
+    gso.save(design, tmp_path / "cap.obj")
+    files = [str(tmp_path / name) for name in ("cap.obj", "out.npz")]
+    run = CliRunner().invoke(
+        main, ["strips", files[0], "-o", files[1], "--strips", "2", "--options", "fast"]
+    )
+    assert run.exit_code == 0, run.output
+    made, wanted = gso.Result.load(files[1]), gso.strips(files[0], strips=2, **FAST)
+    np.testing.assert_array_equal(made.pattern.flat, wanted.pattern.flat)
+    wrong = CliRunner().invoke(main, ["strips", files[0], "-o", files[1], "--strips", "few"])
+    assert wrong.exit_code == 1 and "it must be a number, 'auto' or None" in wrong.output

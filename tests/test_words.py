@@ -61,7 +61,7 @@ def test_functions_agree_with_each_other_and_with_the_page_of_terms(name):
     assert len(kinds) <= 1, kinds
 
 
-@pytest.mark.parametrize("command", ["optimize", "pieces", "fabricate"])
+@pytest.mark.parametrize("command", ["optimize", "strips", "pieces", "fabricate"])
 def test_options_of_a_command_have_the_defaults_of_its_function(command):
     given = FUNCTIONS[command].__kwdefaults__
     for param in COMMANDS[command].params:

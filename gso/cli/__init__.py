@@ -11,6 +11,7 @@ from gso.cli.fabricate_command import fabricate
 from gso.cli.inspect import info, metrics, plot
 from gso.cli.optimize_command import optimize
 from gso.cli.pieces_command import pieces
+from gso.cli.strips_command import strips
 from gso.cli.train import train
 from gso.errors import GSOError
 
@@ -59,5 +60,5 @@ def main() -> None:
     """Make quad and grid surfaces developable, flatten them, denoise them."""
 
 
-for _command in (optimize, pieces, metrics, info, plot, dataset, fabricate, train):
+for _command in (optimize, strips, pieces, metrics, info, plot, dataset, fabricate, train):
     main.add_command(_command)

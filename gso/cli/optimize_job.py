@@ -86,20 +86,24 @@ class Job:
         more = {"net": self.net, "polish": self.method != "net", "sparing": self.method == "auto"}
         return {**self.keywords, **more}
 
+    @property
+    def task(self) -> str:
+        """The task, by name."""
+        return str(self.keywords["task"])
+
     def check(self, out: str, plot: str | None = None) -> None:
         """Raise an error if an output cannot be written, before anything is computed."""
         from gso import io
 
         if out.lower().endswith(".svg"):
-            task = self.keywords["task"]
-            if task != "developable" and not tasks.get(task).flat:
+            if self.task != "developable" and not tasks.get(self.task).flat:
                 raise OptionError(
                     f"{out}: only a flat pattern is drawn as SVG; use --task flatten or "
                     "--task developable"
                 )
             io.check_writable(out)
         elif is_cad(out):
-            if self.keywords["task"] != "developable":
+            if self.task != "developable":
                 raise OptionError(
                     f"{out}: only developable surfaces are written as splines; "
                     "use --task developable"

@@ -119,3 +119,24 @@ scheduler = click.option(
     "--scheduler", metavar="ADDRESS", help="Dask cluster that does the work instead."
 )
 quiet = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+constraints = click.option(
+    "--constraints",
+    metavar="JSON",
+    type=click.Path(),
+    help='File with what must hold: a list such as [{"type": "Glue", "pairs": [[0, 9]]}].',
+)
+plot = click.option(
+    "--plot",
+    metavar="PNG",
+    type=click.Path(),
+    help="Picture to draw (.png, .pdf, .svg); a folder when there are several inputs.",
+)
+table = click.option(
+    "--metrics", "table", metavar="JSON", type=click.Path(), help="File for status and metrics."
+)
+
+
+def named_unit(unit: str) -> str:
+    """Return the unit if the user gave ``--unit``, else ""."""
+    source = click.get_current_context().get_parameter_source("unit")
+    return unit if source is click.core.ParameterSource.COMMANDLINE else ""

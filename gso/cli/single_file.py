@@ -1,0 +1,44 @@
+"""A command on one file: read, solve, write, print."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from gso.cli import file_options
+from gso.errors import MeshError
+
+if TYPE_CHECKING:
+    from gso.cli.optimize_job import Job
+
+#: Vertices up to which a single surface is optimised without compiled loops.
+_SMALL = 20_000
+
+
+def single(job: Job, file: str, out: str, plot: str | None, table: str | None) -> bool:
+    """Solve for one file, and return whether the result is usable."""
+    from gso.cli import report
+    from gso.cli.progress import iterations
+    from gso.solver import loops
+
+    job.check(out, plot)
+    if table is not None:
+        from gso.io import check_writable
+
+        check_writable(table)
+    job.spare([file], out, plot, table)
+    mesh = file_options.load(file, job.weld)
+    if out.lower().endswith(".npy") and mesh.grid_shape is None:
+        raise MeshError(f"{out}: the mesh is no grid, which is all that .npy holds; use .npz")
+    # For one solve of a small mesh, loading compiled loops takes longer than they save.
+    small = len(mesh.vertices) <= _SMALL
+    with iterations() as callback, report.status_only(), loops.without(small):
+        result = job.solve(mesh, callback=callback)
+    job.write(result, out, plot)
+    record = report.record(file, out, result, job.named)
+    if table is not None:
+        report.write_json(table, record)
+    if not job.quiet:
+        click.echo(report.text(record))
+    return bool(record["usable"])

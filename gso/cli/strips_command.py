@@ -1,0 +1,108 @@
+"""``gso strips``: exactly developable strips of planar faces, with bend lines."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gso.cli import file_options
+from gso.cli import shared_options as shared
+from gso.cli.optimize_job import Job
+from gso.cli.single_file import single
+
+if TYPE_CHECKING:
+    from gso.result import Result
+
+
+class _StripsJob(Job):
+    """The settings of ``gso strips``."""
+
+    task = "developable"
+
+    def solve(self, mesh: Any, **more: Any) -> Result:
+        """Make strips of one design."""
+        from gso.ruled.paneling.lay_strips import strips as lay
+
+        return lay(mesh, unit=self.unit, **self.keywords, **more)
+
+
+@click.command(short_help="Make strips that are exactly developable.")
+@click.argument("name", metavar="IN", type=click.Path())
+@click.option(
+    "-o",
+    "--output",
+    "out",
+    metavar="OUT",
+    required=True,
+    type=click.Path(),
+    help="File to write. The suffix says the format: .npz is the full result, .svg the patterns at "
+    "1:1 with their bend lines; .step, .iges and .3dm are smooth surfaces.",
+)
+@click.option(
+    "--strips",
+    metavar="N",
+    help='Number of strips side by side, or "auto" for as few as hold --max-deviation and '
+    "--max-crease. One where no such limit is given.",
+)
+@shared.max_deviation
+@shared.max_strain
+@shared.max_strips
+@click.option(
+    "--max-crease",
+    metavar="DEGREES",
+    type=float,
+    help="Largest angle at a crease between strips.",
+)
+@shared.min_radius
+@click.option("--flats", is_flag=True, help="A single strip may branch at flat triangles.")
+@click.option(
+    "--options",
+    type=click.Choice(["fast", "balanced", "accurate"]),
+    default="balanced",
+    show_default=True,
+    help="How much work to do.",
+)
+@shared.constraints
+@shared.sheet
+@shared.workers
+@shared.plot
+@shared.table
+@shared.unit
+@file_options.weld
+@file_options.force
+@shared.quiet
+def strips(
+    name: str,
+    out: str,
+    unit: str,
+    plot: str | None,
+    table: str | None,
+    quiet: bool,
+    weld: float | None,
+    force: bool,
+    strips: str | None,
+    constraints: str | None,
+    flats: bool,
+    sheet: tuple[float, float] | None,
+    **given: Any,
+) -> None:
+    """Make strips of planar faces near the design IN, and write them to OUT.
+
+    The design is tried as one surface. Where that does not hold --max-deviation, it is cut into
+    pieces, and each piece becomes strips. The exit code is 0 only if the result is usable;
+    otherwise the reasons are printed.
+    """
+    keywords = {
+        **given,
+        "strips": int(strips) if strips is not None and strips.isdecimal() else strips,
+        "flats": flats or None,
+        "sheet": sheet or None,
+    }
+    if constraints is not None:
+        from gso.constraints import read_constraints
+
+        keywords["constraints"] = read_constraints(constraints)
+    read = () if constraints is None else (constraints,)
+    job = _StripsJob(keywords, "tno", None, unit, quiet, weld, force, read, shared.named_unit(unit))
+    click.get_current_context().exit(0 if single(job, name, out, plot, table) else 1)
