@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from gso.mesh.topology import label_components
 from gso.metrics import INFO, Info
 from gso.typing import Array, Ints
 
-_JOINED: dict[str, Any] = {"sum": np.sum, "max": np.max, "min": np.min}
+T = TypeVar("T", bound=float | tuple[float, ...])
+
+_JOINED: dict[str, Callable[[Array], float]] = {"sum": np.sum, "max": np.max, "min": np.min}
 
 
 @dataclass(frozen=True)
@@ -152,7 +154,7 @@ def combined(
     return out
 
 
-def average(function: Callable[..., Any], mesh: Mesh, *others: Mesh) -> Any:
+def average(function: Callable[..., T], mesh: Mesh, *others: Mesh) -> T:
     """Average a function over the components of a mesh, weighted by area.
 
     Parameters
@@ -172,8 +174,8 @@ def average(function: Callable[..., Any], mesh: Mesh, *others: Mesh) -> Any:
     if not several(mesh):
         return function(mesh, *others)
     parts = split(mesh)
-    found = [function(part.mesh, *map(part.of, others)) for part in parts]
-    return np.average(found, axis=0, weights=[part.area for part in parts])
+    found: Any = [function(part.mesh, *map(part.of, others)) for part in parts]
+    return cast(T, np.average(found, axis=0, weights=[part.area for part in parts]))
 
 
 def sizes(mesh: Mesh) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from gso import faults, metrics
 from gso.mesh import Mesh
@@ -89,7 +90,7 @@ def _unfolded(light: Mesh, surface: Nearest, original: Mesh) -> Mesh:
     return original
 
 
-def _means(edges: Ints, count: int):
+def _means(edges: Ints, count: int) -> csr_matrix:
     """Return the matrix (n, n) that gives the mean of each vertex's neighbours."""
     from scipy.sparse import diags
 

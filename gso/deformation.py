@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.components import Component, several, split
 from gso.energy import fairness
@@ -13,7 +10,7 @@ from gso.geometry import closest_motion
 from gso.linalg import spd
 from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints, Solve
 
 #: Weights of a field's slope and of its size, relative to its bending. They only select a
 #: solution where the handles leave the thin plate free.
@@ -55,7 +52,7 @@ class ThinPlateField:
         n = len(mesh.vertices)
         self.mesh, self.ids = mesh, ids
         #: Per component: the component, a mask of its handles, and its own field.
-        self.parts: list[tuple[Component, NDArray[np.bool_], ThinPlateField]] = []
+        self.parts: list[tuple[Component, Flags, ThinPlateField]] = []
         if several(mesh):
             for part in split(mesh):
                 own = np.searchsorted(part.vertices, ids).clip(max=len(part.vertices) - 1)
@@ -80,7 +77,7 @@ class ThinPlateField:
         energy = energy + _SLOPE * typical * (slope.T @ slope) + _SIZE * typical * identity(n)
         rows = energy.tocsr()[self.free]
         self._coupling = rows[:, ids]
-        self._solve: Any = None
+        self._solve: Solve | None = None
         if len(self.free):
             self._solve = spd(rows[:, self.free])
 
@@ -125,7 +122,7 @@ def follow(mesh: Mesh, spread: ThinPlateField, targets: Array) -> Array:
     targets : ndarray, (k, 3)
         Positions that the handles move to.
     """
-    points = mesh.vertices.copy()
+    points: Array = mesh.vertices.copy()
     if spread.parts:
         for piece, here, own in spread.parts:
             points[piece.vertices] = follow(piece.mesh, own, targets[here])

@@ -1,16 +1,32 @@
-"""Types of arrays and of input, as annotations name them; shapes are in the docstrings."""
+"""Types that annotations name; shapes of arrays are in the docstrings."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from os import PathLike
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+if TYPE_CHECKING:
+    from types import EllipsisType
+
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+
+#: What solves a linear system for one or more right-hand sides.
+Solve = Callable[[Array], Array]
+
+#: Path of a file or folder.
+AnyPath = str | PathLike[str]
+
+#: Content of a JSON object.
+Json = dict[str, Any]
+
+#: Keyword arguments that are passed on.
+Keywords = dict[str, Any]
 
 
 class Polyhedron(Protocol):
@@ -27,3 +43,44 @@ class Polyhedron(Protocol):
 
 #: What :func:`gso.as_mesh` takes: a mesh, a grid of points, vertices and faces, or a file.
 MeshLike: TypeAlias = "Polyhedron | ArrayLike | tuple[ArrayLike, ArrayLike] | PathLike[str]"
+
+
+class Scalar(Protocol):
+    """What geometry and energy compute with: a number, an array, a tensor, a CasADi symbol."""
+
+    def __neg__(self: S) -> S: ...
+    def __add__(self: S, other: S | float, /) -> S: ...
+    def __radd__(self: S, other: float, /) -> S: ...
+    def __sub__(self: S, other: S | float, /) -> S: ...
+    def __rsub__(self: S, other: float, /) -> S: ...
+    def __mul__(self: S, other: S | float, /) -> S: ...
+    def __rmul__(self: S, other: float, /) -> S: ...
+    def __truediv__(self: S, other: S | float, /) -> S: ...
+    def __rtruediv__(self: S, other: float, /) -> S: ...
+
+
+S = TypeVar("S", bound=Scalar)
+
+#: A vector: its components.
+Vec = tuple[S, ...]
+
+
+class Batch(Scalar, Protocol):
+    """A NumPy array or a torch tensor."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+    @property
+    def dtype(self) -> object: ...
+    def __pow__(self: B, other: float, /) -> B: ...
+    def __gt__(self: B, other: B | float, /) -> object: ...
+    def __getitem__(
+        self: B, key: slice | EllipsisType | tuple[slice | EllipsisType, ...] | None, /
+    ) -> B: ...
+    def reshape(self: B, first: int, /, *others: int) -> B: ...
+    def sum(self: B, axis: int, /) -> B: ...
+    def mean(self: B, axis: int, /) -> B: ...
+    def clip(self: B, low: float, high: float, /) -> B: ...
+
+
+B = TypeVar("B", bound=Batch)

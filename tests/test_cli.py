@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import signal
@@ -208,7 +209,7 @@ def test_grid_format_needs_a_grid(run, never):
 
 
 def test_plot_without_matplotlib_is_found_before_the_solve(run, small, never, monkeypatch):
-    monkeypatch.setattr("gso.plot.find_spec", lambda name: None)
+    monkeypatch.setattr(importlib.import_module("gso.plot.draw"), "find_spec", lambda name: None)
     done = run("optimize", small, "-o", "out.obj", "--plot", "out.png")
     assert refused(done, 'pip install ".[plot]" in the folder of gso')
 

@@ -150,7 +150,7 @@ def test_mistakes():
 
 
 def test_without_matplotlib(monkeypatch):
-    monkeypatch.setattr("gso.plot.find_spec", lambda name: None)
+    monkeypatch.setattr(sys.modules["gso.plot.draw"], "find_spec", lambda name: None)
     with pytest.raises(gso.GSOError, match=r'pip install "\.\[plot\]"'):
         plot_surface(bump())
     with pytest.raises(gso.GSOError, match=r'pip install "\.\[plot\]"'):

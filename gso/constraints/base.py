@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,16 +90,16 @@ class Subject:
         """Number of vertices."""
         return len(self.mesh.vertices)
 
-    def _indices(self, ids: Any, ndim: int, what: str, count: int, kind: str) -> Ints:
+    def _indices(self, ids: np.ndarray, ndim: int, what: str, count: int, kind: str) -> Ints:
         if ids.size == 0:
             return np.zeros((0, 2)[:ndim], np.int64)
         if ids.ndim != ndim or (ndim == 2 and ids.shape[1] != 2) or ids.dtype.kind not in "iu":
             raise self.refuse(f"needs {what}")
-        ids = ids.astype(np.int64)
-        bad = ids[(ids < 0) | (ids >= count)]
+        index: Ints = ids.astype(np.int64)
+        bad = index[(index < 0) | (index >= count)]
         if bad.size:
             raise self.refuse(f"names {kind} {bad[0]}; the mesh has {count}")
-        return ids
+        return index
 
     def points(self, given: ArrayLike, what: str, count: int | None = None) -> Array:
         """Finite positions (count, dim)."""
@@ -128,15 +128,16 @@ class Subject:
             return None
         return self.positive(given, "weight")
 
-    def positive(self, given: Any, what: str) -> float:
+    def positive(self, given: object, what: str) -> float:
         """A finite number above zero."""
-        good = isinstance(given, int | float | np.number) and not isinstance(given, bool)
-        if not (good and 0 < given < np.inf):
-            raise self.refuse(f"has {what} {given!r}; it must be a positive number")
-        return float(given)
+        if isinstance(given, int | float | np.integer | np.floating) and type(given) is not bool:
+            number = float(given)
+            if 0 < number < np.inf:
+                return number
+        raise self.refuse(f"has {what} {given!r}; it must be a positive number")
 
 
-def _array(given: Any) -> Any:
+def _array(given: ArrayLike) -> np.ndarray:
     """Return the argument as an array; an array of one zero if it is ragged."""
     try:
         return np.asarray(given)
@@ -144,7 +145,7 @@ def _array(given: Any) -> Any:
         return np.zeros(1)
 
 
-def numbers(given: Any) -> Array:
+def numbers(given: ArrayLike) -> Array:
     """Return the argument as an array of numbers; one NaN if it is not numeric."""
     try:
         return np.array(given, dtype=np.float64)

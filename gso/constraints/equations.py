@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.energy import Term, Weighted, curve, equation, length, planarity, position
@@ -19,7 +18,7 @@ from gso.energy.multipliers import STIFF, hardened
 from gso.hierarchy import Transfer
 from gso.mesh import Frame
 from gso.mesh.polyline import Polylines
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 P = TypeVar("P", bound="Part")
 
@@ -49,7 +48,7 @@ class Part:
         new |= {name: frame.to_unit(getattr(self, name)) for name in self.POSITIONS}
         return replace(self, **new, **{n: getattr(self, n) / frame.scale for n in self.LENGTHS})
 
-    def kept(self: P, rows: NDArray[np.bool_]) -> P:
+    def kept(self: P, rows: Flags) -> P:
         """Return the part with only those equations that a mask (k,) selects."""
         return replace(self, **{n: getattr(self, n)[rows] for n in (*self.INDICES, *self.ROWS)})
 
@@ -123,7 +122,7 @@ class Pins(Part):
         return replace(self, ids=ids, positions=self.positions[rows] + transfer.shift[ids])
 
     def violation(self, points: Array) -> Array:
-        return np.linalg.norm(points[self.ids] - self.positions, axis=1)
+        return np.asarray(np.linalg.norm(points[self.ids] - self.positions, axis=1))
 
     @property
     def linear(self) -> tuple[Part, ...]:
@@ -163,7 +162,7 @@ class Relations(Part):
 
     def violation(self, points: Array) -> Array:
         image = self.anchor + (points[self.first] - self.anchor) @ self.matrix.T
-        return np.linalg.norm(points[self.second] - image, axis=1)
+        return np.asarray(np.linalg.norm(points[self.second] - image, axis=1))
 
     @property
     def is_glue(self) -> bool:
@@ -236,9 +235,10 @@ class OnLines(Part):
         return replace(self, ids=ids) if len(ids) else None
 
     def violation(self, points: Array) -> Array:
-        return np.linalg.norm(
+        distance: Array = np.linalg.norm(
             points[self.ids] - self.lines.nearest(points[self.ids]).points, axis=1
         )
+        return distance
 
     def items(self, block: str) -> list[Weighted]:
         term = curve.build(self.ids, self.lines, block=block, weight=self.weight)
@@ -281,7 +281,7 @@ class Planar(Part):
 
     def violation(self, points: Array) -> Array:
         corners = (tuple(points[self.quads[:, k]].T) for k in range(4))
-        return np.abs(geometry.diagonal_distance(*corners))
+        return np.asarray(np.abs(geometry.diagonal_distance(*corners)))
 
     @property
     def anchored(self) -> bool:
@@ -329,7 +329,7 @@ class Lengths(Part):
 
     def violation(self, points: Array) -> Array:
         a, b = (points[self.pairs[:, k]] for k in (0, 1))
-        return np.abs(np.linalg.norm(a - b, axis=1) - self.lengths)
+        return np.asarray(np.abs(np.linalg.norm(a - b, axis=1) - self.lengths))
 
     @property
     def anchored(self) -> bool:
@@ -344,7 +344,7 @@ class Lengths(Part):
         return length.build(self.pairs, self.lengths, block=block)
 
 
-def _kept(transfer: Transfer, ids: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+def _kept(transfer: Transfer, ids: Ints) -> tuple[Ints, Flags]:
     """Return the vertices of a copy that stand for some of the vertices `ids`, and which."""
     places = transfer.place(ids)
     rows = places >= 0

@@ -67,7 +67,7 @@ class Reduction:
     def residuals(self) -> Array:
         """Return the residual of each equation: zero up to rounding, unless some contradict."""
         e = self.equations
-        return np.abs((e.a * self.point[e.root]).sum(axis=1) - e.b)
+        return np.asarray(np.abs((e.a * self.point[e.root]).sum(axis=1) - e.b))
 
     def maps(self, start: int, size: int) -> tuple[csr_matrix, csr_matrix, Array]:
         """Return the constraints as affine maps of a coordinate vector.
@@ -95,7 +95,7 @@ class Reduction:
 
     def _rows(self, ids: Ints) -> Ints:
         dim = self.turn.shape[1]
-        return ids[:, None] * dim + np.arange(dim)
+        return np.asarray(ids[:, None] * dim + np.arange(dim))
 
     def _matrix(self, blocks: Array, start: int, size: int) -> csr_matrix:
         """Return the identity with the rows of `ids` replaced by blocks on their roots."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import fields
-from os import PathLike
-from typing import Any
 
 from gso.constraints.base import Constraint
 from gso.constraints.face_shape import FixedLengths, PlanarFaces
@@ -17,6 +15,7 @@ from gso.constraints.smooth import SmoothCurves
 from gso.constraints.symmetry import SymmetryPlane
 from gso.errors import OptionError
 from gso.spelling import check_keywords, choices, nearest
+from gso.typing import AnyPath
 
 KINDS: dict[str, type[Constraint]] = {
     kind.__name__: kind
@@ -49,7 +48,7 @@ def add(kind: type[Constraint]) -> None:
     KINDS[kind.__name__] = kind
 
 
-def read_constraints(path: str | PathLike[str]) -> list[Constraint]:
+def read_constraints(path: AnyPath) -> list[Constraint]:
     """Read a list of constraints.
 
     Parameters
@@ -75,7 +74,7 @@ def read_constraints(path: str | PathLike[str]) -> list[Constraint]:
     return [_constraint(entry, f"{path}: entry {k}") for k, entry in enumerate(entries)]
 
 
-def _constraint(entry: Any, where: str) -> Constraint:
+def _constraint(entry: object, where: str) -> Constraint:
     if not isinstance(entry, dict) or not isinstance(entry.get("type"), str):
         # Name a field that looks like a misspelt "type".
         wrong = [repr(k) for k in entry if nearest(k, ["type"])] if isinstance(entry, dict) else []

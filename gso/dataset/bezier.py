@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.special import comb
+
+from gso.metrics import curvature_grid
+from gso.typing import Array, Ints
 
 #: Control points along a side of the recipe's nets.
 SMALLEST_NET, LARGEST_NET = 4, 20
@@ -26,10 +29,10 @@ class BezierSurface:
         [0, 1], where the polynomial is extrapolated.
     """
 
-    net: NDArray[np.float64]
-    window: NDArray[np.float64]
+    net: Array
+    window: Array
 
-    def sample(self, height: int = 64, width: int | None = None) -> NDArray[np.float64]:
+    def sample(self, height: int = 64, width: int | None = None) -> Array:
         """Sample a (height, width, 3) grid, normalised to the unit ball.
 
         The surface does not depend on the resolution, but the normalisation (centroid and
@@ -43,26 +46,24 @@ class BezierSurface:
         return normalise(np.einsum("ia,jb,abk->ijk", bu, bv, self.net, optimize=True))
 
 
-def bernstein(degree: int, t: NDArray[np.float64]) -> NDArray[np.float64]:
+def bernstein(degree: int, t: Array) -> Array:
     """Evaluate the Bernstein polynomials of a degree at parameters t, (len(t), degree + 1).
 
     >>> bernstein(2, np.array([0.5]))
     array([[0.25, 0.5 , 0.25]])
     """
-    from scipy.special import comb
-
     k = np.arange(degree + 1)
     t = np.asarray(t, float)[:, None]
-    return comb(degree, k) * t**k * (1.0 - t) ** (degree - k)
+    return np.asarray(comb(degree, k) * t**k * (1.0 - t) ** (degree - k))
 
 
-def normalise(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def normalise(points: Array) -> Array:
     """Subtract the centroid and divide by the largest vertex norm."""
     centred = points - points.reshape(-1, 3).mean(axis=0)
-    return centred / np.sqrt((centred**2).sum(axis=-1).max())
+    return np.asarray(centred / np.sqrt((centred**2).sum(axis=-1).max()))
 
 
-def boundary_length_variance(points: NDArray[np.float64]) -> float:
+def boundary_length_variance(points: Array) -> float:
     """Compute the variance of the four boundary lengths of a grid (Wang et al. 2024, Eq. 2)."""
     sides = (points[0], points[-1], points[:, 0], points[:, -1])
     return float(np.var([np.linalg.norm(np.diff(s, axis=0), axis=1).sum() for s in sides]))
@@ -87,24 +88,20 @@ def draw(rng: np.random.Generator) -> BezierSurface:
 
 
 @cache
-def _binomials(count: int) -> NDArray[np.float64]:
+def _binomials(count: int) -> Array:
     """Return binomial coefficients (degree, k), zero where k exceeds the degree."""
-    from scipy.special import comb
-
-    return comb(*np.ogrid[:count, :count])
+    return np.asarray(comb(*np.ogrid[:count, :count]))
 
 
-def _padded_bernstein(
-    counts: NDArray[np.int64], ranges: NDArray[np.float64], samples: int, width: int
-) -> NDArray[np.float64]:
+def _padded_bernstein(counts: Ints, ranges: Array, samples: int, width: int) -> Array:
     """Evaluate Bernstein polynomials of many degrees (b, samples, width); pad with zeros."""
     t = np.linspace(ranges[:, 0], ranges[:, 1], samples, axis=1)[..., None]
     k = np.arange(width)
     rest = np.maximum(counts[:, None] - 1 - k, 0)[:, None]
-    return _binomials(width)[counts - 1][:, None] * t**k * (1.0 - t) ** rest
+    return np.asarray(_binomials(width)[counts - 1][:, None] * t**k * (1.0 - t) ** rest)
 
 
-def sample_many(surfaces: Sequence[BezierSurface], size: int = 64) -> NDArray[np.float64]:
+def sample_many(surfaces: Sequence[BezierSurface], size: int = 64) -> Array:
     """Sample (b, size, size, 3) grids, each normalised to the unit ball.
 
     The result equals that of :meth:`BezierSurface.sample` up to rounding. All control nets
@@ -152,8 +149,6 @@ def generate(
     max_loss_gc : float
         Largest ``loss_gc`` that is accepted; infinity disables this criterion.
     """
-    from gso.metrics import curvature_grid
-
     rng = np.random.default_rng(seed)
     kept: list[BezierSurface] = []
     while len(kept) < count:

@@ -14,10 +14,9 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from importlib.util import find_spec
-from os import PathLike
 from pathlib import Path
-from typing import Any
 
+from gso import tno
 from gso.dataset import hdf, manifest, shard
 from gso.dataset.claim import claimed
 from gso.dataset.labels import KINDS, REFERENCES
@@ -30,6 +29,7 @@ from gso.executors import Executor, open_executor
 from gso.io import replacing
 from gso.linalg import blas_threads
 from gso.spelling import choices
+from gso.typing import AnyPath, Json
 
 _OTHER_RECIPE = "give its own options, or another folder"
 _OTHER_VERSIONS = "install what it was begun with, or build in another folder"
@@ -39,7 +39,7 @@ Tick = Callable[[str, int, int], None]
 
 
 def build(
-    folder: str | PathLike[str],
+    folder: AnyPath,
     recipe: Recipe | None = None,
     *,
     reference: Iterable[str] = (),
@@ -166,7 +166,7 @@ def tasks(
             yield from (shard.Task(split, number, some, part) for part in parts)
 
 
-def _begin(folder: Path, recipe: Recipe, device: str | None) -> dict[str, Any]:
+def _begin(folder: Path, recipe: Recipe, device: str | None) -> Json:
     """Return the existing manifest, or write and return that of a new dataset.
 
     Raises
@@ -174,7 +174,7 @@ def _begin(folder: Path, recipe: Recipe, device: str | None) -> dict[str, Any]:
     DatasetError
         The existing manifest has another recipe, or labels made on another device.
     """
-    record = {
+    record: Json = {
         "format": manifest.FORMAT,
         "recipe": recipe.as_dict(),
         "versions": versions(device),
@@ -201,9 +201,7 @@ def _begin(folder: Path, recipe: Recipe, device: str | None) -> dict[str, Any]:
     return there
 
 
-def _check_same(
-    folder: Path, there: dict[str, Any], what: str, new: dict[str, Any], hint: str
-) -> None:
+def _check_same(folder: Path, there: Json, what: str, new: Json, hint: str) -> None:
     """Raise a DatasetError if `new` differs from the existing manifest's entry `what`."""
     old = there[what]
     said = [f"{k} {old.get(k)!r}, not {v!r}" for k, v in new.items() if old.get(k) != v]
@@ -215,8 +213,6 @@ def _references(
     recipe: Recipe, names: Iterable[str], splits: Iterable[str]
 ) -> set[tuple[str, str]]:
     """Return the requested pairs of reference and split, checked."""
-    from gso import tno
-
     asked = {(name, split) for name in names for split in splits}
     for name, split in sorted(asked):
         if name not in REFERENCES:
@@ -310,12 +306,12 @@ def _kept(so_far: str = "") -> Iterator[None]:
 
 def _listed(
     folder: Path,
-    record: dict[str, Any],
+    record: Json,
     recipe: Recipe,
     todo: Iterable[shard.Task],
     references: manifest.References,
     drawn: int,
-) -> dict[str, Any]:
+) -> Json:
     """Return the manifest of a dataset whose files all exist, without its statistics."""
     files = []
     for task in todo:

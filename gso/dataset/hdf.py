@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gso.dataset.lazy import Rows
 from gso.errors import DatasetError
+from gso.typing import AnyPath
 
-Rows = slice | NDArray[np.int64]
+if TYPE_CHECKING:
+    import h5py
 
 
 def pack(arrays: dict[str, np.ndarray]) -> bytes:
@@ -31,33 +34,35 @@ def pack(arrays: dict[str, np.ndarray]) -> bytes:
                 chunked = {"chunks": (1, *values.shape[1:]), "compression": 1, "shuffle": True}
             opened.append(file.create_dataset(name, data=values, track_times=False, **chunked))
         file.flush()
-        return file.id.get_file_image()
+        image: bytes = file.id.get_file_image()
+    return image
 
 
-def contents(path: str | os.PathLike[str]) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
+def contents(path: AnyPath) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
     """Return the shape and type of each array of a file, by name."""
     import h5py
 
-    def collect(file: Any) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
-        found: dict[str, tuple[tuple[int, ...], np.dtype]] = {}
+    found: dict[str, tuple[tuple[int, ...], np.dtype]] = {}
 
-        def visit(name: str, item: Any) -> None:
-            if isinstance(item, h5py.Dataset):
-                found[name] = (item.shape, item.dtype)
+    def visit(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset):
+            found[name] = (item.shape, item.dtype)
 
+    with _opened(path) as file:
         file.visititems(visit)
-        return found
-
-    return _opened(path, collect)
+    return found
 
 
-def read(path: str | os.PathLike[str], name: str, rows: Rows = slice(None)) -> np.ndarray:
+def read(path: AnyPath, name: str, rows: Rows = slice(None)) -> np.ndarray:
     """Read rows of an array of a file; row indices must be increasing."""
-    return _opened(path, lambda file: file[name][rows])
+    with _opened(path) as file:
+        values: np.ndarray = file[name][rows]
+    return values
 
 
-def _opened(path: str | os.PathLike[str], use: Callable[[Any], Any]) -> Any:
-    """Open a file and return the result of `use` for it.
+@contextmanager
+def _opened(path: AnyPath) -> Iterator[h5py.File]:
+    """Open a file.
 
     Raises
     ------
@@ -69,7 +74,7 @@ def _opened(path: str | os.PathLike[str], use: Callable[[Any], Any]) -> Any:
     try:
         # Files never change once written, so locks, which some disks lack, are not needed.
         with h5py.File(path, "r", locking=False) as file:
-            return use(file)
+            yield file
     except (OSError, KeyError, RuntimeError) as error:
         raise DatasetError(
             f"{os.fsdecode(path)} is missing or damaged ({error}); "

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -16,8 +16,11 @@ from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
 from gso.metrics import unit
 from gso.result import Result
-from gso.typing import Array
+from gso.typing import Array, Json
 from gso.unknowns.spline import spline_matrix
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 #: Control points along each side of the spline fitted to the normal offsets.
 CONTROLS = 16
@@ -68,7 +71,7 @@ class Kind:
     metrics: tuple[str, ...]
 
     @property
-    def options(self) -> dict[str, Any]:
+    def options(self) -> Json:
         """Settings of the solver."""
         return asdict(tno.check(**self.arguments).options)
 
@@ -153,7 +156,7 @@ def solve_many(
     return [x if isinstance(x, Label) else _failed(kind, points.shape[1]) for x in labels]
 
 
-def _or_error(function: Callable[..., Any], *given: Any, **keywords: Any) -> Any:
+def _or_error(function: Callable[P, T], *given: P.args, **keywords: P.kwargs) -> T | GSOError:
     """Call a function, and return what it raises on purpose."""
     try:
         return function(*given, **keywords)

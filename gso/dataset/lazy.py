@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike
+
+from gso.typing import Ints
+
+Rows = slice | Ints
+
+#: Function that reads rows, given as a slice or as an array of increasing indices.
+Read = Callable[[Rows], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -23,7 +29,7 @@ class Part:
     """
 
     count: int
-    read: Callable[[Any], np.ndarray]
+    read: Read
 
 
 class LazyArray:
@@ -50,7 +56,7 @@ class LazyArray:
     ((6, 2), [2.0, 3.0], [5.0, 1.0])
     """
 
-    def __init__(self, parts: Sequence[Part], shape: tuple[int, ...], dtype: Any):
+    def __init__(self, parts: Sequence[Part], shape: tuple[int, ...], dtype: DTypeLike):
         self.parts = list(parts)
         self._ends = np.cumsum([0, *(part.count for part in self.parts)])
         self.shape = (int(self._ends[-1]), *shape)
@@ -67,10 +73,10 @@ class LazyArray:
     def __repr__(self) -> str:
         return f"LazyArray({self.shape}, {self.dtype})"
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> np.ndarray:
         return self[:] if dtype is None else self[:].astype(dtype)
 
-    def __getitem__(self, key: Any) -> np.ndarray:
+    def __getitem__(self, key: object) -> np.ndarray:
         first, *rest = key if isinstance(key, tuple) else (key,)
         # Indexing the row numbers gives NumPy's semantics and its errors.
         wanted = np.arange(len(self))[first]
@@ -78,13 +84,13 @@ class LazyArray:
         out = rows.reshape((*wanted.shape, *self.shape[1:]))
         return out[(slice(None),) * wanted.ndim + tuple(rest)]
 
-    def _rows(self, wanted: NDArray[np.int64]) -> np.ndarray:
+    def _rows(self, wanted: Ints) -> np.ndarray:
         out = np.empty((len(wanted), *self.shape[1:]), self.dtype)
         owner = np.searchsorted(self._ends, wanted, side="right") - 1
         for number in np.unique(owner):
             here = np.flatnonzero(owner == number)
             rows, back = np.unique(wanted[here] - self._ends[number], return_inverse=True)
             whole = len(rows) == rows[-1] - rows[0] + 1
-            some: Any = slice(int(rows[0]), int(rows[-1]) + 1) if whole else rows
+            some: Rows = slice(int(rows[0]), int(rows[-1]) + 1) if whole else rows
             out[here] = self.parts[number].read(some)[back]
         return out

@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
-from typing import Any
 
 from gso.errors import DatasetError
 from gso.io import replacing
+from gso.typing import Json
 
 NAME = "manifest.json"
 FORMAT = 1
@@ -17,7 +17,7 @@ FORMAT = 1
 References = set[tuple[str, str]]
 
 
-def load(folder: Path) -> dict[str, Any]:
+def load(folder: Path) -> Json:
     """Read a manifest.
 
     Raises
@@ -27,7 +27,7 @@ def load(folder: Path) -> dict[str, Any]:
     """
     path = folder / NAME
     try:
-        record = json.loads(path.read_bytes())
+        record: Json = json.loads(path.read_bytes())
         if record["format"] != FORMAT:
             raise DatasetError(f"{path} is of format {record['format']}, not {FORMAT}")
         if not isinstance(record["files"], list):
@@ -39,25 +39,25 @@ def load(folder: Path) -> dict[str, Any]:
     return record
 
 
-def write(folder: Path, record: dict[str, Any]) -> None:
+def write(folder: Path, record: Json) -> None:
     """Write a manifest atomically."""
     with replacing(folder / NAME) as file:
         file.write(json.dumps(record, indent=1).encode() + b"\n")
 
 
-def pairs(record: dict[str, Any]) -> References:
+def pairs(record: Json) -> References:
     """Return the pairs of reference and split in a manifest."""
     return {(name, split) for name, splits in record["references"].items() for split in splits}
 
 
-def damaged(folder: Path, record: dict[str, Any]) -> list[str]:
+def damaged(folder: Path, record: Json) -> list[str]:
     """Return the files that are missing or do not match their checksum in the manifest."""
     return [entry["name"] for entry in record["files"] if not _good(folder, entry)]
 
 
-def _good(folder: Path, entry: dict[str, Any]) -> bool:
+def _good(folder: Path, entry: Json) -> bool:
     try:
         content = (folder / entry["name"]).read_bytes()
     except OSError:
         return False
-    return hashlib.sha256(content).hexdigest() == entry["sha256"]
+    return hashlib.sha256(content).hexdigest() == str(entry["sha256"])

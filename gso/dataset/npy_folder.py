@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso.dataset.bezier import normalise
+from gso.dataset.lazy import Rows
 from gso.errors import DatasetError, MeshError
 from gso.io import replacing
 from gso.typing import Array
@@ -61,12 +62,12 @@ def load(path: Path) -> Array:
     return grid
 
 
-def rows(path: Path, shape: tuple[int, ...], some: Any) -> Array:
+def rows(path: Path, shape: tuple[int, ...], some: Rows) -> Array:
     """Read a file as an array of one row and index it; all grids of a split share one shape."""
     grid = load(path)
     if grid.shape != shape:
         raise DatasetError(f"{path} holds a grid {grid.shape}; the split's first one has {shape}")
-    return grid[None][some]
+    return np.asarray(grid[None][some])
 
 
 def unit(grids: Array) -> Array:

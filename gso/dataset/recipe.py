@@ -5,11 +5,11 @@ from __future__ import annotations
 import platform
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
 
 from gso.dataset import shapes
 from gso.dataset.labels import KINDS, LABELS
 from gso.errors import OptionError
+from gso.typing import Json
 
 #: Incremented whenever the same recipe would give other surfaces or labels.
 VERSION = 2
@@ -76,7 +76,7 @@ class Recipe:
         sizes["hard"] = round(_HARD * self.n)
         return sizes | (dict.fromkeys(shapes.NAMES, shapes.COUNT) if self.extras else {})
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Json:
         """Return the recipe, its version and the solver's settings, for a manifest."""
         return {
             "version": VERSION,
@@ -86,7 +86,7 @@ class Recipe:
         }
 
     @classmethod
-    def from_dict(cls, given: dict[str, Any]) -> Recipe:
+    def from_dict(cls, given: Json) -> Recipe:
         """Return the recipe stored in a manifest."""
         return cls(
             given["n"], given["seed"], given["size"], tuple(given["labels"]), given["extras"]

@@ -13,13 +13,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry, metrics
 from gso.dataset.bezier import BezierSurface, boundary_length_variance, draw, sample_many
 from gso.dataset.seeds import Stream, generator
 from gso.errors import DatasetError
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 FEATURES = ("K_P", "K_N", "K_A", "sigma2")
 #: Samples along a side for the features, independent of the size of the set's grids.
@@ -149,13 +148,13 @@ def _rounded(shares: Array, count: int) -> Ints:
     return whole
 
 
-def _sound(points: Array) -> NDArray[np.bool_]:
+def _sound(points: Array) -> Flags:
     """Tell which grids are finite and have no degenerate cell."""
     a = metrics.components(points[:, 1:, 1:] - points[:, :-1, :-1])
     b = metrics.components(points[:, :-1, 1:] - points[:, 1:, :-1])
     normal = np.stack(geometry.cross(a, b), axis=-1)
     with np.errstate(invalid="ignore"):
-        return np.sqrt((normal**2).sum(axis=-1)).min(axis=(1, 2)) > _SMALLEST_CELL
+        return np.asarray(np.sqrt((normal**2).sum(axis=-1)).min(axis=(1, 2)) > _SMALLEST_CELL)
 
 
 def _cell(values: Array) -> Ints:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property, partial
-from os import PathLike
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.dataset import hdf, manifest, noise, npy_folder
-from gso.dataset.lazy import LazyArray, Part
+from gso.dataset.lazy import LazyArray, Part, Read, Rows
 from gso.dataset.screen import FEATURES, features
 from gso.errors import DatasetError
 from gso.spelling import choices
+from gso.typing import AnyPath, Array, Json
 
 if TYPE_CHECKING:
     from gso.dataset.torch_data import TorchData
@@ -53,10 +53,14 @@ class Split:
     def __len__(self) -> int:
         return self._count
 
-    def __iter__(self) -> Iterator[Any]:
+    def __iter__(self) -> Iterator[dict[str, np.ndarray]]:
         return (self[k] for k in range(len(self)))
 
-    def __getitem__(self, key: Any) -> Any:
+    @overload
+    def __getitem__(self, key: str) -> LazyArray: ...
+    @overload
+    def __getitem__(self, key: int | Rows) -> dict[str, np.ndarray]: ...
+    def __getitem__(self, key: str | int | Rows) -> LazyArray | dict[str, np.ndarray]:
         if isinstance(key, str):
             try:
                 return self.arrays[key]
@@ -70,7 +74,7 @@ class Split:
         return f"Split({self.name!r}, {len(self)} surfaces: {', '.join(self.arrays)})"
 
     @property
-    def features(self) -> dict[str, NDArray[np.float64]]:
+    def features(self) -> dict[str, Array]:
         """K_P, K_N, K_A and sigma^2 of every surface, by name."""
         if "features" in self.arrays:
             table = self.arrays["features"][:]
@@ -83,9 +87,9 @@ class Split:
         return dict(zip(FEATURES, table.T, strict=True))
 
     @property
-    def metrics(self) -> dict[str, dict[str, NDArray[np.float64]]]:
+    def metrics(self) -> dict[str, dict[str, Array]]:
         """Metrics of the labels: an array over the surfaces by kind of label and metric."""
-        found: dict[str, dict[str, NDArray[np.float64]]] = {}
+        found: dict[str, dict[str, Array]] = {}
         for name, array in self.arrays.items():
             if name.startswith("metrics/"):
                 _, kind, metric = name.split("/")
@@ -97,8 +101,6 @@ class Split:
 
         Keywords are passed to :class:`gso.dataset.torch_data.TorchData`.
         """
-        from importlib.util import find_spec
-
         if find_spec("torch") is None:
             raise DatasetError('this needs torch: pip install ".[net]" in the folder of gso')
         from gso.dataset.torch_data import TorchData
@@ -117,10 +119,10 @@ class Dataset(Mapping[str, Split]):
         Recipe, versions, files and statistics; empty for a folder of .npy files.
     """
 
-    def __init__(self, path: str | PathLike[str], record: dict[str, Any] | None = None):
+    def __init__(self, path: AnyPath, record: Json | None = None):
         self.path = Path(path)
         if record is None and not (self.path / manifest.NAME).exists():
-            self.manifest: dict[str, Any] = {}
+            self.manifest: Json = {}
             found = npy_folder.splits(self.path)
             self._splits = {
                 name: Split(name, len(files), partial(_files, files))
@@ -161,7 +163,7 @@ class Dataset(Mapping[str, Split]):
 
     def _stored(self, split: str) -> dict[str, LazyArray]:
         """Return the arrays of a split from this package's HDF5 files."""
-        by_part: dict[str, list[dict[str, Any]]] = {}
+        by_part: dict[str, list[Json]] = {}
         for entry in self.manifest["files"]:
             if entry["split"] == split:
                 by_part.setdefault(entry["part"], []).append(entry)
@@ -178,7 +180,7 @@ class Dataset(Mapping[str, Split]):
         return {name: found[name] for name in order}
 
 
-def open(path: str | PathLike[str]) -> Dataset:
+def open(path: AnyPath) -> Dataset:
     """Open a dataset.
 
     Parameters
@@ -218,5 +220,5 @@ def _noisy(surface: LazyArray, unit: LazyArray, level: float) -> LazyArray:
     return LazyArray(parts, surface.shape[1:], surface.dtype)
 
 
-def _sum(surface: Any, unit: Any, level: float, rows: hdf.Rows) -> NDArray[np.float64]:
-    return surface(rows) + level * unit(rows).astype(float)
+def _sum(surface: Read, unit: Read, level: float, rows: Rows) -> Array:
+    return np.asarray(surface(rows) + level * unit(rows).astype(float))

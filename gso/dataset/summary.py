@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.dataset.screen import CURVATURE, CURVED, SHAPE
 from gso.dataset.store import Dataset, Split
+from gso.typing import Array, Json
 
 #: Intervals of the features; K_N is counted by its absolute value. Those of K_A and sigma^2
 #: start with the intervals of :mod:`gso.dataset.screen`; the rest is for hard and named splits.
@@ -28,7 +27,7 @@ PUBLISHED_FLAT = {"loss_iso_cell": 3.30e-4}
 _EVEN = ("train", "validation", "test")
 
 
-def summarise(data: Dataset) -> dict[str, Any]:
+def summarise(data: Dataset) -> Json:
     """Compute statistics of every split as plain numbers, for a manifest.
 
     Returns
@@ -41,7 +40,7 @@ def summarise(data: Dataset) -> dict[str, Any]:
     return {name: _split(split) for name, split in data.items()}
 
 
-def _split(split: Split) -> dict[str, Any]:
+def _split(split: Split) -> Json:
     found = split.features if len(split) else {name: np.empty(0) for name in INTERVALS}
     statuses = {
         name.removeprefix("status/"): dict(
@@ -62,7 +61,7 @@ def _split(split: Split) -> dict[str, Any]:
     }
 
 
-def counts(feature: str, values: NDArray[np.float64]) -> list[int]:
+def counts(feature: str, values: Array) -> list[int]:
     """Count the surfaces in each interval of a feature; an interval contains its upper end.
 
     >>> counts("sigma2", np.array([0.0, 0.03, 0.04, 2.0]))
@@ -70,10 +69,11 @@ def counts(feature: str, values: NDArray[np.float64]) -> list[int]:
     """
     edges = INTERVALS[feature]
     place = np.searchsorted(edges[1:-1], np.abs(values))
-    return np.bincount(place, minlength=len(edges) - 1).tolist()
+    counted: list[int] = np.bincount(place, minlength=len(edges) - 1).tolist()
+    return counted
 
 
-def _statistics(values: NDArray[np.float64]) -> dict[str, float | None]:
+def _statistics(values: Array) -> dict[str, float | None]:
     """Compute mean, median and 90th percentile of the finite values."""
     known = values[np.isfinite(values)]
     if not known.size:
@@ -85,7 +85,7 @@ def _statistics(values: NDArray[np.float64]) -> dict[str, float | None]:
     }
 
 
-def differences(one: Any, other: Any, *, tolerance: float = 0.02) -> list[str]:
+def differences(one: Json, other: Json, *, tolerance: float = 0.02) -> list[str]:
     """List where two summaries differ by more than a tolerance, relative to the larger number.
 
     Counts may differ by two in any case: a draw on the border of an interval can fall on
@@ -111,19 +111,17 @@ def differences(one: Any, other: Any, *, tolerance: float = 0.02) -> list[str]:
     return found
 
 
-def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    if isinstance(tree, dict):
-        items = tree.items()
-    elif isinstance(tree, list):
-        items = enumerate(tree)  # type: ignore[assignment]
+def _leaves(
+    tree: Json | list[float] | float | None, path: str = ""
+) -> Iterator[tuple[str, float | None]]:
+    if isinstance(tree, dict | list):
+        for key, value in tree.items() if isinstance(tree, dict) else enumerate(tree):
+            yield from _leaves(value, f"{path}/{key}" if path else str(key))
     else:
         yield path, tree
-        return
-    for key, value in items:
-        yield from _leaves(value, f"{path}/{key}" if path else str(key))
 
 
-def _close(a: Any, b: Any, tolerance: float) -> bool:
+def _close(a: float | None, b: float | None, tolerance: float) -> bool:
     if isinstance(a, int) or isinstance(b, int):
         # A count that only one summary has is zero in the other.
         a, b = a or 0, b or 0

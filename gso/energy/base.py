@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from gso.energy.losses import Loss, Squared
-from gso.typing import Array, Ints
+from gso.typing import Array, Ints, S, Vec
 
-Residual = Callable[[Sequence[tuple[Any, ...]], Sequence[Any]], tuple[Any, ...]]
+
+class Residual(Hashable, Protocol):
+    """Residuals of one element, from the component tuples of its points and its constants."""
+
+    def __call__(self, points: Sequence[Vec[S]], constants: Sequence[S], /) -> Vec[S]: ...
+
+
+class Vectors(Hashable, Protocol):
+    """Plane vectors of one element whose lengths its first residuals compare."""
+
+    def __call__(
+        self, points: Sequence[Vec[S]], constants: Sequence[S], /
+    ) -> tuple[Vec[S], ...]: ...
+
 
 #: ``limit(coordinates, direction) -> largest step``: a step limit for the line search.
 Limit = Callable[[Array, Array], float]
@@ -72,7 +85,7 @@ class Term:
     weights: Array
     constants: Array = field(default_factory=_no_constants)
     linear: bool = False
-    vectors: Residual | None = None
+    vectors: Vectors | None = None
     refresh: Callable[[Mapping[str, Array]], Array] | None = None
     multipliers: Multipliers | None = None
 

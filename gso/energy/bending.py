@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from gso import geometry
 from gso.energy import fairness
-from gso.energy.base import Array, Term
+from gso.energy.base import Term
 from gso.mesh import Mesh, topology
+from gso.typing import Array, S, Vec
 
 #: Rigid motions leave the residual unchanged, because the frame moves with the surface.
 INVARIANT = ("translation", "rotation")
@@ -19,7 +19,7 @@ INVARIANT = ("translation", "rotation")
 _SHORTEST = 0.2
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return the curvature of a polyline at a vertex, minus its target value.
 
     Let d be the second difference of the points a, b, c, and e, f the chords along the
@@ -33,7 +33,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
     return _in_frame(d, geometry.sub(c, a), geometry.sub(p, q), constants)
 
 
-def hinge_residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def hinge_residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return the bending across the common edge a b of two triangles a b c and b a d.
 
     As :func:`residual`, with the linear combination of the four points that vanishes on affine
@@ -43,13 +43,12 @@ def hinge_residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) 
     """
     a, b, c, d = points
     lack = tuple(
-        sum(w * x for w, x in zip(constants[:4], parts, strict=True))
-        for parts in zip(a, b, c, d, strict=True)
+        geometry.dot(tuple(constants[:4]), parts) for parts in zip(a, b, c, d, strict=True)
     )
     return _in_frame(lack, geometry.sub(b, a), geometry.sub(d, c), constants[4:])
 
 
-def _in_frame(d: Any, e: Any, f: Any, constants: Sequence[Any]) -> tuple[Any, ...]:
+def _in_frame(d: Vec[S], e: Vec[S], f: Vec[S], constants: Sequence[S]) -> Vec[S]:
     normal = geometry.cross(e, f)
     along = geometry.dot(d, normal) / geometry.norm(normal)
     parts = (geometry.dot(d, e), geometry.dot(d, f), along)
@@ -103,8 +102,8 @@ def build(mesh: Mesh, *, tangential: float = 1.0) -> list[Term]:
 
 def _lengths(*vectors: Array) -> Array:
     """Average the lengths of vectors (e, 3) by element, with a lower bound."""
-    length = np.mean([np.linalg.norm(x, axis=1) for x in vectors], axis=0)
-    return np.maximum(length, _SHORTEST * length.mean() if len(length) else 0.0)
+    length: Array = np.mean([np.linalg.norm(x, axis=1) for x in vectors], axis=0)
+    return length.clip(_SHORTEST * length.mean() if len(length) else 0.0)
 
 
 def examples(mesh: Mesh) -> list[Term]:

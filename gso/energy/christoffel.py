@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from gso import geometry
-from gso.energy.base import Array, Term
+from gso.energy.base import Term
 from gso.mesh import Mesh, topology
+from gso.typing import Array, Ints, S, Vec
 
 #: Rigid motions change no inner product.
 INVARIANT = ("translation", "rotation")
@@ -19,7 +19,7 @@ INVARIANT = ("translation", "rotation")
 _SHORTEST = 1.0
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return differences of d.(c - a), d.(p - b) and d.(q - b) of a mesh and its counterpart.
 
     Here d is the second difference of the points a, b, c of a polyline, and p, q are the
@@ -38,7 +38,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
     return tuple(s * (x - y) for s, x, y in zip(factors, here, there, strict=True))
 
 
-def _products(a: Any, b: Any, c: Any, p: Any, q: Any) -> tuple[Any, Any, Any]:
+def _products(a: Vec[S], b: Vec[S], c: Vec[S], p: Vec[S], q: Vec[S]) -> Vec[S]:
     d = geometry.second_difference(a, b, c)
     edges = (geometry.sub(c, a), geometry.sub(p, b), geometry.sub(q, b))
     return tuple(geometry.dot(d, e) for e in edges)
@@ -68,7 +68,7 @@ def build(mesh: Mesh, block: str, *, counterpart: str | None = None) -> list[Ter
     spacing = 0.5 * (_lengths(b - a) + _lengths(c - b))
     chords = 0.5 * np.stack([_lengths(c - a), _lengths(p - q)])
     constants = spacing**-2 / chords
-    blocks: tuple[Any, ...] = ((block, stencil),)
+    blocks: tuple[tuple[str, Ints], ...] = ((block, stencil),)
     if counterpart is not None:
         blocks += ((counterpart, stencil),)
     else:
@@ -87,8 +87,8 @@ def build(mesh: Mesh, block: str, *, counterpart: str | None = None) -> list[Ter
 
 def _lengths(chords: Array) -> Array:
     """Measure chords (t, 3), bounded below by :data:`_SHORTEST` times their mean length."""
-    length = np.linalg.norm(chords, axis=1)
-    return np.maximum(length, _SHORTEST * length.mean())
+    length: Array = np.linalg.norm(chords, axis=1)
+    return length.clip(_SHORTEST * length.mean())
 
 
 def examples(mesh: Mesh) -> list[Term]:

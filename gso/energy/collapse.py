@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from gso import geometry
-from gso.energy.base import Array, Ints, Term
+from gso.energy.base import Term
 from gso.energy.stretch import corners_of, per_corner
 from gso.geometry import ops
 from gso.mesh import Mesh
+from gso.typing import Array, Ints, S, Vec
 
 #: Rigid motions of the flat image change no area.
 INVARIANT = ("translation", "rotation")
@@ -23,7 +23,7 @@ UNBOUNDED = True
 SQUEEZED = 0.2
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return ``max(0, a / A - 1)`` of each corner triangle with doubled area A.
 
     The residual is zero where A is larger than `a`, and unbounded as A goes to zero. A step

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from gso import geometry
-from gso.energy.base import Array, Ints, Term, mean_weights
+from gso.energy.base import Term, mean_weights
 from gso.energy.isometry import typical_length
 from gso.mesh import Mesh, topology
+from gso.typing import Array, Ints, S, Vec
 
 #: Rigid motions change no length.
 INVARIANT = ("translation", "rotation")
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return differences of |a|^2, |b|^2 and a.b of a face and its counterpart, times a constant.
 
     For quads a and b are the diagonals: all zero when the parallelograms of the edge
@@ -82,7 +82,7 @@ def build(
     return terms
 
 
-def edge_residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def edge_residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return the difference of an edge's squared length and its target, times a constant.
 
     Constants: one over the mean squared length of the edges; the target squared length.

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from gso.energy.base import Array, Ints, Term
-from gso.geometry import gaussian_curvature
+from gso.energy.base import Term
+from gso.geometry import gaussian_curvature, star_area
 from gso.mesh import Mesh
+from gso.typing import Array, Ints, S, Vec
 
 #: The residual is 1/length^2 and does not change under rigid motions.
 INVARIANT = ("translation", "rotation")
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return the Gaussian curvature at the first point; the others are its ring."""
     return (gaussian_curvature(points[0], points[1:]),)
 
@@ -57,8 +57,6 @@ def _weights(mesh: Mesh, centre: Ints, ring: Ints) -> Array:
 
 def star_areas(vertices: Array, centre: Ints, ring: Ints) -> Array:
     """Return the areas (n,) of vertex stars."""
-    from gso.geometry import star_area
-
     return star_area(
         tuple(vertices[centre].T), [tuple(vertices[ring[:, k]].T) for k in range(ring.shape[1])]
     )

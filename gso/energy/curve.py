@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from gso.energy.base import Array, Ints, Term
+from gso.energy.base import Term
 from gso.geometry import dot, sub
 from gso.mesh import Mesh
 from gso.mesh.polyline import Polylines
+from gso.typing import Array, Ints, S, Vec
 
 #: The curve does not move with the surface.
 INVARIANT = ()
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return the vector from a target to the point, without its part along a unit direction.
 
     Constants: the target; then the direction, or zero where the vertex cannot slide.

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from gso import geometry
 from gso.energy.base import Term, mean_weights
 from gso.mesh import Mesh
+from gso.typing import S, Vec
 
 #: Rigid motions of the flat image change no length.
 INVARIANT = ("translation", "rotation")
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return ``l' / l - 1``. Constants: 1 / l."""
     return (geometry.norm(vectors(points, constants)[0]) - 1.0,)
 
 
-def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def vectors(points: Sequence[Vec[S]], constants: Sequence[S]) -> tuple[Vec[S], ...]:
     """Return the edge vector divided by its length in space."""
     return (tuple(x * constants[0] for x in geometry.sub(points[1], points[0])),)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from gso import geometry
 from gso.energy.base import Term
 from gso.geometry import ops
 from gso.mesh import Mesh
+from gso.typing import S, Vec
 
 #: Rigid motions change no length.
 INVARIANT = ("translation", "rotation")
@@ -23,7 +23,7 @@ INSIDE = (0.5, 1.8)
 BOUNDARY = (0.92, 1.08)
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return ``max(0, low / s - 1) + max(0, s / high - 1)`` of the length ratio s, result / design.
 
     It is zero between both ratios, so that moderate changes cost nothing, and unbounded as the

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from gso import geometry
-from gso.energy.base import Array, Ints, Term
+from gso.energy.base import Term
 from gso.mesh import Mesh, topology
+from gso.typing import Array, B, Ints, S, Vec
 
 #: Translations cancel as the coefficients sum to zero. A target does not rotate with the surface,
 #: so rotations are not declared.
 INVARIANT = ("translation",)
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return the linear combination of the points minus a target vector.
 
     Constants: one coefficient per point (they sum to zero), then the target's components.
@@ -59,7 +59,7 @@ def differences(mesh: Mesh) -> tuple[Ints, Array]:
     return stencil, np.array([[1.0], [-2.0], [1.0]]) * scale
 
 
-def spacing(along: Any, across: Any, shape: Sequence[int]) -> tuple[Any, Any]:
+def spacing(along: B, across: B, shape: Sequence[int]) -> tuple[B, B]:
     """Return a grid's spacing from the mean lengths of its sides; for arrays or tensors.
 
     Sides whose lengths differ by less than a factor of two count as equally long.

@@ -3,40 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from gso import geometry
-from gso.energy.base import Array, Ints, Term
+from gso.energy.base import Term
 from gso.mesh import Mesh, topology
+from gso.typing import Array, Ints, S, Vec
 
 #: Rigid motions of the flat image change no length.
 INVARIANT = ("translation", "rotation")
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return differences of the diagonals' lengths and of their dot product (Wang et al. 2024).
 
     For a triangle they are the differences of its sides' lengths. Constants: |a|, |b| and
     a.b of the cell in space, or the three lengths.
     """
-    lengths = [geometry.norm(v) for v in _vectors(points)]
+    lengths = [geometry.norm(v) for v in vectors(points, constants)]
     if len(points) == 4:
         a, b = geometry.diagonals(*points)
         lengths.append(geometry.dot(a, b))
     return tuple(x - c for x, c in zip(lengths, constants, strict=True))
 
 
-def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def vectors(points: Sequence[Vec[S]], constants: Sequence[S]) -> tuple[Vec[S], ...]:
     """Return the vectors whose lengths the first residuals compare."""
-    return tuple(_vectors(points))
-
-
-def _vectors(points: Sequence[tuple[Any, ...]]) -> list[Any]:
     if len(points) == 4:
-        return list(geometry.diagonals(*points))
-    return [geometry.sub(points[k - 1], points[k]) for k in range(3)]
+        return geometry.diagonals(*points)
+    return tuple(geometry.sub(points[k - 1], points[k]) for k in range(3))
 
 
 def typical_length(mesh: Mesh) -> float:
@@ -71,7 +67,7 @@ def build(mesh: Mesh) -> list[Term]:
 
 def _rest(vertices: Array, faces: Ints) -> Array:
     points = [tuple(vertices[faces[:, k]].T) for k in range(faces.shape[1])]
-    rows = [geometry.norm(v) for v in _vectors(points)]
+    rows = [geometry.norm(v) for v in vectors(points, ())]
     if len(points) == 4:
         rows.append(geometry.dot(*geometry.diagonals(*points)))
     return np.stack(rows)

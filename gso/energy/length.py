@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from gso import geometry
-from gso.energy.base import Array, Ints, Term
+from gso.energy.base import Term
 from gso.mesh import Mesh
+from gso.typing import Array, Ints, S, Vec
 
 #: Rigid motions change no length.
 INVARIANT = ("translation", "rotation")
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return ``(l'^2 - l^2) / 2l``: about ``l' - l`` near zero, and smooth at ``l' = 0``.
 
     Constants: the target length l, and a shift, 0 for a soft term.

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from gso.geometry import ops
-from gso.typing import Array
+from gso.typing import B
 
 
 class Loss(Protocol):
     """Loss of the residuals (r, e) of elements; acts on each residual unless stated otherwise."""
 
-    def value(self, r: Array) -> Array:
+    def value(self, r: B) -> B:
         """Return the loss (., e); its sum over the first axis is the total of each element."""
 
-    def weights(self, r: Array) -> tuple[Array, Array]:
+    def weights(self, r: B) -> tuple[B, B]:
         """Return the derivative, and a curvature >= 0 for the Gauss-Newton matrix, (r, e) each."""
 
 
@@ -27,10 +27,10 @@ class Loss(Protocol):
 class Squared:
     """Half the square."""
 
-    def value(self, r: Array) -> Array:
+    def value(self, r: B) -> B:
         return 0.5 * r * r
 
-    def weights(self, r: Array) -> tuple[Array, Array]:
+    def weights(self, r: B) -> tuple[B, B]:
         return r, ops.like(r, 1.0)
 
 
@@ -43,10 +43,10 @@ class Absolute:
 
     eps: float
 
-    def value(self, r: Array) -> Array:
+    def value(self, r: B) -> B:
         return ops.sqrt(r * r + self.eps**2) - self.eps
 
-    def weights(self, r: Array) -> tuple[Array, Array]:
+    def weights(self, r: B) -> tuple[B, B]:
         w = 1.0 / ops.sqrt(r * r + self.eps**2)
         return r * w, w
 
@@ -60,12 +60,12 @@ class Distance:
 
     eps: float
 
-    def _root(self, r: Array) -> Array:
-        return ops.sqrt((r * r).sum(axis=0, keepdims=True) + self.eps**2)
+    def _root(self, r: B) -> B:
+        return ops.sqrt((r * r).sum(0)[None] + self.eps**2)
 
-    def value(self, r: Array) -> Array:
+    def value(self, r: B) -> B:
         return self.eps * (self._root(r) - self.eps)
 
-    def weights(self, r: Array) -> tuple[Array, Array]:
+    def weights(self, r: B) -> tuple[B, B]:
         w = self.eps / self._root(r)
         return r * w, ops.like(r, w)

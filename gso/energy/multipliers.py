@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gso.energy.base import Array, Term
+from gso.energy.base import Term
+from gso.typing import Array
 
 #: Weight of a hard constraint: large compared with every task's energy, but moderate, as the
 #: multipliers reduce the remaining residual.
@@ -27,7 +28,8 @@ class Shifts:
     """
 
     def __init__(self, term: Term):
-        self._term, self._constants, self._count = term, term.constants.copy(), 0
+        self._term, self._count = term, 0
+        self._constants: Array = term.constants.copy()
 
     def constants(self, blocks: Mapping[str, Array]) -> Array:
         """Return the constants with the current shifts; the coordinates are ignored."""
@@ -36,7 +38,7 @@ class Shifts:
     def update(self, blocks: Mapping[str, Array]) -> float:
         """Add the current residuals to the shifts; return the largest residual."""
         points = [tuple(blocks[b][ids].T) for b, index in self._term.stencil for ids in index.T]
-        value = np.stack(self._term.residual(points, self._constants))
+        value = np.stack(self._term.residual(points, list(self._constants)))
         self._count = len(value)
         shift = self._constants[-len(value) :]
         left = float(np.abs(value - shift).max(initial=0.0))

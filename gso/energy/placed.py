@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
-from gso.energy.base import Array, Ints, Residual, Term
+from gso.energy.base import Residual, Term, Vectors
 from gso.mesh import Frame
+from gso.typing import Array, Ints, S, Vec
 
 #: Number of constants of a component's frame: its centre, and one over its scale.
 _FRAME = 4
@@ -50,8 +50,8 @@ def placed(term: Term, frame: Frame, vertices: Ints, faces: Ints, *, share: floa
     constants = term.by_element
     return replace(
         term,
-        residual=_within(term.residual, kinds),
-        vectors=None if term.vectors is None else _within(term.vectors, kinds),
+        residual=_residual(term.residual, kinds),
+        vectors=None if term.vectors is None else _vectors(term.vectors, kinds),
         stencil=stencil,
         weights=share * term.weights,
         constants=np.concatenate([own, constants]),
@@ -60,17 +60,32 @@ def placed(term: Term, frame: Frame, vertices: Ints, faces: Ints, *, share: floa
 
 
 @lru_cache(maxsize=256)
-def _within(residual: Residual, kinds: tuple[str, ...]) -> Residual:
+def _residual(residual: Residual, kinds: tuple[str, ...]) -> Residual:
     """Wrap a residual so that it takes points in the coordinates of the whole mesh."""
 
-    def within(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
-        centre, factor = constants[: _FRAME - 1], constants[_FRAME - 1]
-        own = []
-        for kind, point in zip(kinds, points, strict=True):
-            if kind == "surface":
-                own.append(tuple((x - c) * factor for x, c in zip(point, centre, strict=True)))
-            else:
-                own.append(tuple(x * factor for x in point) if kind == "flat" else point)
-        return residual(own, constants[_FRAME:])
+    def within(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
+        return residual(_own(points, constants, kinds), constants[_FRAME:])
 
     return within
+
+
+@lru_cache(maxsize=256)
+def _vectors(vectors: Vectors, kinds: tuple[str, ...]) -> Vectors:
+    """Wrap the vectors of a residual as :func:`_residual`."""
+
+    def within(points: Sequence[Vec[S]], constants: Sequence[S]) -> tuple[Vec[S], ...]:
+        return vectors(_own(points, constants, kinds), constants[_FRAME:])
+
+    return within
+
+
+def _own(points: Sequence[Vec[S]], constants: Sequence[S], kinds: tuple[str, ...]) -> list[Vec[S]]:
+    """Convert points of the whole mesh to the component's unit ball."""
+    centre, factor = constants[: _FRAME - 1], constants[_FRAME - 1]
+    own = []
+    for kind, point in zip(kinds, points, strict=True):
+        if kind == "surface":
+            own.append(tuple((x - c) * factor for x, c in zip(point, centre, strict=True)))
+        else:
+            own.append(tuple(x * factor for x in point) if kind == "flat" else point)
+    return own

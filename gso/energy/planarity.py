@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from gso import geometry
-from gso.energy.base import Ints, Term
+from gso.energy.base import Term
 from gso.mesh import Mesh, topology
+from gso.typing import Ints, S, Vec
 
 #: Rigid motions do not change planarity.
 INVARIANT = ("translation", "rotation")
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return the distance between the diagonals' lines. Constants: a shift, 0 for a soft term."""
     return (geometry.diagonal_distance(*points) + constants[0],)
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from gso.energy.base import Array, Ints, Term
+from gso.energy.base import Term
 from gso.geometry import sub
 from gso.mesh import Mesh
+from gso.typing import Array, Ints, S, Vec
 
 #: The targets do not move with the surface.
 INVARIANT = ()
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return the displacement from the target position."""
     return sub(points[0], tuple(constants))
 

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from gso.energy.base import Array, Term
+from gso.energy.base import Term
 from gso.geometry import dot, sub
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
+from gso.mesh.normals import vertex_normals
+from gso.typing import Array, S, Vec
 
 #: The reference does not move with the surface.
 INVARIANT = ()
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return ``t u + (1 - t) (u.n) n`` of the displacement u from the reference point.
 
     Constants: reference point (3), unit normal n (3), factor t on the tangential part.
@@ -79,6 +80,4 @@ def closest(mesh: Mesh, normals: Array, *, tangential: float = 0.0) -> Term:
 
 def examples(mesh: Mesh) -> list[Term]:
     """Build terms for the conformance tests."""
-    from gso.mesh.normals import vertex_normals
-
     return [build(mesh, vertex_normals(mesh), tangential=0.5)]

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from gso import geometry
 from gso.energy.base import Term
 from gso.energy.stretch import corners_of, per_corner, rest_constants
 from gso.mesh import Mesh
+from gso.typing import S, Vec
 
 #: Rigid motions of the flat image do not change the norm of the shear.
 INVARIANT = ("translation", "rotation")
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return (c, d) of each corner triangle of a face, see :mod:`gso.geometry.strain`.
 
     Constants: the three numbers of :func:`gso.geometry.rest_frame` per corner triangle.
     """
-    out: list[Any] = []
+    out: list[S] = []
     for n, corner in enumerate(corners_of(len(points))):
         p, q, r = (points[k] for k in corner)
         m11, m12, m22 = constants[3 * n : 3 * n + 3]

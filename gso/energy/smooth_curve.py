@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from gso.energy import fairness
-from gso.energy.base import Array, Ints, Term
+from gso.energy.base import Term
 from gso.mesh import Mesh, topology
+from gso.typing import Array, Ints
 
 #: Translations cancel, as the coefficients sum to zero; rotations turn the vector of residuals.
 INVARIANT = ("translation",)

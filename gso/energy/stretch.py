@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from gso import geometry
-from gso.energy.base import Array, Ints, Residual, Term
+from gso.energy.base import Residual, Term, Vectors
 from gso.geometry import ops
 from gso.mesh import Mesh, topology
+from gso.typing import Array, B, Ints, S, Vec
 
 #: Rigid motions of the flat image change no strain.
 INVARIANT = ("translation", "rotation")
@@ -30,7 +30,7 @@ def corners_of(size: int) -> tuple[tuple[int, int, int], ...]:
     return _CORNERS if size == 4 else ((0, 1, 2),)
 
 
-def _maps(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> list[Any]:
+def _maps(points: Sequence[Vec[S]], constants: Sequence[S]) -> list[tuple[Vec[S], S, S]]:
     out = []
     for n, corner in enumerate(corners_of(len(points))):
         p, q, r = (points[k] for k in corner)
@@ -39,7 +39,7 @@ def _maps(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> list[A
     return out
 
 
-def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     """Return ``sqrt(2) (Q - 1)`` of each corner triangle, then all sqrt(2) c, all sqrt(2) d.
 
     Half the sum of squares of a corner's three numbers is
@@ -54,7 +54,7 @@ def residual(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tup
     )
 
 
-def vectors(points: Sequence[tuple[Any, ...]], constants: Sequence[Any]) -> tuple[Any, ...]:
+def vectors(points: Sequence[Vec[S]], constants: Sequence[S]) -> tuple[Vec[S], ...]:
     """Return the plane vectors whose lengths are ``sqrt(2) Q``."""
     return tuple((_ROOT2 * q[0], _ROOT2 * q[1]) for q, _, _ in _maps(points, constants))
 
@@ -89,22 +89,24 @@ class TwoPowerLoss:
     @property
     def peak(self) -> float:
         """Factor on the second power."""
-        return self.knee ** (self.p - self.q)
+        peak: float = self.knee ** (self.p - self.q)
+        return peak
 
-    def _squares(self, r: Array) -> tuple[Array, Array]:
+    def _squares(self, r: B) -> tuple[B, B]:
         parts = r.reshape(3, -1, *r.shape[1:])
-        return parts, 0.5 / self.level**2 * (parts * parts).sum(axis=0)
+        return parts, 0.5 / self.level**2 * (parts * parts).sum(0)
 
-    def value(self, r: Array) -> Array:
+    def value(self, r: B) -> B:
         """Return the loss of each corner."""
         y = self._squares(r)[1]
         e = self.eps**2
         low = 2.0 / self.p * ((y + e) ** (0.5 * self.p) - e ** (0.5 * self.p))
         held = ops.minimum(y, (_STEEPEST * self.knee) ** 2)
         rise = self.peak * held ** (0.5 * self.q - 1.0)
-        return self.level**2 * (low + rise * (2.0 / self.q * held + y - held))
+        loss: B = self.level**2 * (low + rise * (2.0 / self.q * held + y - held))
+        return loss
 
-    def weights(self, r: Array) -> tuple[Array, Array]:
+    def weights(self, r: B) -> tuple[B, B]:
         """Return the derivative, and the curvature without negative part and cross terms."""
         parts, y = self._squares(r)
         held = ops.minimum(y, (_STEEPEST * self.knee) ** 2)
@@ -113,7 +115,7 @@ class TwoPowerLoss:
         growth = (0.5 * self.p - 1.0) * low / (y + self.eps**2)
         rising = (0.5 * self.q - 1.0) * self.peak * held ** (0.5 * self.q - 2.0)
         growth = ops.maximum(growth + ops.where(y > held, 0.0, rising), 0.0) / self.level**2
-        return (first * parts).reshape(r.shape), (first + growth * parts**2).reshape(r.shape)
+        return (first * parts).reshape(*r.shape), (first + growth * parts**2).reshape(*r.shape)
 
 
 @dataclass(frozen=True)
@@ -133,20 +135,20 @@ class PowerLoss:
     scale: float
     q: float
 
-    def _squares(self, r: Array) -> tuple[Array, Array]:
+    def _squares(self, r: B) -> tuple[B, B]:
         parts = r.reshape(3, -1, *r.shape[1:])
-        return parts, 0.5 / self.scale**2 * (parts * parts).sum(axis=0)
+        return parts, 0.5 / self.scale**2 * (parts * parts).sum(0)
 
-    def value(self, r: Array) -> Array:
+    def value(self, r: B) -> B:
         """Return the loss of each corner."""
         return self.scale**2 * 2.0 / self.q * self._squares(r)[1] ** (0.5 * self.q)
 
-    def weights(self, r: Array) -> tuple[Array, Array]:
+    def weights(self, r: B) -> tuple[B, B]:
         """Return the derivative, and the curvature without cross terms."""
         parts, y = self._squares(r)
         first = y ** (0.5 * self.q - 1.0)
         growth = (0.5 * self.q - 1.0) * y ** max(0.5 * self.q - 2.0, 0.0) / self.scale**2
-        return (first * parts).reshape(r.shape), (first + growth * parts**2).reshape(r.shape)
+        return (first * parts).reshape(*r.shape), (first + growth * parts**2).reshape(*r.shape)
 
 
 def cells(mesh: Mesh) -> list[Ints]:
@@ -188,7 +190,8 @@ def corner_shares(vertices: Array, quads: Ints) -> Array:
     corners = geometry.quad_corner_vectors(vertices, quads)
     side2 = ((np.roll(vertices[quads], -1, axis=1) - vertices[quads]) ** 2).sum(axis=2).T
     around = np.maximum(side2 + np.roll(side2, 1, axis=0), 1e-300)
-    return np.stack([geometry.dot(tuple(c), tuple(normal)) for c in corners]) / around
+    shares: Array = np.stack([geometry.dot(tuple(c), tuple(normal)) for c in corners]) / around
+    return shares
 
 
 def rest_constants(vertices: Array, faces: Ints) -> Array:
@@ -205,7 +208,9 @@ def per_corner(
     name: str,
     residual: Residual,
     constants: Callable[[Array, Ints], Array],
-    **more: Any,
+    *,
+    linear: bool = False,
+    vectors: Vectors | None = None,
 ) -> list[Term]:
     """Build terms on the corner triangles of a flat image, averaged over the triangles.
 
@@ -213,7 +218,7 @@ def per_corner(
     ----------
     mesh : Mesh
         The surface in space.
-    name, residual, more
+    name, residual, linear, vectors
         As for :class:`gso.energy.Term`.
     constants : callable
         Constants (c, e) of faces from the vertices in space and the faces.
@@ -227,7 +232,8 @@ def per_corner(
             (("flat", faces),),
             weights=np.full(len(faces), 1.0 / count),
             constants=constants(mesh.vertices, faces),
-            **more,
+            linear=linear,
+            vectors=vectors,
         )
         for faces in groups
     ]

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.faults.face_pairs import DEPTH, by_triangles, candidates, split
 from gso.mesh import Mesh
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 
 def crossings(mesh: Mesh) -> Ints:
@@ -47,7 +46,7 @@ def crossings(mesh: Mesh) -> Ints:
     return found[np.lexsort(found.T[::-1])]
 
 
-def _cross(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:
+def _cross(a: Array, b: Array, depth: Array) -> Flags:
     """Mark the pairs of triangles (t, 3, 3) that penetrate by more than a depth (t,)."""
     out = np.zeros(len(a), bool)
     at = np.arange(len(a))
@@ -73,8 +72,8 @@ def _heights(base: Array, other: Array) -> tuple[Array, Array]:
     return normal, np.einsum("tkd,td->tk", other - base[:, :1], normal)
 
 
-def _both_sides(height: Array, depth: Array) -> NDArray[np.bool_]:
-    return (height.min(axis=1) < -depth) & (height.max(axis=1) > depth)
+def _both_sides(height: Array, depth: Array) -> Flags:
+    return np.asarray((height.min(axis=1) < -depth) & (height.max(axis=1) > depth))
 
 
 def _extent(triangle: Array, height: Array, line: Array) -> tuple[Array, Array]:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.faults.boxes import overlapping
 from gso.mesh.topology import four_corners
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Smallest penetration depth of an intersection, relative to the width of the smaller face; less
 #: counts as touching.
@@ -54,7 +53,7 @@ def candidates(points: Array, faces: Ints) -> tuple[Ints, Array]:
     return np.stack([first, second], axis=1)[met], width[met]
 
 
-def split(faces: Ints, other: NDArray[np.bool_] | None = None) -> tuple[Ints, Ints]:
+def split(faces: Ints, other: Flags | None = None) -> tuple[Ints, Ints]:
     """Split faces into two triangles each (m, 2, 3), with the number of valid ones (m,): 1 or 2.
 
     Quads are split along corners 0-2, or 1-3 where `other` is set. The first triangle of a

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.geometry import cross, dot, norm, norm2, sub
 from gso.mesh import Mesh
 from gso.mesh.topology import are_quads, four_corners
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Cosine of the angle between neighbouring normals below which a face is folded onto the next:
 #: the angle is more than 120 degrees. Valid results almost always stay above 0.
@@ -74,8 +73,8 @@ def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
 
 
 def _corner_normals(
-    points: tuple[Array, ...], faces: Ints, quad: NDArray[np.bool_], below: float
-) -> tuple[tuple[Array, ...], NDArray[np.bool_]]:
+    points: tuple[Array, ...], faces: Ints, quad: Flags, below: float
+) -> tuple[tuple[Array, ...], Flags]:
     """Return corner triangles' unit normals (4, m), and quads that fold along a diagonal (2, m).
 
     Corner triangle k is cut off by the diagonal between corners k - 1 and k + 1. For a

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.faults.face_pairs import DEPTH, by_triangles, candidates, split
 from gso.mesh import Mesh
 from gso.mesh.topology import are_quads
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Sum of the angles around a vertex above which its faces overlap: 2 pi and a tolerance.
 _TURN = 2.0 * np.pi + 1e-2
@@ -59,19 +58,19 @@ def overlapping(mesh: Mesh, flat: Array) -> Ints:
     return np.unique(pairs[which[met]], axis=0)
 
 
-def _other_diagonal(points: Array, faces: Ints) -> NDArray[np.bool_]:
+def _other_diagonal(points: Array, faces: Ints) -> Flags:
     """Mark the quads that have an inverted triangle when split along the diagonal 0-2."""
     triangles, _ = split(faces)
-    return are_quads(faces) & (_areas(points, triangles).min(axis=1) <= 0)
+    return np.asarray(are_quads(faces) & (_areas(points, triangles).min(axis=1) <= 0))
 
 
 def _areas(points: Array, triangles: Ints) -> Array:
     """Return the doubled signed areas of triangles (..., 3)."""
     corners = (tuple(points[triangles[..., k]].T) for k in range(3))
-    return geometry.corner_area2(*corners).T
+    return np.asarray(geometry.corner_area2(*corners).T)
 
 
-def _meet(a: Array, b: Array, depth: Array) -> NDArray[np.bool_]:
+def _meet(a: Array, b: Array, depth: Array) -> Flags:
     """Mark the pairs of triangles (t, 3, 2) that overlap by more than a depth (t,).
 
     By the separating-axis test: if a line separates two triangles, one of their sides does.
@@ -96,4 +95,4 @@ def _wound(points: Array, faces: Ints, triangles: Ints, count: Ints) -> Ints:
     face = np.r_[np.arange(len(faces)), np.flatnonzero(count == 2)]
     angles = geometry.corner_angles(points, every)
     turn = np.bincount(every.ravel(), angles.ravel(), minlength=len(points))
-    return face[(turn[every] > _TURN).any(axis=1)]
+    return np.asarray(face[(turn[every] > _TURN).any(axis=1)])

@@ -4,36 +4,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 from gso.geometry import ops
-from gso.geometry.vector import Vec, cross, dot, norm2, sub
+from gso.geometry.vector import cross, dot, norm2, sub
+from gso.typing import B, S, Vec
 
 
-def _wedge(a: Vec, b: Vec) -> tuple[Any, Any]:
+def _wedge(a: Vec[S], b: Vec[S]) -> tuple[S, S]:
     """Return the angle between two edges of a triangle, and its doubled area."""
     twice = ops.sqrt(norm2(cross(a, b)))
     return ops.atan2(twice, dot(a, b)), twice
 
 
-def _star(centre: Vec, ring: Sequence[Vec]) -> tuple[Any, Any]:
+def _star(centre: Vec[S], ring: Sequence[Vec[S]]) -> tuple[S, S]:
     """Sum the angles and the doubled triangle areas of a closed star."""
     edges = [sub(p, centre) for p in ring]
-    angles: Any = 0.0
-    area2: Any = 0.0
-    for a, b in zip(edges, edges[1:] + edges[:1], strict=True):
-        angle, twice = _wedge(a, b)
+    pairs = zip(edges, edges[1:] + edges[:1], strict=True)
+    (angles, area2), *others = (_wedge(a, b) for a, b in pairs)
+    for angle, twice in others:
         angles = angles + angle
         area2 = area2 + twice
     return angles, area2
 
 
-def _curvature(angles: Any, area2: Any) -> Any:
+def _curvature(angles: S, area2: S) -> S:
     """Return the Gaussian curvature of a star from its sums of angles and of doubled areas."""
     return (2.0 * math.pi - angles) / (0.5 * area2)
 
 
-def star_area(centre: Vec, ring: Sequence[Vec]) -> Any:
+def star_area(centre: Vec[S], ring: Sequence[Vec[S]]) -> S:
     """Sum the full areas of the triangles of a star (three times the barycentric area)."""
     return 0.5 * _star(centre, ring)[1]
 
@@ -47,7 +46,7 @@ GRID_RINGS = (
 )
 
 
-def grid_star(points: Vec, split: int = 0) -> tuple[Vec, list[Vec]]:
+def grid_star(points: Vec[B], split: int = 0) -> tuple[Vec[B], list[Vec[B]]]:
     """Return the interior vertices of grids and their rings of six, as component tuples.
 
     Parameters
@@ -65,14 +64,14 @@ def grid_star(points: Vec, split: int = 0) -> tuple[Vec, list[Vec]]:
     ((2, 3, 2), 6)
     """
 
-    def moved(i: int, j: int) -> Vec:
+    def moved(i: int, j: int) -> Vec[B]:
         rows, columns = slice(1 + i, (i - 1) or None), slice(1 + j, (j - 1) or None)
         return tuple(c[..., rows, columns] for c in points)
 
     return moved(0, 0), [moved(i, j) for i, j in GRID_RINGS[split]]
 
 
-def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
+def gaussian_curvature(centre: Vec[S], ring: Sequence[Vec[S]]) -> S:
     """Return the Gaussian curvature of a vertex star, 1 / length^2.
 
     ``K = (2 pi - sum of angles) / (sum of full triangle areas)``, the definition behind the
@@ -98,7 +97,7 @@ def gaussian_curvature(centre: Vec, ring: Sequence[Vec]) -> Any:
     return _curvature(*_star(centre, ring))
 
 
-def grid_curvature(points: Vec, split: int = 0) -> Any:
+def grid_curvature(points: Vec[B], split: int = 0) -> B:
     """Return :func:`gaussian_curvature` of the interior vertices of grids, 1 / length^2.
 
     The six triangles of all stars are computed in one batch, because on small grids the time
@@ -123,7 +122,7 @@ def grid_curvature(points: Vec, split: int = 0) -> Any:
     ((3, 2), True)
     """
     centre, ring = grid_star(points, split)
-    around = zip(*ring, ring[0], strict=True)
-    edges = sub(tuple(ops.stack(c) for c in around), centre)
+    around = tuple(ops.stack([p[k] for p in (*ring, ring[0])]) for k in range(3))
+    edges = sub(around, centre)
     angles, twice = _wedge(tuple(e[:-1] for e in edges), tuple(e[1:] for e in edges))
     return _curvature(angles.sum(0), twice.sum(0))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from gso.geometry.vector import Vec
+from gso.typing import S, Vec
 
 
-def second_difference(a: Vec, b: Vec, c: Vec) -> Vec:
+def second_difference(a: Vec[S], b: Vec[S], c: Vec[S]) -> Vec[S]:
     """Return the second difference ``a - 2 b + c`` of three consecutive polyline vertices.
 
     The fairness of Jiang et al. 2020 is the sum of its squares over a mesh's polylines.

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from types import ModuleType
 from typing import Any
 
 import numpy as np
+
+from gso.typing import B, S
 
 # Below this a squared length counts as zero. Its root has a finite derivative, so a
 # degenerate element gives zeros and never a NaN.
@@ -18,64 +21,75 @@ TINY = 1e-60
 TINY_SINGLE = 1e-30
 
 
-def _module_of(x: Any) -> Any:
-    """Return the torch or casadi module that `x` belongs to, or None for NumPy."""
+def _module_of(x: object) -> ModuleType:
+    """Return the module that `x` belongs to: torch or casadi, otherwise NumPy."""
     root = type(x).__module__.partition(".")[0]
-    return sys.modules[root] if root in ("torch", "casadi") else None
+    return sys.modules[root] if root in ("torch", "casadi") else np
 
 
-def sqrt(x: Any) -> Any:
+def sqrt(x: S) -> S:
     """Return the square root of ``max(x, tiny)``: finite, with a finite derivative, at zero."""
     mod = _module_of(x)
-    if mod is None:
-        return np.sqrt(np.maximum(x, TINY))
-    if mod.__name__ == "torch":
-        return mod.sqrt(mod.clamp(x, min=TINY if x.dtype == mod.float64 else TINY_SINGLE))
-    return mod.sqrt(mod.fmax(x, TINY))
+    number: Any = x
+    if mod is np:
+        root: S = np.sqrt(np.maximum(number, TINY))
+    elif mod.__name__ == "torch":
+        tiny = TINY if number.dtype == mod.float64 else TINY_SINGLE
+        root = mod.sqrt(mod.clamp(number, min=tiny))
+    else:
+        root = mod.sqrt(mod.fmax(number, TINY))
+    return root
 
 
-def atan2(y: Any, x: Any) -> Any:
+def atan2(y: S, x: S) -> S:
     """Return the angle of the vector (x, y), radians."""
     mod = _module_of(y)
-    return np.arctan2(y, x) if mod is None else mod.atan2(y, x)
+    angle: S = mod.arctan2(y, x) if mod is np else mod.atan2(y, x)
+    return angle
 
 
-def minimum(x: Any, y: Any) -> Any:
+def minimum(x: S, y: S | float) -> S:
     """Return the smaller of two numbers."""
     mod = _module_of(x)
-    if mod is None:
-        return np.minimum(x, y)
-    if mod.__name__ != "torch":
-        return mod.fmin(x, y)
-    return mod.minimum(x, y) if _module_of(y) is mod else mod.clamp(x, max=y)
+    if mod is np:
+        small: S = mod.minimum(x, y)
+    elif mod.__name__ != "torch":
+        small = mod.fmin(x, y)
+    else:
+        small = mod.minimum(x, y) if _module_of(y) is mod else mod.clamp(x, max=y)
+    return small
 
 
-def maximum(x: Any, y: Any) -> Any:
+def maximum(x: S, y: S | float) -> S:
     """Return the larger of two numbers."""
     mod = _module_of(x)
-    if mod is None:
-        return np.maximum(x, y)
-    if mod.__name__ != "torch":
-        return mod.fmax(x, y)
-    return mod.maximum(x, y) if _module_of(y) is mod else mod.clamp(x, min=y)
+    if mod is np:
+        large: S = mod.maximum(x, y)
+    elif mod.__name__ != "torch":
+        large = mod.fmax(x, y)
+    else:
+        large = mod.maximum(x, y) if _module_of(y) is mod else mod.clamp(x, min=y)
+    return large
 
 
-def where(condition: Any, x: Any, y: Any) -> Any:
+def where(condition: object, x: S | float, y: S | float) -> S:
     """Return x where a condition on NumPy arrays or torch tensors holds, and y elsewhere."""
-    mod = _module_of(condition)
-    return np.where(condition, x, y) if mod is None else mod.where(condition, x, y)
+    chosen: S = _module_of(condition).where(condition, x, y)
+    return chosen
 
 
-def like(x: Any, values: Any) -> Any:
+def like(x: B, values: B | float) -> B:
     """Broadcast values to the shape of a NumPy array or torch tensor x."""
     mod = _module_of(x)
-    if mod is None:
-        return np.broadcast_to(np.asarray(values, x.dtype), x.shape)
-    given = values if _module_of(values) is mod else mod.as_tensor(values).to(x)
-    return given.expand(x.shape)
+    if mod is np:
+        full: B = mod.broadcast_to(mod.asarray(values, x.dtype), x.shape)
+    else:
+        given: Any = values if _module_of(values) is mod else mod.as_tensor(values).to(x)
+        full = given.expand(x.shape)
+    return full
 
 
-def stack(arrays: Sequence[Any]) -> Any:
+def stack(arrays: Sequence[B]) -> B:
     """Stack NumPy arrays or torch tensors of one shape along a new first axis."""
-    mod = _module_of(arrays[0])
-    return np.stack(arrays) if mod is None else mod.stack(tuple(arrays))
+    stacked: B = _module_of(arrays[0]).stack(tuple(arrays))
+    return stacked

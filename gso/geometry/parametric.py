@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from gso.geometry.vector import cross, dot, norm
+from gso.typing import S, Vec
 
-from gso.geometry.vector import Vec, cross, dot, norm
 
-
-def smooth_gaussian_curvature(su: Vec, sv: Vec, suu: Vec, suv: Vec, svv: Vec) -> Any:
+def smooth_gaussian_curvature(su: Vec[S], sv: Vec[S], suu: Vec[S], suv: Vec[S], svv: Vec[S]) -> S:
     """Return the Gaussian curvature of a parametrised surface, 1 / length^2.
 
     The determinant of the second fundamental form over that of the first,
@@ -27,8 +26,8 @@ def smooth_gaussian_curvature(su: Vec, sv: Vec, suu: Vec, suv: Vec, svv: Vec) ->
     >>> float(smooth_gaussian_curvature(su, sv, up, zero, up))
     1.0
     """
-    n = cross(su, sv)
-    length = norm(n)
-    n = tuple(c / length for c in n)
+    normal = cross(su, sv)
+    length = norm(normal)
+    n = tuple(c / length for c in normal)
     bending = dot(suu, n) * dot(svv, n) - dot(suv, n) * dot(suv, n)
     return bending / (length * length)

@@ -46,4 +46,4 @@ def _spatial(p: Array, q: Array) -> Array:
         return np.eye(3)
     if s[1] <= _THIN * s[0]:
         return np.asarray(Rotation.align_vectors(u[:, 0], vt[0])[0].as_matrix())
-    return u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
+    return np.asarray(u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt)

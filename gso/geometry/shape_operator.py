@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from gso.geometry import ops
-from gso.geometry.strain import rest_frame
-from gso.geometry.vector import Vec, cross, dot, norm
-
-_ORIGIN = (0.0, 0.0, 0.0)
+from gso.geometry.strain import inverse_frame
+from gso.geometry.vector import cross, dot, norm
+from gso.typing import S, Vec
 
 #: Rows of a 2 x 2 matrix.
-Matrix = tuple[tuple[Any, Any], tuple[Any, Any]]
+Matrix = tuple[tuple[S, S], tuple[S, S]]
 
 
-def tangent_frame(a: Vec, b: Vec) -> tuple[Vec, Vec, Vec]:
+def tangent_frame(a: Vec[S], b: Vec[S]) -> tuple[Vec[S], Vec[S], Vec[S]]:
     """Return orthonormal ``(e, f, n)``: `e` along `a`, `f` towards `b`, `n` along ``a x b``.
 
     `a` and `b` must span an area.
@@ -26,7 +23,7 @@ def tangent_frame(a: Vec, b: Vec) -> tuple[Vec, Vec, Vec]:
     return e, cross(n, e), n
 
 
-def shape_matrix(a: Vec, b: Vec, da: Vec, db: Vec) -> Matrix:
+def shape_matrix(a: Vec[S], b: Vec[S], da: Vec[S], db: Vec[S]) -> Matrix[S]:
     """Return the shape operator of a face in the tangent frame of `a` and `b`, 1 / length.
 
     The linear map that takes the tangents `a` and `b` to the changes `da` and `db` of the
@@ -48,23 +45,23 @@ def shape_matrix(a: Vec, b: Vec, da: Vec, db: Vec) -> Matrix:
     (0.25, 0.5)
     """
     e, f, _ = tangent_frame(a, b)
-    m11, m12, m22 = rest_frame(_ORIGIN, a, b)
+    m11, m12, m22 = inverse_frame(a, b)
     first = tuple(p * m11 for p in da)
     second = tuple(p * m12 + q * m22 for p, q in zip(da, db, strict=True))
     return (dot(first, e), dot(second, e)), (dot(first, f), dot(second, f))
 
 
-def determinant(s: Matrix) -> Any:
+def determinant(s: Matrix[S]) -> S:
     """Return the Gaussian curvature of a shape operator, 1 / length^2."""
     return s[0][0] * s[1][1] - s[0][1] * s[1][0]
 
 
-def half_trace(s: Matrix) -> Any:
+def half_trace(s: Matrix[S]) -> S:
     """Return the mean curvature of a shape operator, 1 / length."""
     return 0.5 * (s[0][0] + s[1][1])
 
 
-def eigen(p: Any, q: Any, r: Any) -> tuple[Any, Any, Any]:
+def eigen(p: S, q: S, r: S) -> tuple[S, S, S]:
     """Return the eigenvalues of ``((p, q), (q, r))``, and the angle of the first eigenvector.
 
     Returns ``(high, low, angle)``: `high` >= `low`, and the eigenvector of `high` is

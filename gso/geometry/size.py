@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from gso.geometry.vector import Vec, norm
-from gso.typing import Array
+from gso.geometry.vector import norm
+from gso.typing import Array, B, Vec
 
 
 def box_diagonal(points: Array) -> float:
@@ -21,7 +19,7 @@ def ball(points: Array) -> tuple[Array, float]:
     return centre, float(np.sqrt(((points - centre) ** 2).sum(axis=1).max()))
 
 
-def side_lengths(grid: Vec) -> tuple[Any, Any]:
+def side_lengths(grid: Vec[B]) -> tuple[B, B]:
     """Return the mean lengths of a grid's polylines along both directions.
 
     Parameters

@@ -8,33 +8,36 @@ and ``Q - R``, the second one negative when the triangle is inverted.
 
 from __future__ import annotations
 
-from typing import Any
-
 from gso.geometry import ops
-from gso.geometry.vector import Vec, cross, dot, norm, norm2, sub
+from gso.geometry.vector import cross, dot, norm, norm2, sub
+from gso.typing import S, Vec
 
 
-def rest_frame(p: Vec, q: Vec, r: Vec) -> tuple[Any, Any, Any]:
+def rest_frame(p: Vec[S], q: Vec[S], r: Vec[S]) -> tuple[S, S, S]:
     """Return the inverse rest matrix of a triangle in space, upper triangle ``(m11, m12, m22)``.
 
     In the frame of the triangle's plane the edges ``q - p`` and ``r - p`` are the columns of
     ``[[l, u], [0, h]]``; this is the inverse of that matrix. It grows without bound as
     the triangle's area vanishes, so leave such triangles out.
     """
-    e, f = sub(q, p), sub(r, p)
+    return inverse_frame(sub(q, p), sub(r, p))
+
+
+def inverse_frame(e: Vec[S], f: Vec[S]) -> tuple[S, S, S]:
+    """Return :func:`rest_frame` of a triangle from its edges at the first corner."""
     length = norm(e)
     height = norm(cross(e, f)) / length
     return 1.0 / length, -dot(e, f) / (length * length * height), 1.0 / height
 
 
-def singular_values(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Any, Any]:
+def singular_values(p: Vec[S], q: Vec[S], r: Vec[S], rest: tuple[S, S, S]) -> tuple[S, S]:
     """Return the principal stretches ``(s1, s2)`` of a triangle; ``s2 < 0`` when it is inverted."""
     q_part, c, d = turn_and_shear(p, q, r, rest)
     big, small = norm(q_part), ops.sqrt(norm2((c, d)))
     return big + small, big - small
 
 
-def turn_and_shear(p: Vec, q: Vec, r: Vec, rest: tuple[Any, Any, Any]) -> tuple[Vec, Any, Any]:
+def turn_and_shear(p: Vec[S], q: Vec[S], r: Vec[S], rest: tuple[S, S, S]) -> tuple[Vec[S], S, S]:
     """Return the parts ``((q1, q2), c, d)`` of a triangle's map, all linear in the unknowns.
 
     ``Q = |(q1, q2)|`` is the conformal part (rotation and scale), ``R = |(c, d)|`` the shear.

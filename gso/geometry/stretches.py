@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from gso.geometry import ops
 from gso.geometry.cells import diagonals
-from gso.geometry.vector import Vec, dot, norm2, sub
+from gso.geometry.vector import dot, norm2, sub
+from gso.typing import S, Vec
 
 
-def first_form(*corners: Vec) -> tuple[Any, Any, Any]:
+def first_form(*corners: Vec[S]) -> tuple[S, S, S]:
     """Return ``(E, F, G)`` of a face: inner products of two vectors that span it.
 
     These are the diagonals of a quad, which span its parallelogram of edge midpoints (Jiang et
@@ -22,7 +21,7 @@ def first_form(*corners: Vec) -> tuple[Any, Any, Any]:
     return norm2(a), dot(a, b), norm2(b)
 
 
-def principal_stretches(rest: tuple[Any, Any, Any], image: tuple[Any, Any, Any]) -> tuple[Any, Any]:
+def principal_stretches(rest: tuple[S, S, S], image: tuple[S, S, S]) -> tuple[S, S]:
     """Return the largest and smallest ratio ``(s1, s2)`` of lengths, image over rest.
 
     Takes the :func:`first_form` of the face on both surfaces, which may lie in space; `rest`

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gso.geometry.cells import corner_area2
-from gso.geometry.vector import Vec, angle, cross, sub
-from gso.typing import Array, Ints
+from gso.geometry.vector import angle, cross, sub
+from gso.typing import Array, Ints, Vec
 
 
 def area_vectors(points: Array, triangles: Ints) -> Array:
@@ -22,7 +22,7 @@ def area_vectors(points: Array, triangles: Ints) -> Array:
 
 def doubled_areas(points: Array, triangles: Ints) -> Array:
     """Return the doubled areas (t,) of triangles of points (n, 3)."""
-    return np.linalg.norm(area_vectors(points, triangles), axis=1)
+    return np.asarray(np.linalg.norm(area_vectors(points, triangles), axis=1))
 
 
 def signed_areas(flat: Array, triangles: Ints) -> Array:
@@ -50,7 +50,7 @@ def quad_corner_vectors(points: Array, quads: Ints) -> Array:
     return np.stack([np.stack(cross(sides[k - 1], sides[k])) for k in range(4)])
 
 
-def corners(points: Array, faces: Ints) -> list[Vec]:
+def corners(points: Array, faces: Ints) -> list[Vec[Array]]:
     """Return the corners (k) of faces (m, k) as component arrays (m,), which are contiguous."""
     x, y, z = np.ascontiguousarray(points.T)
     columns = (np.ascontiguousarray(c) for c in faces.T)

@@ -35,12 +35,13 @@ def _matrix(source: int, target: int) -> Array:
     below = np.minimum(x.astype(int), source - 2)
     t = (x - below)[:, None]
     own, unit = 1.0 - t, np.eye(source)
-    return (
+    matrix: Array = (
         own * unit[below]
         + t * unit[below + 1]
         + (own**3 - own) / 6.0 * bends[below]
         + (t**3 - t) / 6.0 * bends[below + 1]
     )
+    return matrix
 
 
 def resample(values: Array, height: int, width: int) -> Array:
@@ -51,7 +52,7 @@ def resample(values: Array, height: int, width: int) -> Array:
     """
     h, w = values.shape[:2]
     along = (_matrix(h, height) @ values.reshape(h, -1)).reshape(height, w, -1)
-    return np.matmul(_matrix(w, width), along)
+    return np.asarray(np.matmul(_matrix(w, width), along))
 
 
 def prolong_displacement(coarse: Mesh, fine: Mesh, points: Array) -> Array:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso.energy import fairness
 from gso.linalg import Pattern, choose
+from gso.linalg.base import Solver
 from gso.mesh import Mesh
 from gso.typing import Array, Ints
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 #: Length over which the field is smoothed, relative to the spacing of the given vertices.
 _REACH = 2.0
@@ -56,7 +61,7 @@ class Prolongation:
         self.held = np.zeros(0, np.int64) if held is None else held
 
     @cached_property
-    def _solver(self) -> Any:
+    def _solver(self) -> Solver:
         from scipy.sparse import diags, tril
 
         mesh, ids = self.mesh, self.ids
@@ -95,10 +100,10 @@ class Prolongation:
             np.linalg.norm(largest, axis=1).max(initial=0.0),
             np.linalg.norm(base, axis=1, keepdims=True),
         )
-        return field * np.minimum(1.0, most / np.maximum(length, 1e-300))
+        return np.asarray(field * np.minimum(1.0, most / np.maximum(length, 1e-300)))
 
 
-def _bending(mesh: Mesh) -> Any:
+def _bending(mesh: Mesh) -> csr_matrix:
     """Return the matrix (m, n) of second differences that reach every vertex of a face.
 
     Where no polyline goes through a vertex, they are those across the edges around it.
@@ -125,7 +130,7 @@ def _bending(mesh: Mesh) -> Any:
     )
 
 
-def _affine(points: Array, values: Array) -> Any:
+def _affine(points: Array, values: Array) -> Callable[[Array], Array]:
     """Fit an affine map to values (m, 3) at points (m, 3)."""
     centre, mean = points.mean(axis=0), values.mean(axis=0)
     x = points - centre

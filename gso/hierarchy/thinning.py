@@ -13,12 +13,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
-from gso.typing import Array, Ints
-
-Mask = NDArray[np.bool_]
+from gso.typing import Array, Flags, Ints
 
 #: Largest number of rounds. Shapes may become worse after a round that removes less than this
 #: share of the vertices.
@@ -147,7 +144,7 @@ def flipped(points: Array, faces: Ints) -> Ints:
     chosen = (best[t] == rank) & (best[u] == rank)
     _, once = np.unique(made[chosen], return_index=True)
     wanted = wanted[np.flatnonzero(chosen)[once]]
-    out = faces.copy()
+    out: Ints = faces.copy()
     a, b, c, d = a[wanted], b[wanted], c[wanted], d[wanted]
     out[one[wanted] // 3] = np.stack([c, a, d], axis=1)
     out[two[wanted] // 3] = np.stack([d, b, c], axis=1)
@@ -191,14 +188,14 @@ def _links(faces: Ints, n: int) -> _Links:
     return _Links(start, origin, dest, apex, key, open_out, open_in)
 
 
-def _among(sorted_keys: Ints, keys: Ints) -> Mask:
+def _among(sorted_keys: Ints, keys: Ints) -> Flags:
     """Return which keys are among sorted ones."""
     at = np.minimum(np.searchsorted(sorted_keys, keys), len(sorted_keys) - 1)
-    return sorted_keys[at] == keys
+    return np.asarray(sorted_keys[at] == keys)
 
 
 def _collapsed(
-    points: Array, faces: Ints, order: Ints, held: Mask, most: int, least: float
+    points: Array, faces: Ints, order: Ints, held: Flags, most: int, least: float
 ) -> Ints:
     """Return the vertex (n,) that each one is collapsed into; itself where it stays."""
     n = len(points)
@@ -218,16 +215,16 @@ def _collapsed(
     return into
 
 
-def _straight(points: Array, links: _Links, border: Mask) -> Mask:
+def _straight(points: Array, links: _Links, border: Flags) -> Flags:
     """Return at which vertices the boundary does not turn."""
     before = points - points[links.open_in]
     after = points[links.open_out] - points
     along = np.einsum("nd,nd->n", before, after)
     sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    return border & (along > _STRAIGHT * sizes)
+    return np.asarray(border & (along > _STRAIGHT * sizes))
 
 
-def _independent(links: _Links, order: Ints, may: Mask, n: int) -> Mask:
+def _independent(links: _Links, order: Ints, may: Flags, n: int) -> Flags:
     """Return a set of vertices that are not neighbours, nearly as large as possible."""
     chosen = np.zeros(n, bool)
     open_to = may.copy()
@@ -247,7 +244,7 @@ def _independent(links: _Links, order: Ints, may: Mask, n: int) -> Mask:
 
 
 def _best_targets(
-    points: Array, links: _Links, centre: Ints, border: Mask, least: float
+    points: Array, links: _Links, centre: Ints, border: Flags, least: float
 ) -> tuple[Ints, Ints, Array]:
     """Return vertices that can be removed, their best target, and the worst new shape there."""
     degree = np.diff(links.start)[centre]
@@ -297,7 +294,7 @@ def _shape(area: Array, *sides: Array) -> Array:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    return np.einsum("kd,kd->k", a, b)
+    return np.asarray(np.einsum("kd,kd->k", a, b))
 
 
 def _cross(a: Array, b: Array) -> Array:
@@ -305,7 +302,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _safe(
-    links: _Links, centre: Ints, target: Ints, shape: Array, border: Mask, n: int
+    links: _Links, centre: Ints, target: Ints, shape: Array, border: Flags, n: int
 ) -> tuple[Ints, Ints, Array]:
     """Keep the collapses that make no edge twice, and none across the surface."""
     degree = np.diff(links.start)[centre]

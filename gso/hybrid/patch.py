@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import RectBivariateSpline
+from scipy.sparse import diags, identity, kron
 
 from gso import geometry, parametrization
 from gso.errors import MeshError
@@ -43,8 +45,6 @@ class Patch:
 
     def at_vertices(self, values: Array) -> Array:
         """Interpolate values (size, size, d) on the grid at those vertices, (n, d)."""
-        from scipy.interpolate import RectBivariateSpline
-
         sides = (np.linspace(0.0, 1.0, n) for n in values.shape[:2])
         u, v = sides
         columns = [
@@ -142,7 +142,7 @@ def _boundary(mesh: Mesh) -> tuple[Ints, Array, Array]:
 
 def _lengths(points: Array) -> Array:
     """Return the edge lengths of a closed polygon; edge k starts at vertex k."""
-    return np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    return np.asarray(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))
 
 
 def _surface_on_left(mesh: Mesh, loop: Ints) -> bool:
@@ -186,8 +186,6 @@ def _corners(turning: Array, lengths: Array) -> list[int]:
 
 def _spline(points: Array, parameters: Array, size: int) -> tuple[Array, Array]:
     """Fit a smooth bicubic spline to points; evaluate it at their parameters and on a grid."""
-    from scipy.sparse import diags, identity, kron
-
     count = int(np.clip(0.75 * np.sqrt(len(points)), 4, _CONTROLS))
     knots = clamped_knots(count)
     u, v = (basis_matrix(knots, count, x) for x in parameters.T)

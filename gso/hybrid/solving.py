@@ -21,16 +21,18 @@ from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.executors import Executor, Item, open_executor
 from gso.hybrid.time_model import net_saves_time
 from gso.hybrid.warm_start import Prediction, predictions
+from gso.io import as_mesh
 from gso.mesh import Mesh
+from gso.net.catalogue import NetLike
 from gso.pattern import Pattern
 from gso.pipeline import component_solves
 from gso.pipeline.case import Case
 from gso.pipeline.normalise import Canonical
 from gso.quantities import as_length
 from gso.result import Result
-from gso.status import Status
+from gso.status import Progress, Status
 from gso.tno import Start, check, optimize
-from gso.typing import Array
+from gso.typing import Array, Keywords, MeshLike
 
 #: Surfaces that are read and predicted together.
 _BATCH = 64
@@ -43,10 +45,10 @@ _NEARLY = 2e-3
 
 
 def solve(
-    mesh: Any,
+    mesh: MeshLike,
     *,
     task: str = "developable",
-    net: Any = None,
+    net: NetLike | None = None,
     polish: bool | int = True,
     sparing: bool = False,
     **keywords: Any,
@@ -110,8 +112,6 @@ def solve(
     >>> result.warm_start in ("net", "cold"), result.usable
     (True, True)
     """
-    from gso.io import as_mesh
-
     clock = time.perf_counter()
     polish = _checked(task, polish, keywords)
     design = as_mesh(mesh)
@@ -123,18 +123,19 @@ def solve(
         return result
     prediction = Prediction()
     if not sparing or net_saves_time(design, task, keywords):
-        asked = {"task": task, "net": net, "passes": _passes(polish), "alone": polish is False}
-        (prediction,) = predictions([design], **asked)
+        (prediction,) = predictions(
+            [design], task=task, net=net, passes=_passes(polish), alone=polish is False
+        )
     result = _finished(design, prediction, task, polish, keywords)
     result.seconds["total"] = time.perf_counter() - clock
     return result
 
 
 def solve_many(
-    meshes: Iterable[Any],
+    meshes: Iterable[MeshLike],
     *,
     task: str = "developable",
-    net: Any = None,
+    net: NetLike | None = None,
     polish: bool | int = True,
     sparing: bool = False,
     workers: int | None = None,
@@ -181,7 +182,7 @@ def solve_many(
         yield from ready.as_completed(work, started)
 
 
-def _pieces(design: Mesh, task: str, sparing: bool, keywords: dict[str, Any]) -> list[Component]:
+def _pieces(design: Mesh, task: str, sparing: bool, keywords: Keywords) -> list[Component]:
     """Return the components that are predicted one by one; none for the design as a whole."""
     if not several(design):
         return []
@@ -194,7 +195,7 @@ def _pieces(design: Mesh, task: str, sparing: bool, keywords: dict[str, Any]) ->
     return pieces
 
 
-def _each(design: Mesh, pieces: list[Component], task: str, keywords: dict[str, Any]) -> Result:
+def _each(design: Mesh, pieces: list[Component], task: str, keywords: Keywords) -> Result:
     """Solve every component from its own prediction, where there is one."""
     callback, compiled = keywords.pop("callback", None), keywords.pop("constraints")
     far, unit = keywords.get("max_deviation"), keywords.pop("unit", "mm")
@@ -203,7 +204,7 @@ def _each(design: Mesh, pieces: list[Component], task: str, keywords: dict[str, 
         size = design.diagonal
         keywords["max_deviation"] = as_length(far, "max_deviation", diagonal=size, unit=unit)
 
-    def one(case: Case, told: Any) -> Result:
+    def one(case: Case, told: Callable[[Progress], object] | None) -> Result:
         kept = () if case.constraints.empty else case.constraints
         return solve(case.design, task=task, constraints=kept, callback=told, **keywords)
 
@@ -225,7 +226,7 @@ class _Started:
 
 
 def _started(
-    meshes: Iterable[Any],
+    meshes: Iterable[MeshLike],
     worth: Callable[[Mesh], bool] | None,
     ask: Callable[[list[Mesh]], list[Prediction]],
 ) -> Iterator[_Started]:
@@ -245,16 +246,14 @@ def _passes(polish: bool | int) -> int | None:
     return _PASSES if polish is True else None
 
 
-def _read(mesh: Any) -> Mesh | GSOError:
-    from gso.io import as_mesh
-
+def _read(mesh: MeshLike) -> Mesh | GSOError:
     try:
         return as_mesh(mesh)
     except GSOError as error:
         return error
 
 
-def _one(task: str, polish: bool | int, keywords: dict[str, Any], started: _Started) -> Result:
+def _one(task: str, polish: bool | int, keywords: Keywords, started: _Started) -> Result:
     if isinstance(started.design, GSOError):
         raise started.design
     result = _finished(started.design, started.prediction, task, polish, keywords)
@@ -262,7 +261,7 @@ def _one(task: str, polish: bool | int, keywords: dict[str, Any], started: _Star
     return result
 
 
-def _checked(task: str, polish: Any, keywords: dict[str, Any]) -> bool | int:
+def _checked(task: str, polish: bool | int, keywords: Keywords) -> bool | int:
     """Check the arguments that need no mesh, make the constraints a list, return `polish`."""
     if not isinstance(polish, bool | np.bool_ | int | np.integer) or polish < 0:
         raise OptionError(f"polish is {polish!r}; take True, False, or a number of iterations")
@@ -288,7 +287,7 @@ def _finished(
     prediction: Prediction,
     task: str,
     polish: bool | int,
-    keywords: dict[str, Any],
+    keywords: Keywords,
 ) -> Result:
     """Solve from a prediction if it is valid, else from a cold start."""
     refused, result = prediction.refused, None
@@ -325,7 +324,7 @@ def _polished(
     points: Array,
     task: str,
     polish: bool | int,
-    keywords: dict[str, Any],
+    keywords: Keywords,
 ) -> Result:
     """Solve from a net's result."""
     # Without iterations the net's result itself is wanted, whatever its energy.

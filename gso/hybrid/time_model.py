@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from gso.mesh import Mesh
 from gso.tno import check
+from gso.typing import Keywords
 
 #: Number of vertices from which a net saves time, by the unknowns of the last stage: for one
 #: design, including the time to load PyTorch, and for one of many.
@@ -14,9 +13,7 @@ _FREE = (10_000, 2_500)
 _OFFSETS = (40_000, 10_000)
 
 
-def net_saves_time(
-    design: Mesh, task: str, keywords: dict[str, Any], *, many: bool = False
-) -> bool:
+def net_saves_time(design: Mesh, task: str, keywords: Keywords, *, many: bool = False) -> bool:
     """Return whether the task's net is expected to save time, at the same quality.
 
     It was found to only for developable solves of grids by curvature. Solves with bounds or

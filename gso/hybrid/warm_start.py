@@ -6,7 +6,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from gso.errors import MeshError
 from gso.hybrid.patch import Patch, as_patch
 from gso.mesh import Mesh
 from gso.net import tasks
-from gso.net.catalogue import available, chain
+from gso.net.catalogue import NetLike, available, chain
 from gso.typing import Array
 
 #: Vertices along each side of the grid that a mesh is resampled to.
@@ -50,7 +49,7 @@ class Prediction:
 def predictions(
     designs: Sequence[Mesh],
     task: str,
-    net: Any = None,
+    net: NetLike | None = None,
     passes: int | None = None,
     *,
     alone: bool = False,
@@ -102,13 +101,13 @@ def predictions(
         for (k, grid, patch), values in zip(group, moved, strict=True):
             clock = time.perf_counter()
             refused = values if isinstance(values, str) else ""
-            points = None if refused else _back(designs[k], grid, patch, values)
+            points = None if isinstance(values, str) else _back(designs[k], grid, patch, values)
             seconds = spent[k] + share + time.perf_counter() - clock
             found[k] = Prediction(points, seconds, name, refused)
     return found
 
 
-def _missing(task: str, net: Any, alone: bool) -> str:
+def _missing(task: str, net: NetLike | None, alone: bool) -> str:
     """Say why no net can be used, whatever the design; empty if one can."""
     if task not in tasks.names() or not (alone or tasks.get(task).warm_start):
         return f"no net makes a start for task {task!r}"
@@ -119,7 +118,7 @@ def _missing(task: str, net: Any, alone: bool) -> str:
     return ""
 
 
-def _name(task: str, net: Any) -> str:
+def _name(task: str, net: NetLike | None) -> str:
     if net is None:
         return tasks.get(task).default
     return type(net).__name__ if hasattr(net, "task") else str(net)
@@ -163,7 +162,9 @@ def _check_curvature(design: Mesh, grid: Array) -> None:
     )
 
 
-def _predicted(grids: Array, task: str, net: Any, passes: int | None) -> Sequence[Any]:
+def _predicted(
+    grids: Array, task: str, net: NetLike | None, passes: int | None
+) -> Sequence[Array | str]:
     """Return the result (H, W, d), or the error message, for each grid."""
     from gso.net import predict
 

@@ -14,10 +14,8 @@ from __future__ import annotations
 import importlib
 import os
 import warnings
-from collections.abc import Callable
-from os import PathLike
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from gso.errors import MeshError, OptionError
 from gso.io.atomic import check_writable, replacing, suffix_of
@@ -25,10 +23,11 @@ from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_faces, save_patches, 
 from gso.io.convert import Unwelded, as_mesh
 from gso.io.flat_svg import save_flat
 from gso.io.lines import save_lines
+from gso.io.raw_surface import Surface, welded
 from gso.io.raw_surface import checked as checked_weld
-from gso.io.raw_surface import welded
 from gso.io.source import read_bytes
 from gso.mesh import Mesh
+from gso.typing import AnyPath, MeshLike
 
 __all__ = [
     "SPLINE_SUFFIXES",
@@ -58,14 +57,21 @@ class _Format(NamedTuple):
     """Module and function names of a file format; the module is imported on first use."""
 
     module: str | ModuleType
-    read: str = "read"
-    write: str = "write"
+    reader: str = "read"
+    writer: str = "write"
 
-    def function(self, name: str) -> Callable[..., Any]:
-        module = self.module
-        if isinstance(module, str):
-            module = importlib.import_module(f"gso.io.{module}")
-        return getattr(module, name)
+    @property
+    def _module(self) -> ModuleType:
+        if isinstance(self.module, str):
+            return importlib.import_module(f"gso.io.{self.module}")
+        return self.module
+
+    def read(self, data: bytes) -> Surface:
+        surface: Surface = getattr(self._module, self.reader)(data)
+        return surface
+
+    def write(self, mesh: Mesh, file: BinaryIO) -> None:
+        getattr(self._module, self.writer)(mesh, file)
 
 
 _FORMATS = {
@@ -103,7 +109,7 @@ def add_format(suffix: str, module: ModuleType) -> None:
     _FORMATS[suffix.lower()] = _Format(module)
 
 
-def load(path: str | PathLike[str], *, weld: float | None = None) -> Mesh:
+def load(path: AnyPath, *, weld: float | None = None) -> Mesh:
     """Read a mesh file; its suffix selects the format.
 
     Parameters
@@ -139,15 +145,14 @@ def load(path: str | PathLike[str], *, weld: float | None = None) -> Mesh:
             what = f"a {suffix!r} file" if suffix else "a file without a suffix"
             raise MeshError(f"cannot read {what}; use {', '.join(_FORMATS)}")
         data = read_bytes(name)
-        form = _FORMATS[suffix]
-        return form.function(form.read)(data).mesh(weld)
+        return _FORMATS[suffix].read(data).mesh(weld)
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from error.__cause__
     except MemoryError:
         raise MeshError(f"{name}: does not fit into memory; give a coarser mesh") from None
 
 
-def save(mesh: Any, path: str | PathLike[str]) -> None:
+def save(mesh: MeshLike, path: AnyPath) -> None:
     """Write a mesh to a file; its suffix selects the format.
 
     An existing file is replaced only when the new one is complete: a write that fails or
@@ -177,22 +182,21 @@ def save(mesh: Any, path: str | PathLike[str]) -> None:
         warnings.warn(note, stacklevel=2)
 
 
-def write(mesh: Any, path: str | PathLike[str]) -> tuple[str, ...]:
+def write(mesh: MeshLike, path: AnyPath) -> tuple[str, ...]:
     """Write a mesh as :func:`save` does, and return its warnings instead of issuing them."""
     check_writable(path, tuple(_FORMATS))
     name = os.fsdecode(path)
     surface = as_mesh(mesh)
     form = _FORMATS[suffix_of(name)]
-    writer = form.function(form.write)
     with replacing(path) as file:
         try:
-            writer(surface, file)
+            form.write(surface, file)
         except MeshError as error:
             raise MeshError(f"{name}: {error}") from None
     return left_out(surface, path)
 
 
-def left_out(mesh: Mesh, path: str | PathLike[str]) -> tuple[str, ...]:
+def left_out(mesh: Mesh, path: AnyPath) -> tuple[str, ...]:
     """Return notes to the user on the attributes of a mesh that this file cannot store."""
     suffix = suffix_of(path)
     if mesh.attributes is None or mesh.attributes.empty or suffix in (".obj", ".npz"):

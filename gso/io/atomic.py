@@ -7,13 +7,13 @@ import secrets
 import stat
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
-from os import PathLike
 from typing import BinaryIO
 
 from gso.errors import MeshError
+from gso.typing import AnyPath
 
 
-def suffix_of(path: str | PathLike[str]) -> str:
+def suffix_of(path: AnyPath) -> str:
     """Return the suffix of a file in lower case, with its dot.
 
     >>> suffix_of("Panel.OBJ")
@@ -22,7 +22,7 @@ def suffix_of(path: str | PathLike[str]) -> str:
     return os.path.splitext(os.fsdecode(path))[1].lower()
 
 
-def check_writable(path: str | PathLike[str], suffixes: Collection[str] | None = None) -> None:
+def check_writable(path: AnyPath, suffixes: Collection[str] | None = None) -> None:
     """Reject an output path that cannot be written, before anything is computed.
 
     Parameters
@@ -65,7 +65,7 @@ def check_writable(path: str | PathLike[str], suffixes: Collection[str] | None =
 
 
 @contextmanager
-def replacing(path: str | PathLike[str]) -> Iterator[BinaryIO]:
+def replacing(path: AnyPath) -> Iterator[BinaryIO]:
     """Open a temporary file beside `path` that replaces it when the block ends normally.
 
     When the block raises, KeyboardInterrupt included, the temporary file is deleted and

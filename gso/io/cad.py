@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import os
 from collections.abc import Sequence
-from os import PathLike
 from typing import NamedTuple
 
 from gso.errors import GSOError, MeshError, OptionError
@@ -13,6 +12,7 @@ from gso.io.atomic import check_writable, replacing, suffix_of
 from gso.mesh import Mesh
 from gso.quantities import millimetres
 from gso.spline import BSplineSurface, TrimmedSpline
+from gso.typing import AnyPath
 
 
 class _Writer(NamedTuple):
@@ -31,7 +31,7 @@ SPLINE_SUFFIXES = tuple(_WRITERS)
 """Suffixes of the CAD files that are written."""
 
 
-def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
+def check_spline(path: AnyPath, unit: str = "mm") -> None:
     """Reject a CAD file that cannot be written, before anything is computed.
 
     Raises
@@ -57,7 +57,7 @@ def check_spline(path: str | PathLike[str], unit: str = "mm") -> None:
     raise GSOError(f"{os.fsdecode(path)}: {suffix_of(path)} files need {writer.name}: {what}")
 
 
-def save_spline(spline: BSplineSurface, path: str | PathLike[str], *, unit: str = "mm") -> None:
+def save_spline(spline: BSplineSurface, path: AnyPath, *, unit: str = "mm") -> None:
     """Write a B-spline surface to a CAD file: the same control net, knots and degrees.
 
     An existing file is replaced only when the new one is complete.
@@ -97,7 +97,7 @@ def save_spline(spline: BSplineSurface, path: str | PathLike[str], *, unit: str 
     _write(path, unit, spline)
 
 
-def save_faces(mesh: Mesh, path: str | PathLike[str], *, unit: str = "mm") -> None:
+def save_faces(mesh: Mesh, path: AnyPath, *, unit: str = "mm") -> None:
     """Write the planar faces of a mesh to a CAD file, as faces that share their edges.
 
     An existing file is replaced only when the new one is complete.
@@ -125,9 +125,7 @@ def save_faces(mesh: Mesh, path: str | PathLike[str], *, unit: str = "mm") -> No
     _write(path, unit, mesh)
 
 
-def save_patches(
-    patches: Sequence[TrimmedSpline], path: str | PathLike[str], *, unit: str = "mm"
-) -> None:
+def save_patches(patches: Sequence[TrimmedSpline], path: AnyPath, *, unit: str = "mm") -> None:
     """Write trimmed splines to a CAD file, such as those of :func:`gso.smooth_strips`.
 
     In STEP files they share their edges. In 3DM files the surfaces are whole, and their
@@ -159,7 +157,7 @@ def save_patches(
 
 
 def _write(
-    path: str | PathLike[str], unit: str, content: BSplineSurface | Mesh | Sequence[TrimmedSpline]
+    path: AnyPath, unit: str, content: BSplineSurface | Mesh | Sequence[TrimmedSpline]
 ) -> None:
     check_spline(path, unit)
     module = importlib.import_module(f"gso.io.{_WRITERS[suffix_of(path)].module}")

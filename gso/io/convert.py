@@ -12,6 +12,7 @@ import numpy as np
 from gso.errors import MeshError
 from gso.io.raw_surface import Surface, welded
 from gso.mesh import Mesh
+from gso.typing import MeshLike
 
 
 @dataclass(frozen=True)
@@ -20,17 +21,17 @@ class Unwelded:
 
     Attributes
     ----------
-    surface : Any
+    surface : MeshLike
         Anything that :func:`as_mesh` takes.
     weld : float
         Vertices within this distance of each other are merged.
     """
 
-    surface: Any
+    surface: MeshLike
     weld: float
 
 
-def as_mesh(x: Any, *, weld: float | None = None) -> Mesh:
+def as_mesh(x: MeshLike | Unwelded, *, weld: float | None = None) -> Mesh:
     """Make a mesh from a mesh, a grid of points, vertices and faces, or a file.
 
     Parameters
@@ -74,7 +75,8 @@ def as_mesh(x: Any, *, weld: float | None = None) -> Mesh:
     if isinstance(x, (tuple, list)) and len(x) == 2:
         return Surface(*x).mesh(weld)
     try:
-        points = np.asarray(x)
+        given: Any = x
+        points = np.asarray(given)
     except (TypeError, ValueError):
         points = np.empty(0, object)
     if points.ndim == 3 and points.shape[2] == 3 and points.dtype.kind in "iuf":

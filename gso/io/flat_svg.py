@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from gso.io.svg_page import SVGPage
 from gso.mesh import Mesh
 from gso.pattern import Bend
 from gso.quantities import millimetres
+from gso.typing import AnyPath
 
 # Line width on paper in millimetres, and its largest fraction of the pattern's size.
 _LINE = 0.1
@@ -25,7 +25,7 @@ _FINEST = 1 / 500
 def save_flat(
     flat: ArrayLike,
     mesh: Mesh,
-    path: str | PathLike[str],
+    path: AnyPath,
     *,
     unit: str = "mm",
     mesh_lines: bool = False,

@@ -7,6 +7,7 @@ import json
 from typing import Any, BinaryIO
 
 import numpy as np
+import trimesh
 
 from gso.errors import MeshError
 from gso.io.raw_surface import Surface, merged
@@ -25,8 +26,6 @@ def read(data: bytes) -> Surface:
     different nodes are never merged: each node gives its own components.
     """
     _check(data)
-    import trimesh
-
     points: list[np.ndarray] = []
     faces: list[np.ndarray] = []
     notes: tuple[str, ...] = ()
@@ -89,8 +88,6 @@ def _check(data: bytes) -> None:
 
 def write(mesh: Mesh, file: BinaryIO) -> None:
     """Write the triangulated mesh as GLB, in single precision."""
-    import trimesh
-
     if np.abs(mesh.vertices).max() > np.finfo(np.float32).max:
         raise MeshError("the coordinates are too large for the single precision of GLB")
     body = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import count
-from os import PathLike
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gso.errors import MeshError
 from gso.io.atomic import check_writable, replacing
-from gso.io.source import Array
 from gso.io.text import write_rows
+from gso.typing import AnyPath, Array
 
 
-def save_lines(lines: Sequence[Any], path: str | PathLike[str]) -> None:
+def save_lines(lines: Sequence[ArrayLike], path: AnyPath) -> None:
     """Write polylines as a Wavefront OBJ file, which CAD and modelling programs read.
 
     Parameters
@@ -54,7 +53,7 @@ def save_lines(lines: Sequence[Any], path: str | PathLike[str]) -> None:
             file.write(f"l {' '.join(str(next(number)) for _ in line)}\n".encode("ascii"))
 
 
-def polyline(line: Any, number: int, dimension: int) -> Array:
+def polyline(line: ArrayLike, number: int, dimension: int) -> Array:
     """Convert a line to an array (k, dimension) of two or more finite points.
 
     Raises

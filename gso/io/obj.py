@@ -8,10 +8,11 @@ import numpy as np
 
 from gso.errors import MeshError
 from gso.io.raw_surface import Surface
-from gso.io.source import Array, Ints, face_corners, ranges
+from gso.io.source import face_corners, ranges
 from gso.io.text import Words, write_rows
 from gso.mesh import Mesh
 from gso.mesh.attributes import LABELS, Attributes, Labels
+from gso.typing import Array, Ints
 
 # Keywords whose data a mesh cannot store, and what they are called in the notes.
 _LEFT_OUT = {

@@ -10,9 +10,10 @@ import numpy as np
 
 from gso.errors import MeshError
 from gso.io.raw_surface import Surface
-from gso.io.source import Ints, face_table, ranges
+from gso.io.source import face_table, ranges
 from gso.io.text import Words, write_rows
 from gso.mesh import Mesh
+from gso.typing import Ints
 
 #: Additional numbers of a vertex, by the letters before OFF; colours have four or three.
 _MORE = {b"ST": (2,), b"C": (4, 3), b"N": (3,)}

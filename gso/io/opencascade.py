@@ -3,12 +3,38 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
+from OCP import collections
+from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_MakeEdge,
+    BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakePolygon,
+    BRepBuilderAPI_MakeWire,
+    BRepBuilderAPI_Sewing,
+)
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepLib import BRepLib
+from OCP.Geom import Geom_BSplineSurface
+from OCP.Geom2d import Geom2d_BSplineCurve
+from OCP.GeomToIGES import GeomToIGES_GeomSurface
+from OCP.gp import gp_Pnt, gp_Pnt2d
+from OCP.IGESControl import IGESControl_Writer
+from OCP.IGESData import IGESData_IGESWriter
+from OCP.IGESSelect import IGESSelect_WorkLibrary
+from OCP.Interface import Interface_Protocol, Interface_Static
+from OCP.Message import Message, Message_Gravity
+from OCP.STEPControl import (
+    STEPControl_Controller,
+    STEPControl_StepModelType,
+    STEPControl_Writer,
+)
+from OCP.StepData import StepData_StepWriter
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Wire
+from scipy.interpolate import make_interp_spline
 
 from gso.errors import MeshError
 from gso.mesh import Mesh
@@ -40,8 +66,6 @@ def write(
     faces of a mesh, which must be planar, and trimmed splines become a shell; in STEP files its
     faces share their edges.
     """
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
-
     scale, name = (1.0, _UNITS[unit]) if unit in _UNITS else (MILLIMETRES[unit], "MM")
     step = suffix in (".step", ".stp")
     small = f"shorter than {_TOLERANCE:g} {unit}, which OpenCASCADE takes for a point"
@@ -61,11 +85,8 @@ def write(
     return written
 
 
-def _step(shape: Any, name: str) -> bytes:
+def _step(shape: TopoDS_Shape, name: str) -> bytes:
     """Return the contents of a STEP file of a shape in a unit."""
-    from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
-    from OCP.StepData import StepData_StepWriter
-
     kind = STEPControl_StepModelType.STEPControl_ShellBasedSurfaceModel
     with _quiet(), _settings({"write.step.unit": name, "xstep.cascade.unit": name}):
         session = STEPControl_Writer()
@@ -74,13 +95,8 @@ def _step(shape: Any, name: str) -> bytes:
         return _printed(writer, session.WS().Protocol())
 
 
-def _iges(shape: Any, name: str, whole: bool) -> bytes:
+def _iges(shape: TopoDS_Shape, name: str, whole: bool) -> bytes:
     """Return the contents of an IGES file of a shape, or of a whole surface, in a unit."""
-    from OCP.GeomToIGES import GeomToIGES_GeomSurface
-    from OCP.IGESControl import IGESControl_Writer
-    from OCP.IGESData import IGESData_IGESWriter
-    from OCP.IGESSelect import IGESSelect_WorkLibrary
-
     with _quiet():
         session = IGESControl_Writer("IN" if name == "INCH" else name, 0 if whole else 1)
         if whole:
@@ -94,15 +110,8 @@ def _iges(shape: Any, name: str, whole: bool) -> bytes:
         return _printed(writer, IGESSelect_WorkLibrary.DefineProtocol_s())
 
 
-def _shell(points: Array, faces: Ints, small: str) -> Any:
+def _shell(points: Array, faces: Ints, small: str) -> TopoDS_Shape:
     """Return a shell of planar faces; `small` describes what is too small."""
-    from OCP.BRepBuilderAPI import (
-        BRepBuilderAPI_MakeFace,
-        BRepBuilderAPI_MakePolygon,
-        BRepBuilderAPI_Sewing,
-    )
-    from OCP.gp import gp_Pnt
-
     sewing = BRepBuilderAPI_Sewing(_TOLERANCE)
     for k, face in enumerate(faces):
         polygon = BRepBuilderAPI_MakePolygon()
@@ -117,9 +126,7 @@ def _shell(points: Array, faces: Ints, small: str) -> Any:
     return sewing.SewedShape()
 
 
-def _trimmed_shell(patches: Sequence[TrimmedSpline]) -> Any:
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
-
+def _trimmed_shell(patches: Sequence[TrimmedSpline]) -> TopoDS_Shape:
     sewing = BRepBuilderAPI_Sewing(_SEWN * max(patch.spline.size for patch in patches))
     for patch in patches:
         surface = _surface(patch.spline)
@@ -129,15 +136,12 @@ def _trimmed_shell(patches: Sequence[TrimmedSpline]) -> Any:
     return sewing.SewedShape()
 
 
-def _trimmed_face(surface: Any, loops: Sequence[Loop]) -> Any:
+def _trimmed_face(surface: Geom_BSplineSurface, loops: Sequence[Loop]) -> TopoDS_Face:
     """Return a face of a surface inside loops of its parameters.
 
     Where smooth curves through the points of the loops cross each other, straight segments
     between the points are used.
     """
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
-    from OCP.BRepCheck import BRepCheck_Analyzer
-
     for straight in (False, True):
         wires = [_wire(surface, loop, straight) for loop in loops]
         if any(wire is None for wire in wires):
@@ -150,11 +154,8 @@ def _trimmed_face(surface: Any, loops: Sequence[Loop]) -> Any:
     raise MeshError("a surface has an outline that crosses itself or is not closed")
 
 
-def _wire(surface: Any, loop: Loop, straight: bool) -> Any:
+def _wire(surface: Geom_BSplineSurface, loop: Loop, straight: bool) -> TopoDS_Wire | None:
     """Return the wire of a loop, of smooth curves or of straight segments; None if it is open."""
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeWire
-    from OCP.BRepLib import BRepLib
-
     wire = BRepBuilderAPI_MakeWire()
     for curve in loop:
         new = np.r_[True, (np.diff(curve, axis=0) != 0).any(axis=1)]
@@ -170,13 +171,8 @@ def _wire(surface: Any, loop: Loop, straight: bool) -> Any:
     return wire.Wire()
 
 
-def _plane_curve(points: Array) -> Any:
+def _plane_curve(points: Array) -> Geom2d_BSplineCurve:
     """Return the curve through points (k, 2) of the parameters of a surface."""
-    from OCP import collections
-    from OCP.Geom2d import Geom2d_BSplineCurve
-    from OCP.gp import gp_Pnt2d
-    from scipy.interpolate import make_interp_spline
-
     step = np.hypot(*np.diff(points, axis=0).T)
     along = np.r_[0.0, np.cumsum(step)]
     spline = make_interp_spline(along / along[-1], points, k=min(3, len(points) - 1))
@@ -186,12 +182,8 @@ def _plane_curve(points: Array) -> Any:
     return Geom2d_BSplineCurve(poles, *_knots(spline.t), spline.k)
 
 
-def _surface(spline: BSplineSurface) -> Any:
+def _surface(spline: BSplineSurface) -> Geom_BSplineSurface:
     """Return the OpenCASCADE surface of a spline."""
-    from OCP import collections
-    from OCP.Geom import Geom_BSplineSurface
-    from OCP.gp import gp_Pnt
-
     poles = collections.Array2_gp_Pnt(1, spline.net.shape[0], 1, spline.net.shape[1])
     for i, row in enumerate(spline.net.tolist(), 1):
         for j, point in enumerate(row, 1):
@@ -200,10 +192,8 @@ def _surface(spline: BSplineSurface) -> Any:
     return Geom_BSplineSurface(poles, u, v, u_times, v_times, *spline.degrees)
 
 
-def _knots(every: Array) -> tuple[Any, Any]:
+def _knots(every: Array) -> tuple[collections.Array1_double, collections.Array1_int]:
     """Return the different knots and their multiplicities as arrays of OpenCASCADE."""
-    from OCP import collections
-
     knots, times = np.unique(every, return_counts=True)
     out = collections.Array1_double(1, len(knots)), collections.Array1_int(1, len(knots))
     for k, (knot, time) in enumerate(zip(knots.tolist(), times.tolist(), strict=True), 1):
@@ -212,7 +202,9 @@ def _knots(every: Array) -> tuple[Any, Any]:
     return out
 
 
-def _printed(writer: Any, protocol: Any) -> bytes:
+def _printed(
+    writer: StepData_StepWriter | IGESData_IGESWriter, protocol: Interface_Protocol
+) -> bytes:
     """Return the text of a file writer."""
     writer.FloatWriter().SetFormat(_FORMAT, True)
     writer.SendModel(protocol)
@@ -225,9 +217,6 @@ def _printed(writer: Any, protocol: Any) -> bytes:
 @contextmanager
 def _settings(wanted: dict[str, str]) -> Iterator[None]:
     """Set global parameters of OpenCASCADE inside a block and restore them after it."""
-    from OCP.Interface import Interface_Static
-    from OCP.STEPControl import STEPControl_Controller
-
     STEPControl_Controller.Init_s()
     before = {name: Interface_Static.CVal_s(name) for name in wanted}
     try:
@@ -242,9 +231,7 @@ def _settings(wanted: dict[str, str]) -> Iterator[None]:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Suppress OpenCASCADE's messages of success on standard output."""
-    from OCP.Message import Message, Message_Gravity
-
-    printers: Iterable[Any] = list(Message.DefaultMessenger_s().Printers())
+    printers = list(Message.DefaultMessenger_s().Printers())
     levels = [printer.GetTraceLevel() for printer in printers]
     try:
         for printer in printers:

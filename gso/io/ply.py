@@ -10,9 +10,10 @@ import numpy as np
 
 from gso.errors import MeshError
 from gso.io.raw_surface import Surface
-from gso.io.source import Array, Ints, doubles, face_table, ranges
+from gso.io.source import doubles, face_table, ranges
 from gso.io.text import Words
 from gso.mesh import Mesh
+from gso.typing import Array, Ints
 
 _KINDS = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
@@ -204,7 +205,7 @@ def _read_binary(data: bytes, header: _Header) -> tuple[Array, Ints, Ints]:
 
 def _even_rows(data: bytes, position: int, element: _Element, order: str) -> np.ndarray | None:
     """Read all rows of an element as one table, or return None if list lengths differ."""
-    layout: list[tuple] = []
+    layout: list[tuple[object, ...]] = []
     size = 0
     for k, p in enumerate(element.properties):
         if p.count_kind is None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gso.errors import MeshError, OptionError
 from gso.mesh import Mesh
@@ -29,8 +29,8 @@ class Surface:
         Names and texture coordinates of the faces.
     """
 
-    vertices: Any
-    faces: Any
+    vertices: ArrayLike
+    faces: ArrayLike | None
     notes: tuple[str, ...] = ()
     attributes: Attributes | None = None
 
@@ -40,11 +40,11 @@ class Surface:
             grid = Mesh.from_grid(self.vertices)
             return grid if weld is None else welded(grid, weld)
         if weld is not None:
-            return _welded(self, checked(weld)).mesh()
+            return _welded(self, self.faces, checked(weld)).mesh()
         return Mesh(self.vertices, self.faces, notes=self.notes, attributes=self.attributes)
 
 
-def checked(weld: Any) -> float:
+def checked(weld: object) -> float:
     """Return a weld distance as a float after checking it.
 
     Raises
@@ -52,10 +52,11 @@ def checked(weld: Any) -> float:
     OptionError
         `weld` is not a finite number of 0 or more.
     """
-    number = isinstance(weld, int | float | np.number) and not isinstance(weld, bool)
-    if not number or not 0 <= weld < np.inf:
-        raise OptionError(f"weld is {weld!r}; it must be a length, 0 or more")
-    return float(weld)
+    if isinstance(weld, int | float | np.integer | np.floating) and not isinstance(weld, bool):
+        length = float(weld)
+        if 0 <= length < np.inf:
+            return length
+    raise OptionError(f"weld is {weld!r}; it must be a length, 0 or more")
 
 
 def welded(mesh: Mesh, weld: float) -> Mesh:
@@ -91,9 +92,9 @@ def welded(mesh: Mesh, weld: float) -> Mesh:
     return surface.mesh(weld)
 
 
-def _welded(surface: Surface, weld: float) -> Surface:
+def _welded(surface: Surface, faces: ArrayLike, weld: float) -> Surface:
     points = checked_vertices(surface.vertices)
-    table = checked_table(surface.faces, len(points))
+    table = checked_table(faces, len(points))
     if np.abs(points).max(initial=0.0) > 1e150:
         # Squared distances would overflow; the mesh constructor reports that.
         return surface

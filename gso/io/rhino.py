@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+import rhino3dm
 
 from gso.errors import MeshError
 from gso.mesh import Mesh, topology
@@ -40,51 +40,47 @@ def write(
     for trimmed splines, the layer "surfaces" has the whole splines, and the layer "outlines"
     closed polylines on them.
     """
-    import rhino3dm
-
-    # The type stubs of rhino3dm lack some setters.
-    rhino: Any = rhino3dm
-    model = rhino.File3dm()
+    model = rhino3dm.File3dm()
     model.ApplicationName = "gso"
-    model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, _UNITS[unit])
+    model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, _UNITS[unit])
     if isinstance(content, BSplineSurface):
         size = content.size
-        model.Objects.AddSurface(_surface(rhino, content, "the spline"))
+        model.Objects.AddSurface(_surface(content, "the spline"))
     elif isinstance(content, Mesh):
         size = content.diagonal
         # A triangle has a side without length.
         corners = content.vertices[topology.four_corners(content.faces)]
         for k, (a, b, c, d) in enumerate(corners):
             surface = BSplineSurface(np.array([[a, d], [b, c]]), _ENDS, _ENDS)
-            model.Objects.AddSurface(_surface(rhino, surface, f"face {k}"))
+            model.Objects.AddSurface(_surface(surface, f"face {k}"))
     else:
         size = max(patch.spline.size for patch in content)
-        surfaces, outlines = (_layer(rhino, model, name) for name in ("surfaces", "outlines"))
+        surfaces, outlines = (_layer(model, name) for name in ("surfaces", "outlines"))
         for k, patch in enumerate(content):
-            model.Objects.AddSurface(_surface(rhino, patch.spline, f"patch {k}"), surfaces)
+            model.Objects.AddSurface(_surface(patch.spline, f"patch {k}"), surfaces)
             for line in patch.outlines():
-                points = [rhino.Point3d(*p) for p in [*line.tolist(), line[0].tolist()]]
-                model.Objects.AddPolyline(rhino.Polyline(points), outlines)
+                points = [rhino3dm.Point3d(*p) for p in [*line.tolist(), line[0].tolist()]]
+                model.Objects.AddPolyline(rhino3dm.Polyline(points), outlines)
     model.Settings.ModelAbsoluteTolerance = _TOLERANCE * size
     return base64.b64decode(model.Encode())
 
 
-def _layer(rhino: Any, model: Any, name: str) -> Any:
+def _layer(model: rhino3dm.File3dm, name: str) -> rhino3dm.ObjectAttributes:
     """Add a layer, and return the attributes of objects on it."""
-    layer = rhino.Layer()
+    layer = rhino3dm.Layer()
     layer.Name = name
-    attributes = rhino.ObjectAttributes()
+    attributes = rhino3dm.ObjectAttributes()
     attributes.LayerIndex = model.Layers.Add(layer)
     return attributes
 
 
-def _surface(rhino: Any, spline: BSplineSurface, what: str) -> Any:
+def _surface(spline: BSplineSurface, what: str) -> rhino3dm.NurbsSurface:
     n, m = spline.net.shape[:2]
     p, q = spline.degrees
-    surface = rhino.NurbsSurface.Create(3, False, p + 1, q + 1, n, m)
+    surface = rhino3dm.NurbsSurface.Create(3, False, p + 1, q + 1, n, m)
     for i, row in enumerate(spline.net.tolist()):
         for j, point in enumerate(row):
-            surface.Points[i, j] = rhino.Point4d(*point, 1.0)
+            surface.Points[i, j] = rhino3dm.Point4d(*point, 1.0)
     # openNURBS omits the first and the last knot, on which no basis function depends.
     for places, knots in ((surface.KnotsU, spline.knots_u), (surface.KnotsV, spline.knots_v)):
         for k, knot in enumerate(knots[1:-1].tolist()):

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import os
-from os import PathLike
 
 import numpy as np
 
 from gso.errors import MeshError
-from gso.typing import Array, Ints
+from gso.typing import AnyPath, Array, Ints
 
 # Largest number of fan apexes tried per polygon, because the work is quadratic.
 _MOST_APEXES = 64
 
 
-def read_bytes(path: str | PathLike[str]) -> bytes:
+def read_bytes(path: AnyPath) -> bytes:
     """Read a file; any failure, and an empty file, raises a MeshError.
 
     The message does not name the file: :func:`gso.io.load` prepends the name.

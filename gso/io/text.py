@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import BinaryIO, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.errors import MeshError
-from gso.io.source import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 # Integers with more digits may overflow 64 bits, and are no valid vertex indices.
 _DIGITS = 18
@@ -133,7 +132,7 @@ class Words:
         values, bad = self._parsed(self.start[words], self.stop[words])
         return np.where(bad, otherwise, values)
 
-    def _parsed(self, start: Ints, stop: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+    def _parsed(self, start: Ints, stop: Ints) -> tuple[Ints, Flags]:
         """Parse integers in parts of the text; also return which parts are invalid."""
         sign = self._text[np.minimum(start, self._text.size - 1)]
         start = start + ((sign == ord("-")) | (sign == ord("+")))
@@ -173,7 +172,7 @@ class Words:
         line = self._first_line + self._data.count(b"\n", 0, int(self.start[word]))
         raise MeshError(f"line {line}: {message}")
 
-    def refuse(self, rows: Ints, bad: NDArray[np.bool_], message: str) -> None:
+    def refuse(self, rows: Ints, bad: Flags, message: str) -> None:
         """Raise a MeshError that names the line of the first bad row, if there is one."""
         if bad.any():
             self.fail_row(rows[bad.argmax()], message)

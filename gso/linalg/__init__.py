@@ -8,10 +8,9 @@ factorisation, roughly: who is fastest) and a class ``Solver(pattern)`` with
 from __future__ import annotations
 
 from types import ModuleType
-from typing import Any
 
 from gso.errors import BackendError, OptionError
-from gso.linalg.base import Pattern, SingularError, blas_threads
+from gso.linalg.base import Pattern, SingularError, Solver, blas_threads
 from gso.linalg.spd import spd
 from gso.registry import Registry
 from gso.spelling import choices
@@ -44,9 +43,12 @@ def find(name: str) -> ModuleType:
     return found[name]
 
 
-def choose(pattern: Pattern, name: str | None = None) -> Any:
+def choose(pattern: Pattern, name: str | None = None) -> Solver:
     """Solver of the named backend, or of the fastest installed one for this pattern."""
     if name is not None:
-        return find(name).Solver(pattern)
-    usable = [m for m in backends().values() if m.available()]
-    return min(usable, key=lambda m: m.cost(pattern)).Solver(pattern)
+        backend = find(name)
+    else:
+        usable = [m for m in backends().values() if m.available()]
+        backend = min(usable, key=lambda m: m.cost(pattern))
+    solver: Solver = backend.Solver(pattern)
+    return solver

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg.lapack import dpbtrf, dpbtrs
 
 from gso.linalg.base import Pattern, SingularError
+from gso.typing import Array
 
 PACKAGE = "scipy"
 
@@ -36,18 +38,14 @@ class Solver:
         self._at = pattern.columns * self._shape[0] + (pattern.indices - pattern.columns)
         self._factor = None
 
-    def factor(self, values: np.ndarray) -> None:
+    def factor(self, values: Array) -> None:
         """Factor the matrix with these values of the lower triangle."""
-        from scipy.linalg.lapack import dpbtrf
-
         band = np.zeros(self._shape[0] * self._shape[1])
         band[self._at] = values
         self._factor, info = dpbtrf(band.reshape(self._shape, order="F"), lower=1, overwrite_ab=1)
         if info != 0:
             raise SingularError(f"leading minor {info} is not positive")
 
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
+    def solve(self, rhs: Array) -> Array:
         """Solve for one right-hand side (n,) or several (n, k)."""
-        from scipy.linalg.lapack import dpbtrs
-
-        return dpbtrs(self._factor, rhs, lower=1)[0]
+        return np.asarray(dpbtrs(self._factor, rhs, lower=1)[0])

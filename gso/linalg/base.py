@@ -5,11 +5,14 @@ from __future__ import annotations
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from gso.typing import Ints
+from gso.typing import Array, Ints
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 
 class SingularError(ArithmeticError):
@@ -52,14 +55,26 @@ class Pattern:
         return int((last - np.arange(self.size)).max())
 
 
+class Solver(Protocol):
+    """Factorisation of matrices of one pattern by a backend."""
+
+    name: str
+
+    def factor(self, values: Array) -> None:
+        """Factor the matrix with these values of the lower triangle."""
+
+    def solve(self, rhs: Array) -> Array:
+        """Solve for one right-hand side (n,) or several (n, k)."""
+
+
 @lru_cache(maxsize=1)
-def _controller() -> Any:
+def _controller() -> ThreadpoolController:
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
 
 
-def blas_threads(count: int) -> AbstractContextManager[Any]:
+def blas_threads(count: int) -> AbstractContextManager[object]:
     """Limit the BLAS to so many threads; 0 leaves it alone.
 
     Two on a busy machine of two cores make factorisations slower than one.

@@ -8,6 +8,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from gso.linalg.base import Pattern, SingularError
+from gso.typing import Array
 
 PACKAGE = "cvxopt"
 
@@ -21,7 +22,7 @@ def available() -> bool:
 def cost(pattern: Pattern) -> float:
     """As measured on grids, with a share of the analysis."""
     density = pattern.nnz / max(pattern.size, 1)
-    return 2e-4 + 4e-9 * pattern.nnz + 7.6e-10 * pattern.size**1.4 * density**1.3
+    return float(2e-4 + 4e-9 * pattern.nnz + 7.6e-10 * pattern.size**1.4 * density**1.3)
 
 
 class Solver:
@@ -40,7 +41,7 @@ class Solver:
         )
         self._symbolic = cholmod.symbolic(self._matrix)
 
-    def factor(self, values: np.ndarray) -> None:
+    def factor(self, values: Array) -> None:
         """Factor the matrix with these values of the lower triangle."""
         from cvxopt import cholmod, matrix
 
@@ -50,7 +51,7 @@ class Solver:
         except ArithmeticError as error:
             raise SingularError(str(error)) from None
 
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
+    def solve(self, rhs: Array) -> Array:
         """Solve for one right-hand side (n,) or several (n, k)."""
         from cvxopt import cholmod, matrix
 

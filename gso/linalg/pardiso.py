@@ -6,8 +6,10 @@ from functools import cache
 from importlib.util import find_spec
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from gso.linalg.base import Pattern, SingularError
+from gso.typing import Array
 
 PACKAGE = "pypardiso"
 
@@ -21,7 +23,7 @@ def available() -> bool:
 def cost(pattern: Pattern) -> float:
     """As measured on grids, with the load of the MKL."""
     density = pattern.nnz / max(pattern.size, 1)
-    return 2e-3 + 1.1e-9 * pattern.size**1.4 * density**1.3
+    return float(2e-3 + 1.1e-9 * pattern.size**1.4 * density**1.3)
 
 
 class Solver:
@@ -31,7 +33,6 @@ class Solver:
 
     def __init__(self, pattern: Pattern):
         from pypardiso import PyPardisoSolver
-        from scipy.sparse import csr_matrix
 
         # Lower columns of a symmetric matrix are its upper rows.
         self._matrix = csr_matrix(
@@ -41,22 +42,22 @@ class Solver:
         self._solver = PyPardisoSolver(mtype=2)
         self._analysed = False
 
-    def _call(self, phase: int, rhs: np.ndarray) -> np.ndarray:
+    def _call(self, phase: int, rhs: Array) -> Array:
         from pypardiso.pardiso_wrapper import PyPardisoError
 
         self._solver.set_phase(phase)
         try:
-            return self._solver._call_pardiso(self._matrix, rhs)
+            return np.asarray(self._solver._call_pardiso(self._matrix, rhs))
         except PyPardisoError as error:
             raise SingularError(str(error)) from None
 
-    def factor(self, values: np.ndarray) -> None:
+    def factor(self, values: Array) -> None:
         """Factor the matrix with these values of the lower triangle."""
         self._matrix.data[:] = values
         self._call(22 if self._analysed else 12, np.zeros((self._matrix.shape[0], 1)))
         self._analysed = True
 
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
+    def solve(self, rhs: Array) -> Array:
         """Solve for one right-hand side (n,) or several (n, k)."""
         b = np.asfortranarray(rhs if rhs.ndim == 2 else rhs[:, None])
         return self._call(33, b).reshape(rhs.shape)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from scipy.sparse import sparray, spmatrix
 
-    from gso.typing import Array
+    from gso.typing import Solve
 
 
-def spd(matrix: Any) -> Callable[[Array], Array]:
+def spd(matrix: sparray | spmatrix) -> Solve:
     """Factor a sparse symmetric positive definite matrix (n, n), and return its solver.
 
     The solver takes a right-hand side (n,) or several (n, k). Matrices that are factored again
@@ -29,5 +29,5 @@ def spd(matrix: Any) -> Callable[[Array], Array]:
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
-    solve: Callable[[Array], Array] = factor.solve
+    solve: Solve = factor.solve
     return solve

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from scipy.sparse import csc_matrix
 
 from gso.linalg.base import Pattern, SingularError
 from gso.linalg.spd import spd
+from gso.typing import Array, Solve
 
 PACKAGE = "scipy"
 
@@ -20,7 +20,7 @@ def available() -> bool:
 def cost(pattern: Pattern) -> float:
     """As measured on grids: grows with the entries a column has and a bit over linearly."""
     density = pattern.nnz / max(pattern.size, 1)
-    return 4e-8 * pattern.size**1.25 * density
+    return float(4e-8 * pattern.size**1.25 * density)
 
 
 class Solver:
@@ -29,8 +29,6 @@ class Solver:
     name = "superlu"
 
     def __init__(self, pattern: Pattern):
-        from scipy.sparse import csc_matrix
-
         n, nnz = pattern.size, pattern.nnz
         i, j = pattern.indices, pattern.columns
         off = i != j
@@ -39,9 +37,9 @@ class Solver:
         full.sort_indices()
         self._entry = full.data - 1
         self._matrix = csc_matrix((full.data.astype(float), full.indices, full.indptr), (n, n))
-        self._solve: Any = None
+        self._solve: Solve
 
-    def factor(self, values: np.ndarray) -> None:
+    def factor(self, values: Array) -> None:
         """Factor the matrix with these values of the lower triangle."""
         self._matrix.data[:] = values[self._entry]
         try:
@@ -49,6 +47,6 @@ class Solver:
         except RuntimeError as error:
             raise SingularError(str(error)) from None
 
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
+    def solve(self, rhs: Array) -> Array:
         """Solve for one right-hand side (n,) or several (n, k)."""
         return self._solve(rhs)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -92,20 +91,22 @@ class Attributes:
         parts += ["texture coordinates (vt)"] if self.texture_corners is not None else []
         return ", ".join(parts) or "nothing"
 
-    def arrays(self) -> dict[str, Array | Ints]:
+    def arrays(self) -> dict[str, np.ndarray]:
         """Convert to plain arrays for a .npz file."""
         words = {
             "libraries": self.libraries,
             "labels": {k: v.names for k, v in self.labels.items()},
         }
-        out: dict[str, Any] = {"attributes": np.frombuffer(json.dumps(words).encode(), np.uint8)}
+        out: dict[str, np.ndarray] = {
+            "attributes": np.frombuffer(json.dumps(words).encode(), np.uint8)
+        }
         out |= {f"attributes_{k}": said.of_face for k, said in self.labels.items()}
         if self.texture is not None and self.texture_corners is not None:
             out |= {"texture": self.texture, "texture_corners": self.texture_corners}
         return out
 
     @classmethod
-    def from_arrays(cls, data: Mapping[str, Any], faces: Ints) -> Attributes | None:
+    def from_arrays(cls, data: Mapping[str, np.ndarray], faces: Ints) -> Attributes | None:
         """Restore from the output of :meth:`arrays`; None where `data` has no attributes.
 
         Raises
@@ -138,7 +139,7 @@ class Attributes:
         return cls(tuple(map(str, said["libraries"])), labels, texture, corners)
 
 
-def _checked(index: Any, shape: tuple[int, ...], count: int) -> Ints:
+def _checked(index: np.ndarray, shape: tuple[int, ...], count: int) -> Ints:
     """Convert to integers; check the shape and the range -1 ... count - 1."""
     table = np.array(index, np.int64)
     if table.shape != shape or (table >= count).any() or (table < -1).any():

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.mesh import Mesh
@@ -107,7 +106,7 @@ class Nearest:
         normals = np.divide(normals, length, out=first.copy(), where=straight)
         return Feet(foot, normals, np.sqrt(squared))
 
-    def _query(self, points: Array) -> tuple[Array, NDArray[np.int64], Array]:
+    def _query(self, points: Array) -> tuple[Array, Ints, Array]:
         queries = np.ascontiguousarray(points, np.float64)
         squared, triangle, foot = self._tree.squared_distance(
             self._vertices, self._triangles, queries

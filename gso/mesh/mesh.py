@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso import geometry
 from gso.errors import MeshError
@@ -24,7 +24,7 @@ from gso.mesh.validation import (
     welding_advice,
 )
 from gso.mesh.welding import seams
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class Mesh:
         return topology.triangulate(self.faces, self._quad_splits)
 
     @cached_property
-    def _quad_splits(self) -> NDArray[np.bool_]:
+    def _quad_splits(self) -> Flags:
         return topology.quad_splits(self.faces, self.half_edges)
 
     @cached_property
@@ -213,7 +213,7 @@ class Mesh:
         return order[np.searchsorted(keys[order], topology.edge_keys(a, b, count))]
 
     @cached_property
-    def boundary_edges(self) -> NDArray[np.bool_]:
+    def boundary_edges(self) -> Flags:
         """Mask over :attr:`edges`: boundary edges."""
         return topology.boundary_edges(self.half_edges)
 
@@ -238,7 +238,7 @@ class Mesh:
         return Mesh(self.vertices[ids], np.where(faces < 0, -1, new[faces])), new
 
     @property
-    def seams(self) -> NDArray[np.bool_]:
+    def seams(self) -> Flags:
         """Mask over half-edges: boundary edges that coincide with another boundary edge."""
         he = self.half_edges
         mask = he.twin < 0
@@ -279,7 +279,7 @@ class Mesh:
     @property
     def is_triangles(self) -> bool:
         """Whether all faces are triangles."""
-        return self.faces.shape[1] == 3
+        return int(self.faces.shape[1]) == 3
 
     @property
     def grid_shape(self) -> tuple[int, int] | None:
@@ -307,7 +307,7 @@ class Mesh:
         return Frame(*geometry.ball(self.vertices[self.used]))
 
     @cached_property
-    def used(self) -> NDArray[np.bool_]:
+    def used(self) -> Flags:
         """Mask over vertices: those that belong to a face."""
         return self.half_edges.face_count > 0
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_graph
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -59,9 +58,9 @@ class Paths:
     def cheapest(
         self,
         target: int,
-        reached: NDArray[np.bool_],
+        reached: Flags,
         weight: Array,
-        closed: NDArray[np.bool_] | None = None,
+        closed: Flags | None = None,
         limit: float = np.inf,
     ) -> Ints:
         """Return the vertices of the cheapest path from a vertex to marked ones.
@@ -98,7 +97,7 @@ class Paths:
         return _traced(away, before, target, reached)
 
 
-def _traced(away: Array, before: Ints, start: int, reached: NDArray[np.bool_]) -> Ints:
+def _traced(away: Array, before: Ints, start: int, reached: Flags) -> Ints:
     """Follow predecessors from the nearest marked vertex back to the start."""
     goals = np.flatnonzero(reached & np.isfinite(away))
     if not goals.size:
@@ -131,7 +130,7 @@ class _Turns:
         cosine = np.einsum("ij,ij->i", way[self.before], way[self.after])
         self.turn = _TURN * float(length.mean()) * np.clip(1.0 - cosine - 0.1, 0.0, None)
 
-    def cheapest(self, target: int, reached: NDArray[np.bool_], cost: Array) -> Ints:
+    def cheapest(self, target: int, reached: Flags, cost: Array) -> Ints:
         """See :meth:`Paths.cheapest`; the costs (e,) include the factors."""
         from scipy.sparse.csgraph import dijkstra
 
@@ -150,6 +149,6 @@ class _Turns:
         path = [int(goals[away[goals].argmin()])]
         while before[path[-1]] != count:
             path.append(int(before[path[-1]]))
-        out = np.r_[target, self.head[path[::-1]]]
+        out: Ints = np.r_[target, self.head[path[::-1]]]
         stop = np.flatnonzero(reached[out[1:]])
         return out[: stop[0] + 2] if stop.size else out

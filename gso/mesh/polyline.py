@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.mesh import Frame
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Vertices do not slide round corners of more than this many degrees.
 CORNER = 45.0
@@ -47,7 +46,7 @@ class Polylines:
 
     start: Array
     end: Array
-    stop: NDArray[np.bool_]
+    stop: Flags
     tangent: Array
 
     @classmethod
@@ -107,8 +106,8 @@ class Polylines:
 
 def turns(way: Array) -> Array:
     """Angle in degrees between each direction (m, dim) of a closed line and the one before."""
-    return np.degrees(geometry.angle(tuple(way.T), tuple(np.roll(way, 1, axis=0).T)))
+    return np.asarray(np.degrees(geometry.angle(tuple(way.T), tuple(np.roll(way, 1, axis=0).T))))
 
 
 def _unit(vectors: Array) -> Array:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))

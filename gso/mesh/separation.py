@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.mesh import Mesh
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Lengths are rounded to this share of the longest edge, for whole numbers in the flow.
 _STEPS = 1000
@@ -14,8 +13,8 @@ _STEPS = 1000
 
 def between(
     mesh: Mesh,
-    one: NDArray[np.bool_],
-    two: NDArray[np.bool_],
+    one: Flags,
+    two: Flags,
     price: Array | None = None,
     factor: Array | None = None,
 ) -> Ints:

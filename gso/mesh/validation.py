@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso import geometry
 from gso.errors import MeshError
 from gso.mesh import topology
 from gso.mesh.attributes import Attributes
 from gso.mesh.welding import collapse
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 if TYPE_CHECKING:
     from gso.mesh.mesh import Mesh
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 JOINED = 1e-7
 
 
-def reordered(attributes: Attributes, table: Ints, flipped: NDArray[np.bool_]) -> Attributes:
+def reordered(attributes: Attributes, table: Ints, flipped: Flags) -> Attributes:
     """Reorder the corners of the attributes for faces that were reversed or lost a column."""
     corners = np.broadcast_to(np.arange(table.shape[1]), table.shape).copy()
     corners[table < 0] = -1
@@ -35,7 +35,7 @@ def numbers(values: ArrayLike, expected: str) -> Array:
         given = np.asarray(values)
         if given.dtype.kind not in "c":
             return np.array(given, dtype=np.float64)
-        error: Any = "complex numbers"
+        error: Exception | str = "complex numbers"
     except (TypeError, ValueError, OverflowError) as caught:
         error = caught
     raise MeshError(f"{expected}: {error}")
@@ -76,7 +76,7 @@ def checked_grid(points: ArrayLike) -> Array:
     return grid
 
 
-def checked_table(faces: Any, count: int) -> Ints:
+def checked_table(faces: ArrayLike, count: int) -> Ints:
     """Convert faces to integers (m, 3) or (m, 4), with vertices from 0 to ``count - 1``."""
     try:
         given = np.asarray(faces)
@@ -104,7 +104,7 @@ def checked_table(faces: Any, count: int) -> Ints:
     return table
 
 
-def checked_faces(faces: Any, points: Array) -> tuple[Ints, NDArray[np.bool_], tuple[str, ...]]:
+def checked_faces(faces: ArrayLike, points: Array) -> tuple[Ints, Flags, tuple[str, ...]]:
     """Check and orient faces; return them, a mask of the reversed ones, and notes."""
     table = checked_table(faces, len(points))
     check_corners(table)
@@ -163,7 +163,7 @@ def check_area(table: Ints, points: Array) -> None:
         )
 
 
-def have_area(table: Ints, points: Array, size: float | None = None) -> NDArray[np.bool_]:
+def have_area(table: Ints, points: Array, size: float | None = None) -> Flags:
     """Mark the faces that have an area, relative to the size of the surface.
 
     Parameters

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.errors import MeshError
 from gso.mesh.topology.graph import label_components
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 # With more pairs per vertex than this the tolerance is larger than the edges.
 _MOST_PAIRS = 50
@@ -74,7 +73,7 @@ def near(points: Array, tolerance: float, names: Ints | None = None) -> Ints:
             f"{first_one if names is None else names[first_one]}); give a length "
             "well below that of the edges"
         )
-    return kept[order[begin]][label][index]
+    return np.asarray(kept[order[begin]][label][index])
 
 
 @dataclass(frozen=True)
@@ -135,7 +134,7 @@ def collapse(faces: Ints, target: Ints) -> Collapsed:
     return Collapsed(left, kept, turns)
 
 
-def seams(points: Array, origin: Ints, dest: Ints) -> NDArray[np.bool_]:
+def seams(points: Array, origin: Ints, dest: Ints) -> Flags:
     """Mark the edges (from vertex `origin` to `dest`) that coincide with another of them."""
     ends, index = np.unique(np.r_[origin, dest], return_inverse=True)
     place = equal(points[ends])[index.ravel()]

@@ -55,6 +55,7 @@ __all__ = [
     "K_A_r",
     "K_A_r_worst",
     "Strains",
+    "SurfaceLike",
     "area",
     "area_error",
     "boundary_distance",

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.errors import MeshError
-from gso.mesh import topology
-from gso.metrics.surfaces import faces_of, image_of, in_range, points_of
-from gso.typing import Array
-
-if TYPE_CHECKING:
-    from gso.mesh import Mesh
+from gso.mesh import Mesh, topology
+from gso.metrics.surfaces import SurfaceLike, faces_of, image_of, in_range, points_of
+from gso.typing import Array, Flags, Ints
 
 
 def area(mesh: Mesh, points: Array | None = None) -> float:
@@ -29,7 +23,7 @@ def area(mesh: Mesh, points: Array | None = None) -> float:
     return float(0.5 * geometry.doubled_areas(v, mesh.triangles).sum())
 
 
-def area_error(surface: Any, flat: Any) -> float:
+def area_error(surface: SurfaceLike, flat: SurfaceLike) -> float:
     """Return the mean of |A'/A - 1| over the corner triangles that have an area."""
     tri = topology.corner_triangles(faces_of(surface))
     p, q = in_range(points_of(surface), image_of(surface, flat))
@@ -38,7 +32,9 @@ def area_error(surface: Any, flat: Any) -> float:
     return float(np.abs(after[keep] / before[keep] - 1.0).mean())
 
 
-def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None, *, surface: Any = None) -> int:
+def flipped_cells(
+    flat: SurfaceLike, faces: Ints | None = None, *, surface: SurfaceLike | None = None
+) -> int:
     """Count the inverted cells in a flat image.
 
     A grid cell (`flat` is (H, W, 2)) is inverted when any of its four corner triangles has
@@ -56,15 +52,13 @@ def flipped_cells(flat: Any, faces: NDArray[np.int64] | None = None, *, surface:
     return int(_flipped(points, table, space, grid=faces is None).sum())
 
 
-def _flipped(
-    points: Array, faces: NDArray[np.int64], space: Array | None, *, grid: bool
-) -> NDArray[np.bool_]:
+def _flipped(points: Array, faces: Ints, space: Array | None, *, grid: bool) -> Flags:
     """Mark the faces (m,) that are inverted in an image (n, 2), quads first."""
     quads, tris = topology.by_size(faces)
     # Corners 1 and 3 are the split along the diagonal 0-2, corners 0 and 2 the other one.
     bad = corner_areas(points, quads).reshape(4, -1) <= 0
     turned = bad.any(axis=0) if grid else (bad[0] | bad[2]) & (bad[1] | bad[3])
-    flipped = np.r_[turned, corner_areas(points, tris) <= 0]
+    flipped: Flags = np.r_[turned, corner_areas(points, tris) <= 0]
     if space is not None:
         area = space_areas(space, quads).reshape(4, -1).min(axis=0, initial=np.inf)
         area = np.r_[area, space_areas(space, tris)]
@@ -72,7 +66,7 @@ def _flipped(
     return flipped
 
 
-def flipped_faces(mesh: Mesh, flat: Array) -> NDArray[np.int64]:
+def flipped_faces(mesh: Mesh, flat: Array) -> Ints:
     """Find the faces of a mesh that are inverted in its flat image (n, 2).
 
     These are the faces that :func:`flips` counts.
@@ -93,11 +87,11 @@ def flips(mesh: Mesh, flat: Array) -> int:
     return len(flipped_faces(mesh, flat))
 
 
-def space_areas(points: Array, faces: NDArray[np.int64]) -> Array:
+def space_areas(points: Array, faces: Ints) -> Array:
     """Return the doubled areas of the corner triangles of faces in space."""
     return geometry.doubled_areas(points, topology.corner_triangles(faces))
 
 
-def corner_areas(flat: Array, faces: NDArray[np.int64]) -> Array:
+def corner_areas(flat: Array, faces: Ints) -> Array:
     """Return the doubled signed areas of the faces' corner triangles in a flat image (n, 2)."""
     return geometry.signed_areas(flat, topology.corner_triangles(faces))

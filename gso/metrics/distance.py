@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from gso import geometry
+from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
-from gso.metrics.surfaces import mesh_of, used_points
+from gso.mesh.polyline import Polylines
+from gso.metrics.surfaces import SurfaceLike, mesh_of, used_points
 from gso.typing import Array
-
-if TYPE_CHECKING:
-    from gso.mesh import Mesh
 
 
 class Distances(NamedTuple):
@@ -24,7 +23,7 @@ class Distances(NamedTuple):
     back_max: float
 
 
-def d_H(before: Any, after: Any) -> float:
+def d_H(before: SurfaceLike, after: SurfaceLike) -> float:
     """Return the published proximity, percent of the input's bounding-box diagonal.
 
     Mean over *output* vertices of the distance to the nearest *input* vertex. It is one-sided
@@ -42,7 +41,7 @@ def point_to_surface(points: Array, mesh: Mesh) -> Array:
     return Nearest(mesh).distances(points)
 
 
-def surface_distance(before: Any, after: Any) -> Distances:
+def surface_distance(before: SurfaceLike, after: SurfaceLike) -> Distances:
     """Measure true point-to-surface distances: output to input ("there"), and back."""
     a, b = mesh_of(before), mesh_of(after)
     there = point_to_surface(used_points(b), a)
@@ -50,7 +49,7 @@ def surface_distance(before: Any, after: Any) -> Distances:
     return Distances(float(there.mean()), float(there.max()), float(back.mean()), float(back.max()))
 
 
-def boundary_distance(before: Any, after: Any) -> tuple[float, float]:
+def boundary_distance(before: SurfaceLike, after: SurfaceLike) -> tuple[float, float]:
     """Measure the largest distances between boundary curves, in the surfaces' unit.
 
     A slit in the output, which no distance between the surfaces shows, is seen here.
@@ -67,8 +66,6 @@ def boundary_distance(before: Any, after: Any) -> tuple[float, float]:
     >>> boundary_distance(grid, grid + [0.0, 0.0, 0.1])
     (0.1, 0.1)
     """
-    from gso.mesh.polyline import Polylines
-
     points, lines = [], []
     for mesh in (mesh_of(before), mesh_of(after)):
         loops = [mesh.vertices[loop] for loop in mesh.boundary_loops]
@@ -88,7 +85,7 @@ def boundary_distance(before: Any, after: Any) -> tuple[float, float]:
     return far(1), far(0)
 
 
-def displacement(before: Any, after: Any) -> tuple[float, float]:
+def displacement(before: SurfaceLike, after: SurfaceLike) -> tuple[float, float]:
     """Return the root mean square and largest vertex displacement, percent of the diagonal.
 
     >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])

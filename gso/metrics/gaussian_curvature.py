@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from gso import geometry
 from gso.mesh import Mesh
-from gso.metrics.surfaces import components, grid_of, mesh_of, unit
+from gso.metrics.surfaces import SurfaceLike, components, grid_of, mesh_of, unit
 from gso.typing import Array
 
 
@@ -18,7 +17,7 @@ def curvature_grid(points: Array) -> Array:
     return geometry.grid_curvature(components(np.asarray(points, float)))
 
 
-def curvature(surface: Any, split: int = 0) -> Array:
+def curvature(surface: SurfaceLike, split: int = 0) -> Array:
     """Return the discrete Gaussian curvature of every vertex (n,); NaN on the boundary, 1/length^2.
 
     Interior vertices may have any valence. Those of a grid come in the order of the mesh.
@@ -39,7 +38,7 @@ def curvature(surface: Any, split: int = 0) -> Array:
     return out
 
 
-def worst_curvature(surface: Any) -> Array:
+def worst_curvature(surface: SurfaceLike) -> Array:
     """Return the Gaussian curvature of every vertex, from the triangulation with larger |K|, (n,).
 
     NaN on the boundary, 1/length^2, with Meyer's area: 1 on a unit sphere.
@@ -53,7 +52,7 @@ def worst_curvature(surface: Any) -> Array:
     return 3.0 * np.where(np.abs(other) > np.abs(own), other, own)
 
 
-def _interior_curvature(surface: Any, split: int = 0) -> Array:
+def _interior_curvature(surface: SurfaceLike, split: int = 0) -> Array:
     grid = grid_of(surface)
     if grid is None:
         values = curvature(surface, split)
@@ -64,17 +63,17 @@ def _interior_curvature(surface: Any, split: int = 0) -> Array:
 
 
 #: Mean |K| of meshes by triangulation: several metrics need it.
-_known: WeakKeyDictionary[Any, dict[int, float]] = WeakKeyDictionary()
+_known: WeakKeyDictionary[Mesh, dict[int, float]] = WeakKeyDictionary()
 
 
-def _mean_abs(surface: Any, split: int) -> float:
+def _mean_abs(surface: SurfaceLike, split: int) -> float:
     known = _known.setdefault(surface, {}) if isinstance(surface, Mesh) else {}
     if split not in known:
         known[split] = float(np.abs(_interior_curvature(surface, split)).mean())
     return known[split]
 
 
-def loss_gc(surface: Any, *, scale: float | None = None, split: int = 0) -> float:
+def loss_gc(surface: SurfaceLike, *, scale: float | None = None, split: int = 0) -> float:
     """Return the mean absolute Gaussian curvature K_A of interior vertices (Wang et al. 2024).
 
     This is Eq. 1 of the paper, multiplied by `scale` squared. Without `scale` it is that of
@@ -101,7 +100,7 @@ def loss_gc(surface: Any, *, scale: float | None = None, split: int = 0) -> floa
     return _mean_abs(surface, split) * scale**2
 
 
-def loss_gc_worst(surface: Any, *, scale: float | None = None) -> float:
+def loss_gc_worst(surface: SurfaceLike, *, scale: float | None = None) -> float:
     """Return :func:`loss_gc` in the triangulation of the quads where it is larger.
 
     On meshes of triangles it equals ``loss_gc``.
@@ -114,7 +113,7 @@ def loss_gc_worst(surface: Any, *, scale: float | None = None) -> float:
     return max(_mean_abs(surface, split) for split in (0, 1)) * scale**2
 
 
-def loss_gc_mean(surface: Any, *, scale: float | None = None) -> float:
+def loss_gc_mean(surface: SurfaceLike, *, scale: float | None = None) -> float:
     """Return the mean of :func:`loss_gc` over both triangulations of the quads, as in the energy.
 
     It does not depend on the numbering of the mesh.
@@ -127,7 +126,7 @@ def loss_gc_mean(surface: Any, *, scale: float | None = None) -> float:
     return 0.5 * sum(_mean_abs(surface, split) for split in (0, 1)) * scale**2
 
 
-def loss_gc_half(surface: Any, *, scale: float | None = None) -> float:
+def loss_gc_half(surface: SurfaceLike, *, scale: float | None = None) -> float:
     """Return :func:`loss_gc` at half the resolution, an independent check that no energy minimises.
 
     It is the mean over the four sub-grids of every second vertex, and over both triangulations
@@ -146,7 +145,7 @@ def loss_gc_half(surface: Any, *, scale: float | None = None) -> float:
     return float(np.mean([_mean_abs(g, split) for g in some for split in (0, 1)]) * scale**2)
 
 
-def mean_abs_K(surface: Any, *, scale: float | None = None) -> float:
+def mean_abs_K(surface: SurfaceLike, *, scale: float | None = None) -> float:
     """Return the mean absolute Gaussian curvature with the area of Meyer et al. 2003.
 
     It is 1 on a unit sphere, and taken from the triangulation of the quads where it is larger:
@@ -155,19 +154,21 @@ def mean_abs_K(surface: Any, *, scale: float | None = None) -> float:
     return 3.0 * loss_gc_worst(surface, scale=scale)
 
 
-def curvature_features(surface: Any, *, scale: float | None = None) -> tuple[float, float, float]:
+def curvature_features(
+    surface: SurfaceLike, *, scale: float | None = None
+) -> tuple[float, float, float]:
     """Return (K_P, K_N, K_A): means of the positive, negative and absolute curvature (Eq. 1)."""
     scale = unit(surface) if scale is None else scale
     k = _interior_curvature(surface) * scale**2
     return float(np.maximum(k, 0).mean()), float(np.minimum(k, 0).mean()), float(np.abs(k).mean())
 
 
-def K_A_r(before: Any, after: Any) -> float:
+def K_A_r(before: SurfaceLike, after: SurfaceLike) -> float:
     """Return the share of mean |K| removed, 1 - K_A(after) / K_A(before); 0 for a flat input."""
     return _removed(loss_gc(before, scale=1.0), loss_gc(after, scale=1.0))
 
 
-def K_A_r_worst(before: Any, after: Any) -> float:
+def K_A_r_worst(before: SurfaceLike, after: SurfaceLike) -> float:
     """Return the share of :func:`loss_gc_worst` removed; 0 for a flat input."""
     return _removed(loss_gc_worst(before, scale=1.0), loss_gc_worst(after, scale=1.0))
 

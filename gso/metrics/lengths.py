@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from gso import geometry
 from gso.mesh import topology
-from gso.metrics.surfaces import cells_of, components, faces_of, image_of, mesh_of, points_of, unit
+from gso.metrics.surfaces import (
+    SurfaceLike,
+    cells_of,
+    components,
+    faces_of,
+    image_of,
+    mesh_of,
+    points_of,
+    unit,
+)
 from gso.typing import Array
 
 
-def isometry_defect(surface: Any, flat: Any, *, scale: float | None = None) -> Array:
+def isometry_defect(
+    surface: SurfaceLike, flat: SurfaceLike, *, scale: float | None = None
+) -> Array:
     """Return the defect ``||a|-|a'|| + ||b|-|b'|| + |a.b - a'.b'|`` of every quad cell (c,)."""
     scale = unit(surface) if scale is None else scale
     cells = cells_of(surface)
@@ -20,10 +29,10 @@ def isometry_defect(surface: Any, flat: Any, *, scale: float | None = None) -> A
     q = image_of(surface, flat) / scale
     a, b = geometry.diagonals(*(components(p[cells[:, k]]) for k in range(4)))
     a2, b2 = geometry.diagonals(*(components(q[cells[:, k]]) for k in range(4)))
-    return np.abs(np.stack(geometry.isometry_defect(a, b, a2, b2))).sum(axis=0)
+    return np.asarray(np.abs(np.stack(geometry.isometry_defect(a, b, a2, b2))).sum(axis=0))
 
 
-def loss_iso_cell(surface: Any, flat: Any, *, scale: float | None = None) -> float:
+def loss_iso_cell(surface: SurfaceLike, flat: SurfaceLike, *, scale: float | None = None) -> float:
     """Return the mean isometry defect of the quad cells, in the unit ball (published, Table 2).
 
     It does not detect folding, nor a shift of the two checkerboard sub-lattices against each
@@ -33,7 +42,7 @@ def loss_iso_cell(surface: Any, flat: Any, *, scale: float | None = None) -> flo
     return float(defect.mean()) if defect.size else float("nan")
 
 
-def isometry_energy(surface: Any, flat: Any) -> float:
+def isometry_energy(surface: SurfaceLike, flat: SurfaceLike) -> float:
     """Return the mean over the faces of E_iso (Jiang et al. 2020), dimensionless.
 
     E_iso sums the squared differences of the squared diagonals and of their inner product (for
@@ -58,7 +67,7 @@ def isometry_energy(surface: Any, flat: Any) -> float:
     return float(np.concatenate(differences).mean() / np.concatenate(squares).mean() ** 2)
 
 
-def edge_length_error(surface: Any, flat: Any) -> float:
+def edge_length_error(surface: SurfaceLike, flat: SurfaceLike) -> float:
     """Return the mean of |l'/l - 1| over the mesh edges."""
     mesh = mesh_of(surface)
     a, b = mesh.edges.T

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from gso import geometry
 from gso.mesh import topology
 from gso.metrics.areas import space_areas
-from gso.metrics.surfaces import components, faces_of, image_of, in_range, points_of
+from gso.metrics.surfaces import SurfaceLike, components, faces_of, image_of, in_range, points_of
 from gso.typing import Array
 
 
@@ -21,7 +21,7 @@ class Strains(NamedTuple):
     values: Array
 
 
-def parallelogram_strain(surface: Any, flat: Any) -> Array:
+def parallelogram_strain(surface: SurfaceLike, flat: SurfaceLike) -> Array:
     """Return the larger principal strain max |s - 1| of every face's midpoint parallelogram (m,).
 
     For triangles it is that of the triangle; zero where a face has no area.
@@ -30,7 +30,7 @@ def parallelogram_strain(surface: Any, flat: Any) -> Array:
     return np.nan_to_num(np.maximum(np.abs(large - 1.0), np.abs(small - 1.0)))
 
 
-def principal_strains(surface: Any, flat: Any) -> Strains:
+def principal_strains(surface: SurfaceLike, flat: SurfaceLike) -> Strains:
     """Return the larger principal strain max |s - 1| of every corner triangle, pooled.
 
     There are four corner triangles per quad and one per triangle; those without area are
@@ -43,7 +43,7 @@ def principal_strains(surface: Any, flat: Any) -> Strains:
     return Strains(float(values.mean()), float(np.percentile(values, 99)), values)
 
 
-def strains(surface: Any, flat: Any) -> dict[str, float]:
+def strains(surface: SurfaceLike, flat: SurfaceLike) -> dict[str, float]:
     """Return maximum, 99th percentile and mean of :func:`principal_strains`, by metric name.
 
     >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
@@ -55,7 +55,7 @@ def strains(surface: Any, flat: Any) -> dict[str, float]:
     return {"strain_max": largest, "strain_p99": found.p99, "strain_mean": found.mean}
 
 
-def corner_strains(surface: Any, flat: Any) -> Array:
+def corner_strains(surface: SurfaceLike, flat: SurfaceLike) -> Array:
     """Return the larger principal strain max |s - 1| (4 q + t,) of every corner triangle.
 
     In the order of :func:`gso.mesh.topology.corner_triangles`; NaN for triangles without area.
@@ -77,7 +77,7 @@ def corner_strains(surface: Any, flat: Any) -> Array:
     return values
 
 
-def face_strains(surface: Any, flat: Any) -> Array:
+def face_strains(surface: SurfaceLike, flat: SurfaceLike) -> Array:
     """Return the largest of :func:`corner_strains` of every face (m,); NaN without any area."""
     quad = topology.are_quads(faces_of(surface))
     values = corner_strains(surface, flat)
@@ -88,7 +88,7 @@ def face_strains(surface: Any, flat: Any) -> Array:
     return out
 
 
-def stretches(surface: Any, flat: Any) -> tuple[Array, Array]:
+def stretches(surface: SurfaceLike, flat: SurfaceLike) -> tuple[Array, Array]:
     """Return the largest and the smallest principal stretch of every face, (m,) each.
 
     They are ratios of lengths, image over surface, for the edge-midpoint parallelograms of
@@ -106,7 +106,7 @@ def stretches(surface: Any, flat: Any) -> tuple[Array, Array]:
     return out[0], out[1]
 
 
-def quasi_conformal(surface: Any, flat: Any) -> Array:
+def quasi_conformal(surface: SurfaceLike, flat: SurfaceLike) -> Array:
     """Return the largest over the smallest stretch of every face (m,); 1 is best.
 
     Second-order accurate on quads, first-order on triangles; NaN where a face has no area.

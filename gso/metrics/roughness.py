@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from gso import geometry
 from gso.mesh import topology
-from gso.metrics.surfaces import cells_of, components, grid_of, mesh_of, points_of, unit
+from gso.metrics.surfaces import (
+    SurfaceLike,
+    cells_of,
+    components,
+    grid_of,
+    mesh_of,
+    points_of,
+    unit,
+)
 from gso.typing import Array
 
 
-def nonplanarity(surface: Any) -> Array:
+def nonplanarity(surface: SurfaceLike) -> Array:
     """Return the distance between the diagonals of every quad over the mean edge length, (q,).
 
     Zero for planar quads. In a mixed mesh, triangles are skipped.
@@ -22,14 +28,14 @@ def nonplanarity(surface: Any) -> Array:
     """
     mesh = mesh_of(surface)
     v = mesh.vertices
-    length = mesh.edge_lengths.mean()
+    length = float(mesh.edge_lengths.mean())
     corners = (components(v[c]) for c in cells_of(mesh).T)
     with np.errstate(invalid="ignore", divide="ignore"):
-        gap = np.abs(np.asarray(geometry.diagonal_distance(*corners)))
+        gap: Array = np.abs(np.asarray(geometry.diagonal_distance(*corners)))
     return np.nan_to_num(gap) / length
 
 
-def fairness(surface: Any, *, scale: float | None = None) -> float:
+def fairness(surface: SurfaceLike, *, scale: float | None = None) -> float:
     """Return the sum of squared second differences along the polylines (Jiang et al. 2020).
 
     Divided by `scale` squared, the unit ball's radius when not given. A mesh with triangles
@@ -56,7 +62,7 @@ def fairness(surface: Any, *, scale: float | None = None) -> float:
     return float(((v[a] + v[b] - v[left] - v[right]) ** 2).sum() / scale**2)
 
 
-def fairness_ratio(before: Any, after: Any) -> float:
+def fairness_ratio(before: SurfaceLike, after: SurfaceLike) -> float:
     """Return :func:`fairness` of a result over that of its input; 1 for a flat input.
 
     >>> bowl = np.dstack([u := np.mgrid[:3.0, :3.0][0], u.T, u**2 + u.T**2])
@@ -67,7 +73,7 @@ def fairness_ratio(before: Any, after: Any) -> float:
     return fairness(after, scale=1.0) / was if was > 0 else 1.0
 
 
-def edge_ratios(before: Any, after: Any) -> Array:
+def edge_ratios(before: SurfaceLike, after: SurfaceLike) -> Array:
     """Return the length ratio result / input of every edge (e,); NaN where the input's is zero.
 
     >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
@@ -77,10 +83,10 @@ def edge_ratios(before: Any, after: Any) -> Array:
     here, there = mesh_of(before), points_of(after)
     a, b = here.edges.T
     was, now = (np.linalg.norm(p[a] - p[b], axis=1) for p in (here.vertices, there))
-    return np.divide(now, was, out=np.full(len(was), np.nan), where=was > 0)
+    return np.asarray(np.divide(now, was, out=np.full(len(was), np.nan), where=was > 0))
 
 
-def loop_ratios(before: Any, after: Any) -> Array:
+def loop_ratios(before: SurfaceLike, after: SurfaceLike) -> Array:
     """Return the length ratio result / input of every boundary loop, longest loop first.
 
     >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
@@ -90,7 +96,7 @@ def loop_ratios(before: Any, after: Any) -> Array:
     here, there = mesh_of(before), points_of(after)
     loops = here.boundary_loops
     was, now = (np.array([_around(p[loop]) for loop in loops]) for p in (here.vertices, there))
-    return now / was
+    return np.asarray(now / was)
 
 
 def _around(points: Array) -> float:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from gso import geometry
 from gso.errors import MeshError
-from gso.mesh import topology
-from gso.typing import Array
+from gso.mesh import Mesh, topology
+from gso.typing import Array, Ints
 
-if TYPE_CHECKING:
-    from gso.mesh import Mesh
+#: A mesh, or a grid (H, W, 3); as an image also (H, W, 2) and (n, 2).
+SurfaceLike = Mesh | ArrayLike
 
 
 def components(points: Array) -> tuple[Array, ...]:
@@ -21,20 +19,22 @@ def components(points: Array) -> tuple[Array, ...]:
     return tuple(points[..., k] for k in range(points.shape[-1]))
 
 
-def points_of(surface: Any) -> Array:
+def points_of(surface: SurfaceLike) -> Array:
     """Return the vertices of a mesh or grid as (n, 3)."""
-    points = surface.vertices if hasattr(surface, "vertices") else np.asarray(surface, float)
+    points = surface.vertices if isinstance(surface, Mesh) else np.asarray(surface, float)
     return points.reshape(-1, points.shape[-1])
 
 
-def used_points(surface: Any) -> Array:
+def used_points(surface: SurfaceLike) -> Array:
     """Return the vertices that belong to a face, (n, 3)."""
-    return surface.vertices[surface.used] if hasattr(surface, "used") else points_of(surface)
+    if isinstance(surface, Mesh):
+        return surface.vertices[surface.used]
+    return points_of(surface)
 
 
-def grid_of(surface: Any) -> Array | None:
+def grid_of(surface: SurfaceLike) -> Array | None:
     """Return the grid array of a mesh or grid, or None."""
-    if hasattr(surface, "grid"):
+    if isinstance(surface, Mesh):
         return surface.grid
     points = np.asarray(surface, float)
     if points.ndim != 3:
@@ -42,35 +42,30 @@ def grid_of(surface: Any) -> Array | None:
     return points
 
 
-def mesh_of(surface: Any) -> Mesh:
-    from gso.mesh import Mesh
-
+def mesh_of(surface: SurfaceLike) -> Mesh:
     return surface if isinstance(surface, Mesh) else Mesh.from_grid(surface)
 
 
-def cells_of(surface: Any) -> NDArray[np.int64]:
+def cells_of(surface: SurfaceLike) -> Ints:
     """Return the quad faces of a mesh or grid."""
-    if not hasattr(surface, "faces"):
-        return topology.grid_faces(*np.asarray(surface).shape[:2])
-    return topology.by_size(surface.faces)[0]
+    if isinstance(surface, Mesh):
+        return topology.by_size(surface.faces)[0]
+    return topology.grid_faces(*np.asarray(surface).shape[:2])
 
 
-def faces_of(surface: Any) -> NDArray[np.int64]:
-    return surface.faces if hasattr(surface, "faces") else cells_of(surface)
+def faces_of(surface: SurfaceLike) -> Ints:
+    return surface.faces if isinstance(surface, Mesh) else cells_of(surface)
 
 
-def image_of(surface: Any, flat: Any) -> Array:
+def image_of(surface: SurfaceLike, flat: SurfaceLike) -> Array:
     """Return an image as (n, 2), or another surface as (n, 3), in the order of the vertices."""
-    if hasattr(flat, "vertices"):
-        out = flat.vertices
-    else:
-        image = np.asarray(flat, float)
-        out = image.reshape(-1, image.shape[-1])[:, :2]
+    image = flat.vertices if isinstance(flat, Mesh) else np.asarray(flat, float)
+    out = image if isinstance(flat, Mesh) else image.reshape(-1, image.shape[-1])[:, :2]
     count = len(points_of(surface))
     if len(out) != count:
         raise MeshError(f"the image has {len(out)} vertices and the surface {count}")
-    index = getattr(surface, "grid_index", None)
-    if hasattr(flat, "vertices") or image.ndim != 3 or index is None:
+    index = surface.grid_index if isinstance(surface, Mesh) else None
+    if image.ndim != 3 or index is None:
         return out
     ordered = np.empty_like(out)
     ordered[index.ravel()] = out
@@ -86,8 +81,8 @@ def in_range(p: Array, q: Array) -> tuple[Array, Array]:
     return p / unit, q / unit
 
 
-def unit(surface: Any) -> float:
+def unit(surface: SurfaceLike) -> float:
     """Return the largest distance of a vertex from the centroid: the default unit of length."""
-    if hasattr(surface, "frame"):
+    if isinstance(surface, Mesh):
         return surface.frame.scale
     return geometry.ball(points_of(surface))[1]

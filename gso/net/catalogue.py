@@ -6,23 +6,29 @@ A card is the JSON file beside the weights that describes a net and its training
 from __future__ import annotations
 
 import json
-from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TypeAlias
 
 from gso.errors import WeightsError
 from gso.net import tasks
 from gso.spelling import choices
+from gso.typing import AnyPath, Json
+
+if TYPE_CHECKING:
+    from gso.net.models.base import Net
 
 #: Nets that come with the package: NAME.safetensors and NAME.json.
 FOLDER = Path(__file__).parent / "weights"
 #: Version of the card's format.
 FORMAT = 1
+#: What names a net: a name, a .safetensors file, or the net itself.
+NetLike: TypeAlias = "AnyPath | Net"
+
 #: Nets that are applied in sequence, each to the result of the one before.
 CHAINS = {"net-cf": ("net-c", "net-f")}
 
 
-def read_card(path: str | PathLike[str]) -> dict[str, Any]:
+def read_card(path: AnyPath) -> Json:
     """Read the card of a .safetensors file.
 
     Raises
@@ -32,7 +38,7 @@ def read_card(path: str | PathLike[str]) -> dict[str, Any]:
     """
     place = Path(path).with_suffix(".json")
     try:
-        card = json.loads(place.read_bytes())
+        card: Json = json.loads(place.read_bytes())
     except OSError as error:
         raise WeightsError(f"{place} cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
@@ -58,7 +64,7 @@ def available(task: str | None = None) -> list[str]:
     return [n for n in found if read_card(located(first[n]))["model"].get("task") == task]
 
 
-def located(model: str | PathLike[str]) -> Path:
+def located(model: AnyPath) -> Path:
     """Return the file of a net, given by its name or as a .safetensors file.
 
     Raises
@@ -81,7 +87,7 @@ def located(model: str | PathLike[str]) -> Path:
     return path
 
 
-def chain(model: str | PathLike[str] | None, task: str) -> tuple[Path, ...]:
+def chain(model: AnyPath | None, task: str) -> tuple[Path, ...]:
     """Return the files of the nets that a name stands for, in the order of application."""
     kind = tasks.get(task)
     name = kind.default if model is None else model

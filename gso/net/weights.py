@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 from functools import lru_cache
-from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import torch
+from safetensors import SafetensorError
+from safetensors.torch import load as unpacked
+from safetensors.torch import save as packed
 
 from gso.errors import GSOError, OptionError, WeightsError
 from gso.io import replacing
@@ -18,6 +19,7 @@ from gso.net.models.base import Net
 from gso.net.models.coarse import CoarseNet
 from gso.net.models.gsonet import GSONet
 from gso.spelling import choices
+from gso.typing import AnyPath, Json
 
 #: Kinds of nets, as cards and configurations name them; :func:`add_kind` adds to them.
 KINDS: dict[str, type[Net]] = {"coarse": CoarseNet, "gsonet": GSONet}
@@ -48,7 +50,7 @@ def add_kind(name: str, cls: type[Net]) -> None:
     KINDS[name] = cls
 
 
-def make(settings: dict[str, Any]) -> Net:
+def make(settings: Json) -> Net:
     """Make a new net from ``{"kind": ..., "task": ..., ...}``.
 
     Raises
@@ -78,11 +80,11 @@ def kind_of(net: Net) -> str:
 
 def save(
     net: Net,
-    path: str | PathLike[str],
-    card: dict[str, Any] | None = None,
+    path: AnyPath,
+    card: Json | None = None,
     *,
     dtype: torch.dtype = torch.float16,
-) -> dict[str, Any]:
+) -> Json:
     """Write a net and its card.
 
     Parameters
@@ -101,8 +103,6 @@ def save(
     dict
         The card.
     """
-    from safetensors.torch import save as packed
-
     tensors = {k: v.detach().to("cpu", dtype).contiguous() for k, v in net.state_dict().items()}
     data = packed(tensors)
     record = {
@@ -119,13 +119,13 @@ def save(
     return record
 
 
-def write_card(path: Path, card: dict[str, Any]) -> None:
+def write_card(path: Path, card: Json) -> None:
     """Write a card."""
     with replacing(path) as file:
         file.write((json.dumps(card, indent=1) + "\n").encode())
 
 
-def load(model: str | PathLike[str], *, device: str | torch.device = "cpu") -> Net:
+def load(model: AnyPath, *, device: str | torch.device = "cpu") -> Net:
     """Load a net in evaluation mode; no code in the files is executed.
 
     Parameters
@@ -159,14 +159,11 @@ def load(model: str | PathLike[str], *, device: str | torch.device = "cpu") -> N
 
 def placed(net: Net, device: str | torch.device) -> Net:
     """Move a net to a device, with weights in the channels-last memory format."""
-    return net.to(device=device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+    return net.to(device=device, memory_format=torch.channels_last)  # type: ignore[call-overload, no-any-return]
 
 
-def _filled(settings: dict[str, Any], data: bytes, path: Path) -> Net:
+def _filled(settings: Json, data: bytes, path: Path) -> Net:
     """Make a net with the weights of a file."""
-    from safetensors import SafetensorError
-    from safetensors.torch import load as unpacked
-
     try:
         # On the meta device, which allocates no memory: compare the card with the file first.
         with torch.device("meta"):

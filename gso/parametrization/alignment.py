@@ -29,7 +29,7 @@ def align(mesh: Mesh, flat: Array, constraints: Compiled) -> Array:
     if not wanted:
         return flat
     held = replace(constraints, parts=wanted)
-    out = flat.copy()
+    out: Array = flat.copy()
     pieces = parts(mesh)
     # In a second round pieces align to those that they are glued to.
     for ids in pieces if len(pieces) == 1 else 2 * pieces:
@@ -61,7 +61,7 @@ def settle(mesh: Mesh, flat: Array, constraints: Compiled) -> Array:
         fixed[part.vertices] = True
     loose = [ids for ids in groups if not fixed[ids].any()]
     tight = [ids for ids in groups if fixed[ids].any()]
-    out = flat.copy()
+    out: Array = flat.copy()
     images = beside([upright(flat[ids]) for ids in loose])
     if tight and loose:
         there = flat[np.concatenate(tight)]
@@ -76,7 +76,7 @@ def settle(mesh: Mesh, flat: Array, constraints: Compiled) -> Array:
 def _turn(flat: Array, k: int) -> Array:
     angle = 2.0 * np.pi * k / _TURNS
     c, s = np.cos(angle), np.sin(angle)
-    return flat @ np.array([[c, s], [-s, c]])
+    return np.asarray(flat @ np.array([[c, s], [-s, c]]))
 
 
 def _closer(image: Array, ids: Ints, flat: Array, held: Compiled) -> tuple[float, Array]:
@@ -100,7 +100,7 @@ def _closer(image: Array, ids: Ints, flat: Array, held: Compiled) -> tuple[float
 def _moved(image: Array, p: Array, q: Array) -> Array:
     """Apply to an image the rigid motion that brings points p closest to q."""
     turn, shift = geometry.closest_motion(p, q)
-    return image @ turn.T + shift
+    return np.asarray(image @ turn.T + shift)
 
 
 def _targets(flat: Array, held: Compiled) -> tuple[Ints, Array]:

@@ -55,7 +55,7 @@ class _Gradients:
 
 def strain_level(vertices: Array, triangles: Ints, flat: Array) -> float:
     """Compute the root mean square of both principal strains of triangles mapped to the plane."""
-    return _Gradients(vertices, triangles).energy(flat @ np.array([1.0, 1j]))[0] ** 0.5
+    return float(_Gradients(vertices, triangles).energy(flat @ np.array([1.0, 1j]))[0] ** 0.5)
 
 
 def relax(

@@ -120,7 +120,7 @@ def _scaled(mesh: Mesh, image: Array) -> Array:
     v, t = mesh.vertices, mesh.triangles
     space = geometry.doubled_areas(v, t)
     plane = np.abs(geometry.signed_areas(image, t)).sum()
-    return (image - image.mean(axis=0)) * np.sqrt(space.sum() / max(plane, 1e-300))
+    return np.asarray((image - image.mean(axis=0)) * np.sqrt(space.sum() / max(plane, 1e-300)))
 
 
 def _circle(points: Array) -> Array:
@@ -140,7 +140,8 @@ def _conformal(mesh: Mesh, loop: Ints) -> Array | None:
     span = float(np.linalg.norm(points[far] - points[0]))
     at = np.array([[0.0, 0.0], [span, 0.0]])
     try:
-        return igl.lscm(mesh.vertices.copy(), mesh.triangles.copy(), held, at)[0]
+        image: Array | None = igl.lscm(mesh.vertices.copy(), mesh.triangles.copy(), held, at)[0]
+        return image
     except RuntimeError:
         return None
 
@@ -173,7 +174,10 @@ def _harmonic(mesh: Mesh, loop: Ints, at: Array) -> Array | None:
     import igl
 
     try:
-        return igl.harmonic(mesh.vertices.copy(), mesh.triangles.copy(), loop.copy(), at, 1)
+        image: Array | None = igl.harmonic(
+            mesh.vertices.copy(), mesh.triangles.copy(), loop.copy(), at, 1
+        )
+        return image
     except RuntimeError:
         return None
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from gso.geometry import ops, sub
-from gso.geometry.vector import Vec
-from gso.typing import Array, Ints
+from gso.typing import Array, B, Ints, Vec
 from gso.unknowns import Layout
 
 #: Largest step, as a fraction of the step at which a triangle degenerates.
@@ -65,7 +63,7 @@ def orientation(triangles: Ints, layout: Layout) -> Orientation:
     return Orientation(np.ascontiguousarray(triangles.T), start, count)
 
 
-def degenerate(points: Sequence[Vec], directions: Sequence[Vec]) -> Any:
+def degenerate(points: Sequence[Vec[B]], directions: Sequence[Vec[B]]) -> B:
     """Compute the step at which each triangle degenerates; infinity where none does.
 
     Along a step the signed area of a triangle is quadratic in the step length; this is the
@@ -80,19 +78,19 @@ def degenerate(points: Sequence[Vec], directions: Sequence[Vec]) -> Any:
     return _first_root(*_areas(points, directions))
 
 
-def _areas(points: Sequence[Vec], directions: Sequence[Vec]) -> tuple[Any, Any, Any]:
+def _areas(points: Sequence[Vec[B]], directions: Sequence[Vec[B]]) -> tuple[B, B, B]:
     """Return c, b and a of the doubled signed areas ``c + b t + a t^2`` at steps t."""
     e, f, de, df = (sub(corners[k], corners[0]) for corners in (points, directions) for k in (1, 2))
     return _cross(e, f), _cross(e, df) + _cross(de, f), _cross(de, df)
 
 
-def _first_root(c: Any, b: Any, a: Any) -> Any:
+def _first_root(c: B, b: B, a: B) -> B:
     """Return the smallest positive root of ``c + b t + a t^2``, or infinity; so where c <= 0."""
     # 2c / (sqrt(b^2 - 4ac) - b) is the smallest positive root, if there is one.
     steepness = (b * b - 4.0 * a * c) ** 0.5 - b
-    falling = (steepness > 0) & (c > 0)
+    falling = ops.minimum(steepness, c) > 0
     return ops.where(falling, 2.0 * c / ops.where(falling, steepness, 1.0), float("inf"))
 
 
-def _cross(a: Vec, b: Vec) -> Any:
+def _cross(a: Vec[B], b: Vec[B]) -> B:
     return a[0] * b[1] - a[1] * b[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gso import geometry
 from gso.mesh import Mesh
@@ -47,7 +48,7 @@ def closest_motion(flat: Array, target: Array) -> Array:
            [0., 1.]])
     """
     turn, shift = geometry.closest_motion(flat, target)
-    return flat @ turn.T + shift
+    return np.asarray(flat @ turn.T + shift)
 
 
 def upright(flat: Array) -> Array:
@@ -83,8 +84,9 @@ def beside(parts: list[Array]) -> list[Array]:
     return out
 
 
-def _complex(p: Array) -> Array:
-    return p @ np.array([1.0, 1j])
+def _complex(p: Array) -> NDArray[np.complex128]:
+    numbers: NDArray[np.complex128] = p @ np.array([1.0, 1j])
+    return numbers
 
 
 def _turned(p: Array, turn: complex) -> Array:

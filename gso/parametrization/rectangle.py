@@ -28,4 +28,4 @@ def rectangle(grid: Array) -> Array:
     array([2., 6.])
     """
     sides = geometry.side_lengths(tuple(np.moveaxis(grid, -1, 0)))
-    return geometry.unit_rectangle(*grid.shape[:2]) * np.array(sides)
+    return np.asarray(geometry.unit_rectangle(*grid.shape[:2]) * np.array(sides))

@@ -10,20 +10,18 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from gso import metrics
 from gso.components import average
-from gso.errors import GSOError, OptionError
+from gso.errors import OptionError
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.plot.draw import GRAZING, SUFFIXES, Panel, draw, facing, write
+from gso.plot.draw import GRAZING, SUFFIXES, Panel, available, draw, facing, require, write
 from gso.plot.heat import curvatures, distance, numbers, scales, strain, stretch
 from gso.plot.piece_panels import pieces
 from gso.plot.rulings import gauss, ruled
@@ -32,6 +30,7 @@ from gso.plot.view import View
 from gso.result import Result
 from gso.seams import Segmentation
 from gso.spelling import choices
+from gso.typing import AnyPath, MeshLike
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,31 +50,14 @@ COLOURS = ("curvature", "distance", "strain", "none")
 """Names that :func:`plot_surface` takes for its values."""
 
 
-def available() -> bool:
-    """Tell whether Matplotlib is installed."""
-    return find_spec("matplotlib") is not None
-
-
-def require() -> None:
-    """Raise an error if Matplotlib is not installed.
-
-    Raises
-    ------
-    GSOError
-        With instructions to install it.
-    """
-    if not available():
-        raise GSOError('plots need Matplotlib: pip install ".[plot]" in the folder of gso')
-
-
 def plot_surface(
-    mesh: Any,
+    mesh: MeshLike,
     values: str | ArrayLike = "none",
     *,
-    path: str | PathLike[str] | None = None,
+    path: AnyPath | None = None,
     title: str = "",
     label: str = "",
-    before: Any = None,
+    before: MeshLike | None = None,
 ) -> Figure:
     """Draw a surface, coloured by a quantity.
 
@@ -163,7 +145,7 @@ def _flattened(design: Mesh, pattern: Pattern, scale: np.ndarray | None = None) 
     return [surface, sheet]
 
 
-def plot_result(result: Result, path: str | PathLike[str] | None = None) -> Figure:
+def plot_result(result: Result, path: AnyPath | None = None) -> Figure:
     """Draw a result beside its design.
 
     `developable`: the curvature before and after in one colour scale, the distance between the
@@ -220,7 +202,7 @@ def _curved(design: Mesh, mesh: Mesh) -> float:
     return metrics.mean_abs_K(mesh, scale=metrics.unit(design))
 
 
-def plot_pieces(found: Segmentation, path: str | PathLike[str] | None = None) -> Figure:
+def plot_pieces(found: Segmentation, path: AnyPath | None = None) -> Figure:
     """Draw a design in pieces from both sides, with its seams, beside the patterns.
 
     Parameters
@@ -246,11 +228,11 @@ def plot_pieces(found: Segmentation, path: str | PathLike[str] | None = None) ->
 
 
 def plot_rulings(
-    mesh: Any,
+    mesh: MeshLike,
     *,
-    path: str | PathLike[str] | None = None,
+    path: AnyPath | None = None,
     count: int = 24,
-    before: Any = None,
+    before: MeshLike | None = None,
 ) -> Figure:
     """Draw a surface with its ruling lines, and its Gauss image beside it.
 

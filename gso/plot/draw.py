@@ -8,19 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
+from gso.errors import GSOError
 from gso.io import check_writable, replacing, suffix_of
 from gso.mesh import topology
 from gso.plot.heat import Heat, Scale
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
@@ -77,7 +79,7 @@ class Panel:
     """
 
     points: Array
-    faces: NDArray[np.int64]
+    faces: Ints
     title: str = ""
     heat: Heat | None = None
     tint: Array | None = None
@@ -87,9 +89,26 @@ class Panel:
     circle: float = 0.0
 
     @property
-    def corners(self) -> NDArray[np.int64]:
+    def corners(self) -> Ints:
         """Faces (m, 4); a triangle repeats its first corner."""
         return topology.four_corners(self.faces)
+
+
+def available() -> bool:
+    """Tell whether Matplotlib is installed."""
+    return find_spec("matplotlib") is not None
+
+
+def require() -> None:
+    """Raise an error if Matplotlib is not installed.
+
+    Raises
+    ------
+    GSOError
+        With instructions to install it.
+    """
+    if not available():
+        raise GSOError('plots need Matplotlib: pip install ".[plot]" in the folder of gso')
 
 
 def draw(panels: Sequence[Panel]) -> Figure:
@@ -151,7 +170,7 @@ def _segments(lines: Sequence[Array]) -> Array:
     return np.concatenate([np.empty((0, 2, 3)), *(np.stack([p[:-1], p[1:]], 1) for p in lines)])
 
 
-def _paint(ax: Any, panel: Panel, span: Array) -> ScalarMappable | None:
+def _paint(ax: Axes, panel: Panel, span: Array) -> ScalarMappable | None:
     """Draw a panel; return the mappable of its colour bar."""
     from matplotlib.patches import Circle
 
@@ -220,7 +239,7 @@ def _shading(panel: Panel, ambient: float) -> Array:
     normal = geometry.quad_area_vectors(panel.points, panel.corners)
     length = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
     lit = np.abs(normal @ panel.light) / (length * np.linalg.norm(panel.light))
-    return ambient + (1.05 - ambient) * lit
+    return np.asarray(ambient + (1.05 - ambient) * lit)
 
 
 def write(figure: Figure, path: str | PathLike[str] | None) -> Figure:

@@ -51,7 +51,7 @@ def per_face(mesh: Mesh, values: Array) -> Array:
         corners = np.where(mesh.faces >= 0, values[mesh.faces], np.nan)
         known = ~np.isnan(corners)
         total, count = np.where(known, corners, 0.0).sum(axis=1), known.sum(axis=1)
-        return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+        return np.asarray(np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0))
     if values.shape == (len(mesh.faces),):
         return values
     raise OptionError(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gso.plot.draw import write
+from gso.plot.draw import require, write
 from gso.typing import Array
 
 if TYPE_CHECKING:
@@ -54,8 +54,6 @@ def plot_histograms(
     >>> [len(axes.patches) for axes in figure.axes]
     [2]
     """
-    from gso.plot import require
-
     require()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.errors import OptionError
@@ -14,7 +12,7 @@ from gso.io import as_mesh
 from gso.mesh import Mesh, topology
 from gso.metrics import components
 from gso.rulings.gauss_image import gauss_image
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints, MeshLike
 
 #: Curvature times size below which a face counts as flat.
 FLAT = 0.01
@@ -57,7 +55,7 @@ class ShapeOperator:
     H: Array
     curvatures: Array
     directions: Array
-    flat: NDArray[np.bool_]
+    flat: Flags
 
     @property
     def rulings(self) -> Array:
@@ -86,7 +84,7 @@ class ShapeOperator:
         return float(width / length) if areas.size else 0.0
 
 
-def shape_operator(mesh: Any, *, flat: float = FLAT) -> ShapeOperator:
+def shape_operator(mesh: MeshLike, *, flat: float = FLAT) -> ShapeOperator:
     """Compute curvatures and principal directions of every face.
 
     The shape operator of a quad maps its diagonals to those of its image in the discrete
@@ -157,7 +155,7 @@ def shape_operator(mesh: Any, *, flat: float = FLAT) -> ShapeOperator:
 
 def face_matrices(
     points: Array, normals: Array, corners: Ints
-) -> tuple[geometry.Matrix, tuple[Array, Array, Array], Array]:
+) -> tuple[geometry.Matrix[Array], tuple[Array, Array, Array], Array]:
     """Compute shape operators, tangent frames and areas of faces with four corners.
 
     A triangle repeats its first corner as the last one, so that its diagonals are two sides.
@@ -184,7 +182,9 @@ def checked_flat(flat: float) -> float:
 
 def _midpoints(mesh: Mesh) -> Array:
     there = mesh.faces >= 0
-    return (mesh.vertices[mesh.faces] * there[..., None]).sum(axis=1) / there.sum(axis=1)[:, None]
+    corners = mesh.vertices[mesh.faces] * there[..., None]
+    middles: Array = corners.sum(axis=1) / there.sum(axis=1)[:, None]
+    return middles
 
 
 def smallest_radius(surface: Mesh) -> float:

@@ -11,16 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import comb
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.io import as_mesh
 from gso.mesh import Mesh, topology
 from gso.metrics import components
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints, MeshLike
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 #: Rings of vertices in a fit, inside and on the boundary, where they lie on one side only.
 RINGS, RIM_RINGS = 2, 3
@@ -37,7 +39,7 @@ _RIDGE = np.array([(1e-15, 1e-15, 1e-12, 1e-9)[i + j] / comb(i + j, i) for i, j 
 _BLOCK = 1 << 17
 
 
-def gauss_image(mesh: Any) -> Array:
+def gauss_image(mesh: MeshLike) -> Array:
     """Compute unit normals at the vertices: the vertices of the discrete Gauss image.
 
     The image has the faces of the mesh. It is a curve on the unit sphere if the surface is
@@ -86,7 +88,7 @@ def gauss_image(mesh: Any) -> Array:
     return normals
 
 
-def _corners(mesh: Mesh) -> Any:
+def _corners(mesh: Mesh) -> csr_matrix:
     """Build the sparse (n, m) incidence matrix of vertices and faces."""
     from scipy.sparse import csr_matrix
 
@@ -95,17 +97,17 @@ def _corners(mesh: Mesh) -> Any:
     return csr_matrix((np.ones(he.origin.size), (he.origin, he.face)), shape=shape)
 
 
-def _mean_normals(mesh: Mesh, corners: Any) -> Array:
+def _mean_normals(mesh: Mesh, corners: csr_matrix) -> Array:
     """Compute unit normals (n, 3): area-weighted means over the faces, z where they cancel."""
     p = mesh.frame.to_unit(mesh.vertices)
     sides = geometry.diagonals(*(components(p[c]) for c in topology.four_corners(mesh.faces).T))
     total = corners @ np.stack(geometry.cross(*sides), axis=1)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     up = np.broadcast_to([0.0, 0.0, 1.0], total.shape)
-    return np.divide(total, length, out=up.copy(), where=length > 0)
+    return np.asarray(np.divide(total, length, out=up.copy(), where=length > 0))
 
 
-def _blocks(centre: Ints, around: Any) -> Iterator[tuple[Ints, Ints, NDArray[np.bool_]]]:
+def _blocks(centre: Ints, around: csr_matrix) -> Iterator[tuple[Ints, Ints, Flags]]:
     """Yield blocks of vertices, their neighbours (b, k), and a mask that is false for padding."""
     count = np.diff(around.indptr)
     order = np.argsort(count, kind="stable")
@@ -123,9 +125,7 @@ def _blocks(centre: Ints, around: Any) -> Iterator[tuple[Ints, Ints, NDArray[np.
         start = stop
 
 
-def _jet_normals(
-    points: Array, normals: Array, centre: Ints, near: Ints, there: NDArray[np.bool_]
-) -> Array:
+def _jet_normals(points: Array, normals: Array, centre: Ints, near: Ints, there: Flags) -> Array:
     """Compute normals of cubic height fields over the planes normal to `normals` at `centre`."""
     up = normals[centre]
     # The coordinate axis farthest from the normal completes a frame.
@@ -142,4 +142,4 @@ def _jet_normals(
     gram = weighted @ basis + weight.sum(axis=1)[:, None, None] * np.diag(_RIDGE)
     slope = np.linalg.solve(gram, weighted @ z[..., None])[:, 1:3, 0]
     out = up - (frame[..., :2] @ slope[..., None])[..., 0]
-    return out / np.linalg.norm(out, axis=1, keepdims=True)
+    return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))

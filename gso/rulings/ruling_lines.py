@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gso.errors import MeshError, OptionError
 from gso.io import as_mesh
@@ -15,7 +14,7 @@ from gso.mesh import Mesh
 from gso.rulings.face_curvature import FLAT, checked_flat
 from gso.rulings.spread import chosen, region_areas, spread
 from gso.rulings.walk import Field, walk
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints, MeshLike
 
 #: Candidate lines per line wanted; their largest total number; their smallest number per line.
 _TRIES, _ENOUGH, _FEWEST = 20, 600, 4
@@ -49,7 +48,7 @@ class Rulings:
     corners: Ints
     weights: Array
     starts: Ints
-    complete: NDArray[np.bool_]
+    complete: Flags
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -93,7 +92,7 @@ class Rulings:
 
 
 def trace(
-    mesh: Any, *, count: int = 24, seeds: ArrayLike | None = None, flat: float = FLAT
+    mesh: MeshLike, *, count: int = 24, seeds: ArrayLike | None = None, flat: float = FLAT
 ) -> Rulings:
     """Trace evenly spread ruling lines across a surface.
 

@@ -11,13 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import geometry
 from gso.mesh import Mesh, topology
 from gso.rulings.face_curvature import face_matrices
 from gso.rulings.gauss_image import gauss_image
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Cosine of the largest turn between two triangles, 60 degrees; at larger turns a line ends.
 _SHARP = 0.5
@@ -46,7 +45,7 @@ class Field:
 
     directions: Array
     rates: Array
-    flat: NDArray[np.bool_]
+    flat: Flags
 
     @classmethod
     def of(cls, mesh: Mesh, limit: float) -> Field:
@@ -63,7 +62,7 @@ class Field:
         return cls.along(mesh, along, high < limit**2)
 
     @classmethod
-    def along(cls, mesh: Mesh, directions: Array, flat: NDArray[np.bool_]) -> Field:
+    def along(cls, mesh: Mesh, directions: Array, flat: Flags) -> Field:
         """Build a field from given directions (t, 3) of any length."""
         p = mesh.vertices[mesh.triangles]
         normal = geometry.area_vectors(mesh.vertices, mesh.triangles)
@@ -98,7 +97,7 @@ class Steps:
     line: Ints
     triangle: Ints
     weights: Array
-    arrived: NDArray[np.bool_]
+    arrived: Flags
 
 
 def walk(mesh: Mesh, field: Field, start: Ints, sign: Array) -> Steps:
@@ -158,7 +157,7 @@ class _Front:
     heading: Array
     left: Array
 
-    def keep(self, which: NDArray[np.bool_]) -> None:
+    def keep(self, which: Flags) -> None:
         """Drop all lines but those selected."""
         for name, values in vars(self).items():
             setattr(self, name, values[which])
@@ -175,11 +174,9 @@ class _Front:
         ahead = np.maximum(self.weights + length[:, None] * self.rates, 0.0)
         ahead[rows, corner] = 0.0
         self.weights = ahead / ahead.sum(axis=1, keepdims=True)
-        return (corner + 1) % 3
+        return np.asarray((corner + 1) % 3)
 
-    def cross(
-        self, mesh: Mesh, field: Field, side: Ints, across: Ints, go: NDArray[np.bool_]
-    ) -> Ints:
+    def cross(self, mesh: Mesh, field: Field, side: Ints, across: Ints, go: Flags) -> Ints:
         """Cross the next triangle to the edge ahead; drop lines that end before it.
 
         `side` is the number of the edge that the lines are on, `across` the twin half-edge, and
@@ -204,7 +201,7 @@ class _Front:
             self._follow_side(mesh, before, side, back)
         return self.leave()
 
-    def _follow_side(self, mesh: Mesh, before: Array, side: Ints, which: NDArray[np.bool_]) -> None:
+    def _follow_side(self, mesh: Mesh, before: Array, side: Ints, which: Flags) -> None:
         """Make lines whose direction points back follow the edge that they came through."""
         rows = np.flatnonzero(which)
         side = side[rows]

@@ -184,7 +184,7 @@ def _split(
 
 
 def _length(vectors: Array) -> Array:
-    return np.sqrt((vectors**2).sum(axis=1, keepdims=True))
+    return np.asarray(np.sqrt((vectors**2).sum(axis=1, keepdims=True)))
 
 
 def _clip(vectors: Array, radius: Array | float) -> Array:

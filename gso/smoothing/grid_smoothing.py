@@ -233,7 +233,8 @@ def _whittaker(array: Array, order: int, weight: float) -> Smoothed:
 def _analyse(unit: Array, order: int) -> Array:
     """Compute the coefficients (3, H, W) of a grid (H, W, 3)."""
     height, width = unit.shape[:2]
-    return modes(height, order)[0].T @ np.moveaxis(unit, 2, 0) @ modes(width, order)[0]
+    found: Array = modes(height, order)[0].T @ np.moveaxis(unit, 2, 0) @ modes(width, order)[0]
+    return found
 
 
 def _synthesise(coefficients: Array, order: int) -> Array:

@@ -11,20 +11,22 @@ Whittaker 1923).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_graph
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix, csr_matrix
 
 # Largest number of vertices in a fit; more, as around a pole with hundreds of faces, are sampled.
 LARGEST = 64
 
 
-def neighbours(mesh: Mesh) -> Any:
+def neighbours(mesh: Mesh) -> csr_matrix:
     """Build the sparse (n, n) pattern of ones of vertices that share a face, with diagonal."""
     from scipy.sparse import csr_matrix
 
@@ -34,7 +36,7 @@ def neighbours(mesh: Mesh) -> Any:
     return _pattern(incidence @ incidence.T)
 
 
-def umbrella(mesh: Mesh, near: Any) -> Any:
+def umbrella(mesh: Mesh, near: csr_matrix) -> csr_matrix:
     """Build the sparse (n, n) umbrella operator: each vertex minus the mean of its neighbours.
 
     Boundary vertices use their neighbours along the boundary only, so that the operator does
@@ -59,10 +61,10 @@ class Rings:
     """Padded vertex lists: `index` (p, k) of vertices, `real` (p, k) false for padding."""
 
     index: Ints
-    real: NDArray[np.bool_]
+    real: Flags
 
 
-def rings(near: Any, size: int) -> Rings:
+def rings(near: csr_matrix, size: int) -> Rings:
     """Collect the vertices within `size` faces of each vertex; a regular sample if too many."""
     reach = near
     for _ in range(size - 1):
@@ -106,9 +108,9 @@ class Residuals:
     normal: Array
     freedom: Array
     scale: Array
-    rows: Any
+    rows: csr_matrix
 
-    def penalty(self, trust: Array | None = None) -> Any:
+    def penalty(self, trust: Array | None = None) -> csc_matrix:
         """Build the sparse (n, n) matrix of the sum of squared residuals, weighted by `trust`."""
         from scipy.sparse import diags
 
@@ -124,7 +126,7 @@ class Residuals:
         away = np.einsum("pkc,pc->pk", points[self.rings.index], self.normal) * self.rings.real
         fit = np.einsum("pkd,pk->pd", self.basis, away)
         away = away - np.einsum("pkd,pd->pk", self.basis, fit)
-        return np.sqrt((away**2).sum(axis=1) / np.maximum(self.freedom, 1))
+        return np.asarray(np.sqrt((away**2).sum(axis=1) / np.maximum(self.freedom, 1)))
 
 
 def residuals(points: Array, patches: Rings, order: int) -> Residuals:
@@ -168,7 +170,7 @@ def residuals(points: Array, patches: Rings, order: int) -> Residuals:
     return Residuals(patches, basis, axes[:, :, 0], freedom, scale, rows)
 
 
-def _pattern(matrix: Any) -> Any:
+def _pattern(matrix: csr_matrix) -> csr_matrix:
     matrix = matrix.tocsr()
     matrix.data[:] = 1.0
     return matrix

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from gso.smoothing.base import Smoothed, checked_options, to_unit
 from gso.smoothing.local_fits import Residuals, Rings, neighbours, residuals, rings, umbrella
 from gso.smoothing.select import Choice, best_weight, factor, gcv, largest_weight, unbiased_risk
 from gso.typing import Array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix, csr_matrix
 
 ORDERS = (2, 3, 4)
 # Cost of degrees of freedom in the cross-validation that chooses the first, coarse smoothing.
@@ -113,7 +116,7 @@ def smooth_mesh(
 
 
 def _squared(
-    unit: Array, pilot: Array, near: Any, order: int, weight: float | None, sigma: float
+    unit: Array, pilot: Array, near: csr_matrix, order: int, weight: float | None, sigma: float
 ) -> tuple[Choice, int, float]:
     for degree, start in ((2, 1e-5), (order, 1e-4)):
         local = residuals(pilot, _patches(near, degree), degree)
@@ -125,7 +128,7 @@ def _squared(
 
 
 def _creased(
-    unit: Array, pilot: Array, near: Any, order: int, weight: float | None, sigma: float
+    unit: Array, pilot: Array, near: csr_matrix, order: int, weight: float | None, sigma: float
 ) -> tuple[Choice, int, float]:
     patches = _patches(near, order)
     start = 1e-6
@@ -141,11 +144,13 @@ def _creased(
     return done, order, sigma
 
 
-def _patches(near: Any, order: int) -> Rings:
+def _patches(near: csr_matrix, order: int) -> Rings:
     return rings(near, 1 if order == 2 else 2)
 
 
-def _solve(penalty: Any, unit: Array, start: float, sigma: float, weight: float | None) -> Choice:
+def _solve(
+    penalty: csc_matrix, unit: Array, start: float, sigma: float, weight: float | None
+) -> Choice:
     if weight is None and sigma < NOTHING:
         return Choice(unit, 0.0, float(len(unit)))
     if weight is None:

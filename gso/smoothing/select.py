@@ -11,12 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso.linalg import Pattern, SingularError, choose, spd
-from gso.typing import Array
+from gso.typing import Array, Solve
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
 STEPS = 10
 PROBES = 2
@@ -39,7 +42,7 @@ class Family:
         Centre of the range of weights.
     """
 
-    def __init__(self, penalty: Any, points: Array, shift: float):
+    def __init__(self, penalty: csc_matrix, points: Array, shift: float):
         count = len(points)
         signs = np.random.default_rng(0).choice([-1.0, 1.0], (count, PROBES))
         start = np.hstack([points, signs])
@@ -86,7 +89,7 @@ class Family:
         mixed = (
             np.einsum("ckm,cm->ck", self.mix[:3], share * self.first[:3]) * self.length[:3, None]
         )
-        return np.einsum("knc,ck->nc", self.basis[:, :, :3], mixed)
+        return np.asarray(np.einsum("knc,ck->nc", self.basis[:, :, :3], mixed))
 
 
 @dataclass(frozen=True)
@@ -101,13 +104,13 @@ class Choice:
 Criterion = Callable[[Array, Array, int], Array]
 
 
-def largest_weight(penalty: Any) -> float:
+def largest_weight(penalty: csc_matrix) -> float:
     """Compute the largest weight at which I is not lost in I + weight K; inf if K is zero."""
     steepest = float(np.abs(penalty.diagonal()).max())
     return STEEPEST / steepest if steepest > 0 else np.inf
 
 
-def best_weight(penalty: Any, points: Array, start: float, criterion: Criterion) -> Choice:
+def best_weight(penalty: csc_matrix, points: Array, start: float, criterion: Criterion) -> Choice:
     """Minimise a criterion of (sum of squared residuals, trace of I - H, n) over weights."""
     most = largest_weight(penalty)
     shift, low, high = min(start, most), 0.0, np.inf
@@ -153,7 +156,7 @@ def unbiased_risk(variance: float) -> Criterion:
     return score
 
 
-def factor(penalty: Any, weight: float) -> Callable[[Array], Array]:
+def factor(penalty: csc_matrix, weight: float) -> Solve:
     """Factorise I + weight K and return a solver for right-hand sides (n, c).
 
     >>> from scipy.sparse import identity

@@ -21,9 +21,8 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 # Parameters are (a, log m, log n, log q, log p). A weak Gaussian prior regularises the fit on
 # tiny grids; on larger ones it has little effect.
@@ -49,7 +48,7 @@ WAVES = WAVES[WAVES[:, 1:3].max(axis=1) > STARTS[:, 1].max()]
 
 
 @lru_cache(maxsize=64)
-def bins(n: int) -> tuple[NDArray[np.int64], Array, Array]:
+def bins(n: int) -> tuple[Ints, Array, Array]:
     """Compute start, size and centre of bins of neighbouring modes.
 
     Modes below 12 have a bin each; the width of later bins is about an eighth of their mode
@@ -140,7 +139,8 @@ class Spectrum:
         v = 1 + np.exp(share[:, self.keep])
         variance = (self.energy / v).sum(axis=1) / self.total
         away = ((points - CENTRE) / SPREAD) ** 2
-        return self.total * np.log(variance) + np.log(v) @ self.count + away.sum(axis=1)
+        cost: Array = self.total * np.log(variance) + np.log(v) @ self.count + away.sum(axis=1)
+        return cost
 
     def _expand(self, point: Array) -> tuple[float, Array, Array, float]:
         """Compute criterion, negative gradient, expected Hessian and noise variance at a point."""
@@ -172,13 +172,13 @@ def shrinkage(law: Law, height: int, width: int) -> Array:
     """
     i, j = np.arange(height), np.arange(width)
     signal = np.exp(_log_share(law.parameters, _log(i), _log(j)))
-    kept = signal / (1 + signal)
+    kept: Array = signal / (1 + signal)
     kept[i[:, None] + j < 2] = 1.0
     return kept
 
 
-def _log(index: NDArray) -> Array:
-    return np.log(np.maximum(index, 1e-80))
+def _log(index: Array | Ints) -> Array:
+    return np.asarray(np.log(np.maximum(index, 1e-80)))
 
 
 def _powers(point: Array, log_i: Array, log_j: Array) -> tuple[Array, Array]:
@@ -192,7 +192,7 @@ def _log_share(point: Array, log_i: Array, log_j: Array) -> Array:
     """Compute log s_ij, (..., i, j), at points (..., 5)."""
     u, v = _powers(point, log_i, log_j)
     a, p = point[..., 0, None, None], np.exp(point[..., 4, None, None])
-    return a - p * np.log1p(np.expm1(a / p) * (u[..., :, None] + v[..., None, :]))
+    return np.asarray(a - p * np.log1p(np.expm1(a / p) * (u[..., :, None] + v[..., None, :])))
 
 
 def _log_share_and_slope(point: Array, log_i: Array, log_j: Array) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gso.energy.base import Residual
+from gso.energy.base import Residual, Vectors
 from gso.geometry.ops import TINY
 from gso.solver.printing import numpy_source
 from gso.typing import Array
@@ -67,7 +67,7 @@ def casadi_function(residual: Residual, shape: tuple[int, ...], constants: int, 
 
 
 @lru_cache(maxsize=32)
-def casadi_geometric_stiffness(vectors: Residual, shape: tuple[int, ...], constants: int):
+def casadi_geometric_stiffness(vectors: Vectors, shape: tuple[int, ...], constants: int):
     """Make the CasADi function of one element: lengths of its plane vectors, and rows h.
 
     The second derivative (geometric stiffness) of the length of a vector (u, v) that is linear
@@ -125,7 +125,7 @@ def kernel(residual: Residual, shape: tuple[int, ...], constants: int, jacobian:
 
 
 @lru_cache(maxsize=32)
-def geometric_stiffness(vectors: Residual, shape: tuple[int, ...], constants: int) -> Kernel:
+def geometric_stiffness(vectors: Vectors, shape: tuple[int, ...], constants: int) -> Kernel:
     """Return the kernel of the geometric stiffness, see :attr:`gso.energy.Term.vectors`."""
     return Kernel(casadi_geometric_stiffness(vectors, shape, constants), shape, jacobian=True)
 

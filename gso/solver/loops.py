@@ -18,7 +18,7 @@ from functools import lru_cache
 from importlib.util import find_spec
 from typing import Any
 
-from gso.energy.base import Residual
+from gso.energy.base import Residual, Vectors
 from gso.errors import BackendError
 from gso.solver.cached_source import compiled
 from gso.solver.kernels import casadi_function, casadi_geometric_stiffness
@@ -68,7 +68,7 @@ def jacobian(function: Residual, shape: tuple[int, ...], constants: int, count: 
     return _loop(function, shape, constants, "jacobian") if _pays(count) else None
 
 
-def stiffness(vectors: Residual, shape: tuple[int, ...], constants: int, count: int) -> Loop | None:
+def stiffness(vectors: Vectors, shape: tuple[int, ...], constants: int, count: int) -> Loop | None:
     """Return the loop for the rows of the geometric stiffness; None if NumPy is to do it."""
     return _loop(vectors, shape, constants, "stiffness") if _pays(count) else None
 

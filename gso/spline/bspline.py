@@ -46,7 +46,7 @@ def clamped_knots(controls: int) -> Array:
     """
     degree = min(DEGREE, controls - 1)
     inner = np.linspace(0.0, 1.0, controls - degree + 1)
-    return np.r_[np.zeros(degree), inner, np.ones(degree)]
+    return np.asarray(np.r_[np.zeros(degree), inner, np.ones(degree)])
 
 
 def basis_matrix(knots: Array, controls: int, t: Array) -> csr_matrix:
@@ -64,8 +64,10 @@ def basis(knots: Array, controls: int, t: Array, order: int = 0) -> Array:
     if order > degree:
         return np.zeros((len(t), controls))
     if order == 0:
-        return basis_matrix(knots, controls, t).toarray()
-    return BSpline(knots, np.eye(controls), degree)(t, nu=order)
+        values: Array = basis_matrix(knots, controls, t).toarray()
+    else:
+        values = BSpline(knots, np.eye(controls), degree)(t, nu=order)
+    return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +167,7 @@ class BSplineSurface:
         n, m = self.net.shape[:2]
         rows = np.tensordot(basis(self.knots_u, n, a.ravel(), du), self.net, axes=1)
         points = np.einsum("pj,pjk->pk", basis(self.knots_v, m, b.ravel(), dv), rows)
-        return points.reshape(*a.shape, 3)
+        return np.asarray(points.reshape(*a.shape, 3))
 
     def sample(self, height: int, width: int) -> Array:
         """Sample points at uniform parameters, both ends included, (height, width, 3).
@@ -187,7 +189,7 @@ class BSplineSurface:
         """
         n = np.cross(self.evaluate(u, v, du=1), self.evaluate(u, v, dv=1))
         length = np.linalg.norm(n, axis=-1, keepdims=True)
-        return np.divide(n, length, out=np.zeros_like(n), where=length > 0)
+        return np.asarray(np.divide(n, length, out=np.zeros_like(n), where=length > 0))
 
     def gaussian_curvature(self, u: ArrayLike, v: ArrayLike) -> Array:
         """Return the Gaussian curvature of the smooth surface at parameters, 1 / length^2."""
@@ -235,7 +237,7 @@ class BSplineSurface:
         """Evaluate points or derivatives at all pairs of parameters, (len(u), len(v), 3)."""
         n, m = self.net.shape[:2]
         a, b = basis(self.knots_u, n, u, du), basis(self.knots_v, m, v, dv)
-        return np.einsum("ia,jb,abk->ijk", a, b, self.net, optimize=True)
+        return np.asarray(np.einsum("ia,jb,abk->ijk", a, b, self.net, optimize=True))
 
 
 def _curvature(derivatives: list[Array]) -> Array:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from gso import metrics
 from gso.errors import MeshError, OptionError
+from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.spline import BSplineSurface, Gap, basis, clamped_knots
-from gso.typing import Array
+from gso.typing import Array, Json, MeshLike
 
 #: Samples of the spline per grid edge when the two are compared. Grids with _LARGE coordinates
 #: or more get two.
@@ -19,7 +19,7 @@ _REFINED = 4
 _LARGE = 100_000
 
 
-def fit_spline(surface: Any, controls: int | tuple[int, int] = 16) -> BSplineSurface:
+def fit_spline(surface: MeshLike, controls: int | tuple[int, int] = 16) -> BSplineSurface:
     """Fit a bicubic B-spline to a grid at uniform parameters, by least squares.
 
     Vertex (i, j) of an (H, W) grid has the parameters (i / (H - 1), j / (W - 1)). The
@@ -55,8 +55,6 @@ def fit_spline(surface: Any, controls: int | tuple[int, int] = 16) -> BSplineSur
     >>> spline.gap.vertices_max < 1e-12
     True
     """
-    from gso.io import as_mesh
-
     mesh = as_mesh(surface)
     spline = interpolated(grid_of(mesh), fitting_controls(controls, grid_of(mesh).shape[:2]))
     return replace(spline, gap=gap(spline, mesh))
@@ -115,7 +113,7 @@ def interpolated(points: Array, controls: tuple[int, int]) -> BSplineSurface:
 
 def describe_spline(
     net: Array, mesh: Mesh, design: Mesh, fitted: Array | None = None
-) -> tuple[BSplineSurface, dict[str, Any]]:
+) -> tuple[BSplineSurface, Json]:
     """Describe the spline of a solve by its curvature and distances.
 
     Parameters
@@ -140,7 +138,7 @@ def describe_spline(
     controls = net.shape[0], net.shape[1]
     spline = BSplineSurface(net, clamped_knots(controls[0]), clamped_knots(controls[1]))
     spline = replace(spline, gap=gap(spline, mesh))
-    said: dict[str, Any] = {
+    said: Json = {
         "controls": list(controls),
         "curvature": spline.mean_gaussian_curvature() * metrics.unit(design) ** 2,
         "mesh": spline.gap._asdict(),  # type: ignore[union-attr]

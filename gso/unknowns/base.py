@@ -61,7 +61,7 @@ class Layout:
         start, _, dim = self.where(name)
         # Half as wide where that is enough: on large meshes these are the largest arrays.
         kind = np.int32 if self.size < 2**31 else np.int64
-        first = index.T.astype(kind) * kind(dim) + kind(start)
+        first: Ints = index.T.astype(kind) * kind(dim) + kind(start)
         return (first[:, None] + np.arange(dim, dtype=kind)[:, None]).reshape(-1, first.shape[1])
 
     def pack(self, blocks: dict[str, Array]) -> Array:
@@ -114,19 +114,22 @@ class Variables:
 
     def points(self, x: Array) -> Array:
         """Map unknowns x to the coordinate vector."""
-        return x.copy() if self.basis is None else self.offset + self.basis @ x
+        points: Array = x.copy() if self.basis is None else self.offset + self.basis @ x
+        return points
 
     def direction(self, dx: Array) -> Array:
         """Map a change of the unknowns to the change of the coordinates."""
-        return dx if self.basis is None else self.basis @ dx
+        change: Array = dx if self.basis is None else self.basis @ dx
+        return change
 
     def project(self, coordinates: Array) -> Array:
         """Find the unknowns whose coordinates are closest in the least-squares sense."""
         if self.basis is None:
-            return coordinates.copy()
+            same: Array = coordinates.copy()
+            return same
         from scipy.sparse import identity
 
-        rhs = self.basis.T @ (coordinates - self.offset)
+        rhs: Array = self.basis.T @ (coordinates - self.offset)
         gram = (self.basis.T @ self.basis).tocsc()
         diagonal = gram.diagonal()
         gram.data[np.abs(gram.data) <= _ROUNDING * diagonal.max(initial=0.0)] = 0.0

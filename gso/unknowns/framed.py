@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.unknowns.base import Array, Layout, Variables
+from gso.typing import Array
+from gso.unknowns.base import Layout, Variables
 
 #: Bound on each of the two tangential components, relative to the bound on the length.
 _TANGENTIAL = 0.3

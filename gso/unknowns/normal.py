@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.unknowns.base import Array, Layout, Variables
+from gso.typing import Array
+from gso.unknowns.base import Layout, Variables
 
 
 def normal_offsets(layout: Layout, points: Array, normals: Array) -> Variables:

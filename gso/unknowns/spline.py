@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gso.spline import basis_matrix, clamped_knots
-from gso.unknowns.base import Array, Layout, Variables
+from gso.typing import Array
+from gso.unknowns.base import Layout, Variables
 from gso.unknowns.normal import normal_offsets
 
 if TYPE_CHECKING:

@@ -53,4 +53,5 @@ def label_components(count: int, a: Ints, b: Ints) -> Ints:
     """
     from scipy.sparse.csgraph import connected_components
 
-    return connected_components(edge_graph(count, a, b), directed=False)[1].astype(np.int64)
+    label = connected_components(edge_graph(count, a, b), directed=False)[1]
+    return np.asarray(label, np.int64)

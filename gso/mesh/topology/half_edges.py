@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.errors import MeshError
 from gso.mesh.topology.graph import edge_graph, label_components
-from gso.typing import Ints
+from gso.typing import Flags, Ints
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class HalfEdges:
     vertex_count: int
 
     @cached_property
-    def boundary_vertex(self) -> NDArray[np.bool_]:
+    def boundary_vertex(self) -> Flags:
         """Mask over vertices: boundary vertices."""
         mask = np.zeros(self.vertex_count, bool)
         open_edges = self.twin < 0
@@ -67,7 +66,7 @@ def _half_edge_table(faces: Ints) -> tuple[Ints, Ints, Ints, Ints]:
 
 def edge_keys(origin: Ints, dest: Ints, vertex_count: int) -> Ints:
     """Encode undirected edges as integers."""
-    return np.minimum(origin, dest) * np.int64(vertex_count) + np.maximum(origin, dest)
+    return np.asarray(np.minimum(origin, dest) * np.int64(vertex_count) + np.maximum(origin, dest))
 
 
 def half_edges(faces: Ints, vertex_count: int) -> HalfEdges:
@@ -84,9 +83,7 @@ def half_edges(faces: Ints, vertex_count: int) -> HalfEdges:
     return HalfEdges(origin, dest, face, nxt, prev, twin, vertex_count)
 
 
-def _tree_parity(
-    count: int, a: Ints, b: Ints, odd: NDArray[np.bool_]
-) -> tuple[NDArray[np.bool_], Ints]:
+def _tree_parity(count: int, a: Ints, b: Ints, odd: Flags) -> tuple[Flags, Ints]:
     """Propagate a parity along a spanning forest; edges a-b with `odd` change it.
 
     Returns the parity and the component label of each node. Pointer jumping takes
@@ -166,7 +163,7 @@ def orient(faces: Ints, vertex_count: int) -> tuple[Ints, int, int]:
 
 def reverse(faces: Ints) -> Ints:
     """Reverse the orientation of faces; the first corner stays first."""
-    out = faces.copy()
+    out: Ints = faces.copy()
     if faces.shape[1] == 3:
         out[:, 1:] = faces[:, :0:-1]
         return out
@@ -204,10 +201,10 @@ def edges(he: HalfEdges) -> Ints:
     return np.stack([he.origin[once], he.dest[once]], axis=1)
 
 
-def boundary_edges(he: HalfEdges) -> NDArray[np.bool_]:
+def boundary_edges(he: HalfEdges) -> Flags:
     """Mark the boundary edges among :func:`edges`, (e,)."""
     return he.twin[_once(he)] < 0
 
 
-def _once(he: HalfEdges) -> NDArray[np.bool_]:
+def _once(he: HalfEdges) -> Flags:
     return (he.twin < 0) | (he.twin > np.arange(he.twin.size))

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.errors import MeshError
 from gso.mesh.topology.half_edges import HalfEdges
 from gso.mesh.topology.triangulation import _place_in_face, are_quads
-from gso.typing import Ints
+from gso.typing import Flags, Ints
 
 #: Rings are padded to one of these lengths, so that few distinct kernels are needed.
 RING_SIZES = (3, 4, 5, 6, 7, 8, 10, 12, 16, 24, 32, 64, 128, 256, 512, 1024, 4096)
@@ -29,7 +28,7 @@ def grid_stars(ids: Ints, ring: Sequence[tuple[int, int]]) -> Stars:
     return [(ids[1:-1, 1:-1].ravel(), np.stack(around, axis=1))]
 
 
-def vertex_stars(faces: Ints, he: HalfEdges, turned: NDArray[np.bool_]) -> tuple[Stars, Stars]:
+def vertex_stars(faces: Ints, he: HalfEdges, turned: Flags) -> tuple[Stars, Stars]:
     """Build closed stars of the interior vertices in two triangulations of the quads around them.
 
     Around a vertex the quads are split alternately: along the diagonal through the vertex, and
@@ -54,7 +53,7 @@ def vertex_stars(faces: Ints, he: HalfEdges, turned: NDArray[np.bool_]) -> tuple
     through = (_place_in_face(he, quad) % 2 == 0) != turned[he.face]
     start = np.zeros(he.vertex_count, np.int64)
     start[he.origin] = np.arange(he.origin.size)
-    found: tuple[list, list] = ([], [])
+    found: tuple[Stars, Stars] = ([], [])
     for valence in np.unique(he.face_count[interior]):
         centre = interior[he.face_count[interior] == valence]
         spokes = np.empty((centre.size, valence), np.int64)
@@ -78,7 +77,7 @@ def vertex_stars(faces: Ints, he: HalfEdges, turned: NDArray[np.bool_]) -> tuple
     return _merged(found[0]), _merged(found[1])
 
 
-def _rings(he: HalfEdges, centre: Ints, spokes: Ints, through: NDArray[np.bool_]) -> Stars:
+def _rings(he: HalfEdges, centre: Ints, spokes: Ints, through: Flags) -> Stars:
     """Build the stars of vertices with equal face counts, padded to :data:`RING_SIZES`.
 
     A quad that is split through the centre adds its opposite corner to the ring.

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.errors import MeshError
 from gso.mesh.topology.half_edges import HalfEdges, _tree_parity, edge_keys
-from gso.typing import Ints
+from gso.typing import Flags, Ints
 
 
-def are_quads(faces: Ints) -> NDArray[np.bool_]:
+def are_quads(faces: Ints) -> Flags:
     """Mark the faces (m, 3) or (m, 4) that have four corners, (m,)."""
     return faces[:, 3] >= 0 if faces.shape[1] == 4 else np.zeros(len(faces), bool)
 
@@ -26,10 +25,10 @@ def by_size(faces: Ints) -> tuple[Ints, Ints]:
 def four_corners(faces: Ints) -> Ints:
     """Pad faces to four corners (m, 4): a triangle repeats its first corner at the end."""
     first, last = faces[:, :1], faces[:, 3:]
-    return np.c_[faces[:, :3], np.where(last < 0, first, last) if last.size else first]
+    return np.asarray(np.c_[faces[:, :3], np.where(last < 0, first, last) if last.size else first])
 
 
-def triangulate(faces: Ints, turned: NDArray[np.bool_]) -> Ints:
+def triangulate(faces: Ints, turned: Flags) -> Ints:
     """Triangulate faces (t, 3); quads where `turned` is set are split along the diagonal 1-3."""
     if faces.shape[1] == 3:
         return faces
@@ -42,7 +41,7 @@ def triangulate(faces: Ints, turned: NDArray[np.bool_]) -> Ints:
     return tris[keep]
 
 
-def quad_splits(faces: Ints, he: HalfEdges) -> NDArray[np.bool_]:
+def quad_splits(faces: Ints, he: HalfEdges) -> Flags:
     """Choose consistent diagonals: mask of the quads split along 1-3 instead of 0-2.
 
     The choice is propagated from the first face over its neighbours. Nearly every regular
@@ -85,13 +84,13 @@ def quad_splits(faces: Ints, he: HalfEdges) -> NDArray[np.bool_]:
     return turn & quad
 
 
-def _place_in_face(he: HalfEdges, quad: NDArray[np.bool_]) -> Ints:
+def _place_in_face(he: HalfEdges, quad: Flags) -> Ints:
     """Return the index within its face, 0 to 3, of the corner where each half-edge starts."""
     first = np.concatenate([[0], np.cumsum(np.where(quad, 4, 3))[:-1]])
-    return np.arange(he.face.size) - first[he.face]
+    return np.asarray(np.arange(he.face.size) - first[he.face])
 
 
-def _clashing_splits(quads: Ints, turn: NDArray[np.bool_], he: HalfEdges) -> NDArray[np.bool_]:
+def _clashing_splits(quads: Ints, turn: Flags, he: HalfEdges) -> Flags:
     """Mark the quads whose diagonal is also an edge or the diagonal of another quad."""
     ends = np.where(turn[:, None], quads[:, [1, 3]], quads[:, [0, 2]])
     split = edge_keys(ends[:, 0], ends[:, 1], he.vertex_count)

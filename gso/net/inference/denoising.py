@@ -11,6 +11,7 @@ import numpy as np
 
 from gso.hierarchy import resample
 from gso.net.models.base import SIZE
+from gso.smoothing import estimate_sigma, smooth_grid
 from gso.spline.fit import interpolated
 from gso.typing import Array
 
@@ -49,8 +50,6 @@ def share(height: int, width: int) -> float:
 
 def sigma(grid: Array, seen: Array) -> float:
     """Estimate the standard deviation of the noise in `seen`, the net's input for a grid."""
-    from gso.smoothing import estimate_sigma, smooth_grid
-
     height, width = grid.shape[:2]
     found = share(height, width) * estimate_sigma(grid)
     if max(height, width) <= SIZE:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from numbers import Real
-from os import PathLike
-from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import ArrayLike
 
 from gso.errors import MeshError, OptionError
 from gso.hierarchy import resample
 from gso.net import tasks
-from gso.net.catalogue import chain
+from gso.net.catalogue import NetLike, chain
 from gso.net.inference import denoising
 from gso.net.models.base import SIZE, Net, exact
 from gso.net.weights import cached
@@ -25,10 +24,10 @@ _BATCH = 64
 
 
 def predict(
-    surface: Any,
+    surface: ArrayLike,
     *,
     task: str = "developable",
-    model: str | PathLike[str] | Net | None = None,
+    model: NetLike | None = None,
     repeat: int = 1,
     passes: int | None = None,
     sigma: float | None = None,
@@ -138,7 +137,7 @@ def _denoised(
 def _predicted(
     batch: Array, nets: list[Net], passes: int | None, sigma: float | Array | None, device: str
 ) -> Array:
-    out = batch
+    out: Array = batch
     for net in nets:
         unit, centre, scale = _normalised(out)
         most = net.passes if passes is None else min(int(passes), net.passes)
@@ -158,7 +157,7 @@ def _predicted(
     return out
 
 
-def _nets(model: Any, task: str, device: str) -> list[Net]:
+def _nets(model: NetLike | None, task: str, device: str) -> list[Net]:
     if isinstance(model, Net):
         nets = [model.to(device)]
     else:
@@ -178,7 +177,7 @@ def _device(device: str | None) -> str:
     return name
 
 
-def _checked(surface: Any) -> Array:
+def _checked(surface: ArrayLike) -> Array:
     """Return grids as an array, or raise a MeshError that says what is wrong."""
     try:
         points = np.asarray(surface, dtype=np.float64)

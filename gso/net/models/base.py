@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from contextlib import AbstractContextManager
-from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -39,7 +38,7 @@ class Net(nn.Module):
     passes = 1
     multiple = 1
 
-    def __init__(self, task: str, **settings: Any):
+    def __init__(self, task: str, **settings: object):
         super().__init__()
         self.kind = tasks.get(task)
         self.task, self.settings, self.bf16 = task, {"task": task, **settings}, False

@@ -104,7 +104,8 @@ class IMDB(nn.Module):
             part, rest = self.active(step(rest)).split(self.sizes, dim=1)
             parts.append(part)
         parts.append(self.last(rest))
-        return x + self.mix(torch.cat(parts, dim=1))
+        mixed: Tensor = x + self.mix(torch.cat(parts, dim=1))
+        return mixed
 
 
 class Residual(nn.Module):
@@ -123,4 +124,5 @@ class Residual(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         y = self.first(silu(self.before(x)))
         y = y + self.everywhere(y.mean(dim=(2, 3)))[:, :, None, None]
-        return x + self.second(silu(self.between(y)))
+        changed: Tensor = x + self.second(silu(self.between(y)))
+        return changed

@@ -94,8 +94,8 @@ def curvature(p: Planes) -> Tensor:
 
 def absolute_curvature(p: Planes) -> Tensor:
     r"""Compute \|K\| (B, H-2, W-2) of interior vertices, averaged over both triangulations."""
-    splits = range(len(geometry.GRID_RINGS))
-    return sum(geometry.grid_curvature(p, k).abs() for k in splits) / len(splits)
+    both = [geometry.grid_curvature(p, k).abs() for k in range(len(geometry.GRID_RINGS))]
+    return torch.stack(both).mean(0)
 
 
 def to_border(inner: Tensor) -> Tensor:

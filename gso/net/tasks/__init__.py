@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from gso.errors import OptionError
 from gso.net.tasks.base import NetTask
 from gso.registry import Registry
@@ -29,7 +27,7 @@ def names() -> list[str]:
     return sorted(_tasks())
 
 
-def get(name: Any) -> NetTask:
+def get(name: object) -> NetTask:
     """Return the task of a name; an OptionError if there is none."""
     found = _tasks()
     if name not in found:

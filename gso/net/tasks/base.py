@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 from gso.typing import Array
+
+if TYPE_CHECKING:
+    from gso.net.training.config import Phase
+    from gso.net.training.data import Batch
+    from gso.net.training.phase_objective import Cost
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ class NetTask:
     score: str
     figures: Callable[[Array, Array], Mapping[str, float]]
     terms: tuple[str, ...]
-    energy: Callable[..., Any] | None = None
+    energy: Callable[[Batch, Phase, float], Cost] | None = None
     noisy: bool = False
     warm_start: bool = True
     refines: bool = False

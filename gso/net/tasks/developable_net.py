@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gso import metrics
 from gso.net.tasks.base import NetTask
+from gso.tasks import developable
+from gso.tasks.developable.objective import TYPICAL_CURVATURE
 from gso.typing import Array
+
+if TYPE_CHECKING:
+    from gso.net.training.config import Phase
+    from gso.net.training.data import Batch
+    from gso.net.training.phase_objective import Cost
 
 #: Lower bound on a design's energy, by which that of results is divided.
 _LEAST_ENERGY = 3e-5
@@ -32,11 +39,9 @@ def figures(design: Array, result: Array) -> dict[str, float]:
     return found | {"score": left / 0.1232 + found["d_H"] / 0.517 + curved / 0.0291}
 
 
-def energy(batch: Any, phase: Any, progress: float) -> Any:
+def energy(batch: Batch, phase: Phase, progress: float) -> Cost:
     """Return the optimiser's objective, relative to the designs' energies."""
     from gso.net.training.solver_energy import Developable
-    from gso.tasks import developable
-    from gso.tasks.developable.objective import TYPICAL_CURVATURE
 
     weights: dict[str, Any] = dict(phase.weights)
     balance = weights.pop("balance", 0.5)

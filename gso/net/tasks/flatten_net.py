@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from gso import metrics
 from gso.mesh import Mesh
 from gso.net.tasks.base import NetTask
+from gso.tasks import flatten
 from gso.typing import Array
+
+if TYPE_CHECKING:
+    from gso.net.training.config import Phase
+    from gso.net.training.data import Batch
+    from gso.net.training.phase_objective import Cost
 
 
 def figures(design: Array, result: Array) -> dict[str, float]:
@@ -24,10 +30,9 @@ def figures(design: Array, result: Array) -> dict[str, float]:
     }
 
 
-def energy(batch: Any, phase: Any, progress: float) -> Any:
+def energy(batch: Batch, phase: Phase, progress: float) -> Cost:
     """Return the optimiser's objective."""
     from gso.net.training.solver_energy import Strain
-    from gso.tasks import flatten
 
     return Strain(batch.surface, flatten.Options())
 

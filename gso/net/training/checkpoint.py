@@ -5,23 +5,23 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save as packed
 from torch import Tensor
 
 from gso.errors import WeightsError
 from gso.io import replacing
 from gso.net.models.base import Net
+from gso.typing import Json
 
 _DAMAGED = "{} is no checkpoint of this run ({}); remove it to begin anew"
 Optimisers = Sequence[torch.optim.Optimizer]
 
 
-def save(path: Path, net: Net, average: Net, optimisers: Optimisers, state: dict[str, Any]) -> None:
+def save(path: Path, net: Net, average: Net, optimisers: Optimisers, state: Json) -> None:
     """Write the net, its moving average, the optimisers' moments, and the JSON `state`."""
-    from safetensors.torch import save as packed
-
     tensors: dict[str, Tensor] = {}
     for prefix, module in (("net", net), ("average", average)):
         tensors |= {f"{prefix}.{k}": v for k, v in module.state_dict().items()}
@@ -34,7 +34,7 @@ def save(path: Path, net: Net, average: Net, optimisers: Optimisers, state: dict
         file.write(data)
 
 
-def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> dict[str, Any]:
+def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> Json:
     """Restore what :func:`save` wrote into the nets and optimisers, and return `state`.
 
     Raises
@@ -42,8 +42,6 @@ def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> dict[str
     WeightsError
         The file is damaged, or belongs to another net.
     """
-    from safetensors import SafetensorError, safe_open
-
     state = numbers(path)
     try:
         with safe_open(path, framework="pt") as file:
@@ -61,7 +59,7 @@ def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> dict[str
     return state
 
 
-def numbers(path: Path) -> dict[str, Any]:
+def numbers(path: Path) -> Json:
     """Read the JSON `state` that :func:`save` wrote, without the tensors.
 
     Raises
@@ -69,8 +67,6 @@ def numbers(path: Path) -> dict[str, Any]:
     WeightsError
         The file is damaged.
     """
-    from safetensors import SafetensorError, safe_open
-
     try:
         with safe_open(path, framework="pt") as file:
             return dict(json.loads((file.metadata() or {})["state"]))

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
-from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from gso.errors import OptionError
 from gso.net import tasks
 from gso.spelling import check_keywords, choices
+from gso.typing import AnyPath, Json
+
+C = TypeVar("C", "Config", "Phase")
 
 #: Configurations that come with the package.
 FOLDER = Path(__file__).parents[1] / "configs"
@@ -162,7 +165,7 @@ class Config:
 
     name: str
     task: str
-    model: Mapping[str, Any]
+    model: Mapping[str, object]
     phases: tuple[Phase, ...]
     steps: int = 10_000
     seed: int = 0
@@ -211,9 +214,9 @@ class Config:
         for phase in self.phases:
             _fits(self, phase)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Json:
         """Return the configuration as a dictionary with the layout of its file."""
-        out = json.loads(json.dumps(asdict(self)))
+        out: Json = json.loads(json.dumps(asdict(self)))
         out["phase"] = out.pop("phases")
         return out
 
@@ -240,7 +243,7 @@ def _fits(config: Config, phase: Phase) -> None:
         raise OptionError(f"weights {', '.join(sorted(wrong))} do not go with task {config.task!r}")
 
 
-def read(path: str | PathLike[str], **changes: Any) -> Config:
+def read(path: AnyPath, **changes: object) -> Config:
     """Read a .toml or .json file, or a configuration of the package by its name.
 
     Parameters
@@ -278,9 +281,9 @@ def read(path: str | PathLike[str], **changes: Any) -> Config:
     return from_dict(given | {k: v for k, v in changes.items() if v is not None})
 
 
-def from_dict(given: Mapping[str, Any]) -> Config:
+def from_dict(given: Mapping[str, object]) -> Config:
     """Make a configuration from a dictionary as :meth:`Config.as_dict` returns it."""
-    rest = {"name": "net", **given}
+    rest: Json = {"name": "net", **given}
     phases = rest.pop("phase", [])
     if not isinstance(phases, list) or not all(isinstance(p, dict) for p in phases):
         raise OptionError("phase must be a list of tables: [[phase]]")
@@ -290,38 +293,36 @@ def from_dict(given: Mapping[str, Any]) -> Config:
     return _made(Config, rest)
 
 
-def _made(cls: Any, given: Mapping[str, Any]) -> Any:
+def _made(cls: type[C], given: Json) -> C:
     check_keywords(f"a configuration's {cls.__name__}", given, [f.name for f in fields(cls)])
-    values = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
+    values: Json = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
     try:
         return cls(**values)
     except TypeError as error:
         raise OptionError(f"configuration: {error}") from None
 
 
-def _toml(text: str) -> Any:
-    import sys
-
+def _toml(text: str) -> Json:
     if sys.version_info >= (3, 11):
         import tomllib
     else:
         import tomli as tomllib
-    return tomllib.loads(text)
+    table: Json = tomllib.loads(text)
+    return table
 
 
-def _choice(what: str, value: Any, known: tuple[str, ...]) -> None:
+def _choice(what: str, value: object, known: tuple[str, ...]) -> None:
     if value not in known:
         raise OptionError(f"{what} is {value!r}; {choices(value, known)}")
 
 
-def _number(what: str, value: Any, least: float, *, whole: bool = False) -> None:
-    kind = int if whole else (int, float)
-    sound = isinstance(value, kind) and not isinstance(value, bool) and math.isfinite(value)
-    if not sound or not value >= least:
+def _number(what: str, value: object, least: float, *, whole: bool = False) -> None:
+    kind = int if whole else int | float
+    if not isinstance(value, kind) or isinstance(value, bool) or not least <= value < math.inf:
         raise OptionError(f"{what} is {value!r}; it must be a number, {least} or more")
 
 
-def _pair(what: str, value: Any) -> None:
+def _pair(what: str, value: object) -> None:
     if not isinstance(value, tuple) or len(value) != 2:
         raise OptionError(f"{what} is {value!r}; it must be two numbers")
     for one in value:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from gso import dataset
+from gso.dataset import store
 from gso.dataset.drawing import draw_many
 from gso.errors import DatasetError
 from gso.io import replacing
@@ -19,6 +19,10 @@ from gso.net import tasks
 from gso.net.models.grid_geometry import ball, normalise
 from gso.net.training import augment
 from gso.net.training.config import Config, Phase
+from gso.typing import Ints
+
+#: Progress callback: (name of the counted items, number done, total number).
+Tick = Callable[[str, int, int], None]
 
 #: Keys of the run's random streams.
 _ORDER, _CHANGES, _FRESH = 0, 1, 2
@@ -153,11 +157,13 @@ def _rows(count: int, batch: int, step: int, seed: int) -> Tensor:
 
 
 @lru_cache(maxsize=4)
-def _order(count: int, epoch: int, seed: int) -> Any:
+def _order(count: int, epoch: int, seed: int) -> Ints:
     return np.random.default_rng(_seed(seed, _ORDER, epoch)).permutation(count)
 
 
-def open_source(config: Config, folder: str | Path, cache: Path, tick: Any = None) -> Source:
+def open_source(
+    config: Config, folder: str | Path, cache: Path, tick: Tick | None = None
+) -> Source:
     """Load the surfaces of a run: those of the train split, then freshly drawn ones.
 
     Parameters
@@ -171,7 +177,7 @@ def open_source(config: Config, folder: str | Path, cache: Path, tick: Any = Non
         Progress callback, called with the name of the counted items, the number done and the
         total number.
     """
-    split = dataset.open(folder)["train"]
+    split = store.open(folder)["train"]
     rows = slice(config.limit or None)
     given = torch.from_numpy(split["surface"][rows])
     if given.shape[1] != given.shape[2]:
@@ -191,7 +197,7 @@ def open_source(config: Config, folder: str | Path, cache: Path, tick: Any = Non
     return Source(torch.cat([surfaces, more]), labels)
 
 
-def fresh(count: int, seed: int, size: int, cache: Path, tick: Any = None) -> Tensor:
+def fresh(count: int, seed: int, size: int, cache: Path, tick: Tick | None = None) -> Tensor:
     """Draw surfaces (count, size, size, 3) by the recipe that are in no dataset, or load them.
 
     They are cached in a file, which is replaced if its count or size differs. The seed is not

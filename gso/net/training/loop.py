@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
 from gso.errors import OptionError
 from gso.net.models.base import exact
 from gso.net.training.config import Config
+from gso.net.training.data import Tick
 from gso.net.training.learning_rate import place
 from gso.net.training.phase_objective import Objective
 from gso.net.training.processes import interruption, processes
-from gso.net.training.training_run import MODEL, Run, Tick, begin
+from gso.net.training.training_run import MODEL, Run, begin
+from gso.typing import AnyPath, Json
 
 __all__ = ["MODEL", "Report", "train"]
 
@@ -52,14 +53,14 @@ class Report(NamedTuple):
 
 def train(
     config: Config,
-    data: str | PathLike[str],
-    out: str | PathLike[str],
+    data: AnyPath,
+    out: AnyPath,
     *,
     minutes: float | None = None,
     device: str | None = None,
     show: Callable[[Report], None] | None = None,
     tick: Tick | None = None,
-) -> dict[str, Any]:
+) -> Json:
     """Train a net, or resume an interrupted run.
 
     The net is written to ``out/model.safetensors``, with its card, at each validation. A killed
@@ -116,7 +117,7 @@ def train(
 
 def _loop(run: Run, show: Callable[[Report], None] | None, interrupted: Callable[[], bool]) -> None:
     config, here = run.config, run.here
-    objective: Any = Objective(run.net)
+    objective: nn.Module = Objective(run.net)
     if here.world > 1:
         objective = DistributedDataParallel(objective)
     start, before = time.monotonic(), run.spent

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -80,8 +79,8 @@ class Developable:
         """Compute the weighted energy (B,) of each term."""
         o = self.options
         x = planes(result)
-        absolute: Any = Absolute(o.eps if eps is None else eps)
-        bent = 0.0
+        absolute = Absolute(o.eps if eps is None else eps)
+        bent = torch.zeros_like(self.curved)
         for split in range(len(geometry.GRID_RINGS)):
             centre, ring = geometry.grid_star(x, split)
             (k,) = curvature.residual([centre, *ring], ())
@@ -89,7 +88,7 @@ class Developable:
         fair = self._fairness(x)
         ones = torch.full_like(x[0], o.tangential)
         moved = proximity.residual([x], [*self.points, *self.normals, ones])
-        distance: Any = Distance(o.quadratic_below)
+        distance = Distance(o.quadratic_below)
         near = distance.value(torch.stack(moved))[0].mean(dim=(1, 2))
         return {
             "curvature": self.w_curvature * bent,
@@ -99,7 +98,7 @@ class Developable:
         }
 
     def _elongation(self, x: Planes) -> Tensor:
-        squared: Any = Squared()
+        squared = Squared()
         total, count = torch.zeros_like(self.curved), 0
         for d, inverse, band in zip(_edges(x), self.lengths, self.bands, strict=True):
             origin = tuple(torch.zeros_like(c) for c in d)
@@ -196,17 +195,18 @@ class Strain:
         level = self.level(r.detach()).clamp_min(_LEAST_STRAIN)[:, None, None].expand_as(r[0])
         knee = o.knee * flatten.bent(level)
         # The terms' losses take elements along a single axis.
-        spread: Any = stretch.TwoPowerLoss(level.reshape(-1), knee=knee.reshape(-1))  # type: ignore[arg-type]
+        spread = stretch.TwoPowerLoss(level.reshape(-1), knee=knee.reshape(-1))  # type: ignore[arg-type]
         cost = spread.value(r.reshape(12, -1)).reshape(4, *r.shape[1:]).mean(dim=(0, 2, 3))
         typical = level[:, 0, 0]
-        absolute: Any = Absolute((0.1 * typical)[:, None, None])  # type: ignore[arg-type]
+        absolute = Absolute((0.1 * typical)[:, None, None])  # type: ignore[arg-type]
         total, count = torch.zeros_like(cost), 0
         for d, inverse in zip(_edges(planes(flat)), self.lengths, strict=True):
             origin = tuple(torch.zeros_like(c) for c in d)
             (change,) = edges.residual([origin, d], [inverse])
             total = total + absolute.value(change).sum(dim=(1, 2))
             count += change[0].numel()
-        return cost / typical + o.w_edges * total / count
+        energy: Tensor = cost / typical + o.w_edges * total / count
+        return energy
 
 
 def _edges(p: Planes) -> list[Planes]:

@@ -72,7 +72,8 @@ def d_h(result: Tensor, design: Tensor) -> Tensor:
     there, here = result.movedim(-1, 0), design.movedim(-1, 0)
     distance = geometry.norm(tuple(there - _nearest(there.detach(), here)))
     diagonal = geometry.norm(tuple(here.amax(dim=(2, 3)) - here.amin(dim=(2, 3))))
-    return 100.0 * distance.mean(dim=(1, 2)) / diagonal
+    percent: Tensor = 100.0 * distance.mean(dim=(1, 2)) / diagonal
+    return percent
 
 
 def _nearest(points: Tensor, vertices: Tensor) -> Tensor:

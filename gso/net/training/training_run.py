@@ -5,16 +5,14 @@ from __future__ import annotations
 import copy
 import os
 import platform
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import torch
 from torch import Tensor
 
-from gso import dataset
+from gso.dataset import store
 from gso.errors import OptionError
 from gso.net import tasks, weights
 from gso.net.catalogue import located, read_card
@@ -22,10 +20,11 @@ from gso.net.models.base import Net
 from gso.net.models.grid_geometry import normalise, normalise_with
 from gso.net.training import checkpoint, muon
 from gso.net.training.config import Config
-from gso.net.training.data import Source, noisy, open_source
+from gso.net.training.data import Source, Tick, noisy, open_source
 from gso.net.training.processes import Processes
 from gso.net.training.training_curves import Curves, read
 from gso.net.training.validate import applied, mean_figures
+from gso.typing import Json
 
 #: Files of a run.
 CHECKPOINT, MODEL = "checkpoint.safetensors", "model.safetensors"
@@ -33,8 +32,6 @@ CHECKPOINT, MODEL = "checkpoint.safetensors", "model.safetensors"
 _NOISE = 7
 #: Number of surfaces per block when the processes apply another net to the surfaces.
 _BLOCK = 64
-#: Progress callback: (name of the counted items, number done, total number).
-Tick = Callable[[str, int, int], None]
 
 
 @dataclass
@@ -50,12 +47,12 @@ class Run:
     net: Net
     average: Net
     optimisers: list[torch.optim.Optimizer]
-    origin: dict[str, Any]
-    begun_with: dict[str, Any]
+    origin: Json
+    begun_with: Json
     step: int = 0
     spent: float = 0.0
     figures: dict[str, float] = field(default_factory=dict)
-    card: dict[str, Any] = field(default_factory=dict)
+    card: Json = field(default_factory=dict)
     curves: Curves | None = None
 
     @property
@@ -85,7 +82,7 @@ class Run:
             path = self.folder / CHECKPOINT
             checkpoint.save(path, self.net, self.average, self.optimisers, state)
 
-    def same(self) -> dict[str, Any]:
+    def same(self) -> Json:
         """Return the values that must be unchanged when the run is resumed."""
         return {"config": _kept(self.config), "data": self.origin["data"], "limit": self.limit}
 
@@ -100,7 +97,7 @@ class Run:
             self.card = weights.save(self.average, self.folder / MODEL, self._card())
         self.here.wait()
 
-    def _card(self) -> dict[str, Any]:
+    def _card(self) -> Json:
         card = {
             "name": self.config.name,
             "config": self.config.as_dict(),
@@ -139,7 +136,7 @@ class Run:
             self.curves.close()
 
 
-def _kept(config: Config) -> dict[str, Any]:
+def _kept(config: Config) -> Json:
     """Return the settings that must be unchanged on resuming: all but those of monitoring."""
     rest = config.as_dict()
     for name in ("validate_every", "checkpoint_every", "validate"):
@@ -273,7 +270,7 @@ def _results(net: Net, surfaces: Tensor, here: Processes, tick: Tick | None, wha
 
 def _validation(config: Config, data: Path) -> tuple[Tensor, Tensor, Tensor | None]:
     """Return input surfaces for validation, the surfaces to compare with, and the noise."""
-    split = dataset.open(data)["validation"]
+    split = store.open(data)["validation"]
     clean = normalise(torch.from_numpy(split["surface"][: config.validate])).float()
     if not tasks.get(config.task).noisy:
         return clean, clean, None
@@ -283,14 +280,14 @@ def _validation(config: Config, data: Path) -> tuple[Tensor, Tensor, Tensor | No
 def _fast(device: torch.device) -> bool:
     """Tell whether convolutions in bfloat16 pay off on a device."""
     if device.type == "cuda":
-        return torch.cuda.is_bf16_supported()
+        return bool(torch.cuda.is_bf16_supported())
     known = getattr(torch.cpu, "_is_avx512_bf16_supported", lambda: False)
     return device.type == "cpu" and bool(known())
 
 
-def _origin(data: Path, here: Processes) -> dict[str, Any]:
+def _origin(data: Path, here: Processes) -> Json:
     """Describe data, package versions and hardware, for the card."""
-    manifest = dataset.open(data).manifest
+    manifest = store.open(data).manifest
     hardware = platform.processor() or platform.machine()
     if here.device.type == "cuda":
         hardware = torch.cuda.get_device_name(here.device)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import torch
 
 from gso.net import tasks
+from gso.net.models.base import Net
 from gso.typing import Array
 
 
@@ -20,7 +19,7 @@ def mean_figures(task: str, befores: Array, results: Array) -> dict[str, float]:
 
 @torch.no_grad()
 def applied(
-    net: Any, surfaces: torch.Tensor, sigma: torch.Tensor | None = None, *, batch: int = 32
+    net: Net, surfaces: torch.Tensor, sigma: torch.Tensor | None = None, *, batch: int = 32
 ) -> Array:
     """Apply a net on its device to surfaces in the unit ball; return results (n, H, W, d)."""
     device = next(net.parameters()).device

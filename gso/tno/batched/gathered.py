@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gso.energy.base import Residual, Weighted
+from gso.energy.base import Residual, Vectors, Weighted
 from gso.energy.losses import Loss
 from gso.parametrization.orientation import Orientation
 from gso.solver import Timings
@@ -50,7 +50,7 @@ class GatheredTerm:
 
     name: str
     residual: Residual
-    vectors: Residual | None
+    vectors: Vectors | None
     shape: tuple[int, ...]
     quadratic: bool
     gather: Ints

@@ -8,7 +8,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from gso.energy.base import Residual
+from gso.energy.base import Residual, Vectors
 from gso.solver.kernels import casadi_function, casadi_geometric_stiffness
 from gso.solver.printing import torch_source
 
@@ -71,7 +71,7 @@ def kernel(residual: Residual, shape: tuple[int, ...], constants: int, jacobian:
 
 
 @lru_cache(maxsize=32)
-def geometric_stiffness(vectors: Residual, shape: tuple[int, ...], constants: int) -> Kernel:
+def geometric_stiffness(vectors: Vectors, shape: tuple[int, ...], constants: int) -> Kernel:
     """Return the kernel of the geometric stiffness, see :attr:`gso.energy.Term.vectors`."""
     function = casadi_geometric_stiffness(vectors, shape, constants)
     return Kernel(function, sum(shape), jacobian=True)
