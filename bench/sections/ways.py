@@ -12,11 +12,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from designs import analytic
 from harness import ROOT, progress, reference, table, timed
 
 import gso
 from gso.components import split
-from sections import analytic
 
 #: Allowed distance, as a share of the diagonal.
 _AWAY = 0.02

@@ -17,11 +17,11 @@ from gso.pipeline.judgement import conclude
 from gso.pipeline.run import Run
 from gso.result import Result
 from gso.tasks.base import Options, Plan
-from gso.tasks.request import Request, check
+from gso.tasks.request import Request
 from gso.tno.batched import stage_groups
 from gso.tno.batched.gathered import TooLarge, Unbatchable
 from gso.tno.batched.stage_groups import Minimise, Structure
-from gso.tno.optimize import optimize
+from gso.tno.optimize import check, optimize
 from gso.typing import MeshLike
 
 
