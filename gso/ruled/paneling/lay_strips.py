@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from gso.quantities import Length, Strain, as_length, as_strain
 from gso.result import Result
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import MOST, Options
-from gso.ruled.paneling.piece_strips import of_pieces
+from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import case_of, check_whole, of_surface
 from gso.seams.cutting import cut
@@ -229,12 +229,29 @@ class _Task:
             tried.append(self._as_a_whole(light))
             if not self.divisible or tried[0].ended or tried[0].holds:
                 return self._answer(tried)
-        try:
-            tried.append(self._in_pieces(light))
-        except GSOError:
-            if not tried:
-                raise
+        failed: GSOError | None = None
+        for division in self._divisions(light):
+            try:
+                tried.append(self._in_pieces(light, division()))
+            except GSOError as error:
+                failed = error
+            else:
+                if tried[-1].ended or tried[-1].holds:
+                    break
+        if failed is not None and not tried:
+            raise failed
         return self._answer(tried)
+
+    def _divisions(self, light: LightDesign) -> Iterator[Callable[[], Pieces]]:
+        """Return the ways to divide the design, those into fewer pieces first."""
+        asked, given = self.request, self.division
+        if given is not None:
+            yield lambda: given
+            return
+        # Pieces that need all of the distance are fewer. Solved together within a share of it, they
+        # may still be developable enough for strips.
+        yield lambda: _without_darts(found_pieces(light, asked, 1.0))
+        yield lambda: found_pieces(light, asked, JOINT)
 
     def _answer(self, tried: Sequence[_Tried]) -> Result:
         best = min(tried, key=lambda one: (not one.holds, one.far))
@@ -256,11 +273,11 @@ class _Task:
         result.seconds["verdict"] = time.perf_counter() - clock
         return _Tried(result, reasons)
 
-    def _in_pieces(self, light: LightDesign) -> _Tried:
+    def _in_pieces(self, light: LightDesign, division: Pieces) -> _Tried:
         asked = self.request
-        if self.division is not None:
+        if division is self.division:
             light = LightDesign(self.design, self.design, asked.max_deviation)
-        result, reasons = of_pieces(light, asked, self.division)
+        result, reasons = of_pieces(light, asked, division)
         return _Tried(result, ordered([*reasons, *against_sheet(result, asked)]))
 
 

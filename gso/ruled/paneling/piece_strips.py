@@ -28,6 +28,7 @@ from gso.ruled.together import together
 from gso.rulings import smallest_radius
 from gso.seams.joint_solve import gap, solve_pieces
 from gso.seams.search import pieces as search
+from gso.seams.segmentation import Segmentation
 from gso.seams.sheets import Sheet, flattened
 from gso.solver import Callback
 from gso.status import Progress, Status
@@ -38,7 +39,7 @@ from gso.wording import length
 
 #: Shares of the allowed distance: what the joint solve of the pieces may use, and the least and the
 #: most within which strips follow its result, so that the two sides of a seam stay together.
-_JOINT, _LEAST, _MOST = 0.5, 0.1, 0.5
+JOINT, _LEAST, _MOST = 0.5, 0.1, 0.5
 #: Distance within which strips follow the joint result where none is given, relative to the
 #: diagonal.
 _NEAR = 0.01
@@ -83,7 +84,7 @@ class _Joint:
 
 
 def of_pieces(
-    light: LightDesign, request: StripsRequest, division: Pieces | None
+    light: LightDesign, request: StripsRequest, division: Pieces
 ) -> tuple[Result, tuple[Reason, ...]]:
     """Make strips of a design in pieces.
 
@@ -95,8 +96,8 @@ def of_pieces(
     ----------
     light : LightDesign
     request : StripsRequest
-    division : Pieces or None
-        The pieces of the design; their seams are searched for if there are none.
+    division : Pieces
+        The pieces of the design. Those that a search found are developable already.
 
     Returns
     -------
@@ -113,8 +114,8 @@ def of_pieces(
         The pieces cannot be solved, or one of them is no disk.
     """
     clock = time.perf_counter()
-    if division is None:
-        joint = _searched(light, request)
+    if isinstance(division, Segmentation):
+        joint = _Joint(light.design, division, division.result, division.sheets)
     else:
         joint = _together(light, request, division)
     if joint.result is not None and joint.result.status is Status.CANCELLED:
@@ -137,13 +138,19 @@ def of_pieces(
     return result, reasons
 
 
-def _searched(light: LightDesign, request: StripsRequest) -> _Joint:
-    """Search for seams without darts, and solve the pieces together."""
+def found_pieces(light: LightDesign, request: StripsRequest, share: float) -> Segmentation:
+    """Search for seams without darts, so that pieces may use a share of the allowed distance.
+
+    Raises
+    ------
+    MeshError
+        A piece cannot be laid flat.
+    """
     found = search(
         # On triangles seams need not follow edge rows.
         Mesh(light.mesh.vertices, light.mesh.triangles),
         max_strain=request.max_strain,
-        max_deviation=None if light.allowed is None else _JOINT * light.allowed,
+        max_deviation=None if light.allowed is None else share * light.allowed,
         darts=False,
         # All lengths are in the design's unit, whatever that is.
         sheet=request.sheet,
@@ -153,13 +160,13 @@ def _searched(light: LightDesign, request: StripsRequest) -> _Joint:
     )
     if any(sheet is None for sheet in found.sheets):
         raise MeshError(f"a piece cannot be laid flat; {'; '.join(map(str, found.reasons))}")
-    return _Joint(light.design, found, found.result, found.sheets)
+    return found
 
 
 def _together(light: LightDesign, request: StripsRequest, division: Pieces) -> _Joint:
     """Solve given pieces together."""
     request.say("joint solve")
-    far = None if light.allowed is None else _JOINT * light.allowed
+    far = None if light.allowed is None else JOINT * light.allowed
     joint = check("developable", max_deviation=far, x0=request.start, verdict=False)
     joint = joint.with_options(joint.options.for_pieces())
     result = solve_pieces(division, joint, request.constraints, request.callback)
