@@ -213,7 +213,7 @@ def test_a_problem_takes_over_the_sparsity_of_one_like_it(monkeypatch):
     variables = unknowns()["normal"]
     first = Problem(items(), variables)
     pattern = first.pattern
-    monkeypatch.setattr(module, "_analysed", None)
+    monkeypatch.setattr(module, "_analyse", None)
     assert Problem(items(), variables, like=first).pattern is pattern
     with pytest.raises(TypeError):
         Problem(items()[:1], variables, like=first).pattern  # noqa: B018

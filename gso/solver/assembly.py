@@ -6,7 +6,7 @@ import hashlib
 from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from gso.linalg.base import Pattern
 from gso.solver.ranking import Pairs, ranked
 from gso.typing import Array, Ints
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
 
 def _repeated(columns: Ints) -> Ints:
@@ -53,7 +56,7 @@ class Places:
     @cached_property
     def scatter(self) -> Ints:
         """The place of each entry, (pairs * e,), ordered as by :func:`products`."""
-        return self.by_element.T.astype(np.int64).ravel()
+        return np.ravel(self.by_element.T.astype(np.int64))
 
 
 @dataclass
@@ -72,7 +75,7 @@ _assemblies: OrderedDict[bytes, tuple[Assembly, int]] = OrderedDict()
 _KEPT = 12_000_000
 
 
-def assemble(n: int, columns: list[Ints], quadratic) -> Assembly:
+def assemble(n: int, columns: list[Ints], quadratic: csc_matrix) -> Assembly:
     """Return the pattern of element matrices, a constant matrix and a diagonal; cached."""
     pairs = sum(c.shape[0] * (c.shape[0] + 1) // 2 * c.shape[1] for c in columns)
     digest = hashlib.blake2b(str(n).encode())
@@ -83,7 +86,7 @@ def assemble(n: int, columns: list[Ints], quadratic) -> Assembly:
     if key in _assemblies:
         _assemblies.move_to_end(key)
         return _assemblies[key][0]
-    assembly = _analysed(n, columns, quadratic)
+    assembly = _analyse(n, columns, quadratic)
     if pairs <= _KEPT:
         _assemblies[key] = assembly, pairs
         while sum(size for _, size in _assemblies.values()) > _KEPT:
@@ -91,7 +94,7 @@ def assemble(n: int, columns: list[Ints], quadratic) -> Assembly:
     return assembly
 
 
-def _analysed(n: int, columns: list[Ints], quadratic: Any) -> Assembly:
+def _analyse(n: int, columns: list[Ints], quadratic: csc_matrix) -> Assembly:
     """Compute the position in the matrix of every product of two unknowns of an element."""
     every = np.arange(n)
     entries = np.stack([np.repeat(every, np.diff(quadratic.indptr)), quadratic.indices])

@@ -63,7 +63,7 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
     )
 
 
-def _smoothed(mesh: Mesh, request: Request[Options]) -> tuple[Array, dict[str, Any]]:
+def _smoothed(mesh: Mesh, request: Request[Options]) -> tuple[Array, dict[str, float]]:
     """Compute smoothed vertices (n, 3), and the order, weight, sigma and degrees of freedom."""
     order, weight = request.options.order, request.options.weight
     norm = "l1" if request.formulation == "crease" else "l2"

@@ -15,7 +15,6 @@ beyond. The elongation of an edge is zero within a range of length ratios.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from gso import metrics as measure
 from gso.energy import Weighted, curvature, elongation, fairness, proximity
@@ -28,7 +27,7 @@ from gso.tasks.developable.analysis import Analysis, Shape, own_bending
 from gso.tasks.developable.options import Options
 from gso.tasks.evaluation import parted
 from gso.tasks.request import Request
-from gso.typing import Array
+from gso.typing import Array, N
 
 #: Mean |K| and mean squared bending of a typical design, for which weights are quoted.
 TYPICAL_CURVATURE = 0.3
@@ -45,7 +44,7 @@ COARSE_CURVATURE, COARSE_FAIRNESS = 1.5, 3.0
 _QUADS = 2.0
 
 
-def adapted_weights(options: Options, curved: Any, bending: Any) -> tuple[Any, Any]:
+def adapted_weights(options: Options, curved: N, bending: N) -> tuple[N, N]:
     """Adapt the curvature and fairness weights to a design's mean |K| and squared bending."""
     curvature = options.w_curvature * (TYPICAL_CURVATURE / curved) ** 0.2
     return curvature, options.w_fairness * (TYPICAL_BENDING / (bending + 1.0)) ** 0.5

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from gso.energy import (
     stretch,
 )
 from gso.energy.losses import Absolute
+from gso.geometry import ops
 from gso.mesh import Mesh
 from gso.parametrization import orientation
 from gso.tasks import per_component
@@ -29,7 +29,7 @@ from gso.tasks.base import Stage, same
 from gso.tasks.evaluation import parted
 from gso.tasks.flatten.options import Options
 from gso.tasks.request import Request
-from gso.typing import Array
+from gso.typing import Array, N
 from gso.unknowns import Layout, free
 
 #: Lower bound on the strain level: smaller strains are rounding errors.
@@ -127,16 +127,16 @@ def _strain_terms(options: Options, mesh: Mesh, level: float) -> list[Weighted]:
         loss = stretch.TwoPowerLoss(level, knee=np.inf, eps=0.03)
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
     else:
-        loss = stretch.TwoPowerLoss(level, knee=options.knee * float(bent(np.float64(level))))
+        loss = stretch.TwoPowerLoss(level, knee=options.knee * float(knee_factor(level)))
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
         # `TwoPowerLoss` too costs level times the strain where strains are small.
         items.append(Weighted(edges.build(mesh), options.w_edges * level, Absolute(0.1 * level)))
     return items
 
 
-def bent(level: Any) -> Any:
+def knee_factor(level: N) -> N:
     """Compute the factor on the knee: below one where the strain level is large."""
-    return ((_LARGE_STRAIN / level) ** (1 / 3)).clip(0.68, 1.0)
+    return ops.minimum(ops.maximum((_LARGE_STRAIN / level) ** (1 / 3), 0.68), 1.0)
 
 
 def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:

@@ -7,12 +7,13 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from copy import copy
 from threading import Lock
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from gso.energy.losses import Loss
 from gso.linalg.base import Pattern
 from gso.parametrization.orientation import SAFETY, degenerate
 from gso.solver.assembly import assemble
@@ -23,6 +24,8 @@ from gso.tno.batched.tensor_terms import Term
 from gso.tno.batched.unknowns import Unknowns
 from gso.typing import Ints
 
+#: Memory for rows of all terms: whole, and term by term.
+_Rows: TypeAlias = tuple[Tensor, list[Tensor]]
 #: Structures that are kept for the next batch.
 _KEPT = 24
 _structures: OrderedDict[bytes, Structure] = OrderedDict()
@@ -158,14 +161,14 @@ class Problem:
             term.linearise(points, self.unknowns.share, gradient, part)
         return self.structure.constant(entries[0])
 
-    def _rows(self, terms: Sequence[Term]) -> tuple[Any, Any]:
+    def _rows(self, terms: Sequence[Term]) -> tuple[_Rows, _Rows]:
         """Return memory for the elements' gradients and matrices: whole, and term by term."""
         out = []
         for sizes in ([len(t.columns) for t in terms], [t.pairs for t in terms]):
             shapes = [(size, t.count, self.surfaces) for size, t in zip(sizes, terms, strict=True)]
             rows = [a * b for a, b, _ in shapes]
             whole = torch.empty(sum(rows), self.surfaces, dtype=torch.float64, device=self._device)
-            parts = [p.view(s) for p, s in zip(whole.split(rows), shapes, strict=True)]
+            parts = [p.view(s) for p, s in zip(torch.split(whole, rows), shapes, strict=True)]
             out.append((whole, parts))
         return out[0], out[1]
 
@@ -179,7 +182,7 @@ class Problem:
             other._constant = self._constant.index_select(-1, which)
         return other
 
-    def with_loss(self, name: str, loss: Any) -> Problem:
+    def with_loss(self, name: str, loss: Loss) -> Problem:
         """Return the problem with another stacked loss of the non-quadratic terms of one name."""
         other = copy(self)
         other.terms = [

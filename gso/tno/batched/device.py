@@ -12,7 +12,7 @@ from gso.solver import Timings
 from gso.tno.batched.batch_minimiser import minimise
 from gso.tno.batched.batch_problem import Problem, forget
 from gso.tno.batched.gathered import Gathered, Solved, TooLarge
-from gso.tno.batched.tensor_terms import stacked_loss
+from gso.tno.batched.tensor_terms import stack_losses
 from gso.tno.batched.unknowns import columns
 from gso.typing import Array
 
@@ -52,7 +52,7 @@ def _solve(parts: Sequence[Gathered], device: torch.device) -> list[Solved]:
     start = columns([part.start for part in parts], device)
     by_iteration = zip(*(part.continuation for part in parts), strict=True)
     losses = [
-        stacked_loss([loss for part in each for loss in part], device) for each in by_iteration
+        stack_losses([loss for part in each for loss in part], device) for each in by_iteration
     ]
     timings.setup += time.perf_counter() - clock
     minima = minimise(
@@ -72,7 +72,7 @@ def _solve(parts: Sequence[Gathered], device: torch.device) -> list[Solved]:
     flat = [t.cpu().numpy() for t in (minima.energy, minima.code, minima.iterations)]
     wanted = [points]
     if first.others is not None:
-        wanted.append(columns([part.others for part in parts], device))
+        wanted.append(columns([p.others for p in parts if p.others is not None], device))
     found = [{n: v.cpu().numpy() for n, v in problem.by_term(at).items()} for at in wanted]
     timings.setup += time.perf_counter() - clock
     out, begin, total = [], 0, sum(map(len, parts))

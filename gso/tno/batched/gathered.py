@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from gso.solver import Timings
 from gso.solver.elements import kind
 from gso.tasks.base import Stage
 from gso.typing import Array, Ints
-from gso.unknowns import Layout
+from gso.unknowns import Layout, Variables
 
 #: Codes of the reasons to stop.
 MAX_ITERATIONS, CONVERGED, STALLED = 0, 1, 2
@@ -197,7 +196,7 @@ def _term(items: Sequence[Weighted], layout: Layout) -> GatheredTerm:
     )
 
 
-def _single(each: Sequence[Any]) -> tuple[Ints | None, Array | None, Array | None]:
+def _single(each: Sequence[Variables]) -> tuple[Ints | None, Array | None, Array | None]:
     """Return the unknown of each coordinate, and the shares and offsets of each surface."""
     first = each[0]
     if first.basis is None:
