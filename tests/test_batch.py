@@ -31,8 +31,8 @@ from gso.tno.batched import tensor_kernels as on_tensors  # noqa: E402
 from gso.tno.batched.batch_problem import Problem as Batch  # noqa: E402
 from gso.tno.batched.batches import check_batch, solve_batch  # noqa: E402
 from gso.tno.batched.device_executor import DeviceExecutor, minimise_elsewhere  # noqa: E402
-from gso.tno.batched.gathered import TooLarge, Unbatchable, gather  # noqa: E402
 from gso.tno.batched.many import solve_all  # noqa: E402
+from gso.tno.batched.stage_batch import TooLarge, Unbatchable, gather  # noqa: E402
 from gso.tno.batched.sums import Sums  # noqa: E402
 from gso.tno.batched.tensor_terms import stack_losses  # noqa: E402
 
@@ -596,7 +596,7 @@ def graphics(monkeypatch):
         return real(parts, "cpu")
 
     monkeypatch.setattr(device, "solve", solve)
-    monkeypatch.setattr(device, "checked", lambda name: None)
+    monkeypatch.setattr(device, "check_device", lambda name: None)
     return sizes
 
 

@@ -175,9 +175,9 @@ def test_the_sorting_and_the_table_analysis_agree(monkeypatch):
     rng = np.random.default_rng(3)
     columns = rng.integers(0, 40, 500) + rng.integers(0, 6, (4, 500))
     groups = [ranking.Pairs(np.minimum(columns, 40), 40)]
-    table = ranking.ranked(groups, 40)
+    table = ranking.rank(groups, 40)
     monkeypatch.setattr(ranking, "_LARGEST_TABLE", 0)
-    for a, b in zip(table, ranking.ranked(groups, 40), strict=True):
+    for a, b in zip(table, ranking.rank(groups, 40), strict=True):
         np.testing.assert_array_equal(a, b)
     (places,), low, high = table
     first, second = np.triu_indices(4)

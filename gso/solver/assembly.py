@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gso.linalg.base import Pattern
-from gso.solver.ranking import Pairs, ranked
+from gso.solver.ranking import Pairs, rank
 from gso.typing import Array, Ints
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
 
-def _repeated(columns: Ints) -> Ints:
+def _find_repeated(columns: Ints) -> Ints:
     """Find pairs a < b of an element that are the same unknown, as ordered by :func:`products`.
 
     Such a pair contributes to the diagonal of the matrix twice.
@@ -100,9 +100,9 @@ def _analyse(n: int, columns: list[Ints], quadratic: csc_matrix) -> Assembly:
     entries = np.stack([np.repeat(every, np.diff(quadratic.indptr)), quadratic.indices])
     constant = Pairs(entries, n, (np.array([0]), np.array([1])))
     groups = [*(Pairs(own, n) for own in columns), constant, Pairs(every[None], n)]
-    (*own, fixed, diagonal), column, row = ranked(groups, n)
+    (*own, fixed, diagonal), column, row = rank(groups, n)
     pattern = Pattern(n, np.searchsorted(column, np.arange(n + 1)), row)
-    places = [Places(at, _repeated(c)) for at, c in zip(own, columns, strict=True)]
+    places = [Places(at, _find_repeated(c)) for at, c in zip(own, columns, strict=True)]
     return Assembly(pattern, places, *(x[:, 0].astype(np.int64) for x in (fixed, diagonal)))
 
 

@@ -102,7 +102,7 @@ class Sums(Same):
         return np.stack([(pull @ s.ravel()).reshape(-1, count) for s in slope])
 
 
-def chained(gather: Ints, shape: tuple[int, ...], variables: Variables) -> tuple[Same, Ints]:
+def chain_rule(gather: Ints, shape: tuple[int, ...], variables: Variables) -> tuple[Same, Ints]:
     """Return the chain rule of elements, and their unknowns (q, e), padded with `variables.size`.
 
     Parameters
@@ -134,7 +134,7 @@ def by_point(gather: Ints, shape: tuple[int, ...], unknown: Ints, size: int) -> 
     Parameters
     ----------
     gather, shape
-        As for :func:`chained`.
+        As for :func:`chain_rule`.
     unknown : ndarray of int, (n,)
         Unknown of each coordinate, `size` if it is fixed.
     size : int

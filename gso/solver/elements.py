@@ -12,7 +12,7 @@ from gso.energy.base import Residual, Term, Weighted
 from gso.energy.losses import Loss
 from gso.solver import loops
 from gso.solver.assembly import Places, products
-from gso.solver.chain import chained
+from gso.solver.chain import chain_rule
 from gso.solver.kernels import geometric_stiffness, kernel
 from gso.typing import Array
 from gso.unknowns import Layout, Variables
@@ -96,7 +96,7 @@ class Elements(Values):
 
     def __init__(self, item: Weighted, variables: Variables, among: int = 0):
         super().__init__(item, variables.layout, among)
-        self._chain, self.columns = chained(self.gather, self.shape, variables)
+        self._chain, self.columns = chain_rule(self.gather, self.shape, variables)
 
     def linearise(self, coordinates: Array, at: slice = _ALL) -> tuple[Array, Array]:
         """Return residuals (r, e) and their Jacobian by the unknowns (r, q, e) of some elements."""

@@ -161,7 +161,7 @@ def minimise(
                 energy, gradient, values = current.linearise(x)
                 t1 = time.perf_counter()
                 if bounds is not None:
-                    held = _held(x, gradient, bounds)
+                    held = _at_bound(x, gradient, bounds)
                     gradient = np.where(held, 0.0, gradient)
                     values[problem.diagonal[held]] += _STIFF * values[problem.diagonal].max()
                 d = direction.step(solver, values, problem.diagonal, gradient)
@@ -200,7 +200,7 @@ def says_no(answer: object) -> bool:
     return isinstance(answer, bool | np.bool_) and not answer
 
 
-def _held(x: Array, gradient: Array, bounds: tuple[Array, Array]) -> NDArray[np.bool_]:
+def _at_bound(x: Array, gradient: Array, bounds: tuple[Array, Array]) -> NDArray[np.bool_]:
     """Return the mask of unknowns at a bound beyond which the energy would fall."""
     low, high = bounds
     width = high - low

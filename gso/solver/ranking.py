@@ -49,7 +49,7 @@ class Pairs:
             yield at, low, high
 
 
-def ranked(groups: list[Pairs], size: int) -> tuple[list[Int32], Ints, Ints]:
+def rank(groups: list[Pairs], size: int) -> tuple[list[Int32], Ints, Ints]:
     """Rank the entries of groups among the distinct ones, sorted by lower, then higher unknown.
 
     Parameters

@@ -17,7 +17,7 @@ from gso.errors import ConvergenceWarning, OptionError
 from gso.linalg.base import Solver
 from gso.pipeline.case import Case
 from gso.pipeline.handles import move_handles, pins_of
-from gso.pipeline.judgement import better, conclude, difference, warning
+from gso.pipeline.judgement import conclude, difference, is_better, warning
 from gso.pipeline.run import Run, objective, solution_at
 from gso.result import Result
 from gso.solver import METHODS, Minimum, minimise
@@ -234,7 +234,7 @@ class Session:
             self._coordinates = self._solve_stages(self._plan)
             self._pose()
             result = self.result()
-            if better(result, dragged):
+            if is_better(result, dragged):
                 result.notes += (difference(dragged, result),)
             else:
                 result = dragged

@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gso import metrics as measure
+from gso.components import several
 from gso.energy import Weighted, curvature, elongation, fairness, proximity
 from gso.energy.losses import Absolute, Distance
 from gso.hierarchy import resample
@@ -25,7 +26,6 @@ from gso.mesh.normals import vertex_normals
 from gso.tasks import per_component
 from gso.tasks.developable.analysis import Analysis, Shape, own_bending
 from gso.tasks.developable.options import Options
-from gso.tasks.evaluation import parted
 from gso.tasks.request import Request
 from gso.typing import Array, N
 
@@ -55,7 +55,7 @@ def objective(analysis: Analysis, request: Request[Options], mesh: Mesh) -> list
 
     Several components are weighted each for its own size and curvature.
     """
-    if not request.options.by_component or not parted(analysis.mesh):
+    if not request.options.by_component or not several(analysis.mesh):
         shape = analysis.shape
         if mesh is not shape.mesh and mesh.grid_index is None:
             request = _on_triangles(request, analysis)
@@ -98,7 +98,7 @@ def _terms(request: Request[Options], shape: Shape, curved: float, mesh: Mesh) -
     if mesh is shape.mesh:
         share = shape.own_bending
     else:
-        smooth = mesh.replaced(_resampled(smooth, mesh))
+        smooth = mesh.replaced(_resample(smooth, mesh))
         share = own_bending(smooth)
     fair = fairness.build(mesh, reference=smooth.vertices, share=share)
     items.append(Weighted(fair, w_fairness))
@@ -107,7 +107,7 @@ def _terms(request: Request[Options], shape: Shape, curved: float, mesh: Mesh) -
     return items
 
 
-def _resampled(source: Mesh, target: Mesh) -> Array:
+def _resample(source: Mesh, target: Mesh) -> Array:
     """Resample the vertices of one grid at the resolution of another, row by row.
 
     Meshes that are not grids have no smoothed vertices: their own are returned.

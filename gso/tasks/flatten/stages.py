@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from gso import parametrization
+from gso.components import several, split
 from gso.energy import (
     Weighted,
     christoffel,
@@ -26,7 +27,6 @@ from gso.mesh import Mesh
 from gso.parametrization import orientation
 from gso.tasks import per_component
 from gso.tasks.base import Stage, same
-from gso.tasks.evaluation import parted
 from gso.tasks.flatten.options import Options
 from gso.tasks.request import Request
 from gso.typing import Array, N
@@ -104,14 +104,13 @@ def _unsqueezing(mesh: Mesh, last: Stage) -> list[Stage]:
 
 
 def strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
-    alone = not parted(mesh)
-    return _stage(
-        "strain",
-        mesh,
-        per_component.objective(
-            mesh, lambda own: _strain_terms(options, own, level if alone else _level(own))
-        ),
-    )
+    """Build the stage that minimises the strain, of the typical size `level`."""
+    alone = not several(mesh)
+
+    def make(own: Mesh) -> list[Weighted]:
+        return _strain_terms(options, own, level if alone else _level(own))
+
+    return _stage("strain", mesh, per_component.objective(mesh, make))
 
 
 def _level(mesh: Mesh) -> float:
@@ -141,8 +140,11 @@ def knee_factor(level: N) -> N:
 
 def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:
     # With several components: the mean of their cells' sizes, each in its own unit ball.
-    sizes = [isometry.typical_length(p.mesh) / p.mesh.frame.scale for p in parted(mesh)]
-    size = float(np.mean(sizes)) if sizes else isometry.typical_length(mesh)
+    if several(mesh):
+        parts = [part.mesh for part in split(mesh)]
+        size = float(np.mean([isometry.typical_length(p) / p.frame.scale for p in parts]))
+    else:
+        size = isometry.typical_length(mesh)
     eps = options.eps * size
     items = per_component.objective(mesh, partial(_length_terms, options, level, eps))
     stage = _stage("lengths", mesh, items)

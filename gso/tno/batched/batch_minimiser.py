@@ -15,7 +15,7 @@ from gso.solver.directions import GaussNewton, LevenbergMarquardt, adapt_damping
 from gso.solver.line_search import falls
 from gso.tno.batched.batch_problem import Problem
 from gso.tno.batched.batch_steps import armijo, direction
-from gso.tno.batched.gathered import CONVERGED, MAX_ITERATIONS, STALLED
+from gso.tno.batched.stage_batch import CONVERGED, MAX_ITERATIONS, STALLED
 
 
 @dataclass

@@ -18,7 +18,7 @@ from gso.linalg.base import Pattern
 from gso.parametrization.orientation import SAFETY, degenerate
 from gso.solver.assembly import assemble
 from gso.tno.batched.cholesky import BlockBanded, divide
-from gso.tno.batched.gathered import Gathered, Unbatchable
+from gso.tno.batched.stage_batch import StageBatch, Unbatchable
 from gso.tno.batched.sums import Sums
 from gso.tno.batched.tensor_terms import Term
 from gso.tno.batched.unknowns import Unknowns
@@ -63,9 +63,9 @@ class Structure:
         self.pattern: Pattern = made.pattern
         scatter = [places.scatter for places in made.places]
         split = len(varying)
-        self.entries = Sums(_joined(scatter[:split]), self.pattern.nnz, device)
-        self.gradient = Sums(_joined([c.ravel() for c in (*varying, *constant)]), n, device)
-        self._fixed = Sums(_joined(scatter[split:]), self.pattern.nnz, device)
+        self.entries = Sums(_join(scatter[:split]), self.pattern.nnz, device)
+        self.gradient = Sums(_join([c.ravel() for c in (*varying, *constant)]), n, device)
+        self._fixed = Sums(_join(scatter[split:]), self.pattern.nnz, device)
         order = self.entries.order
         self._from_fixed = _inverse(self._fixed.order)[order]
         self._unknown = torch.as_tensor(_inverse(self.gradient.order), device=device)
@@ -86,7 +86,7 @@ class Structure:
         return self.gradient(gradients).index_select(0, self._unknown)
 
 
-def _joined(arrays: Sequence[Ints]) -> Ints:
+def _join(arrays: Sequence[Ints]) -> Ints:
     return np.concatenate([np.zeros(0, np.int64), *arrays])
 
 
@@ -126,7 +126,7 @@ class Problem:
 
     Parameters
     ----------
-    parts : sequence of Gathered
+    parts : sequence of StageBatch
         Surfaces whose stages have one key.
     device : torch.device
 
@@ -136,7 +136,7 @@ class Problem:
         The surfaces cannot be solved together.
     """
 
-    def __init__(self, parts: Sequence[Gathered], device: torch.device):
+    def __init__(self, parts: Sequence[StageBatch], device: torch.device):
         first = parts[0]
         self.unknowns = Unknowns.stacked(parts, device)
         each = zip(*(part.terms for part in parts), strict=True)

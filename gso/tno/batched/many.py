@@ -17,7 +17,7 @@ from gso.result import Result
 from gso.tno.batched import device
 from gso.tno.batched.batches import BatchRequest, solve_batch
 from gso.tno.batched.device_executor import DeviceExecutor, minimise_elsewhere
-from gso.tno.batched.gathered import Gathered, Solved
+from gso.tno.batched.stage_batch import StageBatch, StageMinima
 
 #: Surfaces solved together on a processor.
 _BATCH = 16
@@ -120,10 +120,10 @@ def _in_order(
 def _batch(batch: BatchRequest, designs: Sequence[Any]) -> list[Result | GSOError]:
     """Solve designs in one batch in this process."""
     with _one_thread(batch.device):
-        return solve_batch(batch, designs, partial(_minimised, batch.device))
+        return solve_batch(batch, designs, partial(_minimise, batch.device))
 
 
-def _minimised(where: str, gathered: Gathered) -> Solved:
+def _minimise(where: str, gathered: StageBatch) -> StageMinima:
     return device.solve([gathered], where)[0]
 
 

@@ -88,7 +88,7 @@ def optimize_batch(
     """
     check_workers(workers)
     designs = _designs(points)
-    devices.checked(device)
+    devices.check_device(device)
     batch = check_batch(task, formulation, options, device, verdict)
     out: list[Result] = []
     for index, found in enumerate(solve_all(batch, list(designs), workers, executor)):

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from gso.energy.losses import Loss
 from gso.solver.chain import by_point
-from gso.tno.batched.gathered import GatheredTerm, Unbatchable
+from gso.tno.batched.stage_batch import TermBatch, Unbatchable
 from gso.tno.batched.tensor_kernels import geometric_stiffness, kernel
 from gso.tno.batched.unknowns import Unknowns, columns, pick
 
@@ -51,7 +51,7 @@ class Term:
 
     Parameters
     ----------
-    parts : sequence of GatheredTerm
+    parts : sequence of TermBatch
         The term of some surfaces each.
     unknowns : Unknowns
     device : torch.device
@@ -67,7 +67,7 @@ class Term:
         Points of an element do not move with one unknown each.
     """
 
-    def __init__(self, parts: Sequence[GatheredTerm], unknowns: Unknowns, device: torch.device):
+    def __init__(self, parts: Sequence[TermBatch], unknowns: Unknowns, device: torch.device):
         first = parts[0]
         self.name, self.shape, self.quadratic = first.name, first.shape, first.quadratic
         self._residual, self._vectors = first.residual, first.vectors
@@ -153,7 +153,7 @@ class Term:
         total = points.new_zeros(points.shape[1])
         for at, x, c in self._blocks(points):
             residual, slope = run(x, c)
-            slope = self._pulled(slope, share, at) if known is None else known[:, :, at]
+            slope = self._pull(slope, share, at) if known is None else known[:, :, at]
             total += self._cost(residual, at)
             first, second = self.loss.weights(residual)
             first = first * self.factor[at]
@@ -165,17 +165,17 @@ class Term:
             here = entries[:, at]
             _products(slope, second * self.factor[at], here, fresh=True)
             if bend is not None:
-                turned = self._pulled(bend(x, c)[1], share, at)
+                turned = self._pull(bend(x, c)[1], share, at)
                 _products(turned, first[: bend.rows].clamp(min=0.0), here, fresh=False)
         return total
 
     def keep_slope(self, points: Tensor, share: Tensor | None) -> None:
         """Compute the Jacobian of a quadratic term once."""
         run = kernel(self._residual, self.shape, len(self.constants), True)
-        blocks = [self._pulled(run(x, c)[1], share, at) for at, x, c in self._blocks(points)]
+        blocks = [self._pull(run(x, c)[1], share, at) for at, x, c in self._blocks(points)]
         self._slope = torch.cat(blocks, dim=2)
 
-    def _pulled(self, slope: Tensor, share: Tensor | None, at: slice) -> Tensor:
+    def _pull(self, slope: Tensor, share: Tensor | None, at: slice) -> Tensor:
         """Return the Jacobian by unknowns (r, q, b, B) from that by coordinates."""
         if share is None or not self._by_point:
             return slope

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from gso.tno.batched.gathered import Gathered
+from gso.tno.batched.stage_batch import StageBatch
 from gso.typing import Array
 
 T = TypeVar("T")
@@ -36,7 +36,7 @@ class Unknowns:
     offset: Tensor | None = None
 
     @classmethod
-    def stacked(cls, parts: Sequence[Gathered], device: torch.device) -> Unknowns:
+    def stacked(cls, parts: Sequence[StageBatch], device: torch.device) -> Unknowns:
         """Stack the unknowns of surfaces."""
         first = parts[0]
         if first.of is None:
