@@ -7,7 +7,6 @@ from dataclasses import asdict
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.cut_pieces import Pieces
 from gso.errors import MeshError
@@ -22,7 +21,7 @@ from gso.typing import AnyPath, Ints, Json
 from gso.verdict.reason import Reason
 
 #: Arrays of any type by name.
-Arrays: TypeAlias = dict[str, NDArray[Any]]
+Arrays: TypeAlias = dict[str, np.ndarray]
 
 _FORMAT = 3
 #: Classes of results by their kind.

@@ -276,15 +276,15 @@ class Result:
             )
         io.save_spline(self.spline, path, unit=unit)
 
-    def arrays(self) -> dict[str, Any]:
+    def arrays(self) -> dict[str, np.ndarray]:
         """Return flat image and pattern as arrays by name, for files."""
-        out: dict[str, Any] = {} if self.flat is None else {"flat": self.flat}
+        out: dict[str, np.ndarray] = {} if self.flat is None else {"flat": self.flat}
         if self.pattern is not None and self.pattern.flat is not self.flat:
             out |= self.pattern.arrays()
         return out
 
     @classmethod
-    def shape(cls, data: Mapping[str, Any], design: Mesh) -> dict[str, Any]:
+    def shape(cls, data: Mapping[str, np.ndarray], design: Mesh) -> Keywords:
         """Return surface, flat image and pattern from the arrays of a file, by attribute.
 
         Raises

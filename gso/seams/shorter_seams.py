@@ -28,7 +28,7 @@ def straightened(ground: Ground, merging: Merging) -> Ints:
         The piece of each face.
     """
     mesh = ground.mesh
-    label = merging.label.copy()
+    label: Ints = merging.label.copy()
     kept = np.zeros(len(mesh.vertices), bool)
     kept[ground.kept] = True
     for number in range(_PASSES):

@@ -99,7 +99,7 @@ class Ground:
     @property
     def begun(self) -> NDArray[np.bool_]:
         """Vertices (n,) on the boundary or on edges that are cut in any case."""
-        out = self.mesh.half_edges.boundary_vertex.copy()
+        out: NDArray[np.bool_] = self.mesh.half_edges.boundary_vertex.copy()
         out[self.kept] = True
         return out
 

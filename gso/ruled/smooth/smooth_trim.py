@@ -271,8 +271,8 @@ def _border(domain: Array, points: list[Array]) -> Array:
             found.append(x)
     order = np.argsort(keys, kind="stable")
     out = np.array(found)[order]
-    new = (out != np.roll(out, 1, axis=0)).any(axis=1)
-    return out[new]
+    new: Array = out[(out != np.roll(out, 1, axis=0)).any(axis=1)]
+    return new
 
 
 def _chain(ring: Array, corner: set[tuple[float, ...]]) -> Loop:
