@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import linalg
 from gso.energy.losses import Loss
@@ -17,7 +16,7 @@ from gso.solver.directions import METHODS, GaussNewton
 from gso.solver.line_search import armijo, relative_decrease
 from gso.solver.problem import Problem
 from gso.status import Progress, Status
-from gso.typing import Array
+from gso.typing import Array, Flags
 
 Callback = Callable[[Progress], object]
 
@@ -200,7 +199,7 @@ def says_no(answer: object) -> bool:
     return isinstance(answer, bool | np.bool_) and not answer
 
 
-def _at_bound(x: Array, gradient: Array, bounds: tuple[Array, Array]) -> NDArray[np.bool_]:
+def _at_bound(x: Array, gradient: Array, bounds: tuple[Array, Array]) -> Flags:
     """Return the mask of unknowns at a bound beyond which the energy would fall."""
     low, high = bounds
     width = high - low
