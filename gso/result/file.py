@@ -24,6 +24,8 @@ from gso.verdict.reason import Reason
 Arrays: TypeAlias = dict[str, np.ndarray]
 
 _FORMAT = 3
+#: Attributes that a file has as they are.
+_PLAIN = ("task", "formulation", "iterations", "energy", "seconds", "backend", "warm_start")
 #: Classes of results by their kind.
 _KINDS: dict[str, type[Result]] = {kind.KIND: kind for kind in (Result, StripsResult)}
 
@@ -33,15 +35,9 @@ def _record(result: Result) -> Json:
     return {
         "format": _FORMAT,
         "kind": result.KIND,
-        "task": result.task,
-        "formulation": result.formulation,
+        **{name: getattr(result, name) for name in _PLAIN},
         "status": result.status.name,
-        "iterations": result.iterations,
-        "energy": result.energy,
-        "seconds": result.seconds,
-        "backend": result.backend,
         "device": "cpu",
-        "warm_start": result.warm_start,
         "notes": list(result.notes),
         "reasons": [reason.record() for reason in result.reasons],
         "details": result.details,
@@ -140,16 +136,10 @@ def read(path: AnyPath) -> Result:
 def _read(record: Json, kind: type[Result], design: Mesh, **shape: Any) -> Result:
     """Build a result from its record, and its surface and flat images by attribute."""
     result = kind(
-        task=record["task"],
-        formulation=record["formulation"],
+        **{name: record[name] for name in _PLAIN},
         design=design,
         status=Status[record["status"]],
-        iterations=record["iterations"],
-        energy=record["energy"],
         history=[Progress(**p) for p in record["history"]],
-        seconds=record["seconds"],
-        backend=record["backend"],
-        warm_start=record["warm_start"],
         notes=tuple(record["notes"]),
         details=record["details"],
         reasons=tuple(map(Reason.read, record["reasons"])),
