@@ -41,7 +41,7 @@ from gso.tasks.request import check
 from gso.typing import MeshLike
 
 #: Seams that stay: what :func:`gso.cut` takes, or an earlier result for the same mesh.
-Kept: TypeAlias = Seam | Iterable[Seam] | ArrayLike | Pieces | None
+Kept: TypeAlias = "Seam | Iterable[Seam] | ArrayLike | Pieces | None"
 
 #: Ratio of the estimated to the measured strain of a first attempt.
 _RATIO = 1.3
