@@ -14,7 +14,6 @@ from gso.cli import shared_options as shared
 from gso.cli.optimize_job import Job, is_cad
 from gso.cli.single_file import single
 from gso.errors import OptionError
-from gso.typing import Keywords
 
 
 @click.command(short_help="Make surfaces developable, flatten or denoise them.")
@@ -129,7 +128,7 @@ def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
     click.get_current_context().exit(0 if good else 1)
 
 
-def _keywords(given: Keywords, out: str) -> Keywords:
+def _keywords(given: dict[str, Any], out: str) -> dict[str, Any]:
     """Return keywords of :func:`gso.tno.optimize`, checked as far as possible without a mesh."""
     from gso.tno import check
 

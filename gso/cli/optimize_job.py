@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from gso import tasks
 from gso.cli.file_options import here, source, spare
 from gso.errors import OptionError
-from gso.typing import Keywords
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     from gso.mesh import Mesh
     from gso.result import Result
     from gso.solver import Callback
+    from gso.typing import Keywords
 
 
 @dataclass(frozen=True)
