@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -124,13 +124,13 @@ class Pattern:
         """
         return Mesh(mesh.vertices[self.vertex], self.faces) if self.is_cut else mesh
 
-    def arrays(self, prefix: str = "pattern_") -> dict[str, Any]:
+    def arrays(self, prefix: str = "pattern_") -> dict[str, np.ndarray]:
         """Return the pattern as arrays by name; see :meth:`from_arrays`."""
         return {f"{prefix}{name}": getattr(self, name) for name in _ARRAYS}
 
     @classmethod
     def from_arrays(
-        cls, data: Mapping[str, Any], surface: Mesh, prefix: str = "pattern_"
+        cls, data: Mapping[str, np.ndarray], surface: Mesh, prefix: str = "pattern_"
     ) -> Pattern:
         """Return the pattern of a surface that :meth:`arrays` describes.
 

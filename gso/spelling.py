@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from gso.errors import OptionError
 
 K = TypeVar("K", bound="KnownFields")
 
 
-def nearest(name: Any, known: Iterable[str]) -> str | None:
+def nearest(name: object, known: Iterable[str]) -> str | None:
     """Find the known name most similar to a given one, ignoring case; None if none is close.
 
     >>> nearest("Flaten", ["bend", "denoise", "flatten"])
@@ -24,7 +24,7 @@ def nearest(name: Any, known: Iterable[str]) -> str | None:
     return lower[found[0]] if found else None
 
 
-def choices(name: Any, known: Iterable[str]) -> str:
+def choices(name: object, known: Iterable[str]) -> str:
     """Format the part of a message that lists the known names, after an unknown one.
 
     >>> choices("blanced", ["fast", "balanced"])
@@ -84,7 +84,7 @@ class KnownFields:
 
     __signature__ = _Signature()
 
-    def __new__(cls: type[K], *positional: Any, **given: Any) -> K:
+    def __new__(cls: type[K], *positional: object, **given: object) -> K:
         """Check the names before the object is made."""
         if given:
             check_keywords(cls.__qualname__, given, inspect.signature(cls).parameters)

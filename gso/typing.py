@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
 
@@ -41,8 +42,24 @@ class Polyhedron(Protocol):
         """Vertices of each face."""
 
 
+@dataclass(frozen=True)
+class Unwelded:
+    """Input of :func:`gso.as_mesh` together with the distance within which to merge its vertices.
+
+    Attributes
+    ----------
+    surface : MeshLike
+        Anything that it takes.
+    weld : float
+        Vertices within this distance of each other are merged.
+    """
+
+    surface: MeshLike
+    weld: float
+
+
 #: What :func:`gso.as_mesh` takes: a mesh, a grid of points, vertices and faces, or a file.
-MeshLike: TypeAlias = "Polyhedron | ArrayLike | tuple[ArrayLike, ArrayLike] | PathLike[str]"
+MeshLike: TypeAlias = "Polyhedron | Unwelded | ArrayLike | tuple[ArrayLike, ArrayLike] | AnyPath"
 
 
 class Scalar(Protocol):
@@ -84,3 +101,17 @@ class Batch(Scalar, Protocol):
 
 
 B = TypeVar("B", bound=Batch)
+
+
+class Number(Scalar, Protocol):
+    """A number, or a tensor of them."""
+
+    def __abs__(self: N) -> N: ...
+    def __pow__(self: N, other: float, /) -> N: ...
+    def __ge__(self: N, other: N | float, /) -> object: ...
+    def __gt__(self: N, other: N | float, /) -> object: ...
+    def __le__(self: N, other: N | float, /) -> object: ...
+    def __lt__(self: N, other: N | float, /) -> object: ...
+
+
+N = TypeVar("N", bound=Number)

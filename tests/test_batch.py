@@ -31,10 +31,10 @@ from gso.tno.batched import tensor_kernels as on_tensors  # noqa: E402
 from gso.tno.batched.batch_problem import Problem as Batch  # noqa: E402
 from gso.tno.batched.batches import check_batch, solve_batch  # noqa: E402
 from gso.tno.batched.device_executor import DeviceExecutor, minimise_elsewhere  # noqa: E402
-from gso.tno.batched.gathered import TooLarge, Unbatchable, gather  # noqa: E402
 from gso.tno.batched.many import solve_all  # noqa: E402
+from gso.tno.batched.stage_batch import TooLarge, Unbatchable, gather  # noqa: E402
 from gso.tno.batched.sums import Sums  # noqa: E402
-from gso.tno.batched.tensor_terms import stacked_loss  # noqa: E402
+from gso.tno.batched.tensor_terms import stack_losses  # noqa: E402
 
 CPU = torch.device("cpu")
 SIZE = 33
@@ -116,7 +116,7 @@ def test_energy_gradient_and_matrix_are_those_of_the_solver(name, designs):
         coordinates = [s.enter(c) for s, c in zip(own, coordinates, strict=True)]
         gathered = gather(own, coordinates, "gauss-newton")
         problem, x = Batch([gathered], CPU), torch.as_tensor(gathered.start.T)
-        losses = [stacked_loss(each, CPU) for each in gathered.continuation]
+        losses = [stack_losses(each, CPU) for each in gathered.continuation]
         x = x + 1e-4 * torch.as_tensor(rng.standard_normal(x.shape))
         for number, loss in enumerate(losses or [None]):
             here = problem if loss is None else problem.with_loss(own[0].continued, loss)
@@ -596,7 +596,7 @@ def graphics(monkeypatch):
         return real(parts, "cpu")
 
     monkeypatch.setattr(device, "solve", solve)
-    monkeypatch.setattr(device, "checked", lambda name: None)
+    monkeypatch.setattr(device, "check_device", lambda name: None)
     return sizes
 
 

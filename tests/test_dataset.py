@@ -640,7 +640,7 @@ class TestDevice:
             sizes.append(len(parts))
             return real(parts, "cpu")
 
-        monkeypatch.setattr(device, "checked", lambda name: None)
+        monkeypatch.setattr(device, "check_device", lambda name: None)
         monkeypatch.setattr(device, "solve", solve)
         made = dataset.build(tmp_path / "set", QUICK, device="cuda", workers=1)
         assert sizes
@@ -661,7 +661,7 @@ class TestDevice:
         place = tmp_path / "batched"
         shutil.copytree(batched.path, place)
         (place / "test" / "00000.h5").unlink()
-        monkeypatch.setattr(device, "checked", refused)
+        monkeypatch.setattr(device, "check_device", refused)
         with pytest.raises(OptionError, match="cannot be used"):
             dataset.build(place, TINY, workers=0)
         with pytest.raises(OptionError, match="cannot be used"):

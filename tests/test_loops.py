@@ -36,11 +36,17 @@ CASES = [
 ]
 
 
+def forget_loops():
+    loops._residual_loop.cache_clear()
+    loops._stiffness_loop.cache_clear()
+
+
 @pytest.fixture(autouse=True)
 def choice(monkeypatch):
     monkeypatch.setenv(loops.VARIABLE, "numba")
     yield
-    for cached in (loops._loop, loops._adder, loops._installed, cached_source._folder):
+    forget_loops()
+    for cached in (loops._adder, loops._installed, cached_source._folder):
         cached.cache_clear()
 
 
@@ -121,8 +127,8 @@ def test_numpy_does_the_work_where_numba_fails(monkeypatch, caplog):
     def fail(source):
         raise RuntimeError("no compiler")
 
-    loops._loop.cache_clear()
-    monkeypatch.setattr(loops, "compiled", fail)
+    forget_loops()
+    monkeypatch.setattr(loops, "compile_source", fail)
     with caplog.at_level(logging.WARNING, "gso"):
         result = gso.tno.optimize(dome(9), verdict=False)
     assert np.isfinite(result.mesh.vertices).all()
@@ -138,8 +144,8 @@ def test_small_meshes_do_not_load_numba():
 
 SOURCE = "def kernel(x):\n    return x + 1.0\n"
 CODE = (
-    "import logging; logging.basicConfig(); from gso.solver.cached_source import compiled; "
-    f"assert compiled({SOURCE!r})(1.0) == 2.0"
+    "import logging; logging.basicConfig(); from gso.solver.cached_source import compile_source; "
+    f"assert compile_source({SOURCE!r})(1.0) == 2.0"
 )
 
 

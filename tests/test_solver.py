@@ -175,9 +175,9 @@ def test_the_sorting_and_the_table_analysis_agree(monkeypatch):
     rng = np.random.default_rng(3)
     columns = rng.integers(0, 40, 500) + rng.integers(0, 6, (4, 500))
     groups = [ranking.Pairs(np.minimum(columns, 40), 40)]
-    table = ranking.ranked(groups, 40)
+    table = ranking.rank(groups, 40)
     monkeypatch.setattr(ranking, "_LARGEST_TABLE", 0)
-    for a, b in zip(table, ranking.ranked(groups, 40), strict=True):
+    for a, b in zip(table, ranking.rank(groups, 40), strict=True):
         np.testing.assert_array_equal(a, b)
     (places,), low, high = table
     first, second = np.triu_indices(4)
@@ -213,7 +213,7 @@ def test_a_problem_takes_over_the_sparsity_of_one_like_it(monkeypatch):
     variables = unknowns()["normal"]
     first = Problem(items(), variables)
     pattern = first.pattern
-    monkeypatch.setattr(module, "_analysed", None)
+    monkeypatch.setattr(module, "_analyse", None)
     assert Problem(items(), variables, like=first).pattern is pattern
     with pytest.raises(TypeError):
         Problem(items()[:1], variables, like=first).pattern  # noqa: B018

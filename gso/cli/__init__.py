@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import click
 
 from gso.cli.dataset import dataset
@@ -24,7 +22,7 @@ INTERRUPTED = 130
 class _Commands(click.Group):
     """Command group that reports errors as one line and an exit code, without a traceback."""
 
-    def invoke(self, ctx: click.Context) -> Any:
+    def invoke(self, ctx: click.Context) -> object:
         try:
             return super().invoke(ctx)
         except GSOError as error:

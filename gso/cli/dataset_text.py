@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso.cli import report
 from gso.dataset.summary import INTERVALS, PUBLISHED, PUBLISHED_FLAT
+from gso.typing import Json
 
 if TYPE_CHECKING:
     from gso.dataset import Dataset
@@ -19,7 +20,7 @@ _SIGNS = {"K_A": "K_A, mean |K|", "K_P": "K_P", "K_N": "|K_N|", "sigma2": "sigma
 _BAR = 30
 
 
-def lines(data: Dataset, summary: dict[str, Any], split: str | None = None) -> list[str]:
+def lines(data: Dataset, summary: Json, split: str | None = None) -> list[str]:
     """Format the statistics of a dataset, with label metrics of `split` (default: test)."""
     out = [_head(data), "", *_splits(summary)]
     for name in INTERVALS:
@@ -42,7 +43,7 @@ def _head(data: Dataset) -> str:
     )
 
 
-def _splits(summary: dict[str, Any]) -> list[str]:
+def _splits(summary: Json) -> list[str]:
     rows = [("split", "surfaces", "loss_gc", "median", "sigma^2", "failed")]
     for name, found in summary.items():
         failed = sum(ends.get("FAILED", 0) for ends in found["status"].values())
@@ -57,7 +58,7 @@ def _splits(summary: dict[str, Any]) -> list[str]:
     return report.columns(rows)
 
 
-def _intervals(name: str, summary: dict[str, Any]) -> list[str]:
+def _intervals(name: str, summary: Json) -> list[str]:
     """Format counts per interval by split, and a bar for train, validation and test together."""
     groups = {n: s["intervals"][name] for n, s in summary.items() if n in _MAIN}
     others = [s["intervals"][name] for n, s in summary.items() if n not in _MAIN]
@@ -74,7 +75,7 @@ def _intervals(name: str, summary: dict[str, Any]) -> list[str]:
     return report.columns(rows)
 
 
-def _labels(labels: dict[str, Any]) -> list[str]:
+def _labels(labels: Json) -> list[str]:
     out = []
     for kind, metrics in labels.items():
         published = PUBLISHED | (PUBLISHED_FLAT if "loss_gc" not in metrics else {})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
@@ -11,6 +11,10 @@ from click.core import ParameterSource
 from gso.cli import file_options
 from gso.cli import shared_options as shared
 from gso.errors import OptionError
+
+if TYPE_CHECKING:
+    from gso.typing import Array
+    from gso.workshop.fabricate import Fabrication
 
 
 @click.command(short_help="Make designs of flat parts, for the cutter.")
@@ -212,7 +216,7 @@ def fabricate(inputs: tuple[str, ...], folder: str, **given: Any) -> None:
     click.get_current_context().exit(0 if done.usable else 1)
 
 
-def text(done: Any) -> list[str]:
+def text(done: Fabrication) -> list[str]:
     """Format what was made as a table, with the reasons against it."""
     from gso.cli.report import columns
     from gso.verdict import describe
@@ -269,7 +273,7 @@ def _check_together() -> None:
                 raise OptionError(f"--{option} needs --{needed}; give both or none")
 
 
-def _rotations(given: str) -> Any:
+def _rotations(given: str) -> int | str:
     if given == "any":
         return given
     try:
@@ -278,7 +282,7 @@ def _rotations(given: str) -> Any:
         raise OptionError(f"--rotations is {given!r}; it must be a number or any") from None
 
 
-def _table(name: str) -> Any:
+def _table(name: str) -> Array:
     """Read a table of bend deductions."""
     import numpy as np
 

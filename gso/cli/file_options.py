@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
+    from gso.io import Unwelded
     from gso.mesh import Mesh
 
 
@@ -42,14 +43,14 @@ def load(file: str, weld: float | None = None) -> Mesh:
     return io.load(file, weld=weld)
 
 
-def source(file: str, weld: float | None) -> Any:
+def source(file: str, weld: float | None) -> str | Unwelded:
     """Return a file as input of :func:`gso.as_mesh`, for a worker process to read."""
     from gso.io import Unwelded
 
     return file if weld is None else Unwelded(file, weld)
 
 
-def here(file: str, weld: float | None) -> Any:
+def here(file: str, weld: float | None) -> Mesh | str | Unwelded:
     """Read a file for workers that cannot; one that cannot be read is left to them to report."""
     from gso.errors import GSOError
 
@@ -79,9 +80,9 @@ def spare(inputs: Iterable[str | None], outputs: Iterable[str | None], force: bo
             )
 
 
-def _keys(name: str) -> list[Any]:
+def _keys(name: str) -> list[object]:
     """Return keys of a file (real path; device and inode); equal files share at least one."""
-    keys: list[Any] = []
+    keys: list[object] = []
     with suppress(OSError, ValueError):
         keys.append(os.path.realpath(name))
         seen = os.stat(name)

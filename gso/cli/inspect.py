@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,6 +11,7 @@ from gso.errors import GSOError, OptionError
 
 if TYPE_CHECKING:
     from gso.mesh import Mesh
+    from gso.typing import Array
 
 
 @click.command(short_help="Compare two surfaces.")
@@ -155,7 +156,7 @@ def _kind(mesh: Mesh) -> str:
     return "quads and triangles" if (mesh.faces < 0).any() else "quads"
 
 
-def _point(point: Any) -> str:
+def _point(point: Array) -> str:
     return f"({', '.join(f'{c:.6g}' for c in point)})"
 
 

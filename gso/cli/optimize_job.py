@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gso import tasks
 from gso.cli.file_options import here, source, spare
@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from gso.executors import Item
+    from gso.mesh import Mesh
     from gso.result import Result
+    from gso.solver import Callback
+    from gso.typing import Keywords
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class Job:
         The unit if ``--unit`` was given, else "": lengths are then printed without a unit.
     """
 
-    keywords: dict[str, Any] = field(default_factory=dict)
+    keywords: Keywords = field(default_factory=dict)
     method: str = "auto"
     net: str | None = None
     unit: str = "mm"
@@ -57,15 +60,15 @@ class Job:
         """Raise an error if an output is also an input, unless `force` is set."""
         spare((*files, *self.inputs), outputs, self.force)
 
-    def solve(self, mesh: Any, **more: Any) -> Result:
+    def solve(self, mesh: Mesh, callback: Callback | None = None) -> Result:
         """Optimise one surface."""
         if self.method == "tno":
             from gso.tno import optimize
 
-            return optimize(mesh, **self.keywords, **more)
+            return optimize(mesh, **self.keywords, callback=callback)
         from gso.hybrid import solve
 
-        return solve(mesh, **self._with_net(), **more)
+        return solve(mesh, **self._with_net(), callback=callback)
 
     def solve_many(
         self, files: Iterable[str], workers: int | None, scheduler: str | None = None
@@ -73,7 +76,7 @@ class Job:
         """Optimise many surfaces in parallel."""
         read = source if scheduler is None else here
         meshes = (read(file, self.weld) for file in files)
-        spread: dict[str, Any] = {"workers": workers, "scheduler": scheduler}
+        spread: Keywords = {"workers": workers, "scheduler": scheduler}
         if self.method == "tno":
             from gso.tno import optimize_many
 
@@ -82,7 +85,7 @@ class Job:
 
         return solve_many(meshes, **spread, **self._with_net())
 
-    def _with_net(self) -> dict[str, Any]:
+    def _with_net(self) -> Keywords:
         more = {"net": self.net, "polish": self.method != "net", "sparing": self.method == "auto"}
         return {**self.keywords, **more}
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gso.cli import file_options
 from gso.cli import shared_options as shared
 from gso.errors import OptionError
+
+if TYPE_CHECKING:
+    from gso.seams import Segmentation
 
 
 @click.command(short_help="Cut a design into pieces that can be laid flat.")
@@ -90,7 +93,7 @@ def pieces(name: str, folder: str, **given: Any) -> None:
     click.get_current_context().exit(0 if found.usable else 1)
 
 
-def text(found: Any, unit: str) -> list[str]:
+def text(found: Segmentation, unit: str) -> list[str]:
     """Format pieces as a table, with what was measured and the reasons against them."""
     from gso.cli.report import columns
     from gso.verdict import describe

@@ -7,12 +7,13 @@ import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso.errors import ConvergenceWarning
 from gso.metrics import INFO
+from gso.typing import Json
 
 if TYPE_CHECKING:
     from gso.result import Result
@@ -26,7 +27,7 @@ def status_only() -> Iterator[None]:
         yield
 
 
-def record(file: str, out: str, result: Result, unit: str = "") -> dict[str, Any]:
+def record(file: str, out: str, result: Result, unit: str = "") -> Json:
     """Summarise a result without its geometry; `unit` names its unit of length, if known."""
     from gso.result import headline
 
@@ -50,7 +51,7 @@ def record(file: str, out: str, result: Result, unit: str = "") -> dict[str, Any
     }
 
 
-def text(record: Mapping[str, Any]) -> str:
+def text(record: Json) -> str:
     """Format a record: headline, table of metrics, status, notes, and reasons against it."""
     lines = [*filter(None, [record["headline"]]), f"{record['input']} -> {record['output']}", ""]
     lines += table(record["metrics"])
@@ -68,7 +69,7 @@ def text(record: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _spline(said: Mapping[str, Any]) -> str:
+def _spline(said: Json) -> str:
     n, m = said["controls"]
     return (
         f"spline of {n} x {m} control points: mean |K| {_short(said['curvature'])} 1/size^2, "
@@ -77,7 +78,7 @@ def _spline(said: Mapping[str, Any]) -> str:
     )
 
 
-def line(record: Mapping[str, Any]) -> str:
+def line(record: Json) -> str:
     """Format a record in one line."""
     values = record["metrics"]
     shown = [record["headline"]] if record["headline"] else []
@@ -90,7 +91,7 @@ def line(record: Mapping[str, Any]) -> str:
     return "; ".join([f"{record['input']} -> {record['output']}", *shown, record["message"]])
 
 
-def table(metrics: Mapping[str, Any]) -> list[str]:
+def table(metrics: Mapping[str, float | str | None]) -> list[str]:
     """Format metrics as lines of name, value and unit."""
     rows = [(name, _short(value), unit(name)) for name, value in metrics.items()]
     return columns(rows)
@@ -112,7 +113,7 @@ def unit(name: str) -> str:
     return info.unit if info else ""
 
 
-def write_json(path: str, content: Any) -> None:
+def write_json(path: str, content: object) -> None:
     """Write JSON to a file."""
     from gso.io import replacing
 
@@ -120,7 +121,7 @@ def write_json(path: str, content: Any) -> None:
         file.write(json.dumps(content, indent=2, ensure_ascii=False).encode() + b"\n")
 
 
-def _number(value: Any) -> float | int | None:
+def _number(value: float) -> float | int | None:
     """Convert a metric to a JSON number, or None for NaN and infinity, which JSON lacks."""
     number = float(value)
     if not math.isfinite(number):
@@ -128,7 +129,7 @@ def _number(value: Any) -> float | int | None:
     return int(value) if isinstance(value, (int, np.integer)) else number
 
 
-def _short(value: Any) -> str:
+def _short(value: float | str | None) -> str:
     if value is None:
         return "-"
     return value if isinstance(value, str) else f"{value:.4g}"

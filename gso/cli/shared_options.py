@@ -8,7 +8,7 @@ from gso.errors import OptionError
 from gso.quantities import MILLIMETRES, as_length, as_strain
 
 
-class _Length(click.ParamType):
+class _Length(click.ParamType):  # type: ignore[type-arg]
     """A length such as ``5``, ``5mm`` or ``0.5%``: a number, or a text that is checked."""
 
     name = "length"
@@ -31,7 +31,7 @@ class _Length(click.ParamType):
             return value
 
 
-class _Millimetres(click.ParamType):
+class _Millimetres(click.ParamType):  # type: ignore[type-arg]
     """A length in millimetres, such as ``2`` or ``0.2cm``, as a number."""
 
     name = "mm"
@@ -46,7 +46,7 @@ class _Millimetres(click.ParamType):
             self.fail(f"{value!r} is no positive length such as 2, 2mm or 0.2cm", param, ctx)
 
 
-class _Strain(click.ParamType):
+class _Strain(click.ParamType):  # type: ignore[type-arg]
     """A strain such as ``0.01`` or ``1%``, as a ratio."""
 
     name = "strain"

@@ -12,7 +12,9 @@ from gso.cli.optimize_job import Job
 from gso.cli.single_file import single
 
 if TYPE_CHECKING:
+    from gso.mesh import Mesh
     from gso.result import Result
+    from gso.solver import Callback
 
 
 class _StripsJob(Job):
@@ -20,11 +22,11 @@ class _StripsJob(Job):
 
     task = "developable"
 
-    def solve(self, mesh: Any, **more: Any) -> Result:
+    def solve(self, mesh: Mesh, callback: Callback | None = None) -> Result:
         """Make strips of one design."""
         from gso.ruled.paneling.lay_strips import strips as lay
 
-        return lay(mesh, unit=self.unit, **self.keywords, **more)
+        return lay(mesh, unit=self.unit, **self.keywords, callback=callback)
 
 
 @click.command(short_help="Make strips that are exactly developable.")

@@ -259,9 +259,9 @@ def _make(
 
 def _check_device(device: str) -> None:
     """Raise an OptionError if there is no such device, or a BackendError without PyTorch."""
-    from gso.tno.batched.device import checked
+    from gso.tno.batched.device import check_device
 
-    checked(device)
+    check_device(device)
 
 
 @contextmanager

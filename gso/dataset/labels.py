@@ -146,10 +146,10 @@ def solve_many(
         results = iter(solve_batch(batch, good, minimise_elsewhere))
     else:
         # PyTorch is not loaded where another process minimises.
-        from gso.tno.batched.device import checked
+        from gso.tno.batched.device import check_device
         from gso.tno.batched.many import solve_all
 
-        checked(device)
+        check_device(device)
         results = solve_all(batch, good)
     found = [next(results) if isinstance(d, Mesh) else d for d in designs]
     labels = [_or_error(_labelled, kind, f) if isinstance(f, Result) else f for f in found]

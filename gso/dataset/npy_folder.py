@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ from gso.dataset.bezier import normalise
 from gso.dataset.lazy import Rows
 from gso.errors import DatasetError, MeshError
 from gso.io import replacing
-from gso.typing import Array
+from gso.typing import AnyPath, Array
 
 if TYPE_CHECKING:
     from gso.dataset.store import Dataset
@@ -77,7 +76,7 @@ def unit(grids: Array) -> Array:
 
 def export(
     data: Dataset,
-    path: str | PathLike[str],
+    path: AnyPath,
     *,
     array: str = "surface",
     only: tuple[str, ...] = (),

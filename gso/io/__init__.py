@@ -20,14 +20,14 @@ from typing import BinaryIO, NamedTuple
 from gso.errors import MeshError, OptionError
 from gso.io.atomic import check_writable, replacing, suffix_of
 from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_faces, save_patches, save_spline
-from gso.io.convert import Unwelded, as_mesh
+from gso.io.convert import as_mesh
 from gso.io.flat_svg import save_flat
 from gso.io.lines import save_lines
 from gso.io.raw_surface import Surface, welded
 from gso.io.raw_surface import checked as checked_weld
 from gso.io.source import read_bytes
 from gso.mesh import Mesh
-from gso.typing import AnyPath, MeshLike
+from gso.typing import AnyPath, MeshLike, Unwelded
 
 __all__ = [
     "SPLINE_SUFFIXES",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,26 +11,10 @@ import numpy as np
 from gso.errors import MeshError
 from gso.io.raw_surface import Surface, welded
 from gso.mesh import Mesh
-from gso.typing import MeshLike
+from gso.typing import MeshLike, Unwelded
 
 
-@dataclass(frozen=True)
-class Unwelded:
-    """Input of :func:`as_mesh` together with the distance within which to merge its vertices.
-
-    Attributes
-    ----------
-    surface : MeshLike
-        Anything that :func:`as_mesh` takes.
-    weld : float
-        Vertices within this distance of each other are merged.
-    """
-
-    surface: MeshLike
-    weld: float
-
-
-def as_mesh(x: MeshLike | Unwelded, *, weld: float | None = None) -> Mesh:
+def as_mesh(x: MeshLike, *, weld: float | None = None) -> Mesh:
     """Make a mesh from a mesh, a grid of points, vertices and faces, or a file.
 
     Parameters

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,7 +28,7 @@ def save_flat(
     *,
     unit: str = "mm",
     mesh_lines: bool = False,
-    lines: Sequence[Any] = (),
+    lines: Sequence[ArrayLike] = (),
     bends: Sequence[Bend] = (),
 ) -> None:
     """Write a flat pattern as an SVG drawing at the scale 1:1.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -220,9 +219,9 @@ def _notes(design: Mesh, results: Sequence[Result]) -> tuple[str, ...]:
     return tuple(out)
 
 
-def _details(results: Sequence[Result], areas: Sequence[float]) -> dict[str, Any]:
+def _details(results: Sequence[Result], areas: Sequence[float]) -> dict[str, object]:
     """Merge details: means of floats, equal other values, each constraint's largest violation."""
-    out: dict[str, Any] = {}
+    out: dict[str, object] = {}
     for name in dict.fromkeys(name for result in results for name in result.details):
         have = [k for k, result in enumerate(results) if name in result.details]
         values = [results[k].details[name] for k in have]

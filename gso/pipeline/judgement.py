@@ -99,7 +99,7 @@ def warning(result: Result) -> str:
 _SAME = 1e-3
 
 
-def better(one: Result, other: Result) -> bool:
+def is_better(one: Result, other: Result) -> bool:
     """Return whether a result alone is usable, or has less energy at equal usability."""
     if one.usable != other.usable:
         return one.usable

@@ -159,8 +159,8 @@ class Run:
             if number == 0:
                 self.start_refused = plan.start_refused
             if guarded and not self.start_refused:
-                plan = _entered(plan)
-                self.start_refused = _worse(plan)
+                plan = _enter_first(plan)
+                self.start_refused = _reason_against_start(plan)
             if number == 0:
                 self._planned = (request, plan)
             self.timings.setup += time.perf_counter() - clock
@@ -326,7 +326,7 @@ def _guard(plan: Plan, state: PlanState) -> tuple[Array, dict[str, float]]:
     return coordinates, energy
 
 
-def _entered(plan: Plan) -> Plan:
+def _enter_first(plan: Plan) -> Plan:
     """Return an equivalent plan whose start is that of its first stage."""
     if not plan.stages:
         return plan
@@ -336,7 +336,7 @@ def _entered(plan: Plan) -> Plan:
     )
 
 
-def _worse(plan: Plan) -> str:
+def _reason_against_start(plan: Plan) -> str:
     """Say that the start has more energy than a cold start; empty if it has not."""
     if plan.cold_start is None or not plan.stages:
         return ""

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
-from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +18,7 @@ from gso.errors import GSOError
 from gso.io import check_writable, replacing, suffix_of
 from gso.mesh import topology
 from gso.plot.heat import Heat, Scale
-from gso.typing import Array, Ints
+from gso.typing import AnyPath, Array, Ints
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -242,7 +241,7 @@ def _shading(panel: Panel, ambient: float) -> Array:
     return np.asarray(ambient + (1.05 - ambient) * lit)
 
 
-def write(figure: Figure, path: str | PathLike[str] | None) -> Figure:
+def write(figure: Figure, path: AnyPath | None) -> Figure:
     """Write a figure to a file, if one is given, and return it."""
     if path is not None:
         check_writable(path, SUFFIXES)

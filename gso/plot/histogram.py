@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso.plot.draw import require, write
-from gso.typing import Array
+from gso.typing import AnyPath, Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,7 +22,7 @@ def plot_histograms(
     values: Mapping[str, Mapping[str, Array]],
     limits: Mapping[str, tuple[float, float]],
     *,
-    path: str | PathLike[str] | None = None,
+    path: AnyPath | None = None,
 ) -> Figure:
     """Draw a histogram per quantity, with a line per group.
 

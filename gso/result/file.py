@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict
-from os import PathLike
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.cut_pieces import Pieces
 from gso.errors import MeshError
@@ -20,27 +17,27 @@ from gso.result.result import Result
 from gso.result.strips_result import StripsResult
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
+from gso.typing import AnyPath, Ints, Json
 from gso.verdict.reason import Reason
 
+#: Arrays of any type by name.
+Arrays: TypeAlias = dict[str, np.ndarray]
+
 _FORMAT = 3
+#: Attributes that a file has as they are.
+_PLAIN = ("task", "formulation", "iterations", "energy", "seconds", "backend", "warm_start")
 #: Classes of results by their kind.
 _KINDS: dict[str, type[Result]] = {kind.KIND: kind for kind in (Result, StripsResult)}
 
 
-def _record(result: Result) -> dict[str, Any]:
+def _record(result: Result) -> Json:
     """Collect everything but the arrays, as JSON-compatible values."""
     return {
         "format": _FORMAT,
         "kind": result.KIND,
-        "task": result.task,
-        "formulation": result.formulation,
+        **{name: getattr(result, name) for name in _PLAIN},
         "status": result.status.name,
-        "iterations": result.iterations,
-        "energy": result.energy,
-        "seconds": result.seconds,
-        "backend": result.backend,
         "device": "cpu",
-        "warm_start": result.warm_start,
         "notes": list(result.notes),
         "reasons": [reason.record() for reason in result.reasons],
         "details": result.details,
@@ -50,10 +47,10 @@ def _record(result: Result) -> dict[str, Any]:
     }
 
 
-def arrays(result: Result) -> dict[str, Any]:
+def arrays(result: Result) -> Arrays:
     """Return everything of a result as arrays by name; the record is JSON."""
     record = _record(result)
-    out = {
+    out: Arrays = {
         "record": np.frombuffer(json.dumps(record, default=float).encode(), np.uint8),
         "design": result.design.vertices,
         "vertices": result.on_design().vertices,
@@ -76,7 +73,7 @@ def arrays(result: Result) -> dict[str, Any]:
     return out
 
 
-def _pieces_arrays(pieces: Pieces) -> dict[str, Any]:
+def _pieces_arrays(pieces: Pieces) -> Arrays:
     return {
         "pieces_design": pieces.design.vertices,
         "pieces_faces": pieces.design.faces,
@@ -87,7 +84,7 @@ def _pieces_arrays(pieces: Pieces) -> dict[str, Any]:
     }
 
 
-def _read_pieces(data: Mapping[str, Any]) -> Pieces | None:
+def _read_pieces(data: Arrays) -> Pieces | None:
     if "pieces_design" not in data:
         return None
     vertex, seams = data["pieces_vertex"].astype(np.int64), data["pieces_seams"].astype(np.int64)
@@ -102,7 +99,7 @@ def _read_pieces(data: Mapping[str, Any]) -> Pieces | None:
     return Pieces(design, Cut(surface, vertex, seams), names)
 
 
-def read(path: str | PathLike[str]) -> Result:
+def read(path: AnyPath) -> Result:
     """Read a result; see :meth:`gso.Result.load`."""
     from gso.io.arrays import read_arrays
     from gso.io.source import read_bytes
@@ -136,19 +133,13 @@ def read(path: str | PathLike[str]) -> Result:
     return result
 
 
-def _read(record: Mapping[str, Any], kind: type[Result], design: Mesh, **shape: Any) -> Result:
+def _read(record: Json, kind: type[Result], design: Mesh, **shape: Any) -> Result:
     """Build a result from its record, and its surface and flat images by attribute."""
     result = kind(
-        task=record["task"],
-        formulation=record["formulation"],
+        **{name: record[name] for name in _PLAIN},
         design=design,
         status=Status[record["status"]],
-        iterations=record["iterations"],
-        energy=record["energy"],
         history=[Progress(**p) for p in record["history"]],
-        seconds=record["seconds"],
-        backend=record["backend"],
-        warm_start=record["warm_start"],
         notes=tuple(record["notes"]),
         details=record["details"],
         reasons=tuple(map(Reason.read, record["reasons"])),
@@ -158,7 +149,7 @@ def _read(record: Mapping[str, Any], kind: type[Result], design: Mesh, **shape: 
     return result
 
 
-def _divide(result: Result, records: list[Mapping[str, Any]], label: NDArray[np.int64]) -> None:
+def _divide(result: Result, records: list[Json], label: Ints) -> None:
     """Restore the component results from the arrays of the whole mesh."""
     from gso.components import split
 

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from os import PathLike
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Folded, Pattern
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
-from gso.typing import Array
+from gso.typing import AnyPath, Array, Ints, Keywords
 from gso.verdict.reason import Reason
 
 if TYPE_CHECKING:
@@ -117,7 +115,7 @@ class Result:
     reasons: tuple[Reason, ...] = ()
     pattern: Pattern | None = None
     components: list[Result] = field(default_factory=list)
-    names: NDArray[np.int64] | None = None
+    names: Ints | None = None
     pieces: Pieces | None = None
 
     def __post_init__(self) -> None:
@@ -166,7 +164,7 @@ class Result:
         return Folded()
 
     @property
-    def piece_of_face(self) -> NDArray[np.int64]:
+    def piece_of_face(self) -> Ints:
         """The piece of each face of `mesh` (m,), for a design in pieces."""
         return np.zeros(len(self.mesh.faces), np.int64)
 
@@ -217,7 +215,7 @@ class Result:
         found = strains(surface, pattern.flat)
         return found | {k: v for k, v in known.items() if k not in found}
 
-    def save(self, path: str | PathLike[str], *, unit: str = "mm") -> None:
+    def save(self, path: AnyPath, *, unit: str = "mm") -> None:
         """Write the result to a file; the suffix selects the format.
 
         ``.npz`` stores the whole result, to be read by :meth:`load`. ``.svg`` is the flat
@@ -234,8 +232,9 @@ class Result:
 
         suffix = io.suffix_of(path)
         if suffix == ".npz":
+            whole: Keywords = arrays(self)
             with io.replacing(path) as file:
-                np.savez(file, **arrays(self))
+                np.savez(file, **whole)
         elif suffix == ".svg":
             if self.pattern is None:
                 raise MeshError(
@@ -261,7 +260,7 @@ class Result:
             far = max(self.spline.gap or (0.0,))
             self.notes += (f"the spline was fitted to the result, {far:.3g} away at most",)
 
-    def _save_cad(self, path: str | PathLike[str], unit: str) -> None:
+    def _save_cad(self, path: AnyPath, unit: str) -> None:
         """Write the surface to a CAD file."""
         from gso import io
 
@@ -277,15 +276,15 @@ class Result:
             )
         io.save_spline(self.spline, path, unit=unit)
 
-    def arrays(self) -> dict[str, Any]:
+    def arrays(self) -> dict[str, np.ndarray]:
         """Return flat image and pattern as arrays by name, for files."""
-        out: dict[str, Any] = {} if self.flat is None else {"flat": self.flat}
+        out: dict[str, np.ndarray] = {} if self.flat is None else {"flat": self.flat}
         if self.pattern is not None and self.pattern.flat is not self.flat:
             out |= self.pattern.arrays()
         return out
 
     @classmethod
-    def shape(cls, data: Mapping[str, Any], design: Mesh) -> dict[str, Any]:
+    def shape(cls, data: Mapping[str, np.ndarray], design: Mesh) -> Keywords:
         """Return surface, flat image and pattern from the arrays of a file, by attribute.
 
         Raises
@@ -302,7 +301,7 @@ class Result:
         return {"mesh": mesh, "flat": flat, "pattern": pattern}
 
     @classmethod
-    def load(cls, path: str | PathLike[str]) -> Result:
+    def load(cls, path: AnyPath) -> Result:
         """Read a result written as ``.npz``; nothing is unpickled.
 
         Raises

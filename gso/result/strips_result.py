@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from os import PathLike
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.mesh import Mesh
 from gso.pattern import Folded
 from gso.result.result import Result
+from gso.typing import AnyPath, Ints, Keywords
 
 if TYPE_CHECKING:
     from gso.metrics import Distances
@@ -53,7 +52,7 @@ class StripsResult(Result):
         return self.ruled.folded
 
     @property
-    def piece_of_face(self) -> NDArray[np.int64]:
+    def piece_of_face(self) -> Ints:
         """The piece of each face of `mesh` (m,), for a design in pieces."""
         # A piece without strips is one part.
         last = np.cumsum(np.maximum(self.details["strips"], 1))
@@ -78,7 +77,7 @@ class StripsResult(Result):
     def add_spline(self) -> None:
         """Leave it as it is: strips have splines of their own."""
 
-    def _save_cad(self, path: str | PathLike[str], unit: str) -> None:
+    def _save_cad(self, path: AnyPath, unit: str) -> None:
         """Write smooth strips to a CAD file, or planar faces where these are not torsal."""
         from gso import io
         from gso.ruled.smooth.smooth_surface import smooth_strips
@@ -108,12 +107,12 @@ class StripsResult(Result):
             )
         self.notes += (note,)
 
-    def arrays(self) -> dict[str, Any]:
+    def arrays(self) -> dict[str, np.ndarray]:
         """Return the surface as arrays by name, for files."""
         return self.ruled.arrays()
 
     @classmethod
-    def shape(cls, data: Mapping[str, Any], design: Mesh) -> dict[str, Any]:
+    def shape(cls, data: Mapping[str, np.ndarray], design: Mesh) -> Keywords:
         """Return surface and pattern from the arrays of a file, by attribute."""
         from gso.ruled.ruled_surface import RuledSurface
 
@@ -122,7 +121,7 @@ class StripsResult(Result):
         )
 
     @staticmethod
-    def attributes(surface: RuledSurface) -> dict[str, Any]:
+    def attributes(surface: RuledSurface) -> Keywords:
         """Return mesh, flat image and pattern of a surface of strips, by attribute."""
         pattern = surface.pattern
         flat = None if pattern.is_cut else pattern.flat

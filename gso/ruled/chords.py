@@ -191,7 +191,7 @@ def _cornered(at: Array, sharp: Ints) -> Array:
 
     Otherwise the line between two of them would cut off the corner.
     """
-    out = at.copy()
+    out: Array = at.copy()
     low, high = min(at[0], at[-1]), max(at[0], at[-1])
     rounds = np.arange(int(low // _COUNT), int(high // _COUNT) + 1) * _COUNT
     for corner in (sharp + rounds[:, None]).ravel().tolist() if len(at) > 2 else ():
@@ -223,7 +223,7 @@ def _ordered(at: Array, move: Array, held: tuple[bool, bool]) -> Array:
 def _even(ends: Ints, held: tuple[bool, bool]) -> Array:
     """Smooth the ends of a sequence along the outline; those that are held stay."""
     window = np.ones(_WINDOW) / _WINDOW
-    smooth = ends.astype(float)
+    smooth: Array = ends.astype(float)
     for _ in range(2):
         smooth = np.convolve(np.pad(smooth, _WINDOW // 2, mode="edge"), window, mode="valid")
     whole = np.linspace(0.0, 1.0, len(ends))
@@ -231,7 +231,8 @@ def _even(ends: Ints, held: tuple[bool, bool]) -> Array:
         smooth += (ends[0] - smooth[0]) * (1.0 - whole)
     if held[1]:
         smooth += (ends[-1] - smooth[-1]) * whole
-    return (1.0 - _EVEN) * smooth + _EVEN * (smooth[0] + (smooth[-1] - smooth[0]) * whole)
+    line: Array = smooth[0] + (smooth[-1] - smooth[0]) * whole
+    return (1.0 - _EVEN) * smooth + _EVEN * line
 
 
 def turned(

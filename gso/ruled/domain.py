@@ -7,14 +7,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.mesh.normals import vertex_normals
 from gso.ruled.polygon import enclosed_area, resampled, turning
 from gso.ruled.vectors import lengths, unit
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Width of the continuation, relative to the length of the outline.
 _MARGIN = 0.018
@@ -81,7 +80,7 @@ class Domain:
         loop = loop if enclosed_area(loop) > 0 else loop[::-1]
         return np.roll(loop, -_start(loop), axis=0)
 
-    def encloses(self, places: Array) -> NDArray[np.bool_]:
+    def encloses(self, places: Array) -> Flags:
         """Return which places (k, 2) of the plane are inside :attr:`around`."""
         import shapely
 

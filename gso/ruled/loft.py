@@ -256,7 +256,7 @@ def _faces(corners: Ints) -> Ints:
     """Return the faces (f, 4) of corners, anticlockwise in the pattern; -1 ends a triangle."""
     faces = corners[:, [2, 3, 1, 0]]
     one, other = faces[:, 0] == faces[:, 3], faces[:, 1] == faces[:, 2]
-    out = faces.copy()
+    out: Ints = faces.copy()
     out[one, 3] = -1
     out[other] = np.column_stack([faces[other][:, [0, 1, 3]], np.full(other.sum(), -1)])
     return out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso.mesh.polyline import arc_lengths
 from gso.typing import Array, Ints
 
 #: Turning angles of sharp corners, and the largest for which offsets are lengthened.
@@ -23,7 +24,7 @@ def resampled(loop: Array, count: int) -> tuple[Array, Array]:
     the offset is longer, so that the offset polygon has corners too.
     """
     closed = np.vstack([loop, loop[:1]])
-    along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))]
+    along = arc_lengths(closed)
     at = np.linspace(0.0, along[-1], count, endpoint=False)
     turn = turning(loop)
     for k in np.argsort(turn):
@@ -49,7 +50,8 @@ def turning(loop: Array) -> Array:
     way = np.roll(loop, -1, axis=0) - loop
     back = np.roll(way, 1, axis=0)
     cross = back[:, 0] * way[:, 1] - back[:, 1] * way[:, 0]
-    return np.arctan2(cross, (back * way).sum(axis=1))
+    turns: Array = np.arctan2(cross, (back * way).sum(axis=1))
+    return turns
 
 
 def on(loop: Array, at: Array) -> Array:

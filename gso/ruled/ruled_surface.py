@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from gso.ruled.unroll import Unrolled
 from gso.ruled.untrimmed import Untrimmed
 from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Flags, Ints
+
+_Map: TypeAlias = Callable[[Array], Array]
 
 #: Names of the arrays in files.
 _FOLDS, _PARTS = ("rulings", "creases"), ("edges", "angles", "radii")
@@ -115,9 +117,9 @@ class RuledSurface:
         """The rulings in the pattern, as lines."""
         return self.folded.lines(self.pattern.flat)
 
-    def arrays(self) -> dict[str, Array]:
+    def arrays(self) -> dict[str, np.ndarray]:
         """Return the surface as arrays by name, except `moved`; see :meth:`from_arrays`."""
-        out: dict[str, Any] = {
+        out: dict[str, np.ndarray] = {
             "ruled_vertices": self.mesh.vertices,
             "ruled_faces": self.mesh.faces,
             "ruled_strip": self.strip,
@@ -132,7 +134,7 @@ class RuledSurface:
         return out | self.pattern.arrays("ruled_pattern_")
 
     @classmethod
-    def from_arrays(cls, data: Mapping[str, Any], moved: Array) -> RuledSurface:
+    def from_arrays(cls, data: Mapping[str, np.ndarray], moved: Array) -> RuledSurface:
         """Return the surface that :meth:`arrays` describes.
 
         Raises
@@ -220,7 +222,7 @@ class RuledSurface:
         along = np.clip((points - a[k]) @ way[k], 0.0, size[k])
         return np.asarray(a[k] + along[:, None] * way[k])
 
-    def transformed(self, move: Any, scale: float, back: Any) -> RuledSurface:
+    def transformed(self, move: _Map, scale: float, back: _Map) -> RuledSurface:
         """Return the surface in another frame.
 
         Parameters

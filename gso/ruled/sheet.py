@@ -39,5 +39,6 @@ def _seams(mesh: Mesh, table: Ints) -> Ints:
                 for v in (he.origin[k], he.dest[k])
             ]
         )
-    pairs = np.stack([np.stack(e, axis=1) for e in ends], axis=1)
-    return pairs[(pairs[:, 0] != pairs[:, 1]).any(axis=1)]
+    both = np.stack([np.stack(e, axis=1) for e in ends], axis=1)
+    pairs: Ints = both[(both[:, 0] != both[:, 1]).any(axis=1)]
+    return pairs

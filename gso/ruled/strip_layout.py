@@ -47,7 +47,7 @@ class Strips:
     @property
     def count(self) -> int:
         """Number of strips side by side."""
-        return self.index[0].shape[1] - 1
+        return int(self.index[0].shape[1]) - 1
 
     @cached_property
     def size(self) -> int:
@@ -111,9 +111,9 @@ class Strips:
     @cached_property
     def sides(self) -> Ints:
         """Vertices (e, 2) that follow each other on border curves and creases, if different."""
-        pairs = [np.stack([i[:-1], i[1:]], axis=2).reshape(-1, 2) for i in self.index]
-        out = np.concatenate(pairs)
-        return out[out[:, 0] != out[:, 1]]
+        rows = [np.stack([i[:-1], i[1:]], axis=2).reshape(-1, 2) for i in self.index]
+        pairs: Ints = np.concatenate(rows)
+        return _different(pairs)
 
     @cached_property
     def outer(self) -> Ints:
@@ -264,5 +264,5 @@ def _shared(sides: Ints, face: Ints) -> tuple[Ints, Ints, Ints]:
 
 
 def _different(triples: Ints) -> Ints:
-    same = (triples[:, :-1] == triples[:, 1:]).any(axis=1)
-    return triples[~same]
+    out: Ints = triples[(triples[:, :-1] != triples[:, 1:]).all(axis=1)]
+    return out

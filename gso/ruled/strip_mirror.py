@@ -51,6 +51,6 @@ class Mirror:
         image = self.image(points)
         ways = [index[:, ::-1], index[::-1], index[::-1, ::-1]]
         far = [((points[index] - image[way]) ** 2).sum() for way in ways]
-        out = points.copy()
+        out: Array = points.copy()
         out[index] = 0.5 * (points[index] + image[ways[int(np.argmin(far))]])
         return out

@@ -76,7 +76,8 @@ class System:
     def _entries(self, rows: Ints, columns: Ints) -> Ints:
         """Return places in the flat band storage of entries by row and column."""
         row, column = np.broadcast_arrays(rows, columns)
-        return ((2 * self.band + row - column) * self.size + column).reshape(-1)
+        places: Ints = (2 * self.band + row - column) * self.size + column
+        return places.reshape(-1)
 
     def blocks(self, corners: Ints) -> Ints:
         """Return the places of the blocks of groups (g, c) of vertices: (g * 3c * 3c,)."""
@@ -95,7 +96,7 @@ class System:
 
         Without derivatives the multipliers are decoupled.
         """
-        out = matrix.copy()
+        out: Array = matrix.copy()
         if slopes is None:
             out[self._corner] = 1.0
             return out

@@ -6,9 +6,10 @@ with them in the parameters of :mod:`gso.ruled.strip_embedding`.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gso.mesh.closest_point import Nearest
 from gso.ruled.division import Trimmed, meshed
@@ -19,6 +20,9 @@ from gso.ruled.strip_layout import Strips
 from gso.ruled.unroll import Unrolled
 from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Ints
+
+if TYPE_CHECKING:
+    from shapely import Geometry, LinearRing, Polygon
 
 #: Grids of the parameters, to which intersections are rounded; coarser ones are more robust.
 _GRIDS = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8)
@@ -71,7 +75,7 @@ def trimmed(target: Extended, strips: Strips, vertices: Array, unrolled: Unrolle
     return meshed(polygons, nodes, unrolled)
 
 
-def _clipped(cells: Any, region: Any) -> Any:
+def _clipped(cells: NDArray[np.object_], region: Geometry) -> Any:
     """Return the intersections of polygons with a region, on the finest grid that works."""
     import shapely
 
@@ -133,7 +137,7 @@ def _along_normals(
     return which, shares
 
 
-def _enclosed(ring: Array) -> Any:
+def _enclosed(ring: Array) -> Geometry:
     """Return the region around which a closed polygon (n, 2) turns, as a Shapely polygon."""
     import shapely
 
@@ -164,5 +168,5 @@ def _dense(loop: Array, step: float) -> Array:
     return loop[at] + share[:, None] * edge[at]
 
 
-def _rings(piece: Any) -> list[Any]:
+def _rings(piece: Polygon) -> list[LinearRing]:
     return [piece.exterior, *piece.interiors]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -45,7 +44,7 @@ class Untrimmed:
         }
 
     @classmethod
-    def from_arrays(cls, data: Mapping[str, Any]) -> Untrimmed:
+    def from_arrays(cls, data: Mapping[str, np.ndarray]) -> Untrimmed:
         """Return the strips that :meth:`arrays` describes.
 
         Raises

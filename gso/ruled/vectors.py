@@ -16,7 +16,8 @@ def cross(a: Array, b: Array) -> Array:
 
 def lengths(a: Array) -> Array:
     """Return the lengths of vectors along the last axis."""
-    return np.sqrt(np.einsum("...d,...d->...", a, a))
+    squared: Array = np.einsum("...d,...d->...", a, a)
+    return np.sqrt(squared)
 
 
 def unit(a: Array) -> Array:

@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gso.cut_pieces import Piece, Pieces
 from gso.seams.cutting import cut
@@ -40,7 +40,7 @@ __all__ = [
 _SEARCH = {"pieces": "search", "Segmentation": "segmentation", "Sheet": "sheets"}
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _SEARCH:
         raise AttributeError(f"module 'gso.seams' has no attribute {name!r}")
     value = getattr(import_module(f"gso.seams.{_SEARCH[name]}"), name)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.mesh import Mesh
 from gso.seams.potential import Potential
-from gso.typing import Ints
+from gso.typing import Flags, Ints
 
 
 class Estimates:
@@ -24,7 +23,7 @@ class Estimates:
         Vertices on the boundary, and on edges that are cut in any case.
     """
 
-    def __init__(self, mesh: Mesh, potential: Potential, fixed: NDArray[np.bool_]):
+    def __init__(self, mesh: Mesh, potential: Potential, fixed: Flags):
         self._faces, self._potential, self._fixed = mesh.faces, potential, fixed
         self._known: dict[tuple[int, int], float | None] = {}
         # The exclusive or of random numbers of 128 bits is the key of a set, in any order.
@@ -57,7 +56,7 @@ class Estimates:
         return self._potential.strain(self._potential.solve(fixed, inner), ids)
 
 
-def _rim(faces: Ints, count: int) -> tuple[NDArray[np.bool_], bool]:
+def _rim(faces: Ints, count: int) -> tuple[Flags, bool]:
     """Mark the vertices on the boundary of faces (m, 3 or 4), and tell whether they are a disk."""
     size = (faces >= 0).sum(axis=1)
     place = np.arange(faces.shape[1])

@@ -155,7 +155,7 @@ class Slice(Seam):
                 f"a slice has point {self.point!r} and normal {self.normal!r}; they must be "
                 "three finite numbers each, and the normal not zero"
             )
-        height = (mesh.vertices - point) @ (normal / size)
+        height: Array = (mesh.vertices - point) @ (normal / size)
         height[np.abs(height) < 1e-9 * mesh.diagonal] = 0.0
         return height
 

@@ -27,7 +27,7 @@ class Merging:
     def __init__(self, ground: Ground, label: Ints, strain: float, compact: float):
         mesh = ground.mesh
         self.ground, self.strain, self.compact = ground, strain, compact
-        self.label = label.astype(np.int64).copy()
+        self.label: Ints = label.astype(np.int64).copy()
         he = mesh.half_edges
         k = he.interior
         self._ends = np.stack([he.origin[k], he.dest[k]], axis=1)

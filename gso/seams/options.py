@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +13,7 @@ from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
 from gso.quantities import Length, as_length, millimetres
-from gso.typing import Array
+from gso.typing import Array, Ints
 from gso.verdict import Code
 
 #: Factors on the cost of edges in regions to avoid, and on edges to follow.
@@ -129,7 +128,7 @@ def prices(mesh: Mesh, along: ArrayLike | None, avoid: ArrayLike | None) -> Arra
     return factor
 
 
-def _faces(given: ArrayLike, count: int) -> Any:
+def _faces(given: ArrayLike, count: int) -> Ints:
     faces = np.atleast_1d(np.asarray(given))
     if faces.dtype == bool and faces.shape == (count,):
         return np.flatnonzero(faces)
@@ -141,6 +140,6 @@ def _faces(given: ArrayLike, count: int) -> Any:
     return faces
 
 
-def _positive(value: Any) -> bool:
+def _positive(value: float) -> bool:
     real = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     return bool(real and 0 < value < np.inf)

@@ -6,9 +6,8 @@ import json
 import math
 import os
 import re
-from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from gso import io
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.attributes import Attributes, Labels
+from gso.typing import AnyPath, Json
 
 #: Names of files that an earlier call may have left.
 _PATTERN = re.compile(r"pattern(s|_[\w.-]+)\.svg")
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from gso.seams.segmentation import Segmentation
 
 
-def save(found: Segmentation, folder: str | PathLike[str], unit: str = "mm") -> list[str]:
+def save(found: Segmentation, folder: AnyPath, unit: str = "mm") -> list[str]:
     """Write the files of :meth:`Segmentation.save`, and return their names."""
     from gso.seams.segmentation import whole_pattern
 
@@ -76,7 +76,7 @@ def grouped(found: Segmentation) -> Mesh:
     return Mesh(design.vertices, design.faces[order], attributes=Attributes(labels=labels))
 
 
-def record(found: Segmentation, unit: str) -> dict[str, Any]:
+def record(found: Segmentation, unit: str) -> Json:
     """Return metrics, reasons, notes and the table as JSON-compatible values."""
     return {
         "unit": unit,
@@ -94,7 +94,7 @@ def record(found: Segmentation, unit: str) -> dict[str, Any]:
     }
 
 
-def _plain(values: dict[str, Any]) -> dict[str, Any]:
+def _plain(values: Json) -> Json:
     """Replace numbers that JSON lacks by None."""
     return {
         k: v if isinstance(v, str) else (float(v) if math.isfinite(v) else None)

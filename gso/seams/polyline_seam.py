@@ -107,7 +107,8 @@ def _nearest_vertices(mesh: Mesh, points: Array) -> Ints:
     from scipy.spatial import cKDTree
 
     used = np.flatnonzero(mesh.used)
-    return used[cKDTree(mesh.vertices[used]).query(points)[1]]
+    nearest: Ints = used[cKDTree(mesh.vertices[used]).query(points)[1]]
+    return nearest
 
 
 def _straight(mesh: Mesh, start: int, goal: int) -> tuple[Mesh, Ints, Ints | None]:

@@ -13,14 +13,13 @@ Springborn, Schroeder and Pinkall 2008, Conformal equivalence of triangle meshes
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 
 from gso import geometry
 from gso.linalg import spd
 from gso.mesh import Mesh
 from gso.mesh.topology import are_quads, corner_triangles
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Angles below this, in radians, count as this large in the cotangent weights.
 _SHARP = 1e-2
@@ -72,7 +71,7 @@ class Potential:
             (np.r_[-w, -w, w, w], (rows, columns)), shape=(count, count)
         ).tocsr()
 
-    def solve(self, fixed: NDArray[np.bool_], within: Ints | None = None) -> Array:
+    def solve(self, fixed: Flags, within: Ints | None = None) -> Array:
         """Return u (n,), which is zero at fixed vertices.
 
         Every component needs a fixed vertex.

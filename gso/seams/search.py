@@ -6,7 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +38,10 @@ from gso.seams.segmentation import Segmentation
 from gso.seams.straight import straight
 from gso.seams.tree import Ground
 from gso.tasks.request import check
+from gso.typing import MeshLike
+
+#: Seams that stay: what :func:`gso.cut` takes, or an earlier result for the same mesh.
+Kept: TypeAlias = "Seam | Iterable[Seam] | ArrayLike | Pieces | None"
 
 #: Ratio of the estimated to the measured strain of a first attempt.
 _RATIO = 1.3
@@ -51,7 +55,7 @@ _SAME = 1e-9
 
 
 def pieces(
-    mesh: Any,
+    mesh: MeshLike,
     *,
     max_strain: Strain | None = None,
     max_deviation: Length | None = None,
@@ -63,7 +67,7 @@ def pieces(
     min_size: Length | None = None,
     sheet: tuple[Length, Length] | None = None,
     unit: str = "mm",
-    keep: Seam | Iterable[Seam] | ArrayLike | Pieces | None = None,
+    keep: Kept = None,
     along: ArrayLike | None = None,
     avoid: ArrayLike | None = None,
     denoise: bool = False,
@@ -193,7 +197,12 @@ def pieces(
 
 
 def _ground(
-    design: Mesh, keep: Any, along: Any, avoid: Any, symmetric: bool, denoise: bool
+    design: Mesh,
+    keep: Kept,
+    along: ArrayLike | None,
+    avoid: ArrayLike | None,
+    symmetric: bool,
+    denoise: bool,
 ) -> Ground:
     design.check_joined()
     kept = np.empty((0, 2), np.int64)

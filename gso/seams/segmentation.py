@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from os import PathLike
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +12,7 @@ from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.result import Result
 from gso.seams.sheets import Sheet
-from gso.typing import Ints
+from gso.typing import AnyPath, Array, Ints, Json
 from gso.verdict import Reason
 
 
@@ -94,7 +92,7 @@ class Segmentation(Pieces):
         """
         allowed = 1e-6 * self.design.diagonal if tolerance is None else tolerance
         groups: list[list[int]] = []
-        known: list[np.ndarray[Any, Any]] = []
+        known: list[Array] = []
         for number, sheet in enumerate(self.sheets):
             if sheet is None:
                 groups.append([number])
@@ -110,7 +108,7 @@ class Segmentation(Pieces):
                 known.append(outline)
         return groups
 
-    def table(self) -> list[dict[str, Any]]:
+    def table(self) -> list[Json]:
         """Return a row for each piece: name, faces, area, length, width, strain, darts."""
         from gso.metrics import area
 
@@ -118,7 +116,7 @@ class Segmentation(Pieces):
         sides, lengths = self.sides, self.lengths
         for number, piece in enumerate(self):
             sheet = self.sheets[number] if number < len(self.sheets) else None
-            row: dict[str, Any] = {
+            row: Json = {
                 "name": piece.name,
                 "faces": len(piece.faces),
                 "area": area(piece.mesh),
@@ -135,7 +133,7 @@ class Segmentation(Pieces):
             rows.append(row)
         return rows
 
-    def save(self, folder: str | PathLike[str], *, unit: str = "mm") -> list[str]:
+    def save(self, folder: AnyPath, *, unit: str = "mm") -> list[str]:
         """Write a folder of files, and return their names.
 
         Patterns that an earlier call wrote to the folder, by its ``pieces.json``, are deleted.
@@ -156,7 +154,7 @@ class Segmentation(Pieces):
         return f"Segmentation({said}{'' if self.usable else '; not usable'})"
 
 
-def whole_pattern(found: Segmentation) -> tuple[Mesh, np.ndarray[Any, Any]]:
+def whole_pattern(found: Segmentation) -> tuple[Mesh, Array]:
     """Return all pieces as one mesh, and their patterns side by side, (p, 2)."""
     from gso.parametrization.packing import beside, upright
 
@@ -173,7 +171,7 @@ def whole_pattern(found: Segmentation) -> tuple[Mesh, np.ndarray[Any, Any]]:
     return Mesh(points, np.concatenate(shifted)), np.concatenate(flats)
 
 
-def _outline(sheet: Sheet) -> np.ndarray[Any, Any]:
+def _outline(sheet: Sheet) -> Array:
     """Return edge lengths and turns along the boundary of a pattern, (k, 2)."""
     p = sheet.flat[sheet.mesh.boundary_loops[0]]
     step = np.roll(p, -1, axis=0) - p
@@ -183,7 +181,7 @@ def _outline(sheet: Sheet) -> np.ndarray[Any, Any]:
     return np.stack([size, turn * 0.5 * (size + np.roll(size, -1))], axis=1)
 
 
-def _same(one: np.ndarray[Any, Any], two: np.ndarray[Any, Any], allowed: float) -> bool:
+def _same(one: Array, two: Array, allowed: float) -> bool:
     """Tell whether two closed outlines are equal from some vertex on."""
     if one.shape != two.shape or not len(one):
         return False

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.mesh.topology import edge_keys, label_components
 from gso.seams.chains import chains
 from gso.seams.merging import Merging
 from gso.seams.tree import Ground
-from gso.typing import Ints
+from gso.typing import Flags, Ints
 
 #: Number of passes over all seams, and number of edges that are straightened together.
 _PASSES, _WINDOW = 3, 12
@@ -28,7 +27,7 @@ def straightened(ground: Ground, merging: Merging) -> Ints:
         The piece of each face.
     """
     mesh = ground.mesh
-    label = merging.label.copy()
+    label: Ints = merging.label.copy()
     kept = np.zeros(len(mesh.vertices), bool)
     kept[ground.kept] = True
     for number in range(_PASSES):
@@ -129,7 +128,7 @@ def _inside(ground: Ground, label: Ints, a: int, b: int) -> Ints:
     return np.flatnonzero((there == every) & (every > 0) & ~mesh.half_edges.boundary_vertex)
 
 
-def _divided(ground: Ground, faces: Ints, path: Ints) -> NDArray[np.bool_] | None:
+def _divided(ground: Ground, faces: Ints, path: Ints) -> Flags | None:
     """Divide faces along a path: mark those on one side; None unless there are two sides."""
     mesh, n = ground.mesh, len(ground.mesh.vertices)
     he = mesh.half_edges

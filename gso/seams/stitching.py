@@ -14,6 +14,7 @@ from gso.cut_pieces import Pieces
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.cut import cut
+from gso.mesh.polyline import arc_lengths
 from gso.seams.chains import chains
 from gso.seams.sheets import Sheet, flattened
 from gso.seams.tree import Ground
@@ -79,7 +80,7 @@ def stitched(
     sides = dict(zip(every, pieces.sides.tolist(), strict=True))
     cut_keys = set(every)
     spans = chains(pieces.edges, pieces.sides)
-    lengths = [_along(mesh, line) for _, line in spans]
+    lengths = [arc_lengths(mesh.vertices[line]) for _, line in spans]
     for k in np.argsort([-float(s[-1]) for s in lengths], kind="stable").tolist():
         (a, b), line = spans[k]
         a, b = _root(root, a), _root(root, b)
@@ -132,11 +133,6 @@ def _root(root: list[int], k: int) -> int:
     while root[k] != k:
         k = root[k]
     return k
-
-
-def _along(mesh: Mesh, line: Ints) -> Array:
-    step = np.linalg.norm(np.diff(mesh.vertices[line], axis=0), axis=1)
-    return np.r_[0.0, np.cumsum(step)]
 
 
 def _parts(along: Array, neck: float) -> Iterator[tuple[int, int]]:

@@ -15,14 +15,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso.mesh import Mesh
 from gso.mesh.paths import Paths
 from gso.seams.compact_patches import patches
 from gso.seams.estimates import Estimates
 from gso.seams.potential import Potential
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Share of the largest potential that is added to it, so that no edge costs too much.
 _FLOOR = 0.05
@@ -97,9 +96,9 @@ class Ground:
         return self._patches[count]
 
     @property
-    def begun(self) -> NDArray[np.bool_]:
+    def begun(self) -> Flags:
         """Vertices (n,) on the boundary or on edges that are cut in any case."""
-        out = self.mesh.half_edges.boundary_vertex.copy()
+        out: Flags = self.mesh.half_edges.boundary_vertex.copy()
         out[self.kept] = True
         return out
 
@@ -155,7 +154,7 @@ def cut_tree(ground: Ground, strain: float, neck: float = 0.0) -> Ints:
     return np.unique(np.sort(np.concatenate(found), axis=1), axis=0)
 
 
-def _across(ground: Ground, reached: NDArray[np.bool_], line: Ints) -> Ints:
+def _across(ground: Ground, reached: Flags, line: Ints) -> Ints:
     """Continue a cut from its tip to the boundary on the other side."""
     size = np.abs(ground.potential.solve(reached))
     goals, closed = reached.copy(), np.zeros(len(reached), bool)
@@ -181,7 +180,7 @@ def _edges(line: Ints) -> Ints:
     return np.stack([line[:-1], line[1:]], axis=1)
 
 
-def _seeds(ground: Ground, reached: NDArray[np.bool_]) -> list[int]:
+def _seeds(ground: Ground, reached: Flags) -> list[int]:
     """Choose a vertex to begin with in each component without boundary or given cut."""
     label = ground.mesh.components
     out = []

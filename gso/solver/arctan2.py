@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-def arctan2(y, x):
+def arctan2(y: float, x: float) -> float:
     """Return the angle of the vector (x, y) in radians, to 5e-16; written for Numba.
 
     Components must be finite and below 1e307; the sign of zero does not count.

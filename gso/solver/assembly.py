@@ -6,17 +6,20 @@ import hashlib
 from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gso.linalg.base import Pattern
-from gso.solver.ranking import Pairs, ranked
+from gso.solver.ranking import Pairs, rank
 from gso.typing import Array, Ints
 
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
-def _repeated(columns: Ints) -> Ints:
+
+def _find_repeated(columns: Ints) -> Ints:
     """Find pairs a < b of an element that are the same unknown, as ordered by :func:`products`.
 
     Such a pair contributes to the diagonal of the matrix twice.
@@ -53,7 +56,7 @@ class Places:
     @cached_property
     def scatter(self) -> Ints:
         """The place of each entry, (pairs * e,), ordered as by :func:`products`."""
-        return self.by_element.T.astype(np.int64).ravel()
+        return np.ravel(self.by_element.T.astype(np.int64))
 
 
 @dataclass
@@ -72,7 +75,7 @@ _assemblies: OrderedDict[bytes, tuple[Assembly, int]] = OrderedDict()
 _KEPT = 12_000_000
 
 
-def assemble(n: int, columns: list[Ints], quadratic) -> Assembly:
+def assemble(n: int, columns: list[Ints], quadratic: csc_matrix) -> Assembly:
     """Return the pattern of element matrices, a constant matrix and a diagonal; cached."""
     pairs = sum(c.shape[0] * (c.shape[0] + 1) // 2 * c.shape[1] for c in columns)
     digest = hashlib.blake2b(str(n).encode())
@@ -83,7 +86,7 @@ def assemble(n: int, columns: list[Ints], quadratic) -> Assembly:
     if key in _assemblies:
         _assemblies.move_to_end(key)
         return _assemblies[key][0]
-    assembly = _analysed(n, columns, quadratic)
+    assembly = _analyse(n, columns, quadratic)
     if pairs <= _KEPT:
         _assemblies[key] = assembly, pairs
         while sum(size for _, size in _assemblies.values()) > _KEPT:
@@ -91,15 +94,15 @@ def assemble(n: int, columns: list[Ints], quadratic) -> Assembly:
     return assembly
 
 
-def _analysed(n: int, columns: list[Ints], quadratic: Any) -> Assembly:
+def _analyse(n: int, columns: list[Ints], quadratic: csc_matrix) -> Assembly:
     """Compute the position in the matrix of every product of two unknowns of an element."""
     every = np.arange(n)
     entries = np.stack([np.repeat(every, np.diff(quadratic.indptr)), quadratic.indices])
     constant = Pairs(entries, n, (np.array([0]), np.array([1])))
     groups = [*(Pairs(own, n) for own in columns), constant, Pairs(every[None], n)]
-    (*own, fixed, diagonal), column, row = ranked(groups, n)
+    (*own, fixed, diagonal), column, row = rank(groups, n)
     pattern = Pattern(n, np.searchsorted(column, np.arange(n + 1)), row)
-    places = [Places(at, _repeated(c)) for at, c in zip(own, columns, strict=True)]
+    places = [Places(at, _find_repeated(c)) for at, c in zip(own, columns, strict=True)]
     return Assembly(pattern, places, *(x[:, 0].astype(np.int64) for x in (fixed, diagonal)))
 
 

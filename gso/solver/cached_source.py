@@ -13,6 +13,7 @@ import logging
 import os
 import sys
 import tempfile
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -21,7 +22,9 @@ from typing import Any
 from gso.solver.arctan2 import arctan2
 
 _log = logging.getLogger("gso")
-_HEAD = """import numpy as np
+_HEAD = """from __future__ import annotations
+
+import numpy as np
 from numba import njit
 
 
@@ -32,7 +35,7 @@ from numba import njit
 """
 
 
-def compiled(source: str) -> Any:
+def compile_source(source: str) -> Callable[..., None]:
     """Compile a function called ``kernel``, or load it if an earlier process has compiled it.
 
     Parameters
@@ -45,17 +48,18 @@ def compiled(source: str) -> Any:
         text = _head(cache=True) + source
         path = folder / f"kernel_{_digest(text)}.py"
         try:
-            new = _written(path, text)
+            new = _write(path, text)
         except OSError:
             pass
         else:
             if new:
                 _say()
-            return _imported(path)
+            return _load(path)
     _say()
     scope: dict[str, Any] = {}
     exec(compile(_head(cache=False) + source, "<gso kernel>", "exec"), scope)
-    return scope["kernel"]
+    kernel: Callable[..., None] = scope["kernel"]
+    return kernel
 
 
 def _head(*, cache: bool) -> str:
@@ -97,7 +101,7 @@ def _digest(text: str) -> str:
     return hashlib.blake2b(said.encode(), digest_size=16).hexdigest()
 
 
-def _written(path: Path, text: str) -> bool:
+def _write(path: Path, text: str) -> bool:
     """Write a file unless it is there; return whether it was written."""
     if path.exists() and path.read_text(encoding="utf-8") == text:
         return False
@@ -110,7 +114,7 @@ def _written(path: Path, text: str) -> bool:
     return True
 
 
-def _imported(path: Path) -> Any:
+def _load(path: Path) -> Callable[..., None]:
     name = f"gso_{path.stem}"
     if name not in sys.modules:
         module = ModuleType(name)
@@ -122,4 +126,5 @@ def _imported(path: Path) -> Any:
         except BaseException:
             del sys.modules[name]
             raise
-    return sys.modules[name].kernel
+    kernel: Callable[..., None] = sys.modules[name].kernel
+    return kernel

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso.typing import Array, Ints
 from gso.unknowns import Variables
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 _NO_INTS = np.empty(0, np.int64)
 _ALL = slice(None)
@@ -17,7 +20,7 @@ _ALL = slice(None)
 class Same:
     """Every coordinate is a single unknown, or fixed."""
 
-    #: How the compiled loops apply it, see :func:`gso.solver.loops.added`.
+    #: How the compiled loops apply it, see :func:`gso.solver.loops.add_elements`.
     kind = 0
 
     @property
@@ -25,7 +28,7 @@ class Same:
         """Begin of the parts of each coordinate, place of each part's unknown, and its factor."""
         return _NO_INTS, _NO_INTS, np.empty(0)
 
-    def pulled(self, slope: Array, at: slice = _ALL) -> Array:
+    def pull(self, slope: Array, at: slice = _ALL) -> Array:
         """Return the Jacobian by unknowns (r, q, e) of some elements from that by coordinates."""
         return slope
 
@@ -51,11 +54,11 @@ class ByPoint(Same):
     def parts(self) -> tuple[Ints, Ints, Array]:
         return _NO_INTS, _NO_INTS, self._share
 
-    def pulled(self, slope: Array, at: slice = _ALL) -> Array:
+    def pull(self, slope: Array, at: slice = _ALL) -> Array:
         gather = self._gather[:, at]
         product = slope * self._share.take(gather)
         by_point = product.reshape(len(slope), -1, self._dim, gather.shape[1])
-        out = by_point[:, :, 0].copy()
+        out: Array = by_point[:, :, 0].copy()
         for d in range(1, self._dim):
             out += by_point[:, :, d]
         return out
@@ -74,12 +77,12 @@ class Sums(Same):
 
     kind = 2
 
-    def __init__(self, pull: Any, count: int):
-        self._pull, self._count = pull, count
+    def __init__(self, pull: csr_matrix, count: int):
+        self._matrix, self._count = pull, count
 
     @cached_property
     def parts(self) -> tuple[Ints, Ints, Array]:
-        by_coordinate, count = self._pull.tocsc(), self._count
+        by_coordinate, count = self._matrix.tocsc(), self._count
         size = np.diff(by_coordinate.indptr).reshape(-1, count).T
         begin = np.r_[0, np.cumsum(size)]
         order = np.repeat(by_coordinate.indptr[:-1].reshape(-1, count).T.ravel(), size.ravel())
@@ -87,8 +90,8 @@ class Sums(Same):
         unknown = by_coordinate.indices[order] // count
         return begin, unknown.astype(np.int64), by_coordinate.data[order]
 
-    def pulled(self, slope: Array, at: slice = _ALL) -> Array:
-        pull, count = self._pull, slope.shape[2]
+    def pull(self, slope: Array, at: slice = _ALL) -> Array:
+        pull, count = self._matrix, slope.shape[2]
         if count < self._count:
             part = np.arange(self._count)[at]
             rows, columns = (
@@ -99,7 +102,7 @@ class Sums(Same):
         return np.stack([(pull @ s.ravel()).reshape(-1, count) for s in slope])
 
 
-def chained(gather: Ints, shape: tuple[int, ...], variables: Variables) -> tuple[Same, Ints]:
+def chain_rule(gather: Ints, shape: tuple[int, ...], variables: Variables) -> tuple[Same, Ints]:
     """Return the chain rule of elements, and their unknowns (q, e), padded with `variables.size`.
 
     Parameters
@@ -131,7 +134,7 @@ def by_point(gather: Ints, shape: tuple[int, ...], unknown: Ints, size: int) -> 
     Parameters
     ----------
     gather, shape
-        As for :func:`chained`.
+        As for :func:`chain_rule`.
     unknown : ndarray of int, (n,)
         Unknown of each coordinate, `size` if it is fixed.
     size : int

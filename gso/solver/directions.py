@@ -2,37 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
-
 import numpy as np
 
 from gso.geometry import ops
-from gso.linalg import SingularError
-from gso.typing import Array, Ints
-
-
-class LinearSolver(Protocol):
-    """A linear backend, analysed for the pattern of a matrix."""
-
-    name: str
-
-    def factor(self, values: Array) -> None:
-        """Factor the matrix with these values."""
-
-    def solve(self, rhs: Array) -> Array:
-        """Solve for right-hand sides."""
-
+from gso.linalg.base import SingularError, Solver
+from gso.typing import Array, Ints, N
 
 #: Relative damping above which an indefinite matrix is given up for the gradient direction.
 HOPELESS = 1e3
 
 
-def raised(damping: Any) -> Any:
+def raise_damping(damping: N) -> N:
     """Return the damping after a failed factorisation; of a number or a tensor."""
     return ops.maximum(10.0 * damping, 1e-12)
 
 
-def adapted(damping: Any, step: Any) -> Any:
+def adapt_damping(damping: N, step: N) -> N:
     """Return Levenberg-Marquardt's damping after a step: less after full ones, more after short."""
     less = ops.maximum(damping / 5.0, 1e-12)
     more = ops.minimum(8.0 * ops.maximum(damping, 1e-9), 1.0)
@@ -45,7 +30,7 @@ class GaussNewton:
     def __init__(self, damping: float = 1e-9):
         self.damping = damping
 
-    def step(self, solver: LinearSolver, values: Array, diagonal: Ints, gradient: Array) -> Array:
+    def step(self, solver: Solver, values: Array, diagonal: Ints, gradient: Array) -> Array:
         """Solve ``(H + damping mean(diag H) I) d = -gradient``.
 
         The mean of the diagonal is proportional to the trace, which is invariant to rotations
@@ -53,7 +38,7 @@ class GaussNewton:
 
         Parameters
         ----------
-        solver : LinearSolver
+        solver : Solver
             Linear backend, analysed for the pattern of `values`.
         values, diagonal : ndarray
             Matrix values (changed in place) and the positions of the diagonal in them.
@@ -76,7 +61,7 @@ class GaussNewton:
                     return direction
             except SingularError:
                 pass
-            damping = float(raised(damping))
+            damping = float(raise_damping(damping))
             if damping > HOPELESS:
                 return -gradient / float(values[diagonal].max())
 
@@ -92,4 +77,8 @@ class LevenbergMarquardt(GaussNewton):
 
     def accepted(self, step: float) -> None:
         """Adapt the damping to the accepted step length."""
-        self.damping = float(adapted(self.damping, step))
+        self.damping = float(adapt_damping(self.damping, step))
+
+
+#: Directions by the name of the method.
+METHODS = {"gauss-newton": GaussNewton, "levenberg-marquardt": LevenbergMarquardt}

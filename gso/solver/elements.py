@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from gso.energy.base import Residual, Term, Weighted
 from gso.energy.losses import Loss
 from gso.solver import loops
 from gso.solver.assembly import Places, products
-from gso.solver.chain import chained
+from gso.solver.chain import chain_rule
 from gso.solver.kernels import geometric_stiffness, kernel
 from gso.typing import Array
 from gso.unknowns import Layout, Variables
@@ -23,6 +23,8 @@ _BLOCK = 2048
 
 _NONE = np.empty((0, 0))
 _ALL = slice(None)
+
+V = TypeVar("V", bound="Values")
 
 #: Residual function, dimensions of the points, number of constants.
 Kind = tuple[Residual, tuple[int, ...], int]
@@ -54,7 +56,7 @@ class Values:
         self.shape = kind(term, layout)[1]
         self.weights = term.weights
 
-    def refreshed(self, coordinates: Array) -> Any:
+    def refreshed(self: V, coordinates: Array) -> V:
         """Return the term with those constants updated that depend on the coordinates."""
         if self.item.term.refresh is None:
             return self
@@ -62,7 +64,7 @@ class Values:
         other.constants = self.item.term.refresh(self.layout.split(coordinates))
         return other
 
-    def with_loss(self, loss: Loss) -> Any:
+    def with_loss(self: V, loss: Loss) -> V:
         """Return the term with another loss."""
         other = copy(self)
         other.item = replace(self.item, loss=loss)
@@ -94,13 +96,13 @@ class Elements(Values):
 
     def __init__(self, item: Weighted, variables: Variables, among: int = 0):
         super().__init__(item, variables.layout, among)
-        self._chain, self.columns = chained(self.gather, self.shape, variables)
+        self._chain, self.columns = chain_rule(self.gather, self.shape, variables)
 
     def linearise(self, coordinates: Array, at: slice = _ALL) -> tuple[Array, Array]:
         """Return residuals (r, e) and their Jacobian by the unknowns (r, q, e) of some elements."""
         run = kernel(self.item.term.residual, self.shape, len(self.constants), True)
         value, slope = run(coordinates.take(self.gather[:, at]), self.constants[:, at])
-        return value, self._chain.pulled(slope, at)
+        return value, self._chain.pull(slope, at)
 
     def add(self, coordinates: Array, places: Places, gradient: Array, values: Array) -> float:
         """Add gradient and Gauss-Newton matrix, and return the energy.
@@ -168,4 +170,4 @@ class Elements(Values):
         if vectors is None:
             return None
         run = geometric_stiffness(vectors, self.shape, len(self.constants))
-        return self._chain.pulled(run(coordinates.take(self.gather), self.constants)[1])
+        return self._chain.pull(run(coordinates.take(self.gather), self.constants)[1])

@@ -9,39 +9,37 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from gso.energy.base import Residual, Vectors
 from gso.geometry.ops import TINY
-from gso.solver.printing import numpy_source
-from gso.typing import Array
+from gso.solver.printing import Graph, numpy_source
+from gso.typing import Array, S
 
 #: Elements per block: a kernel's work arrays then fit the second-level cache.
 BLOCK = 1024
 
 
-def _points(x: Any, shape: tuple[int, ...]) -> list[tuple[Any, ...]]:
+def _points(x: Sequence[S], shape: tuple[int, ...]) -> list[tuple[S, ...]]:
     ends = np.cumsum(shape)
     return [
         tuple(x[k] for k in range(end - dim, end)) for dim, end in zip(shape, ends, strict=True)
     ]
 
 
-def _numbers(c: Any, count: int) -> list[Any]:
-    return [c[k] for k in range(count)]
-
-
-def _casadi() -> Any:
-    # Its type stubs are wrong about overloads.
+def _casadi() -> ModuleType:
     import casadi
 
     return casadi
 
 
 @lru_cache(maxsize=128)
-def casadi_function(residual: Residual, shape: tuple[int, ...], constants: int, jacobian: bool):
+def casadi_function(
+    residual: Residual, shape: tuple[int, ...], constants: int, jacobian: bool
+) -> Graph:
     """Make the CasADi function of one element: (coordinates, constants) -> residuals, Jacobian.
 
     Parameters
@@ -55,36 +53,34 @@ def casadi_function(residual: Residual, shape: tuple[int, ...], constants: int, 
     jacobian : bool
         Also return the dense Jacobian, row by row.
     """
-    ca: Any = _casadi()
-
-    x = ca.SX.sym("x", sum(shape))
-    c = ca.SX.sym("c", constants)
-    value = ca.vertcat(*residual(_points(x, shape), _numbers(c, constants)))
+    ca = _casadi()
+    x, c = ca.SX.sym("x", sum(shape)), ca.SX.sym("c", constants)
+    value = ca.vertcat(*residual(_points(x, shape), ca.vertsplit(c)))
     outputs = [value]
     if jacobian:
         outputs.append(ca.vec(ca.densify(ca.jacobian(value, x)).T))
-    return ca.Function("element", [x, c], outputs, {"cse": True})
+    function: Graph = ca.Function("element", [x, c], outputs, {"cse": True})
+    return function
 
 
 @lru_cache(maxsize=32)
-def casadi_geometric_stiffness(vectors: Vectors, shape: tuple[int, ...], constants: int):
+def casadi_geometric_stiffness(vectors: Vectors, shape: tuple[int, ...], constants: int) -> Graph:
     """Make the CasADi function of one element: lengths of its plane vectors, and rows h.
 
     The second derivative (geometric stiffness) of the length of a vector (u, v) that is linear
     in the coordinates is the rank-one matrix ``h h^T``, ``h = (u dv - v du) / length^(3/2)``.
     """
-    ca: Any = _casadi()
-
-    x = ca.SX.sym("x", sum(shape))
-    c = ca.SX.sym("c", constants)
-    pairs = ca.vertcat(
-        *(ca.horzcat(*pair) for pair in vectors(_points(x, shape), _numbers(c, constants)))
-    )
+    ca = _casadi()
+    x, c = ca.SX.sym("x", sum(shape)), ca.SX.sym("c", constants)
+    found = vectors(_points(x, shape), ca.vertsplit(c))
+    pairs = ca.vertcat(*(ca.horzcat(*pair) for pair in found))
     u, v = pairs[:, 0], pairs[:, 1]
     length = ca.sqrt(ca.fmax(u * u + v * v, TINY))
     turn = ca.diag(u) @ ca.jacobian(v, x) - ca.diag(v) @ ca.jacobian(u, x)
     rows = ca.diag(1.0 / (length * ca.sqrt(length))) @ turn
-    return ca.Function("stiffness", [x, c], [length, ca.vec(ca.densify(rows).T)], {"cse": True})
+    outputs = [length, ca.vec(ca.densify(rows).T)]
+    function: Graph = ca.Function("stiffness", [x, c], outputs, {"cse": True})
+    return function
 
 
 class Kernel:
@@ -95,7 +91,7 @@ class Kernel:
     (r, k, e), which is empty without `jacobian`.
     """
 
-    def __init__(self, function: Any, shape: tuple[int, ...], *, jacobian: bool):
+    def __init__(self, function: Graph, shape: tuple[int, ...], *, jacobian: bool):
         self.rows = int(function.size1_out(0))
         self.columns = sum(shape)
         self.jacobian = jacobian
@@ -128,13 +124,3 @@ def kernel(residual: Residual, shape: tuple[int, ...], constants: int, jacobian:
 def geometric_stiffness(vectors: Vectors, shape: tuple[int, ...], constants: int) -> Kernel:
     """Return the kernel of the geometric stiffness, see :attr:`gso.energy.Term.vectors`."""
     return Kernel(casadi_geometric_stiffness(vectors, shape, constants), shape, jacobian=True)
-
-
-def evaluate_with_casadi(
-    residual: Residual, shape: Sequence[int], x: Array, c: Array
-) -> tuple[Array, Array]:
-    """Evaluate residuals and Jacobian by CasADi's own ``map``: the slow reference for tests."""
-    function = casadi_function(residual, tuple(shape), len(c), True)
-    value, slope = function.map(x.shape[1])(x, c)
-    value, slope = np.array(value), np.array(slope)
-    return value, slope.reshape(value.shape[0], -1, x.shape[1])

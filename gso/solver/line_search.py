@@ -1,4 +1,4 @@
-"""The line search: backtracking until the energy falls enough."""
+"""The line search: backtracking until the energy falls enough, or no longer."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from collections.abc import Callable
 from typing import Any
 
 from gso.geometry import ops
-from gso.typing import Array
+from gso.status import Status
+from gso.typing import Array, N
 
 #: Required share of the linear decrease, and smallest step that is tried.
 DECREASE, SHORTEST = 1e-4, 1e-4
+#: Energy (dimensionless) that counts as zero.
+_NOTHING = 1e-20
 
 
-def shorter(step: Any, rise: Any, slope: Any) -> Any:
+def shorten(step: N, rise: N, slope: N) -> N:
     """Return the step to try after one that did not lower the energy enough.
 
     It is the minimum of the parabola through the two known values and the slope, clipped to
@@ -41,15 +44,13 @@ def armijo(
     *,
     project: Callable[[Array], Array] | None = None,
     longest: float = 1.0,
-    decrease: float = DECREASE,
-    shortest: float = SHORTEST,
 ) -> tuple[Array, float, float]:
     """Backtrack from the longest step until the energy falls in proportion to the slope.
 
     With bounds, trial points are projected onto them (Bertsekas 1982) and the slope is
     that of the projected step.
 
-    :func:`shorter` gives the next step.
+    :func:`shorten` gives the next step.
 
     Parameters
     ----------
@@ -61,9 +62,8 @@ def armijo(
         Energy and its gradient at x.
     project : callable, optional
         Projection onto the bounds of the unknowns.
-    longest, decrease, shortest : float
-        First step tried, required share of the linear decrease, smallest step tried (relative
-        to `longest` where that is below 1).
+    longest : float
+        First step tried; the smallest one is relative to it where it is below 1.
 
     Returns
     -------
@@ -71,13 +71,51 @@ def armijo(
         The accepted point; the old one with step 0 when there is none.
     """
     t = longest
-    while t >= shortest * min(longest, 1.0):
+    while t >= SHORTEST * min(longest, 1.0):
         candidate = x + t * direction
         if project is not None:
             candidate = project(candidate)
         slope = float(gradient @ (candidate - x))
         value = energy(candidate)
-        if value <= start + decrease * slope:
+        if value <= start + DECREASE * slope:
             return candidate, value, t
-        t = float(shorter(t, value - start, slope))
+        t = float(shorten(t, value - start, slope))
     return x, start, 0.0
+
+
+def falls(before: N, after: N, step: N, expected: N, tolerance: float) -> tuple[Any, Any]:
+    """Return whether the energy falls enough to go on, and whether the solve has converged if not.
+
+    The arguments are those of :func:`relative_decrease`, or tensors of them.
+    """
+    least = tolerance * abs(before)
+    stepped: Any = step > 0
+    # A rejected step is no failure if the predicted decrease is negligible.
+    return before - after > least, stepped | (expected <= ops.maximum(least, _NOTHING))
+
+
+def relative_decrease(
+    before: float, after: float, step: float, expected: float, tolerance: float
+) -> Status | None:
+    """Stop when an iteration lowers the energy by less than a share of it.
+
+    Parameters
+    ----------
+    before, after : float
+        Energy at the start and at the end of the iteration.
+    step : float
+        Accepted step length; 0 if no step lowers the energy enough.
+    expected : float
+        Decrease predicted by the quadratic model.
+    tolerance : float
+        The share.
+
+    Returns
+    -------
+    Status or None
+        None to continue.
+    """
+    enough, well = falls(before, after, step, expected, tolerance)
+    if enough:
+        return None
+    return Status.CONVERGED if well else Status.STALLED

@@ -10,19 +10,22 @@ from __future__ import annotations
 import inspect
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
-from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gso.energy.base import Residual, Vectors
 from gso.errors import BackendError
-from gso.solver.cached_source import compiled
+from gso.solver.cached_source import compile_source
 from gso.solver.kernels import casadi_function, casadi_geometric_stiffness
-from gso.solver.printing import loop_source
+from gso.solver.printing import Graph, loop_source
+from gso.typing import Array, Ints
 
 #: Environment variable: "numpy" for no compiled loops, "numba" for them on small meshes too.
 VARIABLE = "GSO_KERNELS"
@@ -44,7 +47,7 @@ class Loop:
         Number of residuals of an element.
     """
 
-    run: Any
+    run: Callable[..., None]
     rows: int
 
 
@@ -60,21 +63,21 @@ def without(active: bool = True) -> Iterator[None]:
 
 def residual(function: Residual, shape: tuple[int, ...], constants: int, count: int) -> Loop | None:
     """Return the loop that evaluates residuals only; None if NumPy is to do it."""
-    return _loop(function, shape, constants, "residual") if _pays(count) else None
+    return _residual_loop(function, shape, constants, False) if _pays(count) else None
 
 
 def jacobian(function: Residual, shape: tuple[int, ...], constants: int, count: int) -> Loop | None:
     """Return the loop that evaluates residuals and Jacobians; None if NumPy is to do it."""
-    return _loop(function, shape, constants, "jacobian") if _pays(count) else None
+    return _residual_loop(function, shape, constants, True) if _pays(count) else None
 
 
 def stiffness(vectors: Vectors, shape: tuple[int, ...], constants: int, count: int) -> Loop | None:
     """Return the loop for the rows of the geometric stiffness; None if NumPy is to do it."""
-    return _loop(vectors, shape, constants, "stiffness") if _pays(count) else None
+    return _stiffness_loop(vectors, shape, constants) if _pays(count) else None
 
 
-def adder(rows: int, wide: int, size: int, kind: int) -> Any:
-    """Return :func:`added` compiled for elements of one kind.
+def adder(rows: int, wide: int, size: int, kind: int) -> Callable[..., None]:
+    """Return :func:`add_elements` compiled for elements of one kind.
 
     Parameters
     ----------
@@ -83,7 +86,7 @@ def adder(rows: int, wide: int, size: int, kind: int) -> Any:
     kind : int
         Of the chain rule.
     """
-    return _adder(rows, wide, size, kind) or added
+    return _adder(rows, wide, size, kind) or add_elements
 
 
 def _pays(count: int) -> bool:
@@ -99,19 +102,26 @@ def _installed() -> bool:
 
 
 @lru_cache(maxsize=256)
-def _loop(function: Residual, shape: tuple[int, ...], constants: int, kind: str) -> Loop | None:
-    if kind == "stiffness":
-        graph = casadi_geometric_stiffness(function, shape, constants)
-    else:
-        graph = casadi_function(function, shape, constants, kind == "jacobian")
-    run = _compiled(loop_source(graph))
+def _residual_loop(
+    function: Residual, shape: tuple[int, ...], constants: int, jacobian: bool
+) -> Loop | None:
+    return _loop(casadi_function(function, shape, constants, jacobian))
+
+
+@lru_cache(maxsize=32)
+def _stiffness_loop(vectors: Vectors, shape: tuple[int, ...], constants: int) -> Loop | None:
+    return _loop(casadi_geometric_stiffness(vectors, shape, constants))
+
+
+def _loop(graph: Graph) -> Loop | None:
+    run = _compile(loop_source(graph))
     return None if run is None else Loop(run, int(graph.size1_out(0)))
 
 
 @lru_cache(maxsize=256)
-def _adder(rows: int, wide: int, size: int, kind: int) -> Any:
+def _adder(rows: int, wide: int, size: int, kind: int) -> Callable[..., None] | None:
     # With numbers in place of these names the compiler unrolls the inner loops.
-    source = inspect.getsource(added).replace("def added(", "def kernel(")
+    source = inspect.getsource(add_elements).replace("def add_elements(", "def kernel(")
     for line, value in (
         ("rows, count = first.shape", f"rows, count = {rows}, first.shape[1]"),
         ("wide = slope.shape[1] // rows", f"wide = {wide}"),
@@ -122,36 +132,36 @@ def _adder(rows: int, wide: int, size: int, kind: int) -> Any:
         if line not in source:
             raise BackendError(f"the loop has no line {line!r}")
         source = source.replace(line, value)
-    return _compiled(source)
+    return _compile(source)
 
 
-def _compiled(source: str) -> Any:
+def _compile(source: str) -> Callable[..., None] | None:
     """Compile a loop; None if Numba fails, which is said once for each loop."""
     try:
-        return compiled(source)
+        return compile_source(source)
     except Exception as error:
         _log.warning("Numba failed, NumPy evaluates the terms instead: %s", error)
         return None
 
 
-def added(
-    slope,
-    first,
-    second,
-    factor,
-    columns,
-    places,
-    doubled,
-    kind,
-    gather,
-    begin,
-    unknown,
-    share,
-    start,
-    gradient,
-    values,
-    work,
-):
+def add_elements(
+    slope: Array,
+    first: Array,
+    second: Array,
+    factor: Array,
+    columns: Ints,
+    places: NDArray[np.int32],
+    doubled: bool,
+    kind: int,
+    gather: Ints,
+    begin: Ints,
+    unknown: Ints,
+    share: Array,
+    start: int,
+    gradient: Array,
+    values: Array,
+    work: Array,
+) -> None:
     """Add the gradient and the matrices of some elements; written for Numba.
 
     Parameters

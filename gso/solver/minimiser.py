@@ -6,17 +6,17 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import linalg
 from gso.energy.losses import Loss
-from gso.solver.method import METHODS, Method
+from gso.linalg.base import Solver
+from gso.solver.directions import METHODS, GaussNewton
+from gso.solver.line_search import armijo, relative_decrease
 from gso.solver.problem import Problem
 from gso.status import Progress, Status
-from gso.typing import Array
+from gso.typing import Array, Flags
 
 Callback = Callable[[Progress], object]
 
@@ -69,10 +69,10 @@ def minimise(
     continuation: Sequence[Loss] = (),
     continued: str = "",
     bounds: tuple[Array, Array] | None = None,
-    method: str | Method = "gauss-newton",
-    direction: Any = None,
+    method: str = "gauss-newton",
+    direction: GaussNewton | None = None,
     backend: str | None = None,
-    solver: Any = None,
+    solver: Solver | None = None,
     threads: int = 1,
     callback: Callback | None = None,
     stage: tuple[int, int] = (0, 1),
@@ -99,14 +99,14 @@ def minimise(
         Name of these terms.
     bounds : (ndarray, ndarray), optional
         Smallest and largest value of every unknown; x must respect them.
-    method : {"gauss-newton", "levenberg-marquardt"} or Method
-        Direction, line search and stopping rule.
+    method : {"gauss-newton", "levenberg-marquardt"}
+        How the direction of a step is computed.
     direction : GaussNewton, optional
         A direction that continues with its damping, instead of that of `method`.
     backend : str, optional
         Linear backend; the fastest installed one when not given.
-    solver : backend solver, optional
-        A solver that has already analysed the problem's sparsity pattern.
+    solver : Solver, optional
+        A linear solver that has already analysed the problem's sparsity pattern.
     threads : int
         BLAS threads around factorisations; 0 leaves them alone.
     callback : callable, optional
@@ -123,8 +123,7 @@ def minimise(
     if solver is None:
         solver = linalg.choose(problem.pattern, backend)
     timings.setup += time.perf_counter() - clock
-    method = METHODS[method] if isinstance(method, str) else method
-    direction = method.direction() if direction is None else direction
+    direction = METHODS[method]() if direction is None else direction
     last = len(continuation) - 1
     history: list[Progress] = []
 
@@ -161,13 +160,13 @@ def minimise(
                 energy, gradient, values = current.linearise(x)
                 t1 = time.perf_counter()
                 if bounds is not None:
-                    held = _held(x, gradient, bounds)
+                    held = _at_bound(x, gradient, bounds)
                     gradient = np.where(held, 0.0, gradient)
                     values[problem.diagonal[held]] += _STIFF * values[problem.diagonal].max()
                 d = direction.step(solver, values, problem.diagonal, gradient)
                 t2 = time.perf_counter()
                 longest = problem.largest_step(x, d)
-                x, value, step = method.line_search(
+                x, value, step = armijo(
                     current.energy, x, d, energy, gradient, project=project, longest=longest
                 )
                 direction.accepted(step)
@@ -179,9 +178,8 @@ def minimise(
                 timings.search += time.perf_counter() - t2
                 report(done, value, step)
                 expected = -0.5 * float(gradient @ d)
-                ended = method.stop(energy, value, step, expected, tolerance) if settled else None
-                if ended is not None:
-                    status = ended
+                if settled and (end := relative_decrease(energy, value, step, expected, tolerance)):
+                    status = end
                     break
     except Cancelled:
         status = Status.CANCELLED
@@ -201,7 +199,7 @@ def says_no(answer: object) -> bool:
     return isinstance(answer, bool | np.bool_) and not answer
 
 
-def _held(x: Array, gradient: Array, bounds: tuple[Array, Array]) -> NDArray[np.bool_]:
+def _at_bound(x: Array, gradient: Array, bounds: tuple[Array, Array]) -> Flags:
     """Return the mask of unknowns at a bound beyond which the energy would fall."""
     low, high = bounds
     width = high - low

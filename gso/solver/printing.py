@@ -2,9 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
 from gso.errors import BackendError
+
+
+class Graph(Protocol):
+    """The ``casadi.Function`` of one element; CasADi's own type stubs are wrong about overloads."""
+
+    def n_instructions(self) -> int: ...
+    def instruction_id(self, k: int, /) -> int: ...
+    def instruction_input(self, k: int, /) -> list[int]: ...
+    def instruction_output(self, k: int, /) -> list[int]: ...
+    def instruction_constant(self, k: int, /) -> float: ...
+    def n_out(self) -> int: ...
+    def nnz_out(self, k: int, /) -> int: ...
+    def size1_in(self, k: int, /) -> int: ...
+    def size1_out(self, k: int, /) -> int: ...
+    def sz_w(self) -> int: ...
 
 
 class Style(Protocol):
@@ -23,7 +38,7 @@ class Style(Protocol):
         """Return the statement that stores an entry of an output."""
 
 
-def printed(function: Any, style: Style) -> list[str]:
+def print_graph(function: Graph, style: Style) -> list[str]:
     """Return the statements of a CasADi function, one after the other."""
     import casadi as ca
 
@@ -87,14 +102,18 @@ def printed(function: Any, style: Style) -> list[str]:
     return lines
 
 
-class _Arrays:
-    """Statements on arrays of elements."""
+class _Rows:
+    """Operands that are rows of arrays or tensors."""
 
     def given(self, array: str, index: int) -> str:
         return f"{array}[{index}]"
 
     def slot(self, index: int) -> str:
         return f"w[{index}]"
+
+
+class _Arrays(_Rows):
+    """Statements on arrays of elements."""
 
     def step(self, name: str, slot: int, operands: list[str]) -> str:
         said = ", ".join(operands)
@@ -106,23 +125,17 @@ class _Arrays:
         return f"{'rJ'[output]}[{index}] = {operand}"
 
 
-def numpy_source(function: Any) -> str:
+def numpy_source(function: Graph) -> str:
     """Return the source of ``kernel(x, c, r, J, w)``, on arrays of elements."""
-    lines = printed(function, _Arrays())
+    lines = print_graph(function, _Arrays())
     return "def kernel(x, c, r, J, w):\n" + "".join(f"    {line}\n" for line in lines or ["pass"])
 
 
-class _Tensors:
+class _Tensors(_Rows):
     """Statements on PyTorch tensors; numbers in the graph become tensors, by their values."""
 
     def __init__(self) -> None:
         self.numbers: dict[str, str] = {}
-
-    def given(self, array: str, index: int) -> str:
-        return f"{array}[{index}]"
-
-    def slot(self, index: int) -> str:
-        return f"w[{index}]"
 
     def _tensor(self, operand: str) -> str:
         if operand.endswith("]"):
@@ -141,14 +154,14 @@ class _Tensors:
 _TORCH = {"equal": "eq"}
 
 
-def torch_source(function: Any) -> tuple[str, list[float]]:
+def torch_source(function: Graph) -> tuple[str, list[float]]:
     """Return the source of ``kernel(x, c, r, J, w, k)`` on tensors, and the numbers k it needs.
 
     x, c, r, J, w and k are sequences of tensors: coordinates, constants, residuals, entries of
     the Jacobian, work slots, and numbers without dimensions.
     """
     style = _Tensors()
-    lines = printed(function, style)
+    lines = print_graph(function, style)
     body = "".join(f"    {line}\n" for line in lines or ["pass"])
     return "def kernel(x, c, r, J, w, k):\n" + body, [float(text) for text in style.numbers]
 
@@ -218,7 +231,7 @@ def kernel(p, gather, c, start, stop, r, J):
 """
 
 
-def loop_source(function: Any) -> str:
+def loop_source(function: Graph) -> str:
     """Return the source of ``kernel(p, gather, c, start, stop, r, J)``, a loop over elements.
 
     p : coordinates; gather : (k, e) numbers of them; c : constants (c, e); r : residuals (r, e);
@@ -228,7 +241,7 @@ def loop_source(function: Any) -> str:
     keeps the compiler from using vector instructions.
     """
     style = _Scalars()
-    lines = printed(function, style)
+    lines = print_graph(function, style)
     loads = [f"{name} = {place}" for place, name in style.used.items()]
     places = ["r[{0}, first + t]", "J[first + t - start, {0}]"]
     stores = [

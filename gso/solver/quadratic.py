@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso.solver.elements import Elements
 from gso.typing import Array, Ints
 from gso.unknowns import Variables
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
 #: Elements per block: only the Jacobians of one block are held as dense arrays.
 _BLOCK = 65536
@@ -51,7 +54,7 @@ class Quadratic:
         self._at = self.a.T
 
     @cached_property
-    def matrix(self) -> Any:
+    def matrix(self) -> csc_matrix:
         """Lower triangle of ``A^T A``, CSC with sorted rows."""
         from scipy.sparse import csc_matrix
 
@@ -65,7 +68,8 @@ class Quadratic:
         return csc_matrix((data, rows, start), shape=whole.shape)
 
     def _residual(self, x: Array) -> Array:
-        return self.a @ x - self.b
+        residual: Array = self.a @ x - self.b
+        return residual
 
     def energy(self, x: Array) -> float:
         """Return the value at unknowns x."""

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gso.errors import MeshError
-from gso.typing import Ints
+from gso.typing import Flags, Ints
 
 Int32 = NDArray[np.int32]
 
@@ -50,7 +49,7 @@ class Pairs:
             yield at, low, high
 
 
-def ranked(groups: list[Pairs], size: int) -> tuple[list[Int32], Ints, Ints]:
+def rank(groups: list[Pairs], size: int) -> tuple[list[Int32], Ints, Ints]:
     """Rank the entries of groups among the distinct ones, sorted by lower, then higher unknown.
 
     Parameters
@@ -75,7 +74,7 @@ def ranked(groups: list[Pairs], size: int) -> tuple[list[Int32], Ints, Ints]:
     return _by_table(groups, size, used)
 
 
-def _by_table(groups: list[Pairs], size: int, used: Any) -> tuple[list[Int32], Ints, Ints]:
+def _by_table(groups: list[Pairs], size: int, used: Flags) -> tuple[list[Int32], Ints, Ints]:
     """Mark the entries in a table of all columns and all diagonals that are used."""
     count, slot = int(used.sum()), (np.cumsum(used) - 1).astype(np.int32)
     mark = np.zeros((size + 1) * count, bool)
@@ -124,9 +123,10 @@ def _by_sorting(groups: list[Pairs], size: int) -> tuple[list[Int32], Ints, Ints
     return places, low[new].astype(np.int64), high[new].astype(np.int64)
 
 
-def _order(keys: Int32, count: int) -> Any:
+def _order(keys: Int32, count: int) -> Int32:
     """Return the stable order of whole numbers below `count`, by counting."""
     from scipy.sparse import csr_matrix
 
     every = np.arange(len(keys), dtype=np.int32)
-    return csr_matrix((np.ones(len(keys), bool), (keys, every)), (count, len(keys))).indices
+    order: Int32 = csr_matrix((np.ones(len(keys), bool), (keys, every)), (count, len(keys))).indices
+    return order

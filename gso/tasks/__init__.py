@@ -12,20 +12,8 @@ if TYPE_CHECKING:
     from gso.tasks.base import Formulation, Task
     from gso.tasks.options import Options
 
-_FILES = Registry(
-    __name__,
-    __path__,
-    (
-        "base",
-        "constrained",
-        "evaluation",
-        "imposed",
-        "options",
-        "per_component",
-        "request",
-        "start",
-    ),
-)
+_SUPPORT = "base constrained evaluation options per_component request stage_constraints start"
+_FILES = Registry(__name__, __path__, tuple(_SUPPORT.split()))
 _ADDED: dict[str, Task] = {}
 
 

@@ -15,8 +15,8 @@ from gso.mesh import Mesh
 from gso.mesh.cut import Cut
 from gso.pattern import Pattern
 from gso.status import Status
-from gso.tasks.imposed import Imposed
 from gso.tasks.options import Options
+from gso.tasks.stage_constraints import StageConstraints
 from gso.typing import Array
 from gso.unknowns import Layout, Variables
 
@@ -49,9 +49,9 @@ class Analysis:
         self.mesh, self.constraints = mesh, constraints
 
     @cached_property
-    def imposed(self) -> Imposed:
+    def imposed(self) -> StageConstraints:
         """The constraints as eliminated unknowns and terms."""
-        return Imposed(self.constraints)
+        return StageConstraints(self.constraints)
 
     @cached_property
     def opened(self) -> parametrization.Opened:
@@ -100,7 +100,7 @@ class Stage:
     finished : callable, optional
         Stopping test of the sequence: tells from the coordinates at the end of the stage whether
         the remaining stages can be skipped.
-    imposed : Imposed, optional
+    imposed : StageConstraints, optional
         Constraints on the stage's coordinates.
     moving : callable, optional
         As `variables`, for the first iteration after a handle has moved: fewer unknowns, for a
@@ -119,7 +119,7 @@ class Stage:
     limits: Sequence[Limit] = ()
     bounds: Callable[[Array], tuple[Array, Array]] | None = None
     finished: Callable[[Array], bool] | None = None
-    imposed: Imposed | None = None
+    imposed: StageConstraints | None = None
     moving: Callable[[Array], Variables] | None = None
 
     @property

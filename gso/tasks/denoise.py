@@ -49,7 +49,7 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
     """Smooth the surface, unless a start is given, and plan a stage for the constraints if any."""
     mesh, options = analysis.mesh, request.options
     if request.x0 is None:
-        points, details = _smoothed(mesh, request)
+        points, details = _smooth(mesh, request)
     else:
         points, details = request.x0, {}
     points = np.where(mesh.used[:, None], points, mesh.vertices)
@@ -63,7 +63,7 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
     )
 
 
-def _smoothed(mesh: Mesh, request: Request[Options]) -> tuple[Array, dict[str, Any]]:
+def _smooth(mesh: Mesh, request: Request[Options]) -> tuple[Array, dict[str, float]]:
     """Compute smoothed vertices (n, 3), and the order, weight, sigma and degrees of freedom."""
     order, weight = request.options.order, request.options.weight
     norm = "l1" if request.formulation == "crease" else "l2"

@@ -6,15 +6,10 @@ import numpy as np
 
 from gso import metrics as measure
 from gso import tasks
-from gso.components import Component, combined, several, split
+from gso.components import combined, several, split
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.typing import Array
-
-
-def parted(design: Mesh) -> list[Component]:
-    """Return the components of a mesh that has several; an empty list otherwise."""
-    return split(design) if several(design) else []
 
 
 def compute_metrics(task: str, design: Mesh, after: Mesh, flat: Array | None) -> dict[str, float]:
@@ -38,9 +33,9 @@ def compute_metrics(task: str, design: Mesh, after: Mesh, flat: Array | None) ->
     3.535534
     """
     metrics = tasks.get(task).metrics
-    parts = parted(design) if np.array_equal(design.faces, after.faces) else []
-    if not parts:
+    if not several(design) or not np.array_equal(design.faces, after.faces):
         return metrics(design, after, flat, measure.unit(design))
+    parts = split(design)
     found = [
         metrics(
             part.mesh,

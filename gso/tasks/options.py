@@ -76,12 +76,12 @@ class Options(KnownFields):
         if not isinstance(given, cls):
             raise OptionError(
                 f"this task takes {cls.__module__}.{cls.__name__} or one of "
-                f"{', '.join(cls.PRESETS)}, not {_named(type(given))}"
+                f"{', '.join(cls.PRESETS)}, not {_type_name(type(given))}"
             )
         return given
 
 
-def _named(kind: type) -> str:
+def _type_name(kind: type) -> str:
     return kind.__name__ if kind.__module__ == "builtins" else f"{kind.__module__}.{kind.__name__}"
 
 

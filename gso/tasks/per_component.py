@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from gso.components import several, split
 from gso.energy import Weighted
 from gso.energy.placed import placed
 from gso.mesh import Mesh
-from gso.tasks.evaluation import parted
 from gso.typing import Array
 
 
@@ -27,9 +27,9 @@ def objective(mesh: Mesh, make: Callable[..., list[Weighted]], *positions: Array
     *positions : ndarray, (n, 3)
         Further positions of the vertices, in the frame of `mesh`.
     """
-    parts = parted(mesh)
-    if not parts:
+    if not several(mesh):
         return make(mesh, *positions)
+    parts = split(mesh)
     total = sum(part.area for part in parts)
     items = []
     for part in parts:

@@ -8,19 +8,21 @@ from functools import partial
 from inspect import signature
 from typing import Any
 
+from gso.cut_pieces import Pieces
 from gso.executors import Executor, Item, open_executor
 from gso.result import Result
 from gso.tno.optimize import optimize
+from gso.typing import Keywords, MeshLike
 
 
-def _one(keywords: dict[str, Any], mesh: Any) -> Result:
+def _one(keywords: Keywords, mesh: MeshLike | Pieces) -> Result:
     result = optimize(mesh, **keywords)
     result.metrics  # noqa: B018 - computed here, in the worker process
     return result
 
 
 def optimize_many(
-    meshes: Iterable[Any],
+    meshes: Iterable[MeshLike | Pieces],
     *,
     workers: int | None = None,
     scheduler: str | None = None,

@@ -14,14 +14,14 @@ from gso import linalg
 from gso.constraints import Constraint, Handle, compile_constraints, listed
 from gso.deformation import ThinPlateField
 from gso.errors import ConvergenceWarning, OptionError
+from gso.linalg.base import Solver
 from gso.pipeline.case import Case
 from gso.pipeline.handles import move_handles, pins_of
-from gso.pipeline.judgement import better, conclude, difference, warning
+from gso.pipeline.judgement import conclude, difference, is_better, warning
 from gso.pipeline.run import Run, objective, solution_at
 from gso.result import Result
 from gso.solver import METHODS, Minimum, minimise
 from gso.solver.augmented_lagrangian import tighten
-from gso.solver.directions import LinearSolver
 from gso.solver.problem import Problem
 from gso.status import Status
 from gso.tasks.base import Options, Plan, Stage
@@ -105,12 +105,12 @@ class Session:
         self._constraints: list[Constraint] = []
         self._spread: ThinPlateField | None = None
         #: Problem and solver of the stage's unknowns, and of those while handles move.
-        self._kept: dict[bool, tuple[Problem, LinearSolver]] = {}
+        self._kept: dict[bool, tuple[Problem, Solver]] = {}
         #: Whether the current unknowns are those for the first iteration after a move.
         self._moving = False
         #: Whether a handle has moved since the last iteration.
         self._moved = False
-        self._direction = METHODS[self._options.method].direction()
+        self._direction = METHODS[self._options.method]()
         self._x0 = self._case.solver_request.x0
         self._run = Run(self._case)
         self._stage: Stage | None = None
@@ -234,7 +234,7 @@ class Session:
             self._coordinates = self._solve_stages(self._plan)
             self._pose()
             result = self.result()
-            if better(result, dragged):
+            if is_better(result, dragged):
                 result.notes += (difference(dragged, result),)
             else:
                 result = dragged

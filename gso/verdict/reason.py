@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from gso import wording
+from gso.typing import Json
 from gso.verdict.codes import Code, Kind
 
 #: Parts of a mesh that a reason is at, rather than about.
@@ -86,9 +86,9 @@ distance (max_deviation), or more strips or pieces
             return self
         return replace(self, value=factor * self.value, bound=factor * self.bound)
 
-    def record(self, unit: str | None = None) -> dict[str, Any]:
+    def record(self, unit: str | None = None) -> Json:
         """Return it as JSON-compatible values, for readers with its words in a unit of length."""
-        out: dict[str, Any] = {
+        out: Json = {
             "code": self.code.value,
             "value": _finite(self.value),
             "bound": _finite(self.bound),
@@ -99,7 +99,7 @@ distance (max_deviation), or more strips or pieces
         return out if unit is None else out | {"text": describe(self, unit)}
 
     @classmethod
-    def read(cls, record: Mapping[str, Any]) -> Reason:
+    def read(cls, record: Json) -> Reason:
         """Return what a record describes.
 
         Raises

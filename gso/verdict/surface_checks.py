@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gso import faults, metrics
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 from gso.verdict.codes import Code
 from gso.verdict.compare import Measurement
 
@@ -64,7 +63,7 @@ def _shortest(before: Mesh, after: Array, names: Ints | None = None) -> Measurem
     return Measurement(now / was, "edge", [f"{a}-{b}" for a, b in named])
 
 
-def _known(design: Mesh, pairs: Ints) -> NDArray[np.bool_]:
+def _known(design: Mesh, pairs: Ints) -> Flags:
     """Mark the pairs of faces where the design intersects itself already."""
     before = faults.crossings(design)
     if not before.size:

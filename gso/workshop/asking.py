@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from gso.errors import OptionError
 from gso.quantities import Length, as_length, millimetres
 from gso.seams.options import CHANGES, STAYS
 from gso.spelling import choices
+from gso.typing import Json
 
 FORMULATIONS = ("ruled", "curvature", "isometry", "flatten")
 
@@ -78,6 +78,6 @@ class Ask:
         default = STAYS if self.formulation == "flatten" else CHANGES
         return default if self.max_strain is None else self.max_strain
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> Json:
         """Return it as JSON-compatible values."""
         return asdict(self) | {"max_strain": self.strain}

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from gso.mesh import Mesh
+from gso.typing import Array, Json
 from gso.workshop.panels import Panel
 from gso.workshop.part import Part
 from gso.workshop.parts import Fitted
@@ -21,7 +22,7 @@ _LENGTHS = ("diagonal", "allowed", "deviation_mean", "deviation_max", "bend_radi
 _PACKAGES = ("gso", "numpy", "scipy", "shapely", "ezdxf", "spyrrow")
 
 
-def codes(reasons: Sequence[Mapping[str, Any]]) -> str:
+def codes(reasons: Sequence[Json]) -> str:
     """Return the codes of a record's reasons, each once."""
     return ", ".join(dict.fromkeys(reason["code"] for reason in reasons))
 
@@ -46,7 +47,7 @@ def versions() -> dict[str, str]:
     return out
 
 
-def design_record(fitted: Fitted, parts: Sequence[Part], copies: Sequence[str]) -> dict[str, Any]:
+def design_record(fitted: Fitted, parts: Sequence[Part], copies: Sequence[str]) -> Json:
     """Describe one design and its parts, in millimetres.
 
     Parameters
@@ -76,10 +77,11 @@ def design_record(fitted: Fitted, parts: Sequence[Part], copies: Sequence[str]) 
         "seam_mismatch_at": made.matings[worst].number if mismatch else None,
         "parts": [part_record(panel, part) for panel, part in zip(panels, parts, strict=True)],
     }
-    return plain(own)
+    record: Json = plain(own)
+    return record
 
 
-def part_record(panel: Panel, part: Part) -> dict[str, Any]:
+def part_record(panel: Panel, part: Part) -> Json:
     """Describe one part, in millimetres: its size as it is drawn."""
     wide, high = part.size
     angles = np.degrees(np.abs(panel.angles))
@@ -98,7 +100,7 @@ def part_record(panel: Panel, part: Part) -> dict[str, Any]:
     }
 
 
-def chord(outline: np.ndarray[Any, Any]) -> float:
+def chord(outline: Array) -> float:
     """Estimate how far a polygon is from the smooth curve through its points.
 
     Corners of more than 30 degrees count as corners of the curve.

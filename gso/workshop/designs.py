@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -12,9 +12,12 @@ from gso import io
 from gso.components import split
 from gso.mesh import Mesh
 from gso.seams.kinds import Labels
-from gso.typing import Ints
+from gso.typing import Ints, MeshLike
 from gso.workshop.job_folder import path_of
 from gso.workshop.names import different, spelled
+
+#: One or several designs.
+Designs: TypeAlias = "MeshLike | Sequence[MeshLike]"
 
 
 def _no_edges() -> Ints:
@@ -38,7 +41,7 @@ class Design:
     kept: Ints = field(default_factory=_no_edges)
 
 
-def designs_of(given: Any, *, keep_groups: bool = False) -> list[Design]:
+def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
     """Read designs, and divide them into components.
 
     Raises
@@ -66,11 +69,12 @@ def designs_of(given: Any, *, keep_groups: bool = False) -> list[Design]:
     return [replace(design, name=name) for design, name in zip(out, names, strict=True)]
 
 
-def several(given: Any) -> Sequence[Any]:
+def several(given: Designs) -> Sequence[MeshLike]:
     """Return what was given as a sequence of designs."""
-    return given if isinstance(given, list | tuple) and not _is_mesh(given) else [given]
+    some: Any = given
+    return some if isinstance(some, list | tuple) and not _is_mesh(some) else [some]
 
 
-def _is_mesh(given: Any) -> bool:
+def _is_mesh(given: object) -> bool:
     """Whether a tuple is vertices and faces rather than several designs."""
     return isinstance(given, tuple) and len(given) == 2 and not isinstance(given[0], str | Mesh)

@@ -6,9 +6,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,17 +15,18 @@ from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.quantities import Length, Strain, as_length, as_strain, millimetres
 from gso.seams.options import as_sheet
+from gso.typing import AnyPath, Json
 from gso.verdict import Code, Reason, failure, ordered
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import design_record, digest, plain, versions
 from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
-from gso.workshop.designs import designs_of, several
+from gso.workshop.designs import Designs, designs_of, several
 from gso.workshop.finish import Finish
 from gso.workshop.job_folder import WORK, close, opened
 from gso.workshop.marks import check_lines
 from gso.workshop.names import different
-from gso.workshop.nesting import checked_options, nest
+from gso.workshop.nesting import Rotations, checked_options, nest
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.parts import fitted, parts_from
@@ -55,7 +54,7 @@ class Fabrication:
     folder: Path
     parts: tuple[Part, ...]
     sheets: tuple[Drawing, ...]
-    certificate: dict[str, Any]
+    certificate: Json
     files: tuple[str, ...] = field(default=())
 
     @property
@@ -70,8 +69,8 @@ class Fabrication:
 
 
 def fabricate(
-    designs: Any,
-    folder: str | PathLike[str],
+    designs: Designs,
+    folder: AnyPath,
     *,
     unit: str = "mm",
     formulation: str = "ruled",
@@ -86,7 +85,7 @@ def fabricate(
     holes: Sequence[ArrayLike] = (),
     sheet: tuple[Length, Length] | None = None,
     spacing: float = 2.0,
-    rotations: Any = (0, 180),
+    rotations: Rotations = (0, 180),
     seconds: float = 10.0,
     formats: Sequence[str] = ("dxf", "svg"),
     layers: str = "operations",
@@ -214,7 +213,7 @@ def fabricate(
     found = _named(found)
     say("parts")
     parts: list[Part] = []
-    records: list[dict[str, Any]] = []
+    records: list[Json] = []
     reasons: list[Reason] = []
     for k in chosen:
         copies = [every[j].name for j, origin in enumerate(first) if origin == k]
@@ -287,7 +286,7 @@ def _radius(given: Length, meshes: Sequence[Mesh], unit: str) -> float:
     return as_length(given, "min_radius", diagonal=diagonal, unit=unit)
 
 
-def _words(reasons: Iterable[Reason]) -> list[dict[str, Any]]:
+def _words(reasons: Iterable[Reason]) -> list[Json]:
     """Return records of reasons, the most severe first."""
     return [reason.record("mm") for reason in ordered(reasons)]
 
@@ -300,7 +299,7 @@ def _named(found: dict[int, Made]) -> dict[int, Made]:
     return {k: one.named([next(names) for _ in one.panels]) for k, one in in_order.items()}
 
 
-def _notes(records: Sequence[dict[str, Any]], ask: Ask) -> list[str]:
+def _notes(records: Sequence[Json], ask: Ask) -> list[str]:
     """Say what is not as a reader might expect, although it is within what was asked."""
     every = [part for record in records for part in record.get("parts", ())]
     bare = sum(part["bends"] == 0 for part in every)

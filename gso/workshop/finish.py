@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 
 from gso.errors import OptionError
 from gso.spelling import choices
+from gso.typing import Json
 from gso.workshop.thickness import Thickness
 
 SIDES = ("outside", "inside")
@@ -91,7 +91,7 @@ class Finish:
             )
         return long / scale, wide / scale
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> Json:
         """Return it as JSON-compatible values."""
         out = asdict(self)
         if self.thickness is not None and self.thickness.table is not None:

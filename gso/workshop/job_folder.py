@@ -6,11 +6,10 @@ import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from gso import io
 from gso.errors import MeshError, OptionError
-from gso.io.convert import Unwelded
+from gso.typing import Json, Unwelded
 from gso.verdict import Code, failure
 
 #: Folders of drawings and surfaces, the folder of what was made, and files.
@@ -23,7 +22,7 @@ FOLDERS, WORK, CERTIFICATE, PAGE, PAPER = (
 )
 
 
-def opened(place: Path, inputs: Iterable[Any]) -> set[str]:
+def opened(place: Path, inputs: Iterable[object]) -> set[str]:
     """Create the folder, or take over that of an earlier run.
 
     Its certificate says until the end that the run has not ended.
@@ -75,13 +74,13 @@ def opened(place: Path, inputs: Iterable[Any]) -> set[str]:
     return {n for n in files if n.count("/") == 1 and n.split("/")[0] in FOLDERS and ".." not in n}
 
 
-def close(place: Path, certificate: dict[str, Any]) -> None:
+def close(place: Path, certificate: Json) -> None:
     """Write the certificate."""
     with io.replacing(place / CERTIFICATE) as file:
         file.write(json.dumps(certificate, indent=2).encode() + b"\n")
 
 
-def path_of(given: Any) -> Path | None:
+def path_of(given: object) -> Path | None:
     """Return the file that a design is read from, if it is one."""
     source = given.surface if isinstance(given, Unwelded) else given
     return Path(os.fsdecode(source)) if isinstance(source, str | os.PathLike) else None

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from gso import faults, metrics, rulings
@@ -11,6 +9,7 @@ from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.seams.sheets import rectangle
+from gso.typing import Json
 from gso.verdict import Code, Measurement, Reason, compare, merge
 from gso.workshop.asking import Ask
 from gso.workshop.panels import Made, Panel
@@ -29,7 +28,7 @@ def of_pattern(
     pattern: Pattern,
     ask: Ask,
     allowed: float | None,
-) -> dict[str, Any]:
+) -> Json:
     """Measure a surface and its pattern; `allowed` is the largest distance from the design."""
     away = metrics.surface_distance(design, surface)
     sheet = pattern.surface(surface)
@@ -91,7 +90,8 @@ def judge(made: Made, ask: Ask) -> tuple[Reason, ...]:
 def _worst(design: Mesh, surface: Mesh) -> list[float]:
     """Return the vertex of the surface that is farthest from the design."""
     points = surface.vertices[surface.used]
-    return points[int(metrics.point_to_surface(points, design).argmax())].tolist()
+    worst: list[float] = points[int(metrics.point_to_surface(points, design).argmax())].tolist()
+    return worst
 
 
 def _curvatures(surface: Mesh) -> list[float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
@@ -28,6 +28,8 @@ _FULL = 1.0
 _MOST = 500
 
 Say = Callable[[str], None]
+#: Allowed angles in degrees, how many of them, or "any".
+Rotations: TypeAlias = "Sequence[float] | int | str"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,7 @@ def nest(
     *,
     spacing: float = 2.0,
     margin: float = 0.0,
-    rotations: Any = (0, 180),
+    rotations: Rotations = (0, 180),
     seconds: float = 10.0,
     seed: int = 0,
     method: str | None = None,
@@ -144,7 +146,7 @@ def nest(
     return _result(best, sheet, margin, "rectangles", notes)
 
 
-def _checked_sheet(sheet: Any) -> Array:
+def _checked_sheet(sheet: object) -> Array:
     """Return length and width of a sheet as an array (2,).
 
     Raises
@@ -165,7 +167,7 @@ def checked_options(
     sheet: tuple[float, float],
     spacing: float = 0.0,
     margin: float = 0.0,
-    rotations: Any = (0, 180),
+    rotations: Rotations = (0, 180),
     seconds: float = 1.0,
 ) -> tuple[float, float]:
     """Check the options of :func:`nest`; return the room inside the margin, in millimetres.
@@ -200,7 +202,7 @@ def _check_parts(parts: Sequence[Part], method: str | None) -> None:
             raise OptionError(f"part {part.name} cannot be nested: its outline crosses itself")
 
 
-def _item(part: Part, rotations: Any, spacing: float) -> _Item:
+def _item(part: Part, rotations: Rotations, spacing: float) -> _Item:
     """Return a part about the origin, with a simple polygon that has half the spacing about it."""
     import shapely
 
@@ -224,7 +226,7 @@ def _item(part: Part, rotations: Any, spacing: float) -> _Item:
     return _Item(own, shape, by, angles)
 
 
-def _angles(rotations: Any) -> tuple[float, ...] | None:
+def _angles(rotations: Rotations) -> tuple[float, ...] | None:
     if isinstance(rotations, str) and rotations == "any":
         return None
     if isinstance(rotations, int | np.integer) and not isinstance(rotations, bool):
@@ -335,13 +337,13 @@ def _sparrow(
 def _inside(
     items: Sequence[_Item],
     chosen: Sequence[int],
-    placed: Sequence[dict[str, Any]],
+    placed: Sequence[dict[str, float]],
     room: tuple[float, float],
 ) -> tuple[list[tuple[int, Part]], list[tuple[int, Part]]]:
     """Place parts as they were nested; return all of them, and those inside the sheet."""
     own = []
     for one in placed:
-        k = chosen[one["item"]]
+        k = chosen[int(one["item"])]
         part = items[k].part.turned(np.radians(one["angle"]))
         own.append((k, replace(part.shifted(np.array([one["x"], one["y"]])), count=1)))
     low = np.min([part.low for _, part in own], axis=0)
@@ -353,9 +355,9 @@ def _inside(
 
 def _some(
     items: Sequence[_Item], left: dict[int, int], room: tuple[float, float], share: float
-) -> tuple[list[dict[str, Any]], list[int]]:
+) -> tuple[list[dict[str, object]], list[int]]:
     """Choose the largest parts that are left, with a share of the area of a sheet."""
-    asked: list[dict[str, Any]] = []
+    asked: list[dict[str, object]] = []
     chosen: list[int] = []
     area = 0.0
     for k in sorted((k for k, n in left.items() if n), key=lambda k: -items[k].part.area):

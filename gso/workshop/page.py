@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from html import escape
-from typing import Any
 from xml.etree.ElementTree import tostring
 
 import numpy as np
 
 from gso.io.svg_page import SVGPage
+from gso.typing import Json
 from gso.workshop.certificate import codes
 from gso.workshop.part import Drawing, Part
 from gso.workshop.writers import strokes
@@ -43,7 +43,7 @@ _KINDS = {
 }
 
 
-def page(certificate: dict[str, Any], parts: Sequence[Part], sheets: Sequence[Drawing]) -> str:
+def page(certificate: Json, parts: Sequence[Part], sheets: Sequence[Drawing]) -> str:
     """Return the page as HTML."""
     good = certificate["usable"]
     names = [escape(one["name"]) for one in certificate["designs"]]
@@ -92,7 +92,7 @@ def _legend() -> str:
     return f'<p class="legend">{"".join(said)}</p>'
 
 
-def _designs(designs: Sequence[dict[str, Any]]) -> str:
+def _designs(designs: Sequence[Json]) -> str:
     heads = ("design", "copies", "parts", "distance, mean mm", "largest mm", "allowed mm")
     more = ("strain % (99 %)", "smallest bend radius mm", "seam mismatch mm", "verdict")
     rows = ["<table><tr>", *(f"<th>{h}</th>" for h in (*heads, *more)), "</tr>"]
@@ -112,7 +112,7 @@ def _designs(designs: Sequence[dict[str, Any]]) -> str:
     return "".join([*rows, "</table>"])
 
 
-def _verdict(reasons: Sequence[dict[str, Any]]) -> str:
+def _verdict(reasons: Sequence[Json]) -> str:
     if not reasons:
         return '<span class="good">yes</span>'
     return f'<span class="bad">no: {escape(codes(reasons))}</span>'

@@ -6,14 +6,14 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from gso.errors import MeshError
 from gso.mesh import Mesh
+from gso.mesh.polyline import arc_lengths
 from gso.pattern import Bend, Folded
-from gso.typing import Array, Ints
+from gso.typing import Array, Ints, Json
 from gso.verdict import Places, Reason
 
 _ARRAYS = ("points", "faces", "flat", "bends", "angles", "radii")
@@ -116,7 +116,7 @@ class Mating:
         both = []
         for side in (self.one, self.two):
             line = side.on(panels[side.panel].flat)
-            both.append(np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+            both.append(arc_lengths(line))
         return float(np.ptp(both[0] - both[1]))
 
 
@@ -138,7 +138,7 @@ class Made:
     name: str
     panels: tuple[Panel, ...]
     matings: tuple[Mating, ...]
-    record: dict[str, Any]
+    record: Json
     reasons: tuple[Reason, ...] = ()
 
     def named(self, names: Sequence[str]) -> Made:
@@ -151,10 +151,10 @@ class Made:
         )
         return replace(self, panels=panels, reasons=tuple(reasons))
 
-    def arrays(self) -> dict[str, Any]:
+    def arrays(self) -> dict[str, np.ndarray]:
         """Return panels and seams as arrays by name."""
         said = json.dumps([panel.name for panel in self.panels]).encode()
-        out: dict[str, Any] = {"names": np.frombuffer(said, np.uint8)}
+        out: dict[str, np.ndarray] = {"names": np.frombuffer(said, np.uint8)}
         for k, panel in enumerate(self.panels):
             parts = (panel.surface.vertices, panel.surface.faces, panel.flat)
             every = (*parts, panel.bends, panel.angles, panel.radii)
@@ -170,7 +170,7 @@ class Made:
         return out
 
     @classmethod
-    def from_arrays(cls, name: str, data: Mapping[str, Any], record: dict[str, Any]) -> Made:
+    def from_arrays(cls, name: str, data: Mapping[str, np.ndarray], record: Json) -> Made:
         """Return what :meth:`arrays` describes.
 
         Raises

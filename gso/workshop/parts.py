@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
+from gso.mesh.polyline import arc_lengths
 from gso.pattern import Bend
 from gso.seams.sheets import rectangle
 from gso.typing import Array
@@ -214,7 +215,7 @@ def _joint(panel: Panel, seam: Mating, side: Side, scale: float, first: bool) ->
     length = float(along[-1])
     if not seam.common and length > 0:
         line, own = _outline(panel, side)
-        along = _lengths(line) - np.interp(0.5 * length, along, own) + 0.5 * length
+        along = arc_lengths(line) - np.interp(0.5 * length, along, own) + 0.5 * length
     if not first:
         line, along = line[::-1], length - along[::-1]
     return Joint(seam.number, line, along, length, first)
@@ -245,10 +246,6 @@ def _outline(panel: Panel, side: Side) -> tuple[Array, Array]:
     between = between[np.argsort(far[between])]
     ends = side.on(panel.flat)[[0, -1]]
     return np.concatenate([ends[:1], ring[between], ends[1:]]), way * own
-
-
-def _lengths(line: Array) -> Array:
-    return np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
 
 
 def places(length: float, spacing: float) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -13,12 +12,12 @@ from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Folded, Pattern
 from gso.result import Result
-from gso.typing import Array, Ints
+from gso.typing import Array, Ints, Json
 from gso.workshop.matings import across, numbered, of_pattern
 from gso.workshop.panels import Made, Panel
 
 
-def of_surface(name: str, surface: Mesh, pattern: Pattern, record: dict[str, Any]) -> Made:
+def of_surface(name: str, surface: Mesh, pattern: Pattern, record: Json) -> Made:
     """Divide a surface with a pattern into panels.
 
     Parameters
@@ -35,7 +34,7 @@ def of_surface(name: str, surface: Mesh, pattern: Pattern, record: dict[str, Any
     return Made(name, _named(panels, [name] * len(panels)), numbered(matings), record)
 
 
-def of_result(name: str, result: Result, record: dict[str, Any]) -> Made:
+def of_result(name: str, result: Result, record: Json) -> Made:
     """Divide a result into panels with bend lines; of piece A of several they are NAME-A-1 etc."""
     pattern, points, pieces = result.pattern, result.mesh.vertices, result.pieces
     if pattern is None:

@@ -9,15 +9,14 @@ import json
 import subprocess
 import sys
 from importlib.util import find_spec
-from typing import Any
 
 #: Seconds that starting takes at most, and that a solve may take beyond its time.
 _START = 30.0
 
 
 def solved(
-    items: list[dict[str, Any]], height: float, seconds: float, seed: int
-) -> tuple[list[dict[str, Any]] | None, str]:
+    items: list[dict[str, object]], height: float, seconds: float, seed: int
+) -> tuple[list[dict[str, float]] | None, str]:
     """Pack polygons into a strip of a given height and least length.
 
     Parameters

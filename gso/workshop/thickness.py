@@ -191,4 +191,4 @@ def _solved(count: int, pairs: Ints, step: Array) -> Array:
     ).tocsr()
     out = [lsqr(matrix, step[:, d], atol=1e-14, btol=1e-14, iter_lim=20 * count)[0] for d in (0, 1)]
     shift = np.stack(out, axis=1)
-    return shift - shift[0]
+    return np.asarray(shift - shift[0])

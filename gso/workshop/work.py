@@ -15,6 +15,7 @@ import numpy as np
 from gso import io
 from gso.errors import GSOError, MeshError
 from gso.executors import open_executor
+from gso.typing import Keywords
 from gso.verdict import Reason
 from gso.workshop.asking import Ask
 from gso.workshop.certificate import digest, plain
@@ -37,8 +38,9 @@ def store(one: Made, own: str, path: Path) -> None:
     """Write what was made; it replaces the file when it is complete."""
     said = [own, plain(one.record), [reason.record() for reason in one.reasons]]
     record = np.frombuffer(json.dumps(said).encode(), np.uint8)
+    whole: Keywords = {"record": record, **one.arrays()}
     with io.replacing(path) as file:
-        np.savez_compressed(file, record=record, **one.arrays())
+        np.savez_compressed(file, **whole)
 
 
 def work_on(ask: Ask, folder: str, design: Design) -> str:

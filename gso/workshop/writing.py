@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from gso import io
+from gso.typing import Json, Keywords
 from gso.workshop import writers
 from gso.workshop.job_folder import CERTIFICATE, PAGE, PAPER
 from gso.workshop.page import page
@@ -52,9 +52,9 @@ class Drawings:
         if self.paper is not None:
             check_paper(self.paper)
 
-    def options(self, suffix: str) -> dict[str, Any]:
+    def options(self, suffix: str) -> Keywords:
         """Return the options of a writer."""
-        out: dict[str, Any] = {"layers": self.layers, "bend_text": self.bend_text}
+        out: Keywords = {"layers": self.layers, "bend_text": self.bend_text}
         return out | ({"paper": self.paper} if suffix == "pdf" and self.paper else {})
 
 
@@ -63,7 +63,7 @@ def written(
     parts: Sequence[Part],
     sheets: Sequence[Drawing],
     found: Iterable[Made],
-    certificate: dict[str, Any],
+    certificate: Json,
     drawings: Drawings,
     earlier: Set[str],
 ) -> list[str]:

@@ -6,7 +6,6 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -33,7 +32,7 @@ from gso.solver import Callback
 from gso.status import Status
 from gso.tasks.request import Limits
 from gso.tasks.start import Start
-from gso.typing import MeshLike
+from gso.typing import Keywords, MeshLike
 from gso.verdict import Code, Measurement, Reason, compare, judge, ordered
 
 
@@ -141,7 +140,7 @@ def strips(
     def length(value: Length | None, name: str) -> float | None:
         return None if value is None else as_length(value, name, diagonal=diagonal, unit=unit)
 
-    named: dict[str, Any] = {
+    named: Keywords = {
         "strips": strips,
         "max_strips": None if max_strips == MOST else max_strips,
         "max_crease": max_crease,

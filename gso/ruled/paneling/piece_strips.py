@@ -6,7 +6,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -331,7 +330,7 @@ def _numbered(callback: Callback | None, place: int, count: int) -> Callback | N
     if callback is None:
         return None
 
-    def call(progress: Progress) -> Any:
+    def call(progress: Progress) -> object:
         return callback(renumber(progress, place, count, "piece"))
 
     return call

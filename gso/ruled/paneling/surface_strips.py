@@ -234,7 +234,7 @@ def _mirror(compiled: Compiled) -> OnPlane | None:
 
 def _symmetric(compiled: Compiled, points: Array) -> Array:
     """Return points moved to the nearest symmetric places, if there is a plane of symmetry."""
-    out = points.copy()
+    out: Array = points.copy()
     for part in compiled.parts if _mirror(compiled) is not None else ():
         if isinstance(part, Relations):
             one, other = points[part.first], points[part.second]

@@ -3,36 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from gso import geometry
 from gso.geometry import ops
+from gso.typing import S, Vec
 
 #: Least speed across the rulings, relative to that of the strips, and least length of the
 #: rulings; the rounding of both bounds.
 _SPEED, _LENGTH, _ROUND = 0.2, 0.4, 1e-2
 
-Points = Sequence[tuple[Any, ...]]
-Numbers = Sequence[Any]
+Points = Sequence[Vec[S]]
+Numbers = Sequence[S]
 
 
-def _sum(weights: Numbers, points: Points) -> tuple[Any, ...]:
+def _sum(weights: Sequence[S | float], points: Points[S]) -> Vec[S]:
     return tuple(
         sum(w * x for w, x in zip(weights, parts, strict=True))
         for parts in zip(*points, strict=True)
     )
 
 
-def _mixed(v: Any, p: tuple[Any, ...], q: tuple[Any, ...]) -> tuple[Any, ...]:
+def _mixed(v: S, p: Vec[S], q: Vec[S]) -> Vec[S]:
     return tuple((1 - v) * x + v * y for x, y in zip(p, q, strict=True))
 
 
-def _below(x: Any) -> Any:
+def _below(x: S) -> S:
     """Return the negative part of a number, rounded off at zero."""
     return 0.5 * (x - ops.sqrt(x * x + _ROUND**2))
 
 
-def turn_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
+def turn_residual(points: Points[S], constants: Numbers[S]) -> Vec[S]:
     """Return the difference of the unit normals at two places of a ruling.
 
     It is zero for a torsal ruling, along which the tangent plane is constant.
@@ -50,7 +50,7 @@ def turn_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
     return tuple(a / sizes[0] - b / sizes[1] for a, b in zip(*normals, strict=True))
 
 
-def speed_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
+def speed_residual(points: Points[S], constants: Numbers[S]) -> Vec[S]:
     """Return by how much speeds across the rulings are too low, at two places of a ruling.
 
     Constants: weights of the four points of a curve; the places; the direction (3) across the
@@ -65,7 +65,7 @@ def speed_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
     )
 
 
-def length_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
+def length_residual(points: Points[S], constants: Numbers[S]) -> Vec[S]:
     """Return by how much a ruling is too short.
 
     Constants: weights of the four points of a curve; the direction (3) of the rulings; the
@@ -76,7 +76,7 @@ def length_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
     return (_below(geometry.dot(way, along) / length - _LENGTH),)
 
 
-def distance_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
+def distance_residual(points: Points[S], constants: Numbers[S]) -> Vec[S]:
     """Return the distance of a point from a plane.
 
     Constants: weights of the four points of a curve; the place on the ruling; the plane's
@@ -88,7 +88,7 @@ def distance_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
     return (geometry.dot(at, normal) - offset,)
 
 
-def bend_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
+def bend_residual(points: Points[S], constants: Numbers[S]) -> Vec[S]:
     """Return the second derivatives of a curve at both ends of a span, times its squared width.
 
     Constants: the width.
@@ -99,7 +99,7 @@ def bend_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
     return (*first, *_sum((6, 2 * h, -6, 4 * h), (p, a, q, b)))
 
 
-def jump_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
+def jump_residual(points: Points[S], constants: Numbers[S]) -> Vec[S]:
     """Return the jump of the second derivative of a curve at a ruling, times a squared width.
 
     Points: end, derivative, the end in the middle, its derivative, next end, derivative.
@@ -108,7 +108,7 @@ def jump_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
     return _sum(constants, points)
 
 
-def break_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
+def break_residual(points: Points[S], constants: Numbers[S]) -> Vec[S]:
     """Return the difference of the unit normals before and after a ruling, at a place of it.
 
     Points: both ends; the derivatives of both curves before, and those after. Constants: the
@@ -122,7 +122,7 @@ def break_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
     return tuple(a / one - sign * b / two for a, b in zip(*normals, strict=True))
 
 
-def joined_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
+def joined_residual(points: Points[S], constants: Numbers[S]) -> Vec[S]:
     """Return the differences of a flat triangle's unit normal from two at a ruling beside it.
 
     Points and constants as for :func:`turn_residual`, then the triangle's third corner, and the
@@ -135,7 +135,7 @@ def joined_residual(points: Points, constants: Numbers) -> tuple[Any, ...]:
     flat = geometry.cross(geometry.sub(third, p), way)
     size = ops.sqrt(geometry.dot(flat, flat) + least)
     speeds = _sum(slope, one), _sum(slope, two)
-    out: list[Any] = []
+    out: list[S] = []
     for v in (v0, v1):
         normal = geometry.cross(_mixed(v, *speeds), way)
         own = ops.sqrt(geometry.dot(normal, normal) + least)

@@ -169,7 +169,7 @@ def _places(quads: Array, points: Array) -> Array:
 
     def area(s: float) -> Array:
         p, q = (1 - s) * a + s * c, (1 - s) * b + s * d
-        return np.einsum("kd,kd->k", normal, cross(q - p, points - p))
+        return np.asarray(np.einsum("kd,kd->k", normal, cross(q - p, points - p)))
 
     zero, half, one = area(0.0), area(0.5), area(1.0)
     square = 2.0 * (zero + one) - 4.0 * half
@@ -181,4 +181,5 @@ def _places(quads: Array, points: Array) -> Array:
     s = np.clip(both[np.abs(both - 0.5).argmin(axis=0), np.arange(len(zero))], 0, 1)[:, None]
     p, way = (1 - s) * a + s * c, (1 - s) * (b - a) + s * (d - c)
     size = np.maximum(np.einsum("kd,kd->k", way, way), 1e-300)
-    return np.clip(np.einsum("kd,kd->k", points - p, way) / size, 0.0, 1.0)
+    place: Array = np.einsum("kd,kd->k", points - p, way) / size
+    return np.clip(place, 0.0, 1.0)

@@ -62,7 +62,7 @@ class SmoothSurface:
 
         Tangent planes of two patches must not differ by more at their common rulings, either.
         """
-        return max(self.turning, self.kink) <= np.degrees(_TORSAL)
+        return bool(max(self.turning, self.kink) <= np.degrees(_TORSAL))
 
 
 def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSurface:
@@ -141,7 +141,8 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
 
 def _widened(found: Smooth, parts: Sequence[Patch]) -> Array:
     """Return the ranges of the spans, widened to what is inside the outlines of the patches."""
-    spans, ranges = found.curves.spans, found.ranges.copy()
+    spans = found.curves.spans
+    ranges: Array = found.ranges.copy()
     for part in parts:
         if part.is_flat:
             continue

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 
-from gso.energy.base import Term, mean_weights
+from gso.energy.base import Residual, Term, mean_weights
 from gso.ruled.smooth.curves import Curves, hermite
 from gso.ruled.smooth.residuals import (
     bend_residual,
@@ -203,7 +202,7 @@ class Terms:
         h = self._spans.width
         return weights * np.stack([np.ones_like(h), h, np.ones_like(h), h], axis=1)
 
-    def _repeated(self, name: str, residual: Any, constants: list[Array]) -> Term:
+    def _repeated(self, name: str, residual: Residual, constants: list[Array]) -> Term:
         ids = np.tile(self._spans.ids, (len(constants), 1))
         return _mean(name, residual, ids, np.vstack(constants))
 
@@ -212,10 +211,13 @@ def _outermost(curves: Curves) -> Flags:
     """Return which spans are at an end of their sequence."""
     spans = curves.spans
     last = np.array([len(i) - 2 for i in curves.index])[spans.sequence]
-    return (spans.row == 0) | (spans.row == last)
+    outermost: Flags = (spans.row == 0) | (spans.row == last)
+    return outermost
 
 
-def _mean(name: str, residual: Any, ids: Ints, constants: Array, *, linear: bool = False) -> Term:
+def _mean(
+    name: str, residual: Residual, ids: Ints, constants: Array, *, linear: bool = False
+) -> Term:
     return Term(
         name,
         residual,

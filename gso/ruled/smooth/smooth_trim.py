@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -132,17 +131,13 @@ def _divided(
     sharp, given = np.roll(sharp, first), np.roll(given, first)
     starts = np.flatnonzero(owner != np.roll(owner, 1))
     parts = [np.arange(a, b) for a, b in zip(starts, np.r_[starts[1:], len(owner)], strict=True)]
-    count = len(parts)
-    begins: list[Any] = [None] * count
-    ends: list[Any] = [None] * count
-    for n in range(count):
-        here, there = parts[n], parts[(n + 1) % count]
-        crossing = _crossing(
-            patches[owner[here[-1]]], uv[here[-1]], patches[owner[there[0]]], uv[there[0]]
-        )
-        ends[n], begins[(n + 1) % count] = crossing
+    crossings = [
+        _crossing(patches[owner[a[-1]]], uv[a[-1]], patches[owner[b[0]]], uv[b[0]])
+        for a, b in zip(parts, [*parts[1:], parts[0]], strict=True)
+    ]
     out = []
-    for rows, begin, end in zip(parts, begins, ends, strict=True):
+    for n, rows in enumerate(parts):
+        begin, end = crossings[n - 1][1], crossings[n][0]
         inner = rows[given[rows]]
         near = [min(_apart(uv[r], begin), _apart(uv[r], end)) > _SAME for r in inner]
         inner = inner[near]
@@ -271,8 +266,8 @@ def _border(domain: Array, points: list[Array]) -> Array:
             found.append(x)
     order = np.argsort(keys, kind="stable")
     out = np.array(found)[order]
-    new = (out != np.roll(out, 1, axis=0)).any(axis=1)
-    return out[new]
+    new: Array = out[(out != np.roll(out, 1, axis=0)).any(axis=1)]
+    return new
 
 
 def _chain(ring: Array, corner: set[tuple[float, ...]]) -> Loop:

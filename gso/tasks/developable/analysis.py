@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from gso.energy import fairness
 from gso.mesh import Mesh
 from gso.smoothing import estimate_sigma, smooth_grid
 from gso.tasks import base
-from gso.typing import Array
+from gso.typing import Array, N
 
 #: Gaussian curvature at which the fairness term preserves half of the design's own bending.
 FLAT_CURVATURE = 0.02
@@ -103,6 +102,6 @@ def own_bending(mesh: Mesh, absolute: Array | None = None) -> Array:
     return kept_bending(k)
 
 
-def kept_bending(curvature: Any) -> Any:
+def kept_bending(curvature: N) -> N:
     """Compute the share of its own bending that a vertex of a Gaussian curvature should keep."""
     return 1.0 / (1.0 + (curvature / FLAT_CURVATURE) ** 2)

@@ -58,7 +58,7 @@ def search(run: Runner, request: SearchRequest) -> Solution:
         return stay_within(run, request, bound, strain)
 
     best, met = attempt(request)
-    other = None if met else _other(analysis, request)
+    other = None if met else _by_isometry(analysis, request)
     if other is not None:
         solution, met = attempt(other)
         if met or _strain_left(run, solution) < _strain_left(run, best):
@@ -73,7 +73,7 @@ def _with_usable_start(run: Runner, request: R) -> R:
     return request if run.usable_start(*bounded, request) else replace(request, x0=None)
 
 
-def _other(analysis: Analysis, request: SearchRequest) -> SearchRequest | None:
+def _by_isometry(analysis: Analysis, request: SearchRequest) -> SearchRequest | None:
     """Return a request for "isometry", if it is applicable.
 
     It is where the user did not name the formulation, for meshes that can be flattened, without
@@ -120,7 +120,7 @@ def stay_within(
     for weight in _HARDER:
         solution = run(replace(request, max_displacement=bound, weight_factor=weight))
         if solution.status in (Status.ALREADY_GOOD, Status.CANCELLED):
-            return _ended(best or solution, solution), True
+            return _with_end_of(best or solution, solution), True
         value = limit.value(solution.points)
         if best is not None and not value < PROGRESS * least:
             break
@@ -129,7 +129,7 @@ def stay_within(
             break
     free = run(request)
     if free.status is Status.CANCELLED:
-        return _ended(best or free, free), True
+        return _with_end_of(best or free, free), True
     if _distance(run.analysis, free) <= bound:
         value = limit.value(free.points)
         if value < least:
@@ -137,7 +137,7 @@ def stay_within(
     return best or free, limit.met(least)
 
 
-def _ended(best: Solution, last: Solution) -> Solution:
+def _with_end_of(best: Solution, last: Solution) -> Solution:
     """Return the best solution, which is cancelled if the last one is."""
     if last.status is Status.CANCELLED:
         best.status = Status.CANCELLED

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from gso.mesh.normals import vertex_normals
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.options import Options
 from gso.tasks.request import Request
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 
 def radius(request: Request[Options]) -> float | None:
@@ -45,7 +45,9 @@ def check_handles(analysis: Analysis, request: Request[Options]) -> None:
         )
 
 
-def offset_bounds(mesh: Mesh, radius: float | None, held: Any = ()) -> Any:
+def offset_bounds(
+    mesh: Mesh, radius: float | None, held: Ints
+) -> Callable[[Array], tuple[Array, Array]] | None:
     """Build the bounds on normal offsets that keep vertices within `radius` of the design's.
 
     Vertices in `held` are fixed and have no unknown. None without a radius.
@@ -53,7 +55,7 @@ def offset_bounds(mesh: Mesh, radius: float | None, held: Any = ()) -> Any:
     return None if radius is None else partial(_bounds_at, mesh, radius, held)
 
 
-def _bounds_at(mesh: Mesh, radius: float, held: Any, coordinates: Array) -> tuple[Array, Array]:
+def _bounds_at(mesh: Mesh, radius: float, held: Ints, coordinates: Array) -> tuple[Array, Array]:
     points = coordinates.reshape(-1, 3)
     n = vertex_normals(mesh.replaced(points))
     u = points - mesh.vertices
@@ -69,4 +71,5 @@ def inside(points: Array, mesh: Mesh, radius: float | None) -> Array:
         return points
     u = points - mesh.vertices
     length = np.linalg.norm(u, axis=1, keepdims=True)
-    return mesh.vertices + u * np.minimum(1.0, radius / np.maximum(length, 1e-300))
+    bounded: Array = mesh.vertices + u * np.minimum(1.0, radius / np.maximum(length, 1e-300))
+    return bounded

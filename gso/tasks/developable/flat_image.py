@@ -25,7 +25,7 @@ def layout_of(mesh: Mesh, cut: Cut | None = None) -> Layout:
     return Layout((("surface", count, 3), ("flat", flat, 2)))
 
 
-def opened(mesh: Mesh, cut: Cut | None, points: Array) -> Mesh:
+def open_surface(mesh: Mesh, cut: Cut | None, points: Array) -> Mesh:
     """Return the surface with vertices (n, 3), cut open if there is a cut."""
     return mesh.replaced(points) if cut is None else cut.mesh.replaced(points[cut.vertex])
 
@@ -41,7 +41,7 @@ def initial(surface: Mesh) -> Array:
 def with_flat(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
     """Add an initial flat image to a surface, given by the first 3n coordinates."""
     points = coordinates[: 3 * len(mesh.vertices)].reshape(-1, 3)
-    flat = initial(opened(mesh, cut, points))
+    flat = initial(open_surface(mesh, cut, points))
     return layout_of(mesh, cut).pack({"surface": points, "flat": flat})
 
 
@@ -49,11 +49,11 @@ def cold_start(levels: list[Mesh], cut: Cut | None) -> Array:
     """Return the design (the last level) and an image interpolated from that of the first level."""
     coordinates = with_flat(levels[0], cut, levels[0].vertices.ravel())
     for coarse, fine in pairwise(levels):
-        coordinates = refined(coarse, fine, coordinates)
+        coordinates = refine(coarse, fine, coordinates)
     return coordinates
 
 
-def refined(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
+def refine(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
     """Interpolate the displacement and the flat image of a coarse grid to a finer one."""
     blocks = layout_of(coarse).split(coordinates)
     points = prolong_displacement(coarse, fine, blocks["surface"])
@@ -63,7 +63,7 @@ def refined(coarse: Mesh, fine: Mesh, coordinates: Array) -> Array:
 
 def is_isometric(mesh: Mesh, cut: Cut | None, threshold: float, coordinates: Array) -> bool:
     blocks = layout_of(mesh, cut).split(coordinates)
-    surface = opened(mesh, cut, blocks["surface"])
+    surface = open_surface(mesh, cut, blocks["surface"])
     return measure.isometry_energy(surface, blocks["flat"]) <= threshold
 
 
@@ -82,12 +82,12 @@ def length_notes(surface: Mesh, flat: Array) -> list[str]:
 
 def notes(mesh: Mesh, cut: Cut | None, coordinates: Array) -> list[str]:
     blocks = layout_of(mesh, cut).split(coordinates)
-    return length_notes(opened(mesh, cut, blocks["surface"]), blocks["flat"])
+    return length_notes(open_surface(mesh, cut, blocks["surface"]), blocks["flat"])
 
 
-def placed(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
+def place(mesh: Mesh, cut: Cut | None, coordinates: Array) -> Array:
     blocks = layout_of(mesh, cut).split(coordinates)
-    ready, order = parametrization.by_rows(opened(mesh, cut, blocks["surface"]))
+    ready, order = parametrization.by_rows(open_surface(mesh, cut, blocks["surface"]))
     flat = np.empty_like(blocks["flat"])
     flat[order] = parametrization.place(ready, blocks["flat"][order], None)
     return layout_of(mesh, cut).pack({"surface": blocks["surface"], "flat": flat})

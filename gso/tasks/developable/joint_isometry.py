@@ -192,7 +192,7 @@ def plan(
         start.ravel(),
         [*before, *stages],
         notes=opened.notes,
-        finish=partial(flat_image.placed, mesh, cut),
+        finish=partial(flat_image.place, mesh, cut),
         result_notes=partial(flat_image.notes, mesh, cut),
         spline=spline,
         cold_start=None
@@ -225,7 +225,7 @@ def _unrolling(
 ) -> Plan:
     """Plan to keep the design fixed and solve for its flat image."""
     mesh, options, cut = analysis.mesh, request.options, opened.cut
-    flat = flat_image.initial(flat_image.opened(mesh, cut, mesh.vertices))
+    flat = flat_image.initial(flat_image.open_surface(mesh, cut, mesh.vertices))
     stage = _stage(analysis, request, mesh, 0.0, cut)
     stage = replace(
         stage,
@@ -244,7 +244,7 @@ def _unrolling(
         [stage],
         status=Status.ALREADY_GOOD,
         notes=opened.notes,
-        finish=partial(flat_image.placed, mesh, cut),
+        finish=partial(flat_image.place, mesh, cut),
         cut=cut,
     )
 
@@ -283,7 +283,7 @@ def _chain(
         for k, weight in enumerate(weights):
             stage = _stage(analysis, request, mesh, weight, cut)
             if k == 0 and below is not None:
-                stage = replace(stage, enter=partial(flat_image.refined, below, mesh))
+                stage = replace(stage, enter=partial(flat_image.refine, below, mesh))
             if mesh is levels[-1]:
                 finished = partial(flat_image.is_isometric, mesh, cut, options.isometry_threshold)
                 stage = replace(stage, iterations=options.iterations, finished=finished)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso.components import several
 from gso.constraints import Compiled, Pins
 from gso.constraints.equations import Part
 from gso.errors import MeshError
@@ -23,7 +24,6 @@ from gso.mesh import Mesh
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.developable.bounds import inside
 from gso.tasks.developable.options import Options
-from gso.tasks.evaluation import parted
 from gso.tasks.request import Request
 from gso.typing import Array, Ints
 
@@ -65,7 +65,7 @@ class Level:
     constraints: Compiled
     ids: Ints | None = None
 
-    def entered(self, before: Level, bound: float | None, coordinates: Array) -> Array:
+    def enter(self, before: Level, bound: float | None, coordinates: Array) -> Array:
         """Move its start by the displacement that the coarser level before it has found."""
         points = coordinates.reshape(-1, 3)
         if self.ids is None:
@@ -93,16 +93,16 @@ def levels(analysis: Analysis, request: Request[Options]) -> list[Level]:
     if begun and (request.max_displacement is not None or mesh.grid_index is None or not free):
         return [own]
     if mesh.grid_index is not None and free:
-        return _resampled(own, request)
-    if parted(mesh) or request.options.variables == "spline":
+        return _resample(own, request)
+    if several(mesh) or request.options.variables == "spline":
         return [own]
     if mesh.grid_index is not None:
-        return _resampled(own, request) if max(mesh.grid_shape or ()) > _SHORT else [own]
+        return _resample(own, request) if max(mesh.grid_shape or ()) > _SHORT else [own]
     least = request.options.coarse_vertices * (1 if free else _CONSTRAINED)
-    return _thinned(own) if len(mesh.vertices) > least else [own]
+    return _thin(own) if len(mesh.vertices) > least else [own]
 
 
-def _resampled(own: Level, request: Request[Options]) -> list[Level]:
+def _resample(own: Level, request: Request[Options]) -> list[Level]:
     """Return the levels of a grid."""
     o = request.options
     # A warm start has the large displacements already, which the coarsest grids are for.
@@ -123,7 +123,7 @@ def _resampled(own: Level, request: Request[Options]) -> list[Level]:
     return [*found, own]
 
 
-def _thinned(own: Level) -> list[Level]:
+def _thin(own: Level) -> list[Level]:
     """Return the levels of a mesh that is no grid: triangles on some of its vertices."""
     mesh = own.mesh
     small = [p for p in own.constraints.parts if p.vertices.size <= _FEW]

@@ -15,9 +15,9 @@ beyond. The elongation of an edge is zero within a range of length ratios.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from gso import metrics as measure
+from gso.components import several
 from gso.energy import Weighted, curvature, elongation, fairness, proximity
 from gso.energy.losses import Absolute, Distance
 from gso.hierarchy import resample
@@ -26,9 +26,8 @@ from gso.mesh.normals import vertex_normals
 from gso.tasks import per_component
 from gso.tasks.developable.analysis import Analysis, Shape, own_bending
 from gso.tasks.developable.options import Options
-from gso.tasks.evaluation import parted
 from gso.tasks.request import Request
-from gso.typing import Array
+from gso.typing import Array, N
 
 #: Mean |K| and mean squared bending of a typical design, for which weights are quoted.
 TYPICAL_CURVATURE = 0.3
@@ -45,7 +44,7 @@ COARSE_CURVATURE, COARSE_FAIRNESS = 1.5, 3.0
 _QUADS = 2.0
 
 
-def adapted_weights(options: Options, curved: Any, bending: Any) -> tuple[Any, Any]:
+def adapted_weights(options: Options, curved: N, bending: N) -> tuple[N, N]:
     """Adapt the curvature and fairness weights to a design's mean |K| and squared bending."""
     curvature = options.w_curvature * (TYPICAL_CURVATURE / curved) ** 0.2
     return curvature, options.w_fairness * (TYPICAL_BENDING / (bending + 1.0)) ** 0.5
@@ -56,7 +55,7 @@ def objective(analysis: Analysis, request: Request[Options], mesh: Mesh) -> list
 
     Several components are weighted each for its own size and curvature.
     """
-    if not request.options.by_component or not parted(analysis.mesh):
+    if not request.options.by_component or not several(analysis.mesh):
         shape = analysis.shape
         if mesh is not shape.mesh and mesh.grid_index is None:
             request = _on_triangles(request, analysis)
@@ -99,7 +98,7 @@ def _terms(request: Request[Options], shape: Shape, curved: float, mesh: Mesh) -
     if mesh is shape.mesh:
         share = shape.own_bending
     else:
-        smooth = mesh.replaced(_resampled(smooth, mesh))
+        smooth = mesh.replaced(_resample(smooth, mesh))
         share = own_bending(smooth)
     fair = fairness.build(mesh, reference=smooth.vertices, share=share)
     items.append(Weighted(fair, w_fairness))
@@ -108,7 +107,7 @@ def _terms(request: Request[Options], shape: Shape, curved: float, mesh: Mesh) -
     return items
 
 
-def _resampled(source: Mesh, target: Mesh) -> Array:
+def _resample(source: Mesh, target: Mesh) -> Array:
     """Resample the vertices of one grid at the resolution of another, row by row.
 
     Meshes that are not grids have no smoothed vertices: their own are returned.

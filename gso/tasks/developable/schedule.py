@@ -24,8 +24,8 @@ from gso.tasks.developable.bounds import check_handles, inside, offset_bounds, r
 from gso.tasks.developable.levels import FREE_VERTICES, Level, levels, pinned_only
 from gso.tasks.developable.objective import objective
 from gso.tasks.developable.options import Options
-from gso.tasks.imposed import Imposed
 from gso.tasks.request import Request
+from gso.tasks.stage_constraints import StageConstraints
 from gso.typing import Array
 from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets, tangents
 
@@ -75,7 +75,7 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
     stages = [_coarse_stage(analysis, request, level, k) for k, level in enumerate(coarse)]
     stages += _stages(analysis, request, len(coarse))
     for k, (before, level) in enumerate(pairwise([*coarse, own])):
-        enter = partial(level.entered, before, radius(request))
+        enter = partial(level.enter, before, radius(request))
         stages[k + 1] = replace(stages[k + 1], enter=enter)
     if coarse and not constraints.empty:
         first = base.Analysis(coarse[0].mesh, coarse[0].constraints)
@@ -142,7 +142,7 @@ def _stages(analysis: Analysis, request: Request[Options], coarser_meshes: int) 
     cold = request.x0 is None and mesh.grid_index is None and not coarser_meshes
     falling = _falling(o) if cold else (Absolute(o.eps),)
     # On small meshes free vertices are fast enough, and offsets alone cannot meet lengths.
-    quick = len(mesh.vertices) > _QUICK and not _repeated(constraints)
+    quick = len(mesh.vertices) > _QUICK and not _needs_repetition(constraints)
     moving = partial(_unknowns, "normal", mesh, o) if quick else None
 
     def stage(kind: str, iterations: int, losses: Sequence[Absolute]) -> Stage:
@@ -167,7 +167,7 @@ def _stages(analysis: Analysis, request: Request[Options], coarser_meshes: int) 
         return [stage("normal", o.iterations, losses) for losses in (falling, final)]
     if coarser_meshes and not constraints.empty:
         if mesh.grid_index is not None or o.variables == "free" or not pinned_only(constraints):
-            return [stage("free", most if _repeated(constraints) else o.iterations, final)]
+            return [stage("free", most if _needs_repetition(constraints) else o.iterations, final)]
         # Normal offsets alone would leave the tangential displacements to the coarser meshes.
         sweep = [stage("normal", 2, final), *(stage(kind, 1, final) for kind in TANGENTS)]
         return [*_SWEEPS * sweep, stage("normal", most // 2, final)]
@@ -188,7 +188,7 @@ def _stages(analysis: Analysis, request: Request[Options], coarser_meshes: int) 
     return [last]
 
 
-def _repeated(constraints: Compiled) -> bool:
+def _needs_repetition(constraints: Compiled) -> bool:
     """Return whether hard constraints are terms, for which the last stage is repeated."""
     return any(p.hard and not p.linear for p in constraints.parts)
 
@@ -248,5 +248,5 @@ def _coarse_stage(
         continuation=_falling(o) if fall else (Absolute(o.eps),),
         continued="curvature",
         bounds=offset_bounds(mesh, radius(request), level.constraints.hard_ids),
-        imposed=None if level.constraints.empty else Imposed(level.constraints),
+        imposed=None if level.constraints.empty else StageConstraints(level.constraints),
     )

@@ -78,12 +78,12 @@ def of_curvature(analysis: Analysis, target: float) -> Bound:
     """Bound ``loss_gc_worst`` by `target`, reached within 5 %."""
 
     def value(points: Array) -> float:
-        return curved(analysis.mesh, points)
+        return curvature_of(analysis.mesh, points)
 
     return Bound(value, target, 0.05)
 
 
-def curved(mesh: Mesh, points: Array) -> float:
+def curvature_of(mesh: Mesh, points: Array) -> float:
     """Return ``loss_gc_worst`` of a surface (n, 3) in the unit ball.
 
     Several components are averaged by area, each measured by its own size.
@@ -166,7 +166,7 @@ def reach(run: Runner, request: SearchRequest, bound: Bound) -> tuple[Solution, 
         if not _RANGE[0] < weight < _RANGE[1] or (np.isfinite(high) and high < 1.02 * low):
             break
         weight = _next(weight, value, bound.aim, low, high, value_low, value_high)
-    chosen = found.chosen(last)
+    chosen = found.choose(last)
     return chosen, chosen.status is not Status.TARGET_MISSED
 
 
@@ -203,7 +203,7 @@ class _Found:
                 self.closest = (solution, value)
         return False
 
-    def chosen(self, last: Solution) -> Solution:
+    def choose(self, last: Solution) -> Solution:
         """Return the best result, with its status."""
         best = self.best
         if best is None:
@@ -212,11 +212,11 @@ class _Found:
         else:
             status = Status.TARGET_REACHED
             if not self.bound.near(self.value):
-                best = self._blended(best)
+                best = self._blend(best)
         best.status = Status.CANCELLED if last.status is Status.CANCELLED else status
         return best
 
-    def _blended(self, solution: Solution) -> Solution:
+    def _blend(self, solution: Solution) -> Solution:
         """Return a solution moved towards the surface that missed, as far as the bound allows."""
         linear = not any(part.hard for part in self.run.analysis.constraints.parts)
         if self.missed is None or solution.spline is not None or not linear:

@@ -30,7 +30,7 @@ from gso.tasks.flatten.stages import (
     FAR_FROM_FLAT,
     SMALLEST_LEVEL,
     STRAINED,
-    bent,
+    knee_factor,
     planned_stages,
     strain_stage,
 )
@@ -38,7 +38,7 @@ from gso.tasks.request import Request
 from gso.typing import Array
 from gso.unknowns import Layout
 
-__all__ = ["TASK", "Options", "bent"]
+__all__ = ["TASK", "Options", "knee_factor"]
 
 
 def plan(analysis: Analysis, request: Request[Options]) -> Plan:
@@ -71,7 +71,7 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
     finish = partial(_finish, opened, given)
     if not constraints.empty:
         first = parametrization.align(mesh, first, constraints)
-        planned = _constrained(analysis, request, planned)
+        planned = _add_constraints(analysis, request, planned)
         finish = partial(_settle, mesh, constraints)
     cold = partial(_cold, levels, constraints, start.flat)
     return Plan(
@@ -98,7 +98,9 @@ def _notes(opened: parametrization.Opened, coordinates: Array) -> list[str]:
     return length_notes(surface, coordinates.reshape(-1, 2))
 
 
-def _constrained(analysis: Analysis, request: Request[Options], stages: list[Stage]) -> list[Stage]:
+def _add_constraints(
+    analysis: Analysis, request: Request[Options], stages: list[Stage]
+) -> list[Stage]:
     """Plan stages under constraints: first soft with growing weight, then as they are given."""
     even = strain_stage(replace(request.options, norm="l2"), analysis.mesh, 1.0)
     steps = constrained.gradual(analysis.constraints, replace(even, iterations=30))

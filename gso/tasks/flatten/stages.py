@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from gso import parametrization
+from gso.components import several, split
 from gso.energy import (
     Weighted,
     christoffel,
@@ -22,14 +22,14 @@ from gso.energy import (
     stretch,
 )
 from gso.energy.losses import Absolute
+from gso.geometry import ops
 from gso.mesh import Mesh
 from gso.parametrization import orientation
 from gso.tasks import per_component
 from gso.tasks.base import Stage, same
-from gso.tasks.evaluation import parted
 from gso.tasks.flatten.options import Options
 from gso.tasks.request import Request
-from gso.typing import Array
+from gso.typing import Array, N
 from gso.unknowns import Layout, free
 
 #: Lower bound on the strain level: smaller strains are rounding errors.
@@ -104,14 +104,13 @@ def _unsqueezing(mesh: Mesh, last: Stage) -> list[Stage]:
 
 
 def strain_stage(options: Options, mesh: Mesh, level: float) -> Stage:
-    alone = not parted(mesh)
-    return _stage(
-        "strain",
-        mesh,
-        per_component.objective(
-            mesh, lambda own: _strain_terms(options, own, level if alone else _level(own))
-        ),
-    )
+    """Build the stage that minimises the strain, of the typical size `level`."""
+    alone = not several(mesh)
+
+    def make(own: Mesh) -> list[Weighted]:
+        return _strain_terms(options, own, level if alone else _level(own))
+
+    return _stage("strain", mesh, per_component.objective(mesh, make))
 
 
 def _level(mesh: Mesh) -> float:
@@ -127,22 +126,25 @@ def _strain_terms(options: Options, mesh: Mesh, level: float) -> list[Weighted]:
         loss = stretch.TwoPowerLoss(level, knee=np.inf, eps=0.03)
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
     else:
-        loss = stretch.TwoPowerLoss(level, knee=options.knee * float(bent(np.float64(level))))
+        loss = stretch.TwoPowerLoss(level, knee=options.knee * float(knee_factor(level)))
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
         # `TwoPowerLoss` too costs level times the strain where strains are small.
         items.append(Weighted(edges.build(mesh), options.w_edges * level, Absolute(0.1 * level)))
     return items
 
 
-def bent(level: Any) -> Any:
+def knee_factor(level: N) -> N:
     """Compute the factor on the knee: below one where the strain level is large."""
-    return ((_LARGE_STRAIN / level) ** (1 / 3)).clip(0.68, 1.0)
+    return ops.minimum(ops.maximum((_LARGE_STRAIN / level) ** (1 / 3), 0.68), 1.0)
 
 
 def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:
     # With several components: the mean of their cells' sizes, each in its own unit ball.
-    sizes = [isometry.typical_length(p.mesh) / p.mesh.frame.scale for p in parted(mesh)]
-    size = float(np.mean(sizes)) if sizes else isometry.typical_length(mesh)
+    if several(mesh):
+        parts = [part.mesh for part in split(mesh)]
+        size = float(np.mean([isometry.typical_length(p) / p.frame.scale for p in parts]))
+    else:
+        size = isometry.typical_length(mesh)
     eps = options.eps * size
     items = per_component.objective(mesh, partial(_length_terms, options, level, eps))
     stage = _stage("lengths", mesh, items)

@@ -5,17 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import torch
 from torch import Tensor
 
+from gso.energy.losses import Loss
 from gso.solver import Timings
-from gso.solver.directions import GaussNewton, LevenbergMarquardt, adapted
-from gso.solver.method import falls
+from gso.solver.directions import GaussNewton, LevenbergMarquardt, adapt_damping
+from gso.solver.line_search import falls
 from gso.tno.batched.batch_problem import Problem
 from gso.tno.batched.batch_steps import armijo, direction
-from gso.tno.batched.gathered import CONVERGED, MAX_ITERATIONS, STALLED
+from gso.tno.batched.stage_batch import CONVERGED, MAX_ITERATIONS, STALLED
 
 
 @dataclass
@@ -48,7 +48,7 @@ def minimise(
     *,
     iterations: int,
     tolerance: float,
-    continuation: Sequence[Any] = (),
+    continuation: Sequence[Loss] = (),
     continued: str = "",
     method: str = "gauss-newton",
     timings: Timings | None = None,
@@ -105,7 +105,7 @@ def minimise(
         longest = current.largest_step(x, step)
         x, value, length = armijo(current, x, step, energy, slope, longest)
         if marquardt:
-            damping = adapted(damping, length)
+            damping = adapt_damping(damping, length)
         if settled:
             _keep_best(out, live, x, value)
         for history, now in ((out.energies, value), (out.steps, length)):

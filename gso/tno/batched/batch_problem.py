@@ -7,22 +7,25 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from copy import copy
 from threading import Lock
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from gso.energy.losses import Loss
 from gso.linalg.base import Pattern
 from gso.parametrization.orientation import SAFETY, degenerate
 from gso.solver.assembly import assemble
 from gso.tno.batched.cholesky import BlockBanded, divide
-from gso.tno.batched.gathered import Gathered, Unbatchable
+from gso.tno.batched.stage_batch import StageBatch, Unbatchable
 from gso.tno.batched.sums import Sums
 from gso.tno.batched.tensor_terms import Term
 from gso.tno.batched.unknowns import Unknowns
 from gso.typing import Ints
 
+#: Memory for rows of all terms: whole, and term by term.
+_Rows: TypeAlias = tuple[Tensor, list[Tensor]]
 #: Structures that are kept for the next batch.
 _KEPT = 24
 _structures: OrderedDict[bytes, Structure] = OrderedDict()
@@ -60,9 +63,9 @@ class Structure:
         self.pattern: Pattern = made.pattern
         scatter = [places.scatter for places in made.places]
         split = len(varying)
-        self.entries = Sums(_joined(scatter[:split]), self.pattern.nnz, device)
-        self.gradient = Sums(_joined([c.ravel() for c in (*varying, *constant)]), n, device)
-        self._fixed = Sums(_joined(scatter[split:]), self.pattern.nnz, device)
+        self.entries = Sums(_join(scatter[:split]), self.pattern.nnz, device)
+        self.gradient = Sums(_join([c.ravel() for c in (*varying, *constant)]), n, device)
+        self._fixed = Sums(_join(scatter[split:]), self.pattern.nnz, device)
         order = self.entries.order
         self._from_fixed = _inverse(self._fixed.order)[order]
         self._unknown = torch.as_tensor(_inverse(self.gradient.order), device=device)
@@ -83,7 +86,7 @@ class Structure:
         return self.gradient(gradients).index_select(0, self._unknown)
 
 
-def _joined(arrays: Sequence[Ints]) -> Ints:
+def _join(arrays: Sequence[Ints]) -> Ints:
     return np.concatenate([np.zeros(0, np.int64), *arrays])
 
 
@@ -123,7 +126,7 @@ class Problem:
 
     Parameters
     ----------
-    parts : sequence of Gathered
+    parts : sequence of StageBatch
         Surfaces whose stages have one key.
     device : torch.device
 
@@ -133,7 +136,7 @@ class Problem:
         The surfaces cannot be solved together.
     """
 
-    def __init__(self, parts: Sequence[Gathered], device: torch.device):
+    def __init__(self, parts: Sequence[StageBatch], device: torch.device):
         first = parts[0]
         self.unknowns = Unknowns.stacked(parts, device)
         each = zip(*(part.terms for part in parts), strict=True)
@@ -158,14 +161,14 @@ class Problem:
             term.linearise(points, self.unknowns.share, gradient, part)
         return self.structure.constant(entries[0])
 
-    def _rows(self, terms: Sequence[Term]) -> tuple[Any, Any]:
+    def _rows(self, terms: Sequence[Term]) -> tuple[_Rows, _Rows]:
         """Return memory for the elements' gradients and matrices: whole, and term by term."""
         out = []
         for sizes in ([len(t.columns) for t in terms], [t.pairs for t in terms]):
             shapes = [(size, t.count, self.surfaces) for size, t in zip(sizes, terms, strict=True)]
             rows = [a * b for a, b, _ in shapes]
             whole = torch.empty(sum(rows), self.surfaces, dtype=torch.float64, device=self._device)
-            parts = [p.view(s) for p, s in zip(whole.split(rows), shapes, strict=True)]
+            parts = [p.view(s) for p, s in zip(torch.split(whole, rows), shapes, strict=True)]
             out.append((whole, parts))
         return out[0], out[1]
 
@@ -179,7 +182,7 @@ class Problem:
             other._constant = self._constant.index_select(-1, which)
         return other
 
-    def with_loss(self, name: str, loss: Any) -> Problem:
+    def with_loss(self, name: str, loss: Loss) -> Problem:
         """Return the problem with another stacked loss of the non-quadratic terms of one name."""
         other = copy(self)
         other.terms = [

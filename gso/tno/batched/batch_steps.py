@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from gso.solver.directions import HOPELESS, raised
-from gso.solver.line_search import DECREASE, SHORTEST, shorter
+from gso.solver.directions import HOPELESS, raise_damping
+from gso.solver.line_search import DECREASE, SHORTEST, shorten
 from gso.tno.batched.batch_problem import Problem
 from gso.tno.batched.cholesky import BlockBanded
 
@@ -42,7 +42,7 @@ def direction(
         failed = solver.factor(values)
         found = -solver.solve(gradient)
         failed |= ~(torch.isfinite(found).all(dim=0) & ((found * gradient).sum(dim=0) <= 0))
-        damping = raised(damping)
+        damping = raise_damping(damping)
         hopeless = failed & (damping > HOPELESS)
         # The gradient's direction, where no damping helps.
         steepest = -gradient / diagonals.amax(dim=0).clamp(min=1e-300)
@@ -99,7 +99,7 @@ def armijo(
                 found[good],
                 t[good],
             )
-        t = shorter(t, rise, down)
+        t = shorten(t, rise, down)
         left = torch.nonzero(~good & (t >= least)).ravel()
         if not len(left):
             return reached, value, length

@@ -19,7 +19,7 @@ from gso.result import Result
 from gso.tasks.base import Options, Plan
 from gso.tasks.request import Request
 from gso.tno.batched import stage_groups
-from gso.tno.batched.gathered import TooLarge, Unbatchable
+from gso.tno.batched.stage_batch import TooLarge, Unbatchable
 from gso.tno.batched.stage_groups import Minimise, Structure
 from gso.tno.optimize import check, optimize
 from gso.typing import MeshLike

@@ -11,13 +11,13 @@ from gso.errors import OptionError
 from gso.solver import Timings
 from gso.tno.batched.batch_minimiser import minimise
 from gso.tno.batched.batch_problem import Problem, forget
-from gso.tno.batched.gathered import Gathered, Solved, TooLarge
-from gso.tno.batched.tensor_terms import stacked_loss
+from gso.tno.batched.stage_batch import StageBatch, StageMinima, TooLarge
+from gso.tno.batched.tensor_terms import stack_losses
 from gso.tno.batched.unknowns import columns
 from gso.typing import Array
 
 
-def checked(device: str) -> None:
+def check_device(device: str) -> None:
     """Raise an OptionError if there is no such device."""
     try:
         torch.zeros(1, dtype=torch.float64, device=device).item()
@@ -26,7 +26,7 @@ def checked(device: str) -> None:
         raise OptionError(f"device {device!r} cannot be used ({reason}); take 'cpu'") from None
 
 
-def solve(parts: Sequence[Gathered], device: str) -> list[Solved]:
+def solve(parts: Sequence[StageBatch], device: str) -> list[StageMinima]:
     """Minimise parts with one key together, and return the minima of each.
 
     Raises
@@ -46,13 +46,13 @@ def solve(parts: Sequence[Gathered], device: str) -> list[Solved]:
     raise TooLarge
 
 
-def _solve(parts: Sequence[Gathered], device: torch.device) -> list[Solved]:
+def _solve(parts: Sequence[StageBatch], device: torch.device) -> list[StageMinima]:
     first, timings, clock = parts[0], Timings(), time.perf_counter()
     problem = Problem(parts, device)
     start = columns([part.start for part in parts], device)
     by_iteration = zip(*(part.continuation for part in parts), strict=True)
     losses = [
-        stacked_loss([loss for part in each for loss in part], device) for each in by_iteration
+        stack_losses([loss for part in each for loss in part], device) for each in by_iteration
     ]
     timings.setup += time.perf_counter() - clock
     minima = minimise(
@@ -72,7 +72,7 @@ def _solve(parts: Sequence[Gathered], device: torch.device) -> list[Solved]:
     flat = [t.cpu().numpy() for t in (minima.energy, minima.code, minima.iterations)]
     wanted = [points]
     if first.others is not None:
-        wanted.append(columns([part.others for part in parts], device))
+        wanted.append(columns([p.others for p in parts if p.others is not None], device))
     found = [{n: v.cpu().numpy() for n, v in problem.by_term(at).items()} for at in wanted]
     timings.setup += time.perf_counter() - clock
     out, begin, total = [], 0, sum(map(len, parts))
@@ -83,7 +83,7 @@ def _solve(parts: Sequence[Gathered], device: torch.device) -> list[Solved]:
         x, at, energy, step = (a[own] for a in whole)
         value, code, iterations = (a[own] for a in flat)
         by_term = tuple({name: each[own] for name, each in energies.items()} for energies in found)
-        out.append(Solved(x, at, value, code, iterations, energy, step, share, by_term))
+        out.append(StageMinima(x, at, value, code, iterations, energy, step, share, by_term))
     return out
 
 

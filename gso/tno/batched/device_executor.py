@@ -10,15 +10,15 @@ from typing import Any, cast
 from gso.executors import Executor, ProcessExecutor
 from gso.executors.base import R
 from gso.executors.process_pool import ask
-from gso.tno.batched.gathered import Gathered, Solved, TooLarge, Unbatchable
+from gso.tno.batched.stage_batch import StageBatch, StageMinima, TooLarge, Unbatchable
 
 #: Minimises the stages of several calls, of one key, together.
-Together = Callable[[Sequence[Gathered]], list[Solved]]
+Together = Callable[[Sequence[StageBatch]], list[StageMinima]]
 
 
-def minimise_elsewhere(gathered: Gathered) -> Solved:
+def minimise_elsewhere(gathered: StageBatch) -> StageMinima:
     """Have a stage minimised, in a call of a :class:`DeviceExecutor`."""
-    return cast(Solved, ask(gathered))
+    return cast(StageMinima, ask(gathered))
 
 
 class DeviceExecutor(Executor):
@@ -51,7 +51,7 @@ class DeviceExecutor(Executor):
         self.workers, self._processes, self._together = processes.workers, processes, together
         self._most, self._enough = most, enough * processes.workers
         #: Number of workers that do not wait, and the stages of those that do.
-        self._working, self._waiting = 0, dict[Future[Solved], Gathered]()
+        self._working, self._waiting = 0, dict[Future[StageMinima], StageBatch]()
         self._changed, self._closed = Condition(), False
         self._woken: Future[None] = Future()
 
@@ -81,9 +81,9 @@ class DeviceExecutor(Executor):
             with self._changed:
                 self._leave()
 
-    def _minimise(self, gathered: Gathered) -> Solved:
+    def _minimise(self, gathered: StageBatch) -> StageMinima:
         """Have a stage minimised by the thread that waits for the results of all calls."""
-        solved: Future[Solved] = Future()
+        solved: Future[StageMinima] = Future()
         with self._changed:
             self._check()
             self._waiting[solved] = gathered
@@ -112,7 +112,7 @@ class DeviceExecutor(Executor):
                 events: list[Future[Any]] = [*running, self._woken]
                 wait(events, return_when=FIRST_COMPLETED)
                 continue
-            answers = _minimised([self._waiting[solved] for solved in group], self._together)
+            answers = _minimise_all([self._waiting[solved] for solved in group], self._together)
             with self._changed:
                 self._working += len(group)
                 for solved, answer in zip(group, answers, strict=True):
@@ -122,12 +122,12 @@ class DeviceExecutor(Executor):
                     else:
                         solved.set_result(answer)
 
-    def _group(self) -> list[Future[Solved]]:
+    def _group(self) -> list[Future[StageMinima]]:
         """Choose the stages of one key that have the most surfaces; none while too few wait."""
-        by_key: dict[bytes, list[Future[Solved]]] = {}
+        by_key: dict[bytes, list[Future[StageMinima]]] = {}
         for solved, gathered in self._waiting.items():
             by_key.setdefault(gathered.key, []).append(solved)
-        best: list[Future[Solved]] = []
+        best: list[Future[StageMinima]] = []
         surfaces = 0
         for some in by_key.values():
             # The first one is taken however large it is.
@@ -141,7 +141,7 @@ class DeviceExecutor(Executor):
         return best if not self._working or len(best) >= self._enough else []
 
 
-def _minimised(parts: Sequence[Gathered], together: Together) -> list[Solved | Exception]:
+def _minimise_all(parts: Sequence[StageBatch], together: Together) -> list[StageMinima | Exception]:
     """Minimise parts together, in halves where memory is short; return results or exceptions."""
     try:
         return list(together(parts))
@@ -149,4 +149,4 @@ def _minimised(parts: Sequence[Gathered], together: Together) -> list[Solved | E
         if len(parts) == 1:
             return [error]
     half = len(parts) // 2
-    return [x for some in (parts[:half], parts[half:]) for x in _minimised(some, together)]
+    return [x for some in (parts[:half], parts[half:]) for x in _minimise_all(some, together)]

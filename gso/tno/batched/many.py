@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, contextmanager, nullcontext
 from functools import partial
-from typing import Any
 
 import numpy as np
 import torch
@@ -13,11 +12,13 @@ import torch
 from gso.errors import GSOError, OptionError
 from gso.executors import Executor, Item, ProcessExecutor, open_executor
 from gso.executors.base import processors, useful_workers
+from gso.mesh import Mesh
 from gso.result import Result
 from gso.tno.batched import device
 from gso.tno.batched.batches import BatchRequest, solve_batch
 from gso.tno.batched.device_executor import DeviceExecutor, minimise_elsewhere
-from gso.tno.batched.gathered import Gathered, Solved
+from gso.tno.batched.stage_batch import StageBatch, StageMinima
+from gso.typing import Array
 
 #: Surfaces solved together on a processor.
 _BATCH = 16
@@ -33,7 +34,7 @@ _ENOUGH, _GPU_ENOUGH = 4, 256
 
 def solve_all(
     batch: BatchRequest,
-    designs: Sequence[Any],
+    designs: Sequence[Mesh | Array],
     workers: int | None = 0,
     executor: Executor | None = None,
 ) -> Iterator[Result | GSOError]:
@@ -41,7 +42,8 @@ def solve_all(
     count = len(designs)
     if not count:
         return
-    vertices = max(np.size(getattr(designs[0], "vertices", designs[0])) // 3, 1)
+    first = designs[0]
+    vertices = max(np.size(first.vertices if isinstance(first, Mesh) else first) // 3, 1)
     here = _on_processor(batch.device)
     most = _BATCH if here else max(_VERTICES // vertices, 1)
     if executor is None and workers is None:
@@ -117,17 +119,17 @@ def _in_order(
                 shown += 1
 
 
-def _batch(batch: BatchRequest, designs: Sequence[Any]) -> list[Result | GSOError]:
+def _batch(batch: BatchRequest, designs: Sequence[Mesh | Array]) -> list[Result | GSOError]:
     """Solve designs in one batch in this process."""
     with _one_thread(batch.device):
-        return solve_batch(batch, designs, partial(_minimised, batch.device))
+        return solve_batch(batch, designs, partial(_minimise, batch.device))
 
 
-def _minimised(where: str, gathered: Gathered) -> Solved:
+def _minimise(where: str, gathered: StageBatch) -> StageMinima:
     return device.solve([gathered], where)[0]
 
 
-def _measured(batch: BatchRequest, designs: Sequence[Any]) -> list[Result | GSOError]:
+def _measured(batch: BatchRequest, designs: Sequence[Mesh | Array]) -> list[Result | GSOError]:
     """Solve designs in a worker process, by itself, and compute their metrics there."""
     found = _batch(batch, designs)
     for result in found:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-import torch
+from numpy.typing import ArrayLike
+from torch import Tensor
 
 from gso.errors import GSOError, MeshError
 from gso.executors import Executor
@@ -20,7 +20,7 @@ from gso.typing import Array
 
 
 def optimize_batch(
-    points: Any,
+    points: Tensor | ArrayLike,
     *,
     task: str = "developable",
     formulation: str | None = None,
@@ -88,7 +88,7 @@ def optimize_batch(
     """
     check_workers(workers)
     designs = _designs(points)
-    devices.checked(device)
+    devices.check_device(device)
     batch = check_batch(task, formulation, options, device, verdict)
     out: list[Result] = []
     for index, found in enumerate(solve_all(batch, list(designs), workers, executor)):
@@ -98,9 +98,9 @@ def optimize_batch(
     return out
 
 
-def _designs(points: Any) -> Array:
+def _designs(points: Tensor | ArrayLike) -> Array:
     """Return designs (B, H, W, 3) as an array, or say what is wrong with which."""
-    if isinstance(points, torch.Tensor):
+    if isinstance(points, Tensor):
         points = points.detach().cpu().numpy()
     try:
         designs = np.asarray(points, dtype=np.float64)

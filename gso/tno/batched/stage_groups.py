@@ -14,12 +14,12 @@ from gso.pipeline.run import PlanState
 from gso.solver import Minimum, Timings
 from gso.status import Progress, Status
 from gso.tasks.base import Plan, Stage
-from gso.tno.batched.gathered import (
+from gso.tno.batched.stage_batch import (
     CONVERGED,
     MAX_ITERATIONS,
     STALLED,
-    Gathered,
-    Solved,
+    StageBatch,
+    StageMinima,
     Unbatchable,
     gather,
 )
@@ -32,7 +32,7 @@ _STATUSES = {
 }
 
 #: Minimises a stage of many surfaces.
-Minimise = Callable[[Gathered], Solved]
+Minimise = Callable[[StageBatch], StageMinima]
 
 
 #: All of a plan that must be the same in a batch: arrays, and values that can be compared.
@@ -168,7 +168,9 @@ def _fallbacks(plans: Sequence[Plan]) -> list[Array] | None:
     return found if len(found) == len(plans) else None
 
 
-def _minima(solved: Solved, stage: Stage, place: tuple[int, int], backend: str) -> list[Minimum]:
+def _minima(
+    solved: StageMinima, stage: Stage, place: tuple[int, int], backend: str
+) -> list[Minimum]:
     """Convert the results of a stage to those of each surface."""
     out, energies, steps = [], solved.energies.tolist(), solved.steps.tolist()
     for k, last in enumerate(solved.iterations.tolist()):

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from gso.energy.base import Residual, Vectors
 from gso.solver.kernels import casadi_function, casadi_geometric_stiffness
-from gso.solver.printing import torch_source
+from gso.solver.printing import Graph, torch_source
 
 
 class Kernel:
@@ -26,7 +26,7 @@ class Kernel:
         Whether the function has a Jacobian.
     """
 
-    def __init__(self, function: Any, columns: int, *, jacobian: bool):
+    def __init__(self, function: Graph, columns: int, *, jacobian: bool):
         self.rows = int(function.size1_out(0))
         self.columns = columns if jacobian else 0
         self.slots = int(function.sz_w())

@@ -17,36 +17,33 @@ from torch import Tensor
 
 from gso.energy.losses import Loss
 from gso.solver.chain import by_point
-from gso.tno.batched.gathered import GatheredTerm, Unbatchable
+from gso.tno.batched.stage_batch import TermBatch, Unbatchable
 from gso.tno.batched.tensor_kernels import geometric_stiffness, kernel
-from gso.tno.batched.unknowns import Unknowns, columns, picked
+from gso.tno.batched.unknowns import Unknowns, columns, pick
 
 #: Numbers per row of a block of elements: on a processor its work arrays then stay in the cache,
 #: on a graphics processor they fit into memory.
 _BLOCK, _LARGE_BLOCK = 16384, 1 << 21
 
 
-def stacked_loss(losses: Sequence[Loss], device: torch.device) -> Any:
+def stack_losses(losses: Sequence[Loss], device: torch.device) -> Loss:
     """Return one loss with the parameters of many, as tensors (B,) where they differ."""
     first: Any = losses[0]
-    if all(loss == first for loss in losses):
-        return first
     settings = {}
     for field in fields(first):
         values = [getattr(loss, field.name) for loss in losses]
         if any(value != values[0] for value in values):
             settings[field.name] = torch.tensor(values, dtype=torch.float64, device=device)
-    return replace(first, **settings)
+    stacked: Loss = replace(first, **settings)
+    return stacked
 
 
-def _loss_of(loss: Any, which: Tensor) -> Any:
+def _loss_of(loss: Loss, which: Tensor) -> Loss:
     """Return a stacked loss of some surfaces."""
-    changed = {
-        f.name: picked(value, which)
-        for f in fields(loss)
-        if isinstance(value := getattr(loss, f.name), Tensor)
-    }
-    return replace(loss, **changed) if changed else loss
+    whole: Any = loss
+    changes = {f.name: pick(getattr(loss, f.name), which) for f in fields(whole)}
+    some: Loss = replace(whole, **changes)
+    return some
 
 
 class Term:
@@ -54,7 +51,7 @@ class Term:
 
     Parameters
     ----------
-    parts : sequence of GatheredTerm
+    parts : sequence of TermBatch
         The term of some surfaces each.
     unknowns : Unknowns
     device : torch.device
@@ -70,7 +67,7 @@ class Term:
         Points of an element do not move with one unknown each.
     """
 
-    def __init__(self, parts: Sequence[GatheredTerm], unknowns: Unknowns, device: torch.device):
+    def __init__(self, parts: Sequence[TermBatch], unknowns: Unknowns, device: torch.device):
         first = parts[0]
         self.name, self.shape, self.quadratic = first.name, first.shape, first.quadratic
         self._residual, self._vectors = first.residual, first.vectors
@@ -78,7 +75,7 @@ class Term:
         self._gather = torch.as_tensor(gather, device=device)
         self.constants = columns([part.constants for part in parts], device)
         self.factor = columns([part.factor for part in parts], device)
-        self.loss = stacked_loss([loss for part in parts for loss in part.losses], device)
+        self.loss = stack_losses([loss for part in parts for loss in part.losses], device)
         self._slope: Tensor | None = None
         self._by_point = unknowns.of is not None
         self.columns = gather
@@ -102,11 +99,11 @@ class Term:
     def of_surfaces(self, which: Tensor) -> Term:
         """Return the term of some surfaces."""
         other = copy(self)
-        other.constants, other.factor = picked(self.constants, which), picked(self.factor, which)
-        other.loss, other._slope = _loss_of(self.loss, which), picked(self._slope, which)
+        other.constants, other.factor = pick(self.constants, which), pick(self.factor, which)
+        other.loss, other._slope = _loss_of(self.loss, which), pick(self._slope, which)
         return other
 
-    def with_loss(self, loss: Any) -> Term:
+    def with_loss(self, loss: Loss) -> Term:
         """Return the term with another stacked loss."""
         other = copy(self)
         other.loss = loss
@@ -156,7 +153,7 @@ class Term:
         total = points.new_zeros(points.shape[1])
         for at, x, c in self._blocks(points):
             residual, slope = run(x, c)
-            slope = self._pulled(slope, share, at) if known is None else known[:, :, at]
+            slope = self._pull(slope, share, at) if known is None else known[:, :, at]
             total += self._cost(residual, at)
             first, second = self.loss.weights(residual)
             first = first * self.factor[at]
@@ -168,17 +165,17 @@ class Term:
             here = entries[:, at]
             _products(slope, second * self.factor[at], here, fresh=True)
             if bend is not None:
-                turned = self._pulled(bend(x, c)[1], share, at)
+                turned = self._pull(bend(x, c)[1], share, at)
                 _products(turned, first[: bend.rows].clamp(min=0.0), here, fresh=False)
         return total
 
     def keep_slope(self, points: Tensor, share: Tensor | None) -> None:
         """Compute the Jacobian of a quadratic term once."""
         run = kernel(self._residual, self.shape, len(self.constants), True)
-        blocks = [self._pulled(run(x, c)[1], share, at) for at, x, c in self._blocks(points)]
+        blocks = [self._pull(run(x, c)[1], share, at) for at, x, c in self._blocks(points)]
         self._slope = torch.cat(blocks, dim=2)
 
-    def _pulled(self, slope: Tensor, share: Tensor | None, at: slice) -> Tensor:
+    def _pull(self, slope: Tensor, share: Tensor | None, at: slice) -> Tensor:
         """Return the Jacobian by unknowns (r, q, b, B) from that by coordinates."""
         if share is None or not self._by_point:
             return slope

@@ -8,14 +8,13 @@ folder.
 
 from __future__ import annotations
 
-from os import PathLike
 from types import ModuleType
-from typing import Any
 
 from gso.errors import OptionError
 from gso.io.atomic import check_writable, replacing, suffix_of
 from gso.registry import Registry
 from gso.spelling import choices
+from gso.typing import AnyPath
 from gso.workshop.part import Drawing
 from gso.workshop.writers.layers import layer_set
 from gso.workshop.writers.writer_checks import check, require
@@ -61,7 +60,7 @@ def suffixes() -> dict[str, str]:
 
 
 def write(
-    drawing: Drawing, path: str | PathLike[str], *, layers: str = "operations", **options: Any
+    drawing: Drawing, path: AnyPath, *, layers: str = "operations", **options: object
 ) -> None:
     """Write a drawing to a file, at the scale 1:1 in millimetres.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 import uuid
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,11 @@ from gso.workshop.part import Drawing
 from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import Layer
 from gso.workshop.writers.strokes import Line, Text
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing as Document
+    from ezdxf.entities.dxfgfx import DXFGraphic
+    from ezdxf.layouts.layout import Modelspace
 
 SUFFIX = ".dxf"
 PACKAGE = "ezdxf"
@@ -62,8 +67,8 @@ def content(
     """
     document = _document(drawing)
     for layer in dict.fromkeys(layers.values()):
-        made = document.layers.add(layer.name, color=layer.aci, lineweight=_WIDTH)
-        made.dxf.plot = int(layer.plotted)
+        own = document.layers.add(layer.name, color=layer.aci, lineweight=_WIDTH)
+        own.dxf.plot = int(layer.plotted)
     space = document.modelspace()
     for border in strokes.sheet(drawing):
         _line(space, border, layers["sheet"].name)
@@ -82,11 +87,11 @@ def content(
     return encoded
 
 
-def _document(drawing: Drawing) -> Any:
+def _document(drawing: Drawing) -> Document:
     """Make an empty document whose view shows the whole drawing."""
-    import ezdxf
+    from ezdxf.filemanagement import new
 
-    document = ezdxf.new("R2010", units=_MILLIMETRES)
+    document = new("R2010", units=_MILLIMETRES)
     document.header["$MEASUREMENT"] = 1
     document.header["$LWDISPLAY"] = 1
     document.appids.new(APPLICATION)
@@ -99,7 +104,7 @@ def _document(drawing: Drawing) -> Any:
     return document
 
 
-def _line(space: Any, line: Line, layer: str) -> Any:
+def _line(space: Modelspace, line: Line, layer: str) -> DXFGraphic:
     if len(line.points) > 2:
         return space.add_lwpolyline(
             line.points.tolist(), format="xy", close=line.closed, dxfattribs={"layer": layer}
@@ -119,7 +124,7 @@ def _data(bend: Bend) -> list[tuple[int, str | float]]:
     return [*data, (1041, float(bend.radius))] if np.isfinite(bend.radius) else data
 
 
-def _text(space: Any, text: Text, layer: str) -> Any:
+def _text(space: Modelspace, text: Text, layer: str) -> DXFGraphic:
     from ezdxf.enums import TextEntityAlignment
 
     made = space.add_text(

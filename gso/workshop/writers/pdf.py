@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import Layer
 from gso.workshop.writers.tiles import FOOT, Tile, Tiling, tiled
 from gso.workshop.writers.writer_checks import length
+
+if TYPE_CHECKING:
+    from reportlab.pdfgen.canvas import Canvas
 
 SUFFIX = ".pdf"
 PACKAGE = "reportlab"
@@ -90,7 +93,7 @@ def content(
     return stream.getvalue()
 
 
-def check_paper(paper: Any) -> None:
+def check_paper(paper: object) -> None:
     """Raise an OptionError if there is no such paper."""
     if not isinstance(paper, str) or paper not in PAPERS:
         raise OptionError(f"no paper {paper!r}; {choices(paper, PAPERS)}")
@@ -106,7 +109,7 @@ class _Book:
     margin, overlap : float
     """
 
-    def __init__(self, stream: Any, tiling: Tiling, margin: float, overlap: float):
+    def __init__(self, stream: io.BytesIO, tiling: Tiling, margin: float, overlap: float):
         from reportlab.pdfgen.canvas import Canvas
 
         self._tiling, self._margin, self._overlap = tiling, margin, overlap
@@ -159,7 +162,7 @@ class _Book:
         self._marks(wide, high)
         self._foot(drawing, tile.name)
 
-    def _begin(self) -> Any:
+    def _begin(self) -> Canvas:
         if self._page:
             self._canvas.showPage()
         self._page += 1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +29,7 @@ def require(package: str, files: str) -> None:
         raise GSOError(f'{files} need {package}: pip install "gso[workshop]"')
 
 
-def length(name: str, value: Any, *, zero: bool = False) -> float:
+def length(name: str, value: float | str, *, zero: bool = False) -> float:
     """Return an option that is a length in millimetres as a number.
 
     Parameters

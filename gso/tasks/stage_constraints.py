@@ -9,7 +9,7 @@ from gso.energy import Weighted
 from gso.unknowns import Variables
 
 
-class Imposed:
+class StageConstraints:
     """Constraints as they enter the stages of a plan.
 
     Parameters
@@ -42,7 +42,7 @@ class Imposed:
         start, _, _ = layout.where(self.constraints.block)
         return variables.constrained(*reduction.maps(start, layout.size))
 
-    def with_handles(self, constraints: Compiled) -> Imposed:
+    def with_handles(self, constraints: Compiled) -> StageConstraints:
         """Return the same constraints with other positions of handles; multipliers stay.
 
         The parts of `constraints` must be those of this object, in the same order.
@@ -51,4 +51,4 @@ class Imposed:
             part.items(constraints.block) if isinstance(part, Pins) else own
             for part, own in zip(constraints.parts, self._items, strict=True)
         ]
-        return Imposed(constraints, items)
+        return StageConstraints(constraints, items)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from gso.solver import Timings
 from gso.solver.elements import kind
 from gso.tasks.base import Stage
 from gso.typing import Array, Ints
-from gso.unknowns import Layout
+from gso.unknowns import Layout, Variables
 
 #: Codes of the reasons to stop.
 MAX_ITERATIONS, CONVERGED, STALLED = 0, 1, 2
@@ -30,7 +29,7 @@ class TooLarge(Exception):
 
 
 @dataclass(frozen=True)
-class GatheredTerm:
+class TermBatch:
     """One weighted term of many surfaces, with equal stencils.
 
     Attributes
@@ -60,14 +59,14 @@ class GatheredTerm:
 
 
 @dataclass(frozen=True)
-class Gathered:
+class StageBatch:
     """One stage of many surfaces with equal stencils.
 
     Attributes
     ----------
     key : bytes
         Stages of the same key can be solved together, with the unknowns that they have.
-    terms : tuple of GatheredTerm
+    terms : tuple of TermBatch
     coordinates, size : int
         Number of coordinates N and of unknowns n.
     of : ndarray of int, (N,), or None
@@ -89,7 +88,7 @@ class Gathered:
     """
 
     key: bytes
-    terms: tuple[GatheredTerm, ...]
+    terms: tuple[TermBatch, ...]
     coordinates: int
     size: int
     of: Ints | None
@@ -110,7 +109,7 @@ class Gathered:
 
 
 @dataclass(frozen=True)
-class Solved:
+class StageMinima:
     """The minima of a stage of many surfaces.
 
     Attributes
@@ -145,7 +144,7 @@ def gather(
     method: str,
     key: bytes = b"",
     others: Sequence[Array] | None = None,
-) -> Gathered:
+) -> StageBatch:
     """Gather one stage of each surface, from its coordinates at the beginning.
 
     Raises
@@ -162,7 +161,7 @@ def gather(
         if not isinstance(limit, Orientation):
             raise Unbatchable
         corners.append(limit.start + 2 * limit.corners)
-    return Gathered(
+    return StageBatch(
         key,
         tuple(_term(items, first.layout) for items in own),
         first.layout.size,
@@ -181,10 +180,10 @@ def gather(
     )
 
 
-def _term(items: Sequence[Weighted], layout: Layout) -> GatheredTerm:
+def _term(items: Sequence[Weighted], layout: Layout) -> TermBatch:
     """Gather a term of each surface."""
     term = items[0].term
-    return GatheredTerm(
+    return TermBatch(
         term.name,
         term.residual,
         term.vectors,
@@ -197,7 +196,7 @@ def _term(items: Sequence[Weighted], layout: Layout) -> GatheredTerm:
     )
 
 
-def _single(each: Sequence[Any]) -> tuple[Ints | None, Array | None, Array | None]:
+def _single(each: Sequence[Variables]) -> tuple[Ints | None, Array | None, Array | None]:
     """Return the unknown of each coordinate, and the shares and offsets of each surface."""
     first = each[0]
     if first.basis is None:
