@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         GSOError,
         MeshError,
         OptionError,
+        SchedulerError,
         WeightsError,
     )
     from gso.io import as_mesh, load, save, save_spline
@@ -87,6 +88,7 @@ __all__ = [
     "Result",
     "RuledOptions",
     "Ruling",
+    "SchedulerError",
     "SlidingBoundary",
     "SmoothCurves",
     "Status",
@@ -126,7 +128,8 @@ _PLACES = {
         "SmoothCurves SymmetryPlane"
     ),
     "gso.errors": (
-        "BackendError ConvergenceWarning DatasetError GSOError MeshError OptionError WeightsError"
+        "BackendError ConvergenceWarning DatasetError GSOError MeshError OptionError "
+        "SchedulerError WeightsError"
     ),
     "gso.io": "as_mesh load save save_spline",
     "gso.mesh": "Mesh topology",

@@ -14,25 +14,32 @@ from gso.constraints import Compiled
 from gso.dataset import bezier
 from gso.energy import registry
 from gso.executors import SERIAL, ProcessExecutor
-from gso.linalg.base import Pattern
-from gso.pipeline.case import Case
-from gso.solver import kernels
-from gso.solver.problem import Problem
-from gso.tasks.request import check
-from gso.unknowns.base import DIMENSIONS
+from gso.linalg import Pattern
+from gso.pipeline import Case
+from gso.solver import Problem, kernels
+from gso.tasks import check
+from gso.unknowns import DIMENSIONS
 from tests.conftest import codes, cylinder, meshes, saddle
 
 torch = pytest.importorskip("torch")
 
 from gso.linalg import banded as lapack  # noqa: E402
-from gso.solver.directions import GaussNewton  # noqa: E402
-from gso.tno.batched import batch_steps, cholesky, device, many, stage_groups  # noqa: E402
+from gso.solver import GaussNewton  # noqa: E402
+from gso.tno.batched import (  # noqa: E402
+    DeviceExecutor,
+    batch_steps,
+    check_batch,
+    cholesky,
+    device,
+    many,
+    minimise_elsewhere,
+    solve_all,
+    solve_batch,
+    stage_groups,
+)
 from gso.tno.batched import tensor_kernels as on_tensors  # noqa: E402
 from gso.tno.batched.batch_problem import Problem as Batch  # noqa: E402
-from gso.tno.batched.batches import check_batch, solve_batch  # noqa: E402
-from gso.tno.batched.device_executor import DeviceExecutor, minimise_elsewhere  # noqa: E402
 from gso.tno.batched.gathered import TooLarge, Unbatchable, gather  # noqa: E402
-from gso.tno.batched.many import solve_all  # noqa: E402
 from gso.tno.batched.sums import Sums  # noqa: E402
 from gso.tno.batched.tensor_terms import stacked_loss  # noqa: E402
 

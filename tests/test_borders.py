@@ -12,7 +12,7 @@ import pytest
 import gso
 from gso import metrics
 from gso.energy import elongation
-from gso.mesh.normals import vertex_normals
+from gso.mesh import vertex_normals
 from tests.conftest import meshes, renumbered, rotation
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))

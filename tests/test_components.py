@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 
 import gso
-from gso import Mesh, metrics
+from gso import Mesh, Status, metrics
 from gso.components import average, combined, labels, split
+from gso.pipeline import Canonical
 from gso.pipeline import component_solves as solving
-from gso.pipeline.normalise import Canonical
-from gso.status import Status
+from gso.tasks import compute_metrics
 from gso.tasks.developable import Options
-from gso.tasks.evaluation import compute_metrics
 
 #: Tasks and formulations, with options.
 ASKED = [

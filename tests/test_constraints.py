@@ -11,15 +11,18 @@ from scipy.spatial.transform import Rotation
 
 import gso
 from gso import geometry
-from gso.constraints import Constraint, compile_constraints, read_constraints
-from gso.constraints.conflicts import check
-from gso.constraints.equations import Part, Pins, Relations
-from gso.constraints.linear import reduce
-from gso.energy import Term, Weighted
-from gso.energy.multipliers import STIFF, hardened
-from gso.mesh import Frame, Mesh
-from gso.mesh.normals import vertex_normals
-from gso.mesh.polyline import Polylines
+from gso.constraints import (
+    Constraint,
+    Part,
+    Pins,
+    Relations,
+    check,
+    compile_constraints,
+    read_constraints,
+    reduce,
+)
+from gso.energy import STIFF, Term, Weighted, hardened
+from gso.mesh import Frame, Mesh, Polylines, vertex_normals
 from gso.unknowns import Layout, free, normal_offsets
 from gso.verdict import Code
 from tests.conftest import codes, saddle, shuffled, sphere_cap

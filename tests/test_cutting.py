@@ -8,8 +8,8 @@ import pytest
 import gso
 from gso import metrics, parametrization
 from gso.cli import main
-from gso.mesh import Mesh
-from gso.mesh.cut import cut, joining
+from gso.mesh import Mesh, joining
+from gso.mesh.cut import cut
 from gso.pattern import Pattern
 from gso.result import Result
 from gso.verdict import Code

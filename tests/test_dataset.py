@@ -21,12 +21,11 @@ import pytest
 from click.testing import CliRunner
 
 import gso
-from gso import dataset, metrics
+from gso import DatasetError, OptionError, dataset, metrics
 from gso.cli import main
-from gso.dataset import bezier, drawing, hdf, labels, lazy, noise, screen, shapes, summary
-from gso.dataset.recipe import PUBLISHED, Recipe
-from gso.errors import DatasetError, OptionError
-from gso.unknowns.spline import tensor_matrix
+from gso.dataset import Recipe, bezier, drawing, hdf, labels, lazy, noise, screen, shapes, summary
+from gso.dataset.recipe import PUBLISHED
+from gso.unknowns import tensor_matrix
 
 ROOT = Path(__file__).resolve().parents[1]
 TINY = Recipe(n=64, size=16, extras=False)
@@ -219,7 +218,7 @@ class TestLabels:
         assert {k: v.shape for k, v in label.arrays.items()} == labels.shapes("developable", 16)
 
     def test_offsets_are_displacements_along_the_normals_of_the_design(self, tiny):
-        from gso.mesh.normals import vertex_normals
+        from gso.mesh import vertex_normals
 
         item = tiny["validation"][2]
         normals = vertex_normals(gso.Mesh.from_grid(item["surface"])).reshape(16, 16, 3)

@@ -10,21 +10,19 @@ import pytest
 from click.testing import CliRunner
 
 import gso
+from gso import GSOError, MeshError, OptionError
 from gso.cli import main
-from gso.errors import GSOError, MeshError, OptionError
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Mesh, Nearest
 from gso.pattern import Bend
 from gso.verdict import Code
-from gso.workshop import work
+from gso.workshop import Finish, Thickness, work
 from gso.workshop.asking import Ask
 from gso.workshop.checks import judge_sheet
 from gso.workshop.designs import Design, designs_of
-from gso.workshop.finish import Finish
 from gso.workshop.making import made
 from gso.workshop.marks import to_pattern, to_surface
 from gso.workshop.parts import drawn, fitted, parts_of
-from gso.workshop.thickness import Thickness, thickened
+from gso.workshop.thickness import thickened
 from tests.conftest import codes
 from tests.test_pieces import dome
 from tests.test_workshop import arch, bent

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 import gso
-from gso import hybrid
-from gso.errors import MeshError, OptionError, WeightsError
+from gso import MeshError, OptionError, WeightsError, hybrid
 from gso.hybrid import solving, warm_start
 from gso.hybrid.patch import as_patch
 from gso.hybrid.time_model import net_saves_time
 from gso.mesh import Mesh
 from gso.mesh.topology import reverse
-from gso.pipeline.run import Run
+from gso.pipeline import Run
 from gso.tasks.developable.joint_isometry import Options as JointOptions
 from gso.tno import Start, optimize
 from tests.conftest import cylinder, saddle, shuffled, sphere_cap

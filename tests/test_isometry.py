@@ -14,8 +14,7 @@ import gso
 from gso import metrics
 from gso.dataset import bezier
 from gso.energy import proximity
-from gso.mesh.closest_point import Nearest
-from gso.mesh.normals import vertex_normals
+from gso.mesh import Nearest, vertex_normals
 
 JOINT = {"formulation": "isometry"}
 FLAT = {"task": "flatten", "formulation": "isometry"}

@@ -9,12 +9,11 @@ import gso
 from gso import faults
 from gso.constraints import compile_constraints
 from gso.hierarchy import Prolongation, Transfer, coarser, nearest_on_grid, thinned
-from gso.mesh import Mesh
-from gso.mesh.normals import vertex_normals
+from gso.mesh import Mesh, vertex_normals
+from gso.tasks import check
+from gso.tasks.developable import Options
 from gso.tasks.developable import levels as planned
 from gso.tasks.developable.analysis import Analysis
-from gso.tasks.developable.options import Options
-from gso.tasks.request import check
 
 
 def lifted(plane: np.ndarray) -> np.ndarray:

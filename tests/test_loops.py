@@ -12,15 +12,11 @@ import numpy as np
 import pytest
 
 import gso
-from gso.energy import registry
-from gso.energy.base import Weighted
-from gso.energy.losses import Absolute, Distance, Squared
-from gso.mesh.normals import vertex_normals
-from gso.solver import cached_source, loops
-from gso.solver.problem import Problem
-from gso.unknowns import Layout
+from gso.energy import Absolute, Distance, Squared, Weighted, registry
+from gso.mesh import vertex_normals
+from gso.solver import Problem, cached_source, loops
+from gso.unknowns import Layout, normal_offsets
 from gso.unknowns.free import free
-from gso.unknowns.normal import normal_offsets
 from tests.conftest import meshes
 from tests.test_pieces import dome
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gso
-from gso.errors import MeshError, OptionError, WeightsError
+from gso import MeshError, OptionError, WeightsError
 from gso.parametrization import rectangle
 from tests.conftest import cylinder, rotation, saddle
 

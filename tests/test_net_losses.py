@@ -7,11 +7,9 @@ import pytest
 
 from gso import metrics
 from gso.constraints import Compiled
-from gso.mesh import Mesh
-from gso.mesh.normals import vertex_normals
+from gso.mesh import Mesh, vertex_normals
 from gso.parametrization import rectangle
-from gso.tasks import developable, flatten
-from gso.tasks.request import check
+from gso.tasks import check, developable, flatten
 from tests.conftest import cylinder, saddle
 
 torch = pytest.importorskip("torch")

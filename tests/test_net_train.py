@@ -17,26 +17,32 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from gso import DatasetError, OptionError, WeightsError
 from gso.cli import main
 from gso.dataset import bezier
-from gso.errors import DatasetError, OptionError, WeightsError
 from tests.conftest import saddle, sphere_cap
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("safetensors")
 
 from gso.net import GSONet, load, save, tasks, train  # noqa: E402
-from gso.net.models.grid_geometry import ball, normalise  # noqa: E402
+from gso.net.models import ball, normalise  # noqa: E402
 from gso.net.training import (  # noqa: E402
+    Batch,
+    Config,
+    Objective,
+    Phase,
     augment,
     checkpoint,
+    from_dict,
+    read,
     training_losses,
 )
-from gso.net.training.config import FOLDER, TERMS, Config, Phase, from_dict, read  # noqa: E402
-from gso.net.training.data import Batch, Source, fresh, noisy, open_source  # noqa: E402
+from gso.net.training.config import FOLDER, TERMS  # noqa: E402
+from gso.net.training.data import Source, fresh, noisy, open_source  # noqa: E402
 from gso.net.training.learning_rate import place  # noqa: E402
 from gso.net.training.muon import optimisers, orthogonal  # noqa: E402
-from gso.net.training.phase_objective import _COSTS, Objective, aligned  # noqa: E402
+from gso.net.training.phase_objective import _COSTS, aligned  # noqa: E402
 from gso.net.training.processes import Processes  # noqa: E402
 from gso.net.training.training_curves import Curves  # noqa: E402
 from gso.net.training.training_curves import read as read_curves  # noqa: E402
@@ -439,7 +445,7 @@ def test_matrices_are_made_orthogonal_together_as_alone():
     "name", ["developable", "net-c", "net-f", "flatten-strain", "flatten", "denoise"]
 )
 def test_a_step_stays_on_the_device_of_its_batch(name, monkeypatch):
-    from gso.net.models.base import Net
+    from gso.net.models import Net
     from gso.net.weights import make
 
     # The device without storage refuses tensors of others, as a GPU does.

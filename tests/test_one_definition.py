@@ -8,7 +8,7 @@ import pytest
 from gso import Mesh, geometry, metrics
 from gso.energy import congruence, curvature, fairness, stretch
 from gso.hybrid import patch
-from gso.mesh.normals import vertex_normals
+from gso.mesh import vertex_normals
 from gso.parametrization import rectangle
 from tests.conftest import saddle
 

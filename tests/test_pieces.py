@@ -9,11 +9,9 @@ import pytest
 from click.testing import CliRunner
 
 import gso
-from gso import faults, metrics
+from gso import OptionError, faults, metrics
 from gso.cli import main
-from gso.errors import OptionError
-from gso.mesh import Mesh
-from gso.mesh.paths import Paths
+from gso.mesh import Mesh, Paths
 from gso.mesh.separation import between
 from gso.seams import Path
 from gso.seams.disks import opening
@@ -279,7 +277,7 @@ def test_a_changed_shape_is_developable_and_closed():
     assert found.usable, found.reasons
     assert found.metrics["strain_max"] <= 1e-3
     # Distances by another route: vertices and midpoints of faces, both ways.
-    from gso.mesh.closest_point import Nearest
+    from gso.mesh import Nearest
 
     middles = found.design.vertices[found.design.faces].mean(axis=1)
     assert Nearest(mesh).distances(middles).max() <= 0.13

@@ -10,10 +10,19 @@ import numpy as np
 import pytest
 
 import gso
-from gso.plot import plot_result, plot_rulings, plot_surface
-from gso.plot.draw import Panel, draw
-from gso.plot.heat import curvatures, distance, numbers, per_face, strain
-from gso.plot.view import View
+from gso.plot import (
+    Panel,
+    View,
+    curvatures,
+    distance,
+    numbers,
+    plot_result,
+    plot_rulings,
+    plot_surface,
+    strain,
+)
+from gso.plot.draw import draw
+from gso.plot.heat import per_face
 
 pytest.importorskip("matplotlib")
 

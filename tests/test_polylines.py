@@ -7,8 +7,7 @@ import pytest
 
 import gso
 from gso import metrics
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Mesh, Nearest
 from gso.seams import Edges, Path, Polyline, Slice
 from gso.seams.slicing import divided
 from tests.conftest import rotation, saddle, shuffled

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 import gso
 from gso import tasks
 from gso.mesh import Mesh
-from gso.pipeline.case import Case
-from gso.solver.problem import Problem
-from gso.tasks.request import check
+from gso.pipeline import Case
+from gso.solver import Problem
+from gso.tasks import check
 from gso.unknowns import free
 from tests.conftest import saddle
 

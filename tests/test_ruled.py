@@ -10,20 +10,16 @@ import pytest
 import gso
 from gso import faults, metrics, parametrization
 from gso.mesh import Mesh
-from gso.ruled import strip_fit
+from gso.ruled import Conditions, Domain, Folds, Strips, strip_fit
 from gso.ruled.chords import chords
-from gso.ruled.conditions import Conditions
 from gso.ruled.copies import copies, with_copies
 from gso.ruled.descent import planarised
 from gso.ruled.diagonal_gap import planarity
-from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
-from gso.ruled.fold_lines import Folds
 from gso.ruled.loft import loft
 from gso.ruled.polygon import resampled
 from gso.ruled.prices import prices
 from gso.ruled.program import sequences
-from gso.ruled.strip_layout import Strips
 from gso.ruled.strip_weights import Weights
 from gso.ruled.system import System
 from gso.verdict import Code

@@ -10,12 +10,11 @@ import pytest
 import shapely
 
 import gso
+from gso.ruled import Strips, Untrimmed
 from gso.ruled.smooth.curves import Curves, hermite
 from gso.ruled.smooth.patches import patches
 from gso.ruled.smooth.smooth_fit import _places
 from gso.ruled.smooth.smooth_surface import smooth_strips
-from gso.ruled.strip_layout import Strips
-from gso.ruled.untrimmed import Untrimmed
 from gso.spline import TrimmedSpline
 from tests.conftest import cylinder
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from gso import Mesh
-from gso.errors import MeshError, OptionError
+from gso import Mesh, MeshError, OptionError
 from gso.smoothing import Smoothed, estimate_sigma, smooth_grid, smooth_mesh
 from gso.smoothing.grid_smoothing import modes
 from gso.smoothing.local_fits import neighbours, residuals, rings, umbrella

@@ -11,12 +11,9 @@ import pytest
 import gso
 from gso import Progress, Status, linalg
 from gso.constraints import compile_constraints
-from gso.energy import Weighted, curvature, fairness, position, proximity
-from gso.energy.losses import Absolute, Distance
-from gso.mesh import Mesh
-from gso.mesh.normals import vertex_normals
-from gso.solver import METHODS, minimise
-from gso.solver.problem import Problem
+from gso.energy import Absolute, Distance, Weighted, curvature, fairness, position, proximity
+from gso.mesh import Mesh, vertex_normals
+from gso.solver import METHODS, Problem, minimise
 from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets, spline_surface
 from tests.conftest import saddle
 

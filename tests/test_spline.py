@@ -18,8 +18,7 @@ from gso.cli import main
 from gso.energy import Weighted, congruence, fairness
 from gso.mesh import Mesh
 from gso.quantities import MILLIMETRES
-from gso.solver import minimise
-from gso.solver.problem import Problem
+from gso.solver import Problem, minimise
 from gso.spline import BSplineSurface, clamped_knots
 from gso.spline.fit import fitting_controls, gap
 from gso.tasks.developable import Options

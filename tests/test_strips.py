@@ -11,12 +11,10 @@ from gso.cli import main
 from gso.components import split
 from gso.mesh import Mesh
 from gso.result import StripsResult
+from gso.ruled.paneling import LightDesign, Options, StripsRequest
 from gso.ruled.paneling.lay_strips import lay_strips
-from gso.ruled.paneling.light_design import LightDesign
-from gso.ruled.paneling.options import Options
-from gso.ruled.paneling.strips_request import StripsRequest
-from gso.seams.sheets import rectangle
-from gso.tasks.request import Limits
+from gso.seams import rectangle
+from gso.tasks import Limits
 from tests.conftest import cylinder, saddle
 from tests.test_pieces import ball, dome
 

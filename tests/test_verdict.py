@@ -11,16 +11,15 @@ import pytest
 from click.testing import CliRunner
 
 import gso
-from gso import metrics
+from gso import Status, metrics
 from gso.cli import main
 from gso.dataset import bezier
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.pipeline.judgement import add_verdict
-from gso.pipeline.lay_flat import largest_strain, lay_out
+from gso.pipeline import add_verdict, lay_out
+from gso.pipeline.lay_flat import largest_strain
 from gso.result import headline
-from gso.status import Status
-from gso.tasks.request import Limits
+from gso.tasks import Limits
 from gso.verdict import Code, judge
 from tests.conftest import codes, cylinder, saddle, shuffled
 

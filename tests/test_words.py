@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import gso
+from gso import OptionError
 from gso.cli import main
-from gso.errors import OptionError
 from gso.quantities import MILLIMETRES, as_length, as_strain
 
 COMMANDS = dict(main.commands)

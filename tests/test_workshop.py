@@ -9,20 +9,19 @@ import pytest
 import shapely
 
 import gso
-from gso.errors import MeshError, OptionError
+from gso import MeshError, OptionError
 from gso.mesh import Mesh
 from gso.pattern import Bend
 from gso.verdict import Code
+from gso.workshop import Finish, Part, Thickness
 from gso.workshop.asking import Ask
 from gso.workshop.congruent import origins
 from gso.workshop.designs import Design
-from gso.workshop.finish import Finish
 from gso.workshop.making import made
 from gso.workshop.offsets import offset, with_allowance
 from gso.workshop.panels import Made
-from gso.workshop.part import Part, signed_area
+from gso.workshop.part import signed_area
 from gso.workshop.parts import mirrored, parts_of, scaled
-from gso.workshop.thickness import Thickness
 from tests.test_pieces import dome
 
 
@@ -186,8 +185,8 @@ class TestCongruent:
         assert [(p.name, p.count) for p in parts] == [("one", 3), ("valley", 2), ("mirrored", 4)]
 
     def test_seams_with_other_numbers_make_other_parts(self):
+        from gso.workshop import Notch
         from gso.workshop.congruent import united
-        from gso.workshop.part import Notch
 
         notch = Notch(np.array([50.0, 0]), np.array([0.0, 1]), "1")
         one = replace(SQUARE, notches=(notch,))

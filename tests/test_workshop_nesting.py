@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 import shapely
 
-from gso.errors import OptionError
-from gso.workshop import sparrow
+from gso import OptionError
+from gso.workshop import Part, sparrow
 from gso.workshop.nesting import nest
-from gso.workshop.part import Part
 from gso.workshop.rectangles import ORDERS, packed
 
 

@@ -11,10 +11,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from gso.errors import GSOError, MeshError, OptionError
+from gso import GSOError, MeshError, OptionError
 from gso.pattern import Bend
-from gso.workshop import writers
-from gso.workshop.part import Drawing, Label, Notch, Part
+from gso.workshop import Drawing, Label, Notch, Part, writers
 from gso.workshop.writers.tiles import tiled
 
 ezdxf = pytest.importorskip("ezdxf")

@@ -1,5 +1,24 @@
 """Meshes: vertices, faces, the grid if there is one, connectivity, closest points, cuts."""
 
+from gso.mesh.attributes import LABELS, Attributes, Labels
+from gso.mesh.closest_point import Nearest
+from gso.mesh.cut import Cut, cut, joining
 from gso.mesh.mesh import Frame, Mesh
+from gso.mesh.normals import vertex_normals
+from gso.mesh.paths import Paths
+from gso.mesh.polyline import Polylines
 
-__all__ = ["Frame", "Mesh"]
+__all__ = [
+    "LABELS",
+    "Attributes",
+    "Cut",
+    "Frame",
+    "Labels",
+    "Mesh",
+    "Nearest",
+    "Paths",
+    "Polylines",
+    "cut",
+    "joining",
+    "vertex_normals",
+]

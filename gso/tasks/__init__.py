@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from gso.errors import OptionError
 from gso.registry import Registry
 from gso.spelling import choices
+from gso.tasks.base import Analysis, Formulation, Plan, Solution, Stage, Task
+from gso.tasks.evaluation import compute_metrics, largest_strain
+from gso.tasks.options import Options
+from gso.tasks.request import Limits, Request, check
+from gso.tasks.start import Start
 
-if TYPE_CHECKING:
-    from gso.tasks.base import Formulation, Task
-    from gso.tasks.options import Options
+__all__ = [
+    "Analysis",
+    "Formulation",
+    "Limits",
+    "Options",
+    "Plan",
+    "Request",
+    "Solution",
+    "Stage",
+    "Start",
+    "Task",
+    "add",
+    "check",
+    "choose",
+    "compute_metrics",
+    "get",
+    "largest_strain",
+    "names",
+]
 
 _FILES = Registry(
     __name__,

@@ -12,8 +12,8 @@ import gso
 from gso import energy, io, linalg, tasks
 from gso.energy import Term, Weighted
 from gso.geometry import sub
-from gso.io.raw_surface import Surface
-from gso.tasks.base import Formulation, Plan, Stage, Task
+from gso.io import Surface
+from gso.tasks import Formulation, Plan, Stage, Task
 from gso.unknowns import Layout, free
 from tests.conftest import saddle
 
@@ -118,8 +118,8 @@ def lifted():
     torch = pytest.importorskip("torch")
     from gso.net import tasks as net_tasks
     from gso.net import weights
-    from gso.net.models.base import Net
-    from gso.net.training.data import Batch
+    from gso.net.models import Net
+    from gso.net.training import Batch
 
     class Lift(Net):
         def __init__(self, task="lift"):
@@ -159,9 +159,7 @@ def lifted():
 def test_a_task_and_a_kind_of_nets(lifted, tmp_path):
     import torch
 
-    from gso.net.training.config import from_dict
-    from gso.net.training.data import Batch
-    from gso.net.training.phase_objective import Objective
+    from gso.net.training import Batch, Objective, from_dict
     from gso.net.training.validate import mean_figures
 
     config = from_dict(

@@ -10,7 +10,7 @@ from tests.conftest import saddle
 
 torch = pytest.importorskip("torch")
 
-from gso.errors import OptionError, WeightsError  # noqa: E402
+from gso import OptionError, WeightsError  # noqa: E402
 from gso.net import available, load, predict, save, tasks  # noqa: E402
 from gso.net.weights import KINDS, kind_of, make  # noqa: E402
 

@@ -1,1 +1,36 @@
 """The architectures of nets."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gso.first_use import at_first_use
+
+if TYPE_CHECKING:
+    from gso.net.models.base import SIZE, Net, exact
+    from gso.net.models.coarse import CoarseNet
+    from gso.net.models.grid_geometry import Planes, ball, normalise, normalise_with, planes
+    from gso.net.models.gsonet import GSONet
+
+__all__ = [
+    "SIZE",
+    "CoarseNet",
+    "GSONet",
+    "Net",
+    "Planes",
+    "ball",
+    "exact",
+    "normalise",
+    "normalise_with",
+    "planes",
+]
+
+__getattr__, __dir__ = at_first_use(
+    __name__,
+    {
+        "base": "SIZE Net exact",
+        "coarse": "CoarseNet",
+        "grid_geometry": "Planes ball normalise normalise_with planes",
+        "gsonet": "GSONet",
+    },
+)

@@ -6,9 +6,39 @@ BackendError
     PyTorch is not installed.
 """
 
+from __future__ import annotations
+
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
 from gso.errors import BackendError
+from gso.first_use import at_first_use
 
 if find_spec("torch") is None:
     raise BackendError('batched solves need torch: pip install ".[net]" in the folder of gso')
+
+if TYPE_CHECKING:
+    from gso.tno.batched.batches import check_batch, solve_batch
+    from gso.tno.batched.device import checked
+    from gso.tno.batched.device_executor import DeviceExecutor, minimise_elsewhere
+    from gso.tno.batched.many import planners, solve_all
+
+__all__ = [
+    "DeviceExecutor",
+    "check_batch",
+    "checked",
+    "minimise_elsewhere",
+    "planners",
+    "solve_all",
+    "solve_batch",
+]
+
+__getattr__, __dir__ = at_first_use(
+    __name__,
+    {
+        "batches": "check_batch solve_batch",
+        "device": "checked",
+        "device_executor": "DeviceExecutor minimise_elsewhere",
+        "many": "planners solve_all",
+    },
+)
