@@ -7,15 +7,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import gso
-from gso import metrics, parametrization
+from gso import energy, metrics, parametrization
 from gso.dataset import bezier
-from gso.energy import stretch
 from gso.mesh import Mesh
 from gso.mesh.topology import corner_triangles
 from gso.parametrization import orientation
 from gso.tasks import flatten
 from gso.unknowns import Layout
 from tests.conftest import cylinder, saddle, shuffled, sphere_cap
+
+stretch = energy.registry()["stretch"]
 
 Options = flatten.Options
 

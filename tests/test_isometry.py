@@ -11,10 +11,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import gso
-from gso import metrics
+from gso import energy, metrics
 from gso.dataset import bezier
-from gso.energy import proximity
 from gso.mesh import Nearest, vertex_normals
+
+proximity = energy.registry()["proximity"]
 
 JOINT = {"formulation": "isometry"}
 FLAT = {"task": "flatten", "formulation": "isometry"}

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import gso
+from gso import unknowns
 from gso.energy import Absolute, Distance, Squared, Weighted, registry
 from gso.mesh import vertex_normals
 from gso.solver import Problem, cached_source, loops
 from gso.unknowns import Layout, normal_offsets
-from gso.unknowns.free import free
 from tests.conftest import meshes
 from tests.test_pieces import dome
 
@@ -85,7 +85,7 @@ def check(kind, term, loss, monkeypatch):
     points = mesh.vertices + 0.03 * rng.standard_normal(mesh.vertices.shape)
     layout = Layout.of(len(points), "surface")
     item = Weighted(term, 2.0, loss)
-    problem = Problem([item], free(layout))
+    problem = Problem([item], unknowns.free(layout))
     compared(problem, points.ravel(), monkeypatch)
     # Coordinates that are sums of unknowns.
     normals = vertex_normals(mesh) + 0.1 * rng.standard_normal(points.shape)

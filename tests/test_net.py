@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gso
-from gso import MeshError, OptionError, WeightsError
-from gso.parametrization import rectangle
+from gso import MeshError, OptionError, WeightsError, parametrization
 from tests.conftest import cylinder, rotation, saddle
 
 torch = pytest.importorskip("torch")
@@ -222,7 +221,7 @@ def test_batches_are_single_surfaces(coarse):
 
 def test_new_flatten_net_gives_the_rectangle():
     points = saddle(30, 40)
-    start = rectangle(points)
+    start = parametrization.rectangle(points)
     flat = predict(points, task="flatten", model=CoarseNet("flatten"))
     np.testing.assert_allclose(flat, start - start.mean(axis=(0, 1)), atol=1e-6)
 

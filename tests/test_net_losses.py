@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gso import metrics
+from gso import metrics, parametrization
 from gso.constraints import Compiled
 from gso.mesh import Mesh, vertex_normals
-from gso.parametrization import rectangle
 from gso.tasks import check, developable, flatten
 from tests.conftest import cylinder, saddle
 
@@ -77,7 +76,10 @@ def test_elongation_energy_is_the_solvers_where_it_is_large(pair):
 def test_strain_energy_is_the_solvers(pair):
     designs, _ = pair
     rng = np.random.default_rng(1)
-    flats = [rectangle(p) + 3e-3 * rng.standard_normal((*p.shape[:2], 2)) for p in designs]
+    flats = [
+        parametrization.rectangle(p) + 3e-3 * rng.standard_normal((*p.shape[:2], 2))
+        for p in designs
+    ]
     strain = solver_energy.Strain(batch(*designs), flatten.Options())
     values, levels = strain(batch(*flats)), strain.level(strain.residuals(batch(*flats)))
     for k, (design, flat) in enumerate(zip(designs, flats, strict=True)):
@@ -114,7 +116,7 @@ def test_distances_are_to_the_nearest_vertex(steps):
 
 def test_iso_and_the_metric():
     surface = saddle(9, 8)
-    flat = rectangle(surface)
+    flat = parametrization.rectangle(surface)
     defect = training_losses.iso(batch(surface), batch(flat))
     by_hand = metrics.isometry_defect(surface, flat, scale=1.0)
     assert float(defect) <= (by_hand**2).mean() <= 3 * float(defect)
@@ -147,7 +149,7 @@ def test_normals_and_rectangle_are_the_packages(pair):
     for k, design in enumerate(designs):
         expected = vertex_normals(Mesh.from_grid(design, weld=False)).reshape(design.shape)
         np.testing.assert_allclose(normals[k], expected, atol=1e-12)
-        start = rectangle(design)
+        start = parametrization.rectangle(design)
         np.testing.assert_allclose(flat[k], start - start.mean(axis=(0, 1)), atol=1e-12)
 
 

@@ -9,13 +9,18 @@ import numpy as np
 import pytest
 
 import gso
-from gso import Progress, Status, linalg
+from gso import Progress, Status, energy, linalg
+from gso import unknowns as kinds
 from gso.constraints import compile_constraints
-from gso.energy import Absolute, Distance, Weighted, curvature, fairness, position, proximity
+from gso.energy import Absolute, Distance, Weighted
 from gso.mesh import Mesh, vertex_normals
 from gso.solver import METHODS, Problem, minimise
-from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets, spline_surface
+from gso.unknowns import Layout, Variables, normal_offsets, spline_offsets, spline_surface
 from tests.conftest import saddle
+
+curvature, fairness, position, proximity = map(
+    energy.registry().get, ("curvature", "fairness", "position", "proximity")
+)
 
 MESH = Mesh.from_grid(saddle(13, 11))
 LAYOUT = Layout((("surface", len(MESH.vertices), 3),))
@@ -34,12 +39,12 @@ def items() -> list[Weighted]:
 
 def held(*constraints) -> Variables:
     reduction = compile_constraints(constraints, MESH).reduction
-    return free(LAYOUT).constrained(*reduction.maps(0, LAYOUT.size))
+    return kinds.free(LAYOUT).constrained(*reduction.maps(0, LAYOUT.size))
 
 
 def unknowns() -> dict:
     return {
-        "free": free(LAYOUT),
+        "free": kinds.free(LAYOUT),
         "normal": normal_offsets(LAYOUT, MESH.vertices, NORMALS),
         "spline-offsets": spline_offsets(LAYOUT, MESH.vertices, NORMALS, (13, 11), (6, 5)),
         "spline-surface": spline_surface(LAYOUT, (13, 11), (9, 8)),
@@ -192,7 +197,7 @@ def test_an_element_may_name_a_vertex_twice(held_ids):
     triples = term.stencil[0][1].copy()
     triples[:, 2] = triples[:, 1]
     twice = replace(term, stencil=(("surface", triples),), linear=False)
-    variables = held(gso.Fixed(held_ids)) if held_ids else free(LAYOUT)
+    variables = held(gso.Fixed(held_ids)) if held_ids else kinds.free(LAYOUT)
     problem = Problem([Weighted(twice, 1.0)], variables)
     x = variables.project(MESH.vertices.ravel())
     _, gradient, values = problem.linearise(x)

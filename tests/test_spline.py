@@ -13,9 +13,9 @@ from click.testing import CliRunner
 from scipy.interpolate import NdBSpline
 
 import gso
-from gso import metrics
+from gso import energy, metrics
 from gso.cli import main
-from gso.energy import Weighted, congruence, fairness
+from gso.energy import Weighted
 from gso.mesh import Mesh
 from gso.quantities import MILLIMETRES
 from gso.solver import Problem, minimise
@@ -25,6 +25,8 @@ from gso.tasks.developable import Options
 from gso.unknowns import Layout, spline_surface
 
 from .conftest import cylinder, rotation, saddle, shuffled, sphere_cap
+
+congruence, fairness = map(energy.registry().get, ("congruence", "fairness"))
 
 SURFACE = Options(variables="surface", controls=8)
 UNITS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}

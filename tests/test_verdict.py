@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 import gso
-from gso import Status, metrics
+from gso import Status, metrics, verdict
 from gso.cli import main
 from gso.dataset import bezier
 from gso.mesh import Mesh
@@ -20,7 +20,7 @@ from gso.pipeline import add_verdict, lay_out
 from gso.pipeline.lay_flat import largest_strain
 from gso.result import headline
 from gso.tasks import Limits
-from gso.verdict import Code, judge
+from gso.verdict import Code
 from tests.conftest import codes, cylinder, saddle, shuffled
 
 pytestmark = pytest.mark.filterwarnings("ignore::gso.ConvergenceWarning")
@@ -138,12 +138,16 @@ def test_strain_is_judged_as_it_was_asked_for(good):
     strain = good.metrics["strain_max"]
     for factor, fine in ((1.1, True), (1.0, True), (0.99, False)):
         limits = Limits(max_strain=factor * strain)
-        reasons = judge(result_of(good.design, good.mesh.vertices, pattern=good.pattern), limits)
+        reasons = verdict.judge(
+            result_of(good.design, good.mesh.vertices, pattern=good.pattern), limits
+        )
         assert codes(reasons) == ([] if fine else [Code.STRAIN])
     # A distance beside it does not bring its own limit of half a percent.
     curved = result_of(saddle(9), 0.9 * saddle(9), pattern=lay_out(Mesh.from_grid(saddle(9))))
-    assert Code.STRAIN not in codes(judge(curved, Limits(max_strain=0.5, max_deviation=1.0)))
-    assert Code.STRAIN in codes(judge(curved, Limits(max_deviation=1.0)))
+    assert Code.STRAIN not in codes(
+        verdict.judge(curved, Limits(max_strain=0.5, max_deviation=1.0))
+    )
+    assert Code.STRAIN in codes(verdict.judge(curved, Limits(max_deviation=1.0)))
 
 
 def test_a_distance_that_is_passed():
@@ -251,7 +255,7 @@ def test_coordinates_that_are_not_finite():
     flat = FLAT.reshape(-1, 3)[:, :2].copy()
     result = result_of(FLAT, FLAT, "flatten", flat=flat)
     result.flat[3] = np.nan
-    (why,) = judge(result, Limits())
+    (why,) = verdict.judge(result, Limits())
     assert why.code is Code.NOT_FINITE and why.places.ids == (3,)
 
 
@@ -293,7 +297,7 @@ def test_a_face_that_no_pattern_fits():
     flat = design.vertices[:, :2].copy()
     flat[40] = flat[41]
     result = result_of(design, 0.9 * saddle(9), pattern=Pattern.whole(design, flat))
-    why = next(r for r in judge(result, Limits()) if r.code is Code.NOT_FLATTENED)
+    why = next(r for r in verdict.judge(result, Limits()) if r.code is Code.NOT_FLATTENED)
     assert why.value >= 0.99 and why.places.kind == "face"
     assert set(why.places.ids) <= {27, 28, 35, 36}
 

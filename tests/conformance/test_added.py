@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import gso
-from gso import energy, io, linalg, tasks
+from gso import energy, io, linalg, tasks, unknowns
 from gso.energy import Term, Weighted
 from gso.geometry import sub
 from gso.io import Surface
 from gso.tasks import Formulation, Plan, Stage, Task
-from gso.unknowns import Layout, free
+from gso.unknowns import Layout
 from tests.conftest import saddle
 
 
@@ -60,7 +60,9 @@ def shrink(analysis, request):
         "near", near, (("surface", ids),), np.full(len(ids), 1.0 / len(ids)), mesh.vertices.T.copy()
     )
     items = [Weighted(stay, 1.0), Weighted(origin_term(mesh), 1.0)]
-    stage = Stage("shrink", layout, items, lambda _: free(layout), imposed=analysis.imposed)
+    stage = Stage(
+        "shrink", layout, items, lambda _: unknowns.free(layout), imposed=analysis.imposed
+    )
     return Plan(layout, mesh.vertices.ravel(), [stage])
 
 
