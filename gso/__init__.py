@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     )
     from gso.io import as_mesh, load, save, save_spline
     from gso.mesh import Mesh, topology
+    from gso.pattern import Pattern
     from gso.result import Result
     from gso.ruled.loft import loft
     from gso.ruled.paneling.lay_strips import strips
@@ -83,6 +84,7 @@ __all__ = [
     "OnCurve",
     "OptionError",
     "Options",
+    "Pattern",
     "PlanarFaces",
     "Progress",
     "Result",
@@ -133,6 +135,7 @@ _PLACES = {
     ),
     "gso.io": "as_mesh load save save_spline",
     "gso.mesh": "Mesh topology",
+    "gso.pattern": "Pattern",
     "gso.result": "Result",
     "gso.ruled.loft": "loft",
     "gso.ruled.paneling.lay_strips": "strips",

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import gso
+from gso import linalg
 from gso.constraints import Compiled
-from gso.dataset import bezier
+from gso.dataset import generate
 from gso.energy import registry
 from gso.executors import SERIAL, ProcessExecutor
 from gso.linalg import Pattern
@@ -23,7 +24,6 @@ from tests.conftest import codes, cylinder, meshes, saddle
 
 torch = pytest.importorskip("torch")
 
-from gso.linalg import banded as lapack  # noqa: E402
 from gso.solver import GaussNewton  # noqa: E402
 from gso.tno.batched import (  # noqa: E402
     DeviceExecutor,
@@ -31,11 +31,9 @@ from gso.tno.batched import (  # noqa: E402
     check_batch,
     cholesky,
     device,
-    many,
     minimise_elsewhere,
     solve_all,
     solve_batch,
-    stage_groups,
 )
 from gso.tno.batched import tensor_kernels as on_tensors  # noqa: E402
 from gso.tno.batched.batch_problem import Problem as Batch  # noqa: E402
@@ -57,7 +55,7 @@ TERMS = [
 
 @pytest.fixture(scope="module")
 def designs():
-    return np.stack([s.sample(SIZE) for s in bezier.generate(4, seed=11)])
+    return np.stack([s.sample(SIZE) for s in generate(4, seed=11)])
 
 
 def planned(task, points, **request):
@@ -116,7 +114,7 @@ def test_energy_gradient_and_matrix_are_those_of_the_solver(name, designs):
     task, request, heights = CASES[name]
     points = designs[:2] if heights is None else np.stack([bump(21, h) for h in heights])
     plans = [planned(task, p, **request) for p in points]
-    assert stage_groups.same(*(stage_groups.structure(plan) for plan in plans))
+    assert len({len(plan.stages) for plan in plans}) == 1
     rng = np.random.default_rng(0)
     coordinates = [plan.start for plan in plans]
     for own in zip(*(plan.stages for plan in plans), strict=True):
@@ -197,7 +195,8 @@ def test_only_indefinite_matrices_are_damped():
         exact = -np.linalg.solve(dense(pattern, values[:, k]), gradient[:, k].numpy())
         np.testing.assert_allclose(found[:, k], exact, rtol=1e-6)
     own = np.ascontiguousarray(values[:, 1])
-    wanted = GaussNewton().step(lapack.Solver(pattern), own, diagonal, gradient[:, 1].numpy())
+    solver = linalg.find("banded").Solver(pattern)
+    wanted = GaussNewton().step(solver, own, diagonal, gradient[:, 1].numpy())
     np.testing.assert_allclose(found[:, 1], wanted, rtol=1e-8)
 
 
@@ -618,8 +617,8 @@ def test_on_a_device(workers, designs, graphics, processes):
 
 
 def test_large_grids_are_planned_one_by_one(designs, graphics, processes, monkeypatch):
-    monkeypatch.setattr(many, "_VERTICES", SIZE * SIZE)
-    monkeypatch.setattr(many, "_MOST", 2 * SIZE * SIZE)
+    monkeypatch.setattr("gso.tno.batched.many._VERTICES", SIZE * SIZE)
+    monkeypatch.setattr("gso.tno.batched.many._MOST", 2 * SIZE * SIZE)
     gso.tno.optimize_batch(designs, task="flatten", device="cuda", executor=processes)
     assert max(graphics) <= 2
 
@@ -628,7 +627,7 @@ def test_what_fails_in_a_batch_is_solved_alone(designs, monkeypatch):
     def fail(*given):
         raise gso.MeshError("some surface has no image")
 
-    monkeypatch.setattr(stage_groups, "solve", fail)
+    monkeypatch.setattr("gso.tno.batched.stage_groups.solve", fail)
     found = gso.tno.optimize_batch(designs[:2], task="flatten", workers=0)
     assert [one.backend for one in found] == [
         gso.tno.optimize(p, task="flatten", verdict=False).backend for p in designs[:2]

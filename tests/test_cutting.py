@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import gso
+from gso import Pattern, metrics, parametrization
 from gso import mesh as meshes
-from gso import metrics, parametrization
 from gso.cli import main
 from gso.mesh import Mesh, joining
-from gso.pattern import Pattern
 from gso.result import Result
 from gso.verdict import Code
 from tests.conftest import codes, is_disk, saddle, shuffled

@@ -279,12 +279,12 @@ def test_a_callback_can_cancel(surfaces):
 
 @pytest.mark.slow
 def test_one_set_of_weights_serves_three_resolutions():
-    from gso.dataset import bezier
+    from gso.dataset import generate
 
     figures = []
     for size in (32, 64, 128):
         rows = []
-        for surface in bezier.generate(12, seed=77):
+        for surface in generate(12, seed=77):
             points = surface.sample(size)
             m = gso.tno.optimize(points).metrics
             rows.append((m["loss_gc"], m["d_H"]))

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from click.testing import CliRunner
 
 import gso
 from gso import GSOError, MeshError, OptionError
-from gso.cli import fabricate_command, main
+from gso.cli import main
 from gso.mesh import Mesh
 from gso.verdict import Code, describe
-from gso.workshop import Finish, Thickness, work
-from gso.workshop.part import signed_area
+from gso.workshop import Finish, Thickness, made
 from tests.test_pieces import dome
 from tests.test_workshop import arch
 
@@ -63,7 +63,7 @@ class TestFiles:
             np.testing.assert_allclose(
                 np.ptp(outline, axis=0), [part["length"], part["width"]], rtol=1e-6
             )
-            assert abs(signed_area(outline)) == pytest.approx(part["area"], rel=1e-6)
+            assert shapely.Polygon(outline).area == pytest.approx(part["area"], rel=1e-6)
             text = (job.folder / "parts" / f"{part['name']}.svg").read_text()
             wide, high = (
                 float(x) for x in re.search(r'viewBox="\S+ \S+ (\S+) (\S+)"', text).groups()
@@ -101,16 +101,15 @@ class TestFiles:
 class TestRuns:
     def test_a_run_that_was_ended_goes_on(self, tmp_path, monkeypatch):
         calls = []
-        make = work.made
 
         def count(name, *rest):
             calls.append(name)
             if len(calls) == 2 and not done:
                 raise KeyboardInterrupt
-            return make(name, *rest)
+            return made(name, *rest)
 
         done = []
-        monkeypatch.setattr(work, "made", count)
+        monkeypatch.setattr("gso.workshop.work.made", count)
         with pytest.raises(KeyboardInterrupt):
             gso.fabricate(row(), tmp_path, unit="m", workers=0)
         done.append(True)
@@ -162,7 +161,14 @@ class TestRuns:
         said = [describe(reason, "mm") for reason in job.reasons]
         assert len(said) > 1 and said == [r["text"] for r in job.certificate["reasons"]]
         assert all(f"<li>{html.escape(text)}</li>" in page for text in said)
-        assert [f"not usable: {text}" for text in said] == fabricate_command.text(job)[-len(said) :]
+        gso.save(dome(9, 1.0), tmp_path / "dome.obj")
+        words = ["fabricate", str(tmp_path / "dome.obj"), "-o", str(tmp_path / "out")]
+        more = ["--max-deviation", "1e-6", "--thickness", "50", "--workers", "0"]
+        done = CliRunner().invoke(main, [*words, *more])
+        reasons = json.loads((tmp_path / "out" / "certificate.json").read_text())["reasons"]
+        assert len(reasons) == len(said)
+        told = done.output.splitlines()[-len(said) :]
+        assert told == [f"not usable: {r['text']}" for r in reasons]
 
     @pytest.mark.parametrize(
         "bad",

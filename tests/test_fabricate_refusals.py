@@ -13,16 +13,11 @@ import gso
 from gso import GSOError, MeshError, OptionError
 from gso.cli import main
 from gso.mesh import Mesh, Nearest
-from gso.pattern import Bend
 from gso.verdict import Code
-from gso.workshop import Finish, Thickness, work
-from gso.workshop.asking import Ask
+from gso.workshop import Ask, Bend, Design, Finish, Thickness, designs_of, made, parts_of, thickened
 from gso.workshop.checks import judge_sheet
-from gso.workshop.designs import Design, designs_of
-from gso.workshop.making import made
 from gso.workshop.marks import to_pattern, to_surface
-from gso.workshop.parts import drawn, fitted, parts_of
-from gso.workshop.thickness import thickened
+from gso.workshop.parts import drawn, fitted
 from tests.conftest import codes
 from tests.test_pieces import dome
 from tests.test_workshop import arch, bent
@@ -79,7 +74,7 @@ class TestFolder:
         def end(*_):
             raise KeyboardInterrupt
 
-        monkeypatch.setattr(work, "made", end)
+        monkeypatch.setattr("gso.workshop.work.made", end)
         with pytest.raises(KeyboardInterrupt):
             gso.fabricate(dome(5), tmp_path, workers=0)
         said = json.loads((tmp_path / "certificate.json").read_text())
@@ -105,7 +100,7 @@ class TestFolder:
         ],
     )
     def test_wrong_options_are_refused_before_anything_is_made(self, tmp_path, monkeypatch, bad):
-        monkeypatch.setattr(work, "made", None)
+        monkeypatch.setattr("gso.workshop.work.made", None)
         with pytest.raises(GSOError):
             gso.fabricate(dome(5), tmp_path / "out", workers=0, **bad)
         assert not (tmp_path / "out").exists()

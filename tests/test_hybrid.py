@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import gso
+from gso import IsometryOptions as JointOptions
 from gso import MeshError, OptionError, WeightsError, hybrid, tno
-from gso.hybrid import solving, warm_start
+from gso.hybrid import net_saves_time
 from gso.hybrid.patch import as_patch
-from gso.hybrid.time_model import net_saves_time
 from gso.mesh import Mesh
 from gso.mesh.topology import reverse
 from gso.pipeline import Run
-from gso.tasks.developable.joint_isometry import Options as JointOptions
 from gso.tno import Start
 from tests.conftest import cylinder, saddle, shuffled, sphere_cap
 
@@ -257,24 +257,30 @@ def test_the_net_alone_flattens(surfaces):
     assert np.allclose(*apart)
 
 
+def prediction(points=None, net="", refused=""):
+    return SimpleNamespace(points=points, seconds=0.01, net=net, refused=refused)
+
+
 @pytest.fixture
 def coarse_net(monkeypatch):
     """Predictions like those of a fair net, and why there is none where that is asked."""
 
     def predictions(designs, task, net, passes, alone):
         if net == "none":
-            return [warm_start.Prediction(refused="there is none")] * len(designs)
+            return [prediction(refused="there is none")] * len(designs)
         few = gso.DevelopableOptions(iterations=1)
         results = [tno.optimize(design, options=few) for design in designs]
-        return [warm_start.Prediction(r.mesh.vertices, 0.01, "fair") for r in results]
+        return [prediction(r.mesh.vertices, "fair") for r in results]
 
-    monkeypatch.setattr(solving, "predictions", predictions)
+    monkeypatch.setattr("gso.hybrid.solving.predictions", predictions)
 
 
 def predicts(monkeypatch, points):
     """Let every net make the same of every design."""
-    found = warm_start.Prediction(points, 0.01, "odd")
-    monkeypatch.setattr(solving, "predictions", lambda designs, **_: [found] * len(designs))
+    found = prediction(points, "odd")
+    monkeypatch.setattr(
+        "gso.hybrid.solving.predictions", lambda designs, **_: [found] * len(designs)
+    )
 
 
 @pytest.mark.parametrize("polish", [True, False])
@@ -433,7 +439,7 @@ def test_a_net_of_another_task_is_refused():
 
 
 def test_without_torch_it_is_the_optimiser(monkeypatch, surfaces):
-    monkeypatch.setattr(warm_start, "find_spec", lambda name: None)
+    monkeypatch.setattr("gso.hybrid.warm_start.find_spec", lambda name: None)
     cold, result = tno.optimize(surfaces[0]), hybrid.solve(surfaces[0])
     assert same(cold, result)
     assert "torch" in result.notes[-1]
@@ -441,7 +447,7 @@ def test_without_torch_it_is_the_optimiser(monkeypatch, surfaces):
 
 
 def test_without_weights_it_is_the_optimiser(monkeypatch, surfaces):
-    monkeypatch.setattr(warm_start, "available", lambda task: [])
+    monkeypatch.setattr("gso.hybrid.warm_start.available", lambda task: [])
     cold, result = tno.optimize(surfaces[0]), hybrid.solve(surfaces[0])
     assert same(cold, result)
     assert "no net" in result.notes[-1]
@@ -632,9 +638,9 @@ def test_passes_are_left_out_where_a_whole_solve_follows(surfaces, monkeypatch, 
     def asked(designs, task, net, passes, alone):
         assert alone is (polish is False)
         seen.append(passes)
-        return [warm_start.Prediction(refused="enough")] * len(designs)
+        return [prediction(refused="enough")] * len(designs)
 
-    monkeypatch.setattr(solving, "predictions", asked)
+    monkeypatch.setattr("gso.hybrid.solving.predictions", asked)
     hybrid.solve(surfaces[0], polish=polish)
     list(hybrid.solve_many([surfaces[0]], polish=polish, workers=0))
     assert seen == [passes, passes]
@@ -665,7 +671,9 @@ def test_where_a_net_pays(size, keywords, many, expected):
 
 
 def test_no_net_is_asked_where_it_does_not_pay(surfaces, monkeypatch):
-    monkeypatch.setattr(solving, "predictions", lambda designs, **_: [1 / 0 for _ in designs])
+    monkeypatch.setattr(
+        "gso.hybrid.solving.predictions", lambda designs, **_: [1 / 0 for _ in designs]
+    )
     cold, result = tno.optimize(surfaces[0]), hybrid.solve(surfaces[0], sparing=True)
     (item,) = hybrid.solve_many([surfaces[0]], sparing=True, workers=0)
     for found in (result, item.result):

@@ -15,7 +15,7 @@ import gso
 from gso import unknowns
 from gso.energy import Absolute, Distance, Squared, Weighted, registry
 from gso.mesh import vertex_normals
-from gso.solver import Problem, cached_source, loops
+from gso.solver import Problem, loops
 from gso.unknowns import Layout, normal_offsets
 from tests.conftest import meshes
 from tests.test_pieces import dome
@@ -36,7 +36,7 @@ CASES = [
 def choice(monkeypatch):
     monkeypatch.setenv(loops.VARIABLE, "numba")
     yield
-    for cached in (loops._loop, loops._adder, loops._installed, cached_source._folder):
+    for cached in (loops._loop, loops._adder, loops._installed):
         cached.cache_clear()
 
 

@@ -19,7 +19,7 @@ from click.testing import CliRunner
 
 from gso import DatasetError, OptionError, WeightsError
 from gso.cli import main
-from gso.dataset import bezier
+from gso.dataset import generate
 from tests.conftest import saddle, sphere_cap
 
 torch = pytest.importorskip("torch")
@@ -59,7 +59,7 @@ def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("surfaces")
     for split, count, seed in (("train", 8, 1), ("validation", 2, 2)):
         (path / split).mkdir()
-        for k, surface in enumerate(bezier.generate(count, seed=seed)):
+        for k, surface in enumerate(generate(count, seed=seed)):
             np.save(path / split / f"{k:03d}.npy", surface.sample(32))
     return path
 
@@ -276,7 +276,7 @@ def test_runs(made, folder, tmp_path):
 def test_bfloat16_spares_the_curvature(name):
     # Where positions go in and displacements come out, its rounding would cover the optimum.
     net = load(name)
-    grids = [surface.sample(64) for surface in bezier.generate(2, seed=5)]
+    grids = [surface.sample(64) for surface in generate(2, seed=5)]
     surfaces = normalise(torch.from_numpy(np.stack(grids))).float()
     found = []
     for net.bf16 in (False, True):

@@ -21,7 +21,6 @@ from gso.plot import (
     plot_surface,
     strain,
 )
-from gso.plot.draw import draw
 from gso.plot.heat import per_face
 
 pytest.importorskip("matplotlib")
@@ -141,7 +140,7 @@ def test_lines_are_painted_over_their_face_and_under_nearer_ones():
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 2], [1, 0, 2], [0, 1, 2.0]])
     panel = Panel(points, np.array([[3, 4, 5], [0, 1, 2]]), shaded=False)
     panel.lines = [np.array([[0.1, 0.1, 0.0], [0.3, 0.1, 0.0], [0.5, 0.1, 0.0]])]
-    painted = draw([panel]).axes[0].collections[0]
+    painted = gso.plot.draw([panel]).axes[0].collections[0]
     assert [len(path.vertices) > 3 for path in painted.get_paths()] == [True, False, False, True]
     assert np.allclose(painted.get_facecolor()[:, 3], [1.0, 0.0, 0.0, 1.0])
 
@@ -219,7 +218,7 @@ def test_nearer_faces_are_painted_later():
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 2], [1, 0, 2], [0, 1, 2.0]])
     panel = Panel(points, np.array([[3, 4, 5], [0, 1, 2]]), shaded=False)
     panel.heat = numbers(gso.Mesh(points, panel.faces), np.array([0.0, 1.0]), "")
-    painted = draw([panel]).axes[0].collections[0].get_facecolor()
+    painted = gso.plot.draw([panel]).axes[0].collections[0].get_facecolor()
     from matplotlib import colormaps
 
     far, near = colormaps[panel.heat.scale.colours]([1.0, 0.0])
@@ -232,7 +231,7 @@ def test_faces_without_a_number_are_grey():
     assert np.isfinite(heat.values).all()  # each face of a grid has an interior corner
     one = gso.Mesh(mesh.vertices[[0, 1, 10, 9]], [[0, 1, 2, 3]])
     assert np.isnan(curvatures([one])[0].values).all()
-    painted = draw([Panel(mixed().vertices, mixed().faces, heat=curvatures([mixed()])[0])])
+    painted = gso.plot.draw([Panel(mixed().vertices, mixed().faces, heat=curvatures([mixed()])[0])])
     colour = painted.axes[0].collections[0].get_facecolor()[:, :3]
     assert np.allclose(colour - colour[:, :1], 0.0)
 

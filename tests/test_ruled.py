@@ -16,7 +16,6 @@ from gso.ruled.copies import copies, with_copies
 from gso.ruled.descent import planarised
 from gso.ruled.diagonal_gap import planarity
 from gso.ruled.extended import Extended
-from gso.ruled.loft import loft
 from gso.ruled.polygon import resampled
 from gso.ruled.prices import prices
 from gso.ruled.program import sequences
@@ -337,7 +336,7 @@ def rails():
 
 def test_lofts_are_planar_between_rails():
     curves = rails()
-    strip = loft(*curves)
+    strip = gso.loft(*curves)
     assert strip.sound
     off = np.linalg.norm(strip.moved - np.concatenate(curves), axis=1)
     assert off.max() < 1e-3
@@ -349,7 +348,7 @@ def test_lofts_are_planar_between_rails():
     there, here = (np.linalg.norm(x[a] - x[b], axis=1) for x in (mesh.vertices, flat))
     np.testing.assert_allclose(here, there, atol=1e-12)
     # Twice as many rulings: a quarter of the distance.
-    finer = loft(*curves, rulings=65)
+    finer = gso.loft(*curves, rulings=65)
     less = np.linalg.norm(finer.moved - np.concatenate(curves), axis=1)
     assert less.max() < 0.35 * off.max()
 
@@ -357,7 +356,7 @@ def test_lofts_are_planar_between_rails():
 def test_lofts_of_cones_are_cones_and_impossible_ones_are_not_sound():
     t = np.linspace(0.0, 1.0, 50)
     circle = np.stack([np.cos(t), np.sin(t), 0.0 * t], axis=1)
-    cone = loft(circle, 2.0 * circle + [0.0, 0.0, 1.0])
+    cone = gso.loft(circle, 2.0 * circle + [0.0, 0.0, 1.0])
     a, b = cone.mesh.vertices[cone.rulings.edges].transpose(1, 0, 2)
     apex = np.array([0.0, 0.0, -1.0])
     way, true = b - a, 0.5 * (a + b) - apex
@@ -365,11 +364,11 @@ def test_lofts_of_cones_are_cones_and_impossible_ones_are_not_sound():
     sine /= np.linalg.norm(way, axis=1) * np.linalg.norm(true, axis=1)
     assert np.degrees(sine.max()) < 0.05
     wave = np.stack([4.0 * t, 1.0 + 0.4 * np.sin(3.0 * t), 0.3 * np.cos(4.0 * t)], axis=1)
-    assert not loft(rails()[0], wave).sound
+    assert not gso.loft(rails()[0], wave).sound
     with pytest.raises(gso.MeshError, match="curve `other`"):
-        loft(circle, circle[:2])
+        gso.loft(circle, circle[:2])
     with pytest.raises(gso.OptionError, match="rulings"):
-        loft(circle, circle + 1.0, rulings=2)
+        gso.loft(circle, circle + 1.0, rulings=2)
 
 
 @pytest.mark.parametrize("strips", [1, 2])

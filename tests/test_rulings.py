@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
 import gso
-from gso import geometry, metrics, rulings
+from gso import geometry, metrics
 from gso.cli import main
 from gso.mesh import topology
 from gso.rulings import shape_operator, trace
@@ -148,7 +148,7 @@ def test_first_order_on_irregular_meshes(layout, surface):
 
 def test_curvature_is_the_ratio_of_determinants():
     mesh = grid(torus, 9)
-    shape, image = shape_operator(mesh), rulings.gauss_image(mesh)
+    shape, image = shape_operator(mesh), gso.rulings.gauss_image(mesh)
     v, n = mesh.vertices[mesh.faces], image[mesh.faces]
 
     def det(p):
@@ -180,7 +180,11 @@ def test_gauss_image_satisfies_the_relation_of_jiang():
     unit, scaled = [], []
     for n in (17, 33):
         mesh = grid(torus, n)
-        image, faces, normals = rulings.gauss_image(mesh), mesh.faces, metrics.face_normals(mesh)
+        image, faces, normals = (
+            gso.rulings.gauss_image(mesh),
+            mesh.faces,
+            metrics.face_normals(mesh),
+        )
         cosine = (image[faces] * normals[:, None]).sum(axis=2)
         mean = np.bincount(faces.ravel(), cosine.ravel()) / np.bincount(faces.ravel())
 
@@ -289,7 +293,7 @@ def test_odd_meshes_give_numbers(kind):
         assert len(getattr(shape, name)) == len(mesh.faces)
     assert np.allclose(np.linalg.norm(shape.directions, axis=2), 1.0)
     assert np.allclose(shape.directions @ shape.normals[..., None], 0.0, atol=1e-12)
-    image = rulings.gauss_image(mesh)
+    image = gso.rulings.gauss_image(mesh)
     assert np.allclose(np.linalg.norm(image, axis=1), mesh.used)
     assert all(np.isfinite(line).all() and len(line) > 1 for line in rulings.lines)
 

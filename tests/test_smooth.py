@@ -14,7 +14,6 @@ from gso.ruled import Strips, Untrimmed
 from gso.ruled.smooth.curves import Curves, hermite
 from gso.ruled.smooth.patches import patches
 from gso.ruled.smooth.smooth_fit import _places
-from gso.ruled.smooth.smooth_surface import smooth_strips
 from gso.spline import TrimmedSpline
 from tests.conftest import cylinder
 
@@ -85,7 +84,7 @@ def test_places_on_rulings_are_found():
 
 def test_a_cylinder_is_reproduced():
     result = gso.tno.optimize(cylinder(33, turn=0.4), formulation="ruled")
-    strips = smooth_strips(result.ruled, result.design)
+    strips = gso.smooth_strips(result.ruled, result.design)
     size = result.design.diagonal
     assert strips.is_torsal
     assert strips.turning < 0.01
@@ -99,7 +98,7 @@ def test_a_cylinder_is_reproduced():
 
 
 def test_strips_are_torsal_and_close(solved):
-    strips = smooth_strips(solved.ruled, solved.design)
+    strips = gso.smooth_strips(solved.ruled, solved.design)
     assert strips.is_torsal
     assert strips.distances[0] < 5e-3 * solved.design.diagonal
     # Normals along rulings inside the outline, by differences of points.
@@ -132,7 +131,7 @@ def test_step_files_have_one_sound_shell(solved, tmp_path):
     result.save(path, unit="mm")
     assert "smooth strips" in result.notes[-1]
     text = path.read_text(encoding="utf-8")
-    strips = smooth_strips(result.ruled, result.design)
+    strips = gso.smooth_strips(result.ruled, result.design)
     assert text.count("ADVANCED_FACE") == sum(len(p.faces) for p in strips.patches)
     reader = STEPControl_Reader()
     reader.ReadFile(str(path))
@@ -165,7 +164,7 @@ def _area(spline, loop, count=100):
 
 def test_rhino_files_have_surfaces_and_outlines(solved, tmp_path):
     rhino = pytest.importorskip("rhino3dm")
-    strips = smooth_strips(solved.ruled, solved.design)
+    strips = gso.smooth_strips(solved.ruled, solved.design)
     gso.io.save_patches(strips.patches, tmp_path / "a.3dm", unit="cm")
     model = rhino.File3dm.Read(str(tmp_path / "a.3dm"))
     assert [layer.Name for layer in model.Layers] == ["surfaces", "outlines"]
@@ -187,12 +186,12 @@ def test_surfaces_that_bend_sharply_are_written_as_planar_faces(solved, tmp_path
 def test_files_keep_the_strips(solved, tmp_path):
     solved.save(tmp_path / "a.npz")
     again = gso.Result.load(tmp_path / "a.npz")
-    one, two = (smooth_strips(r.ruled, r.design) for r in (solved, again))
+    one, two = (gso.smooth_strips(r.ruled, r.design) for r in (solved, again))
     assert one.turning == two.turning
     assert one.distances == two.distances
     old = replace(solved.ruled, untrimmed=None)
     with pytest.raises(gso.MeshError, match="earlier version"):
-        smooth_strips(old)
+        gso.smooth_strips(old)
 
 
 @pytest.mark.parametrize("name", ["rulings", "lengths", "flats", "ends", "owner"])
@@ -211,7 +210,7 @@ def test_trees_have_flat_patches():
     x, y = points[..., 0], points[..., 1]
     design = np.dstack([x, y, 0.1 * (x**3 - 3.0 * x * y**2)])
     result = gso.tno.optimize(design, options=gso.RuledOptions(flats=True, starts=("design",)))
-    strips = smooth_strips(result.ruled, result.design)
+    strips = gso.smooth_strips(result.ruled, result.design)
     assert strips.turning < 0.1
     assert any(p.spline.degrees == (1, 1) for p in strips.patches)
 
@@ -228,7 +227,7 @@ def test_holes_and_slots_are_cut_out(size):
     # Rulings cross the slot: the strip does not turn around its end.
     assert result.usable
     assert result.metrics["deviation_max"] < 0.5
-    strips = smooth_strips(result.ruled, result.design)
+    strips = gso.smooth_strips(result.ruled, result.design)
     assert strips.is_torsal
     assert strips.distances[1] < 0.02 * mesh.diagonal
     area = sum(_area(p.spline, loop) for p in strips.patches for loop, *_ in p.faces)
@@ -251,7 +250,7 @@ def test_what_cannot_be_written_is_refused(tmp_path):
 def test_a_loft_becomes_one_patch():
     t = np.linspace(0.0, 1.0, 40)
     circle = np.stack([np.cos(t), np.sin(t), 0.0 * t], axis=1)
-    strips = smooth_strips(gso.loft(circle, 2.0 * circle + [0.0, 0.0, 1.0]))
+    strips = gso.smooth_strips(gso.loft(circle, 2.0 * circle + [0.0, 0.0, 1.0]))
     (patch,) = strips.patches
     u = np.linspace(patch.spline.knots_u[0], patch.spline.knots_u[-1], 30)
     for v, radius in ((0.0, 1.0), (1.0, 2.0)):

@@ -210,12 +210,10 @@ def test_an_element_may_name_a_vertex_twice(held_ids):
 
 
 def test_a_problem_takes_over_the_sparsity_of_one_like_it(monkeypatch):
-    from gso.solver import assembly as module
-
     variables = unknowns()["normal"]
     first = Problem(items(), variables)
     pattern = first.pattern
-    monkeypatch.setattr(module, "_analysed", None)
+    monkeypatch.setattr("gso.solver.assembly._analysed", None)
     assert Problem(items(), variables, like=first).pattern is pattern
     with pytest.raises(TypeError):
         Problem(items()[:1], variables, like=first).pattern  # noqa: B018

@@ -11,13 +11,11 @@ import pytest
 from click.testing import CliRunner
 
 import gso
-from gso import Status, metrics, verdict
+from gso import Pattern, Status, metrics, tasks, verdict
 from gso.cli import main
-from gso.dataset import bezier
+from gso.dataset import generate
 from gso.mesh import Mesh
-from gso.pattern import Pattern
 from gso.pipeline import add_verdict, lay_out
-from gso.pipeline.lay_flat import largest_strain
 from gso.result import headline
 from gso.tasks import Limits
 from gso.verdict import Code
@@ -104,7 +102,7 @@ def test_tubes_are_cut_and_closed_surfaces_have_no_pattern():
     k = np.arange(24)
     tube = Mesh(rings.reshape(-1, 3), np.stack([k, np.roll(k, -1), np.roll(k, -1) + 24, k + 24], 1))
     assert lay_out(tube).is_cut
-    assert largest_strain(tube, lay_out(tube)) < 1e-9
+    assert tasks.largest_strain(tube, lay_out(tube)) < 1e-9
     ball = Mesh(np.r_[np.eye(3), -np.eye(3)], [
         [0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5],
     ])  # fmt: skip
@@ -303,7 +301,7 @@ def test_a_face_that_no_pattern_fits():
 
 
 def test_isometry_with_a_fixed_boundary():
-    design = bezier.generate(1, seed=5)[0].sample(17)
+    design = generate(1, seed=5)[0].sample(17)
     held = [gso.FixedBoundary()]
     result = gso.tno.optimize(design, formulation="isometry", constraints=held)
     # Usable only with less curvature than the design.
@@ -340,9 +338,9 @@ def test_hybrid_results_are_judged():
 
 
 def test_batches_may_leave_it_out():
-    for verdict in (True, False):
-        (item,) = gso.tno.optimize_many([saddle(9)], workers=0, options="fast", verdict=verdict)
-        assert (item.result.pattern is not None) is verdict
+    for judged in (True, False):
+        (item,) = gso.tno.optimize_many([saddle(9)], workers=0, options="fast", verdict=judged)
+        assert (item.result.pattern is not None) is judged
 
 
 @pytest.mark.parametrize(("unit", "said"), [(["--unit", "cm"], " cm"), ([], "")])

@@ -9,8 +9,7 @@ import pytest
 import shapely
 
 from gso import OptionError
-from gso.workshop import Part, sparrow
-from gso.workshop.nesting import nest
+from gso.workshop import Part, nest
 from gso.workshop.rectangles import ORDERS, packed
 
 
@@ -148,7 +147,9 @@ class TestFallback:
             raise subprocess.TimeoutExpired("spyrrow", 1)
 
         monkeypatch.setattr("gso.workshop.sparrow.subprocess.run", slow)
-        assert sparrow.solved([], 1.0, 1.0, 0) == (None, "spyrrow took too long")
+        nested = nest(triangles(4), (500.0, 400.0))
+        assert nested.method == "rectangles"
+        assert "spyrrow took too long" in nested.notes[0]
 
     def test_a_wrong_answer_is_not_taken(self, monkeypatch):
         def odd(*words, **given):

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from gso import GSOError, MeshError, OptionError
-from gso.pattern import Bend
-from gso.workshop import Drawing, Label, Notch, Part, writers
+from gso.workshop import Bend, Drawing, Label, Notch, Part, writers
 from gso.workshop.writers.tiles import tiled
 
 ezdxf = pytest.importorskip("ezdxf")

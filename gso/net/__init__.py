@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 from gso.first_use import at_first_use
 
 if TYPE_CHECKING:
-    from gso.net.catalogue import NetLike, available, chain
+    from gso.net.catalogue import NetLike, available, chain, located, read_card
     from gso.net.inference.prediction import predict
     from gso.net.models.coarse import CoarseNet
     from gso.net.models.gsonet import GSONet
     from gso.net.tasks import add_task
     from gso.net.training.loop import train
-    from gso.net.weights import add_kind, load, save
+    from gso.net.weights import KINDS, add_kind, kind_of, load, make, save
 
 __all__ = [
+    "KINDS",
     "CoarseNet",
     "GSONet",
     "NetLike",
@@ -23,8 +24,12 @@ __all__ = [
     "add_task",
     "available",
     "chain",
+    "kind_of",
     "load",
+    "located",
+    "make",
     "predict",
+    "read_card",
     "save",
     "train",
 ]
@@ -33,12 +38,12 @@ __all__ = [
 __getattr__, __dir__ = at_first_use(
     __name__,
     {
-        "catalogue": "NetLike available chain",
+        "catalogue": "NetLike available chain located read_card",
         "inference.prediction": "predict",
         "models.coarse": "CoarseNet",
         "models.gsonet": "GSONet",
         "tasks": "add_task",
         "training.loop": "train",
-        "weights": "add_kind load save",
+        "weights": "KINDS add_kind kind_of load make save",
     },
 )

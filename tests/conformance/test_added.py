@@ -111,7 +111,7 @@ def test_a_constraint_in_a_file(tmp_path):
         with pytest.raises(gso.OptionError, match="Centre"):
             gso.constraints.add(Centre)
     finally:
-        gso.constraints.read.KINDS.pop("Centre")
+        gso.constraints.KINDS.pop("Centre")
 
 
 @pytest.fixture

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import gso
-from gso.constraints import read_constraints
-from gso.constraints.read import KINDS
+from gso.constraints import KINDS, read_constraints
 from tests.conftest import rotation
 
 

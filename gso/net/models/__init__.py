@@ -9,7 +9,17 @@ from gso.first_use import at_first_use
 if TYPE_CHECKING:
     from gso.net.models.base import SIZE, Net, exact
     from gso.net.models.coarse import CoarseNet
-    from gso.net.models.grid_geometry import Planes, ball, normalise, normalise_with, planes
+    from gso.net.models.grid_geometry import (
+        Planes,
+        axes,
+        ball,
+        normalise,
+        normalise_with,
+        normals,
+        planes,
+        points,
+        rectangle,
+    )
     from gso.net.models.gsonet import GSONet
 
 __all__ = [
@@ -18,11 +28,15 @@ __all__ = [
     "GSONet",
     "Net",
     "Planes",
+    "axes",
     "ball",
     "exact",
     "normalise",
     "normalise_with",
+    "normals",
     "planes",
+    "points",
+    "rectangle",
 ]
 
 __getattr__, __dir__ = at_first_use(
@@ -30,7 +44,9 @@ __getattr__, __dir__ = at_first_use(
     {
         "base": "SIZE Net exact",
         "coarse": "CoarseNet",
-        "grid_geometry": "Planes ball normalise normalise_with planes",
+        "grid_geometry": (
+            "Planes axes ball normalise normalise_with normals planes points rectangle"
+        ),
         "gsonet": "GSONet",
     },
 )
