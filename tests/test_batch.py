@@ -38,7 +38,6 @@ from gso.tno.batched import (  # noqa: E402
 from gso.tno.batched import tensor_kernels as on_tensors  # noqa: E402
 from gso.tno.batched.batch_problem import Problem as Batch  # noqa: E402
 from gso.tno.batched.gathered import TooLarge, Unbatchable, gather  # noqa: E402
-from gso.tno.batched.sums import Sums  # noqa: E402
 from gso.tno.batched.tensor_terms import stacked_loss  # noqa: E402
 
 CPU = torch.device("cpu")
@@ -216,15 +215,6 @@ def test_a_hopeless_matrix_gives_the_gradient():
     )
     assert (found < 0).all()
     assert float(found.std()) == 0.0
-
-
-def test_sums_add_every_row():
-    targets = np.random.default_rng(0).integers(0, 9, 200)
-    rows = torch.as_tensor(np.random.default_rng(1).standard_normal((200, 3)))
-    sums = Sums(targets, 11, CPU)
-    wanted = np.zeros((11, 3))
-    np.add.at(wanted, targets, rows.numpy())
-    np.testing.assert_allclose(sums(rows), wanted[sums.order], atol=1e-12)
 
 
 def energies(results):

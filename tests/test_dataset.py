@@ -23,13 +23,19 @@ from click.testing import CliRunner
 import gso
 from gso import DatasetError, OptionError, dataset, metrics
 from gso.cli import main
-from gso.dataset import INTERVALS, LABELS, LEVELS, Recipe, bezier, labels, screen, shapes
+from gso.dataset import INTERVALS, LABELS, LEVELS, Recipe, generate, labels, screen, shapes
 from gso.unknowns import tensor_matrix
 
 ROOT = Path(__file__).resolve().parents[1]
 TINY = Recipe(n=64, size=16, extras=False)
 #: As many files, and done in seconds.
 QUICK = replace(TINY, labels=("strain",))
+
+
+def in_unit_ball(grid):
+    """A grid (H, W, 3) moved to its centroid and scaled to radius one."""
+    moved = grid - grid.mean(axis=(0, 1))
+    return moved / np.linalg.norm(moved, axis=2).max()
 
 
 def digests(folder):
@@ -74,11 +80,11 @@ def batched(tmp_path_factory):
 
 class TestScreen:
     def test_surfaces_are_the_same_in_any_company(self):
-        some = [screen.surface(3, k) for k in range(40)]
-        together = bezier.sample_many(some, 64)
+        some = generate(40, seed=3)
+        together = dataset.draw_many([(40, 3)], 64)
         for k in (0, 17, 39):
-            np.testing.assert_array_equal(bezier.sample_many(some[k : k + 1], 64)[0], together[k])
-            np.testing.assert_allclose(some[k].sample(64), together[k], atol=1e-12)
+            np.testing.assert_array_equal(dataset.draw_many([(k + 1, 3)], 64)[k], together[k])
+            np.testing.assert_allclose(some[k].sample(64), together[k], atol=1e-6)
 
     def test_intervals_get_their_shares_and_the_mean_is_the_published_one(self):
         chosen = screen.select(400, 12, seed=5)
@@ -107,7 +113,7 @@ class TestScreen:
         assert told == [3, 5, 6]
         monkeypatch.setattr("gso.dataset.drawing._MANY", 1)
         np.testing.assert_array_equal(dataset.draw_many(pieces, 16), alone)
-        expected = bezier.sample_many(bezier.generate(2, seed=2), 16)
+        expected = [surface.sample(16) for surface in generate(2, seed=2)]
         np.testing.assert_allclose(alone[3:5], expected, atol=1e-6)
 
     def test_hard_draws_lie_beyond_the_intervals(self):
@@ -133,7 +139,7 @@ class TestScreen:
 
     @staticmethod
     def features(seed, numbers):
-        points = bezier.sample_many([screen.surface(seed, int(k)) for k in numbers], 64)
+        points = np.stack([screen.surface(seed, int(k)).sample(64) for k in numbers])
         return dict(zip(screen.FEATURES, screen.features(points).T, strict=True))
 
 
@@ -191,14 +197,14 @@ class TestShapes:
         import teapot
 
         for k, grid in zip((0, 4, 8, 12, 14, 16, 18, 24), shapes.sample("teapot", seed=0)):
-            np.testing.assert_allclose(grid, bezier.normalise(teapot.patch(k, 64)), atol=1e-12)
+            np.testing.assert_allclose(grid, in_unit_ball(teapot.patch(k, 64)), atol=1e-12)
         pytest.importorskip("matplotlib")
         import terrain
 
         data = shapes._data("terrain")
         for (i, j), grid in zip(data["corner"], shapes.sample("terrain", seed=0)):
             window = terrain.terrain((i, i + 64, j, j + 64))
-            np.testing.assert_allclose(grid, bezier.normalise(window), atol=1e-12)
+            np.testing.assert_allclose(grid, in_unit_ball(window), atol=1e-12)
 
 
 class TestLabels:
@@ -229,10 +235,8 @@ class TestLabels:
         assert item["spline_residual"] == pytest.approx(misfit, abs=1e-6)
 
     def test_storage_changes_no_metric_by_a_thousandth(self):
-        points = bezier.sample_many(
-            [screen.surface(0, k) for k in screen.select(10, 1, seed=0).main[:2]]
-        )
-        for grid in points:
+        for number in screen.select(10, 1, seed=0).main[:2]:
+            grid = screen.surface(0, number).sample(64)
             for kind in LABELS:
                 label = labels.solve(kind, grid)
                 stored = label.arrays[kind].astype(np.float32).astype(float)
@@ -277,8 +281,8 @@ class TestSet:
     def test_surfaces_come_back_from_the_seed(self, tiny):
         split = tiny["train"]
         for k in (0, 40):
-            made = bezier.sample_many([screen.surface(0, int(split["id"][k]))], 16)[0]
-            np.testing.assert_array_equal(split["surface"][k], made)
+            made = screen.surface(0, int(split["id"][k])).sample(16)
+            np.testing.assert_allclose(split["surface"][k], made, atol=1e-12)
         np.testing.assert_allclose(
             split.features["K_A"][:3], TestScreen.features(0, split["id"][:3])["K_A"], rtol=1e-12
         )

@@ -116,10 +116,17 @@ class TestRuns:
         job = gso.fabricate(row(), tmp_path, unit="m", workers=0)
         assert job.usable and len(calls) == 3
         # The same again needs no solve, another request does.
-        gso.fabricate(row(), tmp_path, unit="m", workers=0)
+        again = gso.fabricate(row(), tmp_path, unit="m", workers=0)
         assert len(calls) == 3
+        for one, two in zip(job.parts, again.parts, strict=True):
+            np.testing.assert_allclose(one.outline, two.outline, atol=1e-9)
+        assert again.reasons == job.reasons
         gso.fabricate(row(), tmp_path, unit="m", workers=0, max_deviation=0.1)
         assert len(calls) == 5
+        for path in (tmp_path / "work").glob("*.npz"):
+            path.write_bytes(b"damaged")
+        assert gso.fabricate(row(), tmp_path, unit="m", workers=0, max_deviation=0.1).usable
+        assert len(calls) == 7
 
     def test_files_of_an_earlier_run_are_deleted(self, tmp_path):
         gso.fabricate(row(), tmp_path, unit="m", workers=0)

@@ -15,9 +15,7 @@ from gso.cli import main
 from gso.mesh import Mesh, Nearest
 from gso.verdict import Code
 from gso.workshop import Ask, Bend, Design, Finish, Thickness, designs_of, made, parts_of, thickened
-from gso.workshop.checks import judge_sheet
-from gso.workshop.marks import to_pattern, to_surface
-from gso.workshop.parts import drawn, fitted
+from gso.workshop.parts import drawn
 from tests.conftest import codes
 from tests.test_pieces import dome
 from tests.test_workshop import arch, bent
@@ -137,42 +135,50 @@ class TestNames:
 class TestSheets:
     """A cylinder of radius 1, and sheets with which it cannot be made."""
 
-    def why(self, whole, **thickness):
-        finish = Finish(thickness=Thickness(**thickness))
-        return judge_sheet(fitted(whole, 1.0, finish), Ask(), finish)
+    @pytest.fixture
+    def why(self, tmp_path, monkeypatch):
+        def reasons(whole, **thickness):
+            monkeypatch.setattr("gso.workshop.work.made", lambda *_: whole)
+            finish = Finish(thickness=Thickness(**thickness))
+            given = {"workers": 0, "finish": finish, "formats": ("svg",)}
+            return gso.fabricate(
+                small(), tmp_path / f"{len(list(tmp_path.iterdir()))}", **given
+            ).reasons
 
-    def test_a_thin_sheet_is_fine(self, cylinder):
-        assert self.why(cylinder, sheet=0.02) == ()
-        assert self.why(cylinder, sheet=0.002, radius=0.001) == ()
+        return reasons
 
-    def test_a_sheet_thicker_than_the_radius_is_refused(self, cylinder):
-        (why,) = self.why(cylinder, sheet=2.5, face="outside")
+    def test_a_thin_sheet_is_fine(self, cylinder, why):
+        assert why(cylinder, sheet=0.02) == ()
+        assert why(cylinder, sheet=0.002, radius=0.001) == ()
+
+    def test_a_sheet_thicker_than_the_radius_is_refused(self, cylinder, why):
+        (why,) = why(cylinder, sheet=2.5, face="outside")
         assert (why.code, why.bound, why.places.ids) == (Code.TOO_THICK, 2.5, ("arch",))
         assert why.value == pytest.approx(cylinder.record["bend_radius_min"])
 
-    def test_a_bend_beyond_the_table_is_refused(self, cylinder):
-        (why,) = self.why(cylinder, sheet=0.01, table=[[0.0, 0.0], [1e-3, 1e-4]])
+    def test_a_bend_beyond_the_table_is_refused(self, cylinder, why):
+        (why,) = why(cylinder, sheet=0.01, table=[[0.0, 0.0], [1e-3, 1e-4]])
         assert (why.code, why.bound) == (Code.BEND_ANGLE, pytest.approx(np.degrees(1e-3)))
         assert why.value == pytest.approx(np.degrees(np.abs(cylinder.panels[0].angles).max()))
 
-    def test_bends_without_room_for_the_tool_are_refused(self, cylinder):
-        (why,) = self.why(cylinder, sheet=0.02, radius=3.0)
+    def test_bends_without_room_for_the_tool_are_refused(self, cylinder, why):
+        (why,) = why(cylinder, sheet=0.02, radius=3.0)
         assert why.code is Code.BENDS_NEAR and why.value < why.bound
 
-    def test_a_part_without_bend_lines_is_refused_where_the_thickness_matters(self):
+    def test_a_part_without_bend_lines_is_refused_where_the_thickness_matters(self, why):
         flat = made(Design("arch", arch()), Ask(formulation="curvature"))
         assert not len(flat.panels[0].bends)
         assert flat.record["bend_radius_min"] == pytest.approx(1.0, rel=0.05)
-        assert self.why(flat, sheet=0.02) == ()
-        (why,) = self.why(flat, sheet=0.02, face="outside")
+        assert why(flat, sheet=0.02) == ()
+        (why,) = why(flat, sheet=0.02, face="outside")
         assert (why.code, why.bound) == (Code.NEUTRAL_STRAIN, 1e-3)
         assert why.value == pytest.approx(0.01, rel=0.05)
-        (why,) = self.why(flat, sheet=2.5)
+        (why,) = why(flat, sheet=2.5)
         assert (why.code, why.bound) == (Code.TOO_THICK, 1.25)
 
-    def test_seams_that_the_thickness_parts_are_refused(self, strips):
-        assert self.why(strips, sheet=1e-4, face="outside") == ()
-        why = self.why(strips, sheet=0.05, face="outside")
+    def test_seams_that_the_thickness_parts_are_refused(self, strips, why):
+        assert why(strips, sheet=1e-4, face="outside") == ()
+        why = why(strips, sheet=0.05, face="outside")
         assert Code.SEAM_SIDES in codes(why)
 
     @pytest.mark.parametrize("formulation", ["curvature", "flatten"])
@@ -204,10 +210,8 @@ class TestLines:
         ends = np.array([0.8 * low + 0.2 * high, 0.2 * low + 0.8 * high])
         ends[:, 2] = high[2]
         t = np.linspace(0, 1, 200)[:, None]
-        number, flat = to_pattern(strips.panels, ends[0] + t * (ends[1] - ends[0]))
-        line = np.array(
-            [to_surface(strips.panels[k], f[None])[0] for k, f in zip(number, flat, strict=True)]
-        )
+        near = Nearest.of(surface.vertices, surface.triangles)
+        line = near.locate(ends[0] + t * (ends[1] - ends[0]))[2]
         parts = parts_of(strips, 100.0, Finish(), [line])
         drawn_length = sum(
             np.linalg.norm(np.diff(m, axis=0), axis=1).sum() for p in parts for m in p.marks

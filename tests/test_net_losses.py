@@ -13,8 +13,8 @@ from tests.conftest import cylinder, saddle
 
 torch = pytest.importorskip("torch")
 
-from gso.net.models import grid_geometry  # noqa: E402
-from gso.net.training import solver_energy, training_losses  # noqa: E402
+from gso.net import models  # noqa: E402
+from gso.net.training import Developable, Strain, training_losses  # noqa: E402
 
 
 def batch(*surfaces):
@@ -50,7 +50,7 @@ def last_stage(points):
 
 def test_developable_energy_is_the_solvers(pair):
     designs, results = pair
-    fast = solver_energy.Developable(batch(*designs), developable.Options())
+    fast = Developable(batch(*designs), developable.Options())
     parts = fast.parts(batch(*results))
     for k, (design, result) in enumerate(zip(designs, results, strict=True)):
         last = last_stage(design)
@@ -65,7 +65,7 @@ def test_developable_energy_is_the_solvers(pair):
 def test_elongation_energy_is_the_solvers_where_it_is_large(pair):
     designs, _ = pair
     results = designs * [0.4, 1.0, 1.6]
-    parts = solver_energy.Developable(batch(*designs), developable.Options()).parts(batch(*results))
+    parts = Developable(batch(*designs), developable.Options()).parts(batch(*results))
     for k, (design, result) in enumerate(zip(designs, results, strict=True)):
         last = last_stage(design)
         value = total(last.items, result.reshape(-1, 3))["elongation"]
@@ -80,7 +80,7 @@ def test_strain_energy_is_the_solvers(pair):
         parametrization.rectangle(p) + 3e-3 * rng.standard_normal((*p.shape[:2], 2))
         for p in designs
     ]
-    strain = solver_energy.Strain(batch(*designs), flatten.Options())
+    strain = Strain(batch(*designs), flatten.Options())
     values, levels = strain(batch(*flats)), strain.level(strain.residuals(batch(*flats)))
     for k, (design, flat) in enumerate(zip(designs, flats, strict=True)):
         mesh, level = Mesh.from_grid(design, weld=False), float(levels[k])
@@ -143,9 +143,9 @@ def test_curvature_weights():
 
 def test_normals_and_rectangle_are_the_packages(pair):
     designs, _ = pair
-    p = grid_geometry.planes(batch(*designs))
-    normals = grid_geometry.points(grid_geometry.normals(p)).numpy()
-    flat = grid_geometry.rectangle(p).numpy()
+    p = models.planes(batch(*designs))
+    normals = models.points(models.normals(p)).numpy()
+    flat = models.rectangle(p).numpy()
     for k, design in enumerate(designs):
         expected = vertex_normals(Mesh.from_grid(design, weld=False)).reshape(design.shape)
         np.testing.assert_allclose(normals[k], expected, atol=1e-12)
@@ -157,7 +157,7 @@ def test_degenerate_surfaces_have_finite_gradients():
     point = torch.zeros(1, 8, 8, 3, requires_grad=True)
     value = (
         training_losses.gc(point).sum()
-        + solver_energy.Strain(point.detach(), flatten.Options())(point[..., :2]).sum()
+        + Strain(point.detach(), flatten.Options())(point[..., :2]).sum()
     )
     value.backward()
     assert torch.isfinite(value) and torch.isfinite(point.grad).all()

@@ -21,7 +21,6 @@ from gso.plot import (
     plot_surface,
     strain,
 )
-from gso.plot.heat import per_face
 
 pytest.importorskip("matplotlib")
 
@@ -238,7 +237,7 @@ def test_faces_without_a_number_are_grey():
 
 def test_face_values_are_means_of_corners():
     mesh = mixed()
-    values = per_face(mesh, np.array([0.0, 1.0, 2.0, np.nan, 6.0]))
+    values = numbers(mesh, np.array([0.0, 1.0, 2.0, np.nan, 6.0]), "").values
     assert np.allclose(values, [1.0, 3.0])
 
 

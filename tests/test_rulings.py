@@ -15,7 +15,6 @@ from gso import geometry, metrics
 from gso.cli import main
 from gso.mesh import topology
 from gso.rulings import shape_operator, trace
-from gso.rulings.spread import chosen, spread
 from gso.rulings.walk import Field, walk
 from tests.conftest import meshes, saddle, shuffled, sphere_cap
 
@@ -414,13 +413,11 @@ def test_a_line_between_two_regions_goes_along_their_common_side():
     assert (np.diff(points[:, 0]) > -1e-2).all()
 
 
-def test_spreading():
-    points = np.random.default_rng(0).random((50, 3))
-    order = spread(points, 100)
-    assert sorted(order) == list(range(50))
-    lines = [np.array([[x, 0.0, 0.0], [x, 1.0, 0.0]]) for x in np.linspace(0, 1, 21)]
-    kept = chosen(np.array([line.mean(axis=0) for line in lines]), lines, 3, np.ones(21))
-    assert np.allclose([lines[k][0, 0] for k in kept], [0.15, 0.5, 0.85], atol=0.06)
+def test_a_few_lines_lie_in_the_middles_of_their_shares():
+    u, v = parameters(33)
+    rulings = trace(gso.Mesh.from_grid(stack(u, v, 0.3 * u**2)), count=3)
+    at = np.sort([line[:, 0].mean() for line in rulings.lines])
+    assert np.allclose(at, [-2 / 3, 0.0, 2 / 3], atol=0.12)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,8 @@ from gso.mesh.mesh import Frame, Mesh
 from gso.mesh.normals import vertex_normals
 from gso.mesh.paths import Paths
 from gso.mesh.polyline import Polylines
+from gso.mesh.separation import between
+from gso.mesh.welding import collapse, equal, near
 
 __all__ = [
     "LABELS",
@@ -18,7 +20,11 @@ __all__ = [
     "Nearest",
     "Paths",
     "Polylines",
+    "between",
+    "collapse",
     "cut",
+    "equal",
     "joining",
+    "near",
     "vertex_normals",
 ]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from gso.first_use import at_first_use
 
 if TYPE_CHECKING:
-    from gso.net.catalogue import NetLike, available, chain, located, read_card
+    from gso.net.catalogue import CHAINS, NetLike, available, chain, located, read_card
     from gso.net.inference.prediction import predict
     from gso.net.models.coarse import CoarseNet
     from gso.net.models.gsonet import GSONet
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from gso.net.weights import KINDS, add_kind, kind_of, load, make, save
 
 __all__ = [
+    "CHAINS",
     "KINDS",
     "CoarseNet",
     "GSONet",
@@ -38,7 +39,7 @@ __all__ = [
 __getattr__, __dir__ = at_first_use(
     __name__,
     {
-        "catalogue": "NetLike available chain located read_card",
+        "catalogue": "CHAINS NetLike available chain located read_card",
         "inference.prediction": "predict",
         "models.coarse": "CoarseNet",
         "models.gsonet": "GSONet",

@@ -16,6 +16,7 @@ from gso.seams.kinds import Creases, Edges, Labels, Path, Seam, Slice
 from gso.seams.polyline_seam import Polyline
 
 if TYPE_CHECKING:
+    from gso.seams.disks import opening
     from gso.seams.search import pieces
     from gso.seams.segmentation import Segmentation
     from gso.seams.sheets import Sheet, flattened, rectangle
@@ -34,6 +35,7 @@ __all__ = [
     "Slice",
     "cut",
     "flattened",
+    "opening",
     "pieces",
     "rectangle",
 ]
@@ -42,6 +44,7 @@ __all__ = [
 __getattr__, __dir__ = at_first_use(
     __name__,
     {
+        "disks": "opening",
         "search": "pieces",
         "segmentation": "Segmentation",
         "sheets": "Sheet flattened rectangle",
