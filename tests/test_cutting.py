@@ -260,6 +260,8 @@ class TestFiles:
         for task in ("flatten", "conformal"):
             plot_result(gso.tno.optimize(tube(CONE), task=task), tmp_path / f"{task}.png")
         plot_result(gso.tno.optimize(tube(CONE), formulation="isometry"), tmp_path / "i.png")
+        assert all(p.stat().st_size > 5000 for p in tmp_path.iterdir())
+        assert len(list(tmp_path.iterdir())) == 3
 
     def test_command_line(self, tmp_path):
         gso.save(tube(CYLINDER), tmp_path / "tube.obj")

@@ -340,12 +340,15 @@ def test_orientation_limit_is_the_first_collapse():
     cells = corner_triangles(gso.mesh.topology.grid_faces(6, 6))
     limit = parametrization.orientation(cells, Layout((("flat", 36, 2),)))
     flat = np.stack(np.meshgrid(np.arange(6.0), np.arange(6.0), indexing="ij"), -1).reshape(-1, 2)
+    steps = []
     for _ in range(20):
         move = rng.standard_normal(flat.shape) * rng.choice([0.2, 1.0, 30.0])
         step = limit(flat.ravel(), move.ravel())
         areas = [metrics.corner_areas(flat + s * move, cells).min() for s in (step, step / 0.9)]
         assert areas[0] > 0
+        steps.append(step)
         assert step == 1.0 or areas[1] < 1e-9
+    assert min(steps) < 1.0
 
 
 @pytest.mark.parametrize(

@@ -91,8 +91,12 @@ def test_a_backend(added):
     own = linalg.find("superlu")
     members = {"PACKAGE": "scipy", "available": own.available, "cost": own.cost}
     added("backend", "mine", Solver=own.Solver, **members)
-    result = gso.tno.optimize(saddle(9), options=gso.DevelopableOptions(backend="mine"))
-    assert result.usable or result.reasons
+    ours, plain = (
+        gso.tno.optimize(saddle(9), options=gso.DevelopableOptions(backend=name))
+        for name in ("mine", "superlu")
+    )
+    assert ours.backend == "mine"
+    np.testing.assert_allclose(ours.mesh.vertices, plain.mesh.vertices, atol=1e-12)
 
 
 def test_a_constraint_in_a_file(tmp_path):
