@@ -14,8 +14,7 @@ from gso import GSOError, MeshError, OptionError
 from gso.cli import main
 from gso.mesh import Mesh, Nearest
 from gso.verdict import Code
-from gso.workshop import Ask, Bend, Design, Finish, Thickness, designs_of, made, parts_of, thickened
-from gso.workshop.parts import drawn
+from gso.workshop import Ask, Design, Finish, Thickness, designs_of, made, parts_of, thickened
 from tests.conftest import codes
 from tests.test_pieces import dome
 from tests.test_workshop import arch, bent
@@ -248,13 +247,12 @@ class TestLines:
         with pytest.raises(OptionError, match="kerf"):
             Finish(kerf=1.0, registration=(1.0, 3.0))
 
-    def test_small_bends_are_not_lost(self):
-        rng = np.random.default_rng(0)
-        some = [Bend(np.zeros((2, 2)), a, 1.0) for a in 0.002 * rng.normal(size=200)]
-        kept = drawn(some)
-        assert len(kept) < 100
-        assert sum(b.angle for b in kept) == pytest.approx(
-            sum(b.angle for b in some), abs=np.radians(0.2)
+    def test_small_bends_are_not_lost(self, cylinder):
+        panel = bent(0.002 * np.random.default_rng(0).normal(size=200))
+        (part,) = parts_of(replace(cylinder, panels=(panel,)), 1.0, Finish())
+        assert 0 < len(part.bends) < 100
+        assert sum(b.angle for b in part.bends) == pytest.approx(
+            panel.angles.sum(), abs=np.radians(0.2)
         )
 
 

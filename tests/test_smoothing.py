@@ -9,8 +9,7 @@ from gso.smoothing import Smoothed, estimate_sigma, smooth_grid, smooth_mesh
 from gso.smoothing.local_fits import neighbours, residuals, rings, umbrella
 from gso.smoothing.select import best_weight, factor, gcv
 from gso.smoothing.spectrum import CENTRE, Spectrum
-
-from .conftest import rotation
+from tests.conftest import rotation
 
 SIGMA = 0.01
 

@@ -21,8 +21,7 @@ from gso.solver import Problem, minimise
 from gso.spline import BSplineSurface, clamped_knots
 from gso.tasks.developable import Options
 from gso.unknowns import Layout, spline_surface
-
-from .conftest import cylinder, rotation, saddle, shuffled, sphere_cap
+from tests.conftest import cylinder, rotation, saddle, shuffled, sphere_cap
 
 congruence, fairness = map(energy.registry().get, ("congruence", "fairness"))
 

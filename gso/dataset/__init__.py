@@ -14,13 +14,12 @@ if TYPE_CHECKING:
     from gso.dataset.noise import LEVELS
     from gso.dataset.npy_folder import export
     from gso.dataset.recipe import Recipe
-    from gso.dataset.screen import CURVATURE, CURVED, select
+    from gso.dataset.screen import CURVATURE, select
     from gso.dataset.store import Dataset, Split, open
     from gso.dataset.summary import INTERVALS, PUBLISHED, PUBLISHED_FLAT, differences, summarise
 
 __all__ = [
     "CURVATURE",
-    "CURVED",
     "INTERVALS",
     "LABELS",
     "LEVELS",
@@ -51,7 +50,7 @@ __getattr__, __dir__ = at_first_use(
         "noise": "LEVELS",
         "npy_folder": "export",
         "recipe": "Recipe",
-        "screen": "CURVATURE CURVED select",
+        "screen": "CURVATURE select",
         "store": "Dataset Split open",
         "summary": "INTERVALS PUBLISHED PUBLISHED_FLAT differences summarise",
     },

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from gso.energy.base import Limit, Residual, Term, Vectors, Weighted, mean_weights
+from gso.energy.base import Limit, Term, Weighted, mean_weights
 from gso.energy.losses import Absolute, Distance, Loss, Squared
 from gso.energy.multipliers import STIFF, hardened
 from gso.registry import Registry
@@ -21,10 +21,8 @@ __all__ = [
     "Distance",
     "Limit",
     "Loss",
-    "Residual",
     "Squared",
     "Term",
-    "Vectors",
     "Weighted",
     "add",
     "hardened",

@@ -1,6 +1,6 @@
 """Meshes: vertices, faces, the grid if there is one, connectivity, closest points, cuts."""
 
-from gso.mesh.attributes import LABELS, Attributes, Labels
+from gso.mesh.attributes import Attributes, Labels
 from gso.mesh.closest_point import Nearest
 from gso.mesh.cut import Cut, cut, joining
 from gso.mesh.mesh import Frame, Mesh
@@ -11,7 +11,6 @@ from gso.mesh.separation import between
 from gso.mesh.welding import collapse, equal, near
 
 __all__ = [
-    "LABELS",
     "Attributes",
     "Cut",
     "Frame",

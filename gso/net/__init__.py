@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from gso.first_use import at_first_use
 
 if TYPE_CHECKING:
-    from gso.net.catalogue import CHAINS, NetLike, available, chain, located, read_card
+    from gso.net.catalogue import CHAINS, available, located, read_card
     from gso.net.inference.prediction import predict
     from gso.net.models.coarse import CoarseNet
     from gso.net.models.gsonet import GSONet
@@ -20,11 +20,9 @@ __all__ = [
     "KINDS",
     "CoarseNet",
     "GSONet",
-    "NetLike",
     "add_kind",
     "add_task",
     "available",
-    "chain",
     "kind_of",
     "load",
     "located",
@@ -39,7 +37,7 @@ __all__ = [
 __getattr__, __dir__ = at_first_use(
     __name__,
     {
-        "catalogue": "CHAINS NetLike available chain located read_card",
+        "catalogue": "CHAINS available located read_card",
         "inference.prediction": "predict",
         "models.coarse": "CoarseNet",
         "models.gsonet": "GSONet",

@@ -2,25 +2,22 @@
 
 from gso.parametrization.alignment import align, settle
 from gso.parametrization.arap import Relaxed, relax, strain_level
-from gso.parametrization.embedding import centred, embeddings, flattens, parts, spanned
+from gso.parametrization.embedding import embeddings, flattens, parts, spanned
 from gso.parametrization.initial import begin, flips, given, oriented_triangles, refine, strain
 from gso.parametrization.opening import Opened, by_rows, opened, turning
-from gso.parametrization.orientation import SAFETY, Orientation, degenerate, orientation
+from gso.parametrization.orientation import SAFETY, orientation
 from gso.parametrization.packing import beside, closest_motion, place, upright
 from gso.parametrization.rectangle import rectangle
 
 __all__ = [
     "SAFETY",
     "Opened",
-    "Orientation",
     "Relaxed",
     "align",
     "begin",
     "beside",
     "by_rows",
-    "centred",
     "closest_motion",
-    "degenerate",
     "embeddings",
     "flattens",
     "flips",

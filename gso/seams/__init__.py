@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from gso.seams.disks import opening
     from gso.seams.search import pieces
     from gso.seams.segmentation import Segmentation
-    from gso.seams.sheets import Sheet, flattened, rectangle
+    from gso.seams.sheets import Sheet, rectangle
 
 __all__ = [
     "Creases",
@@ -34,7 +34,6 @@ __all__ = [
     "Sheet",
     "Slice",
     "cut",
-    "flattened",
     "opening",
     "pieces",
     "rectangle",
@@ -47,6 +46,6 @@ __getattr__, __dir__ = at_first_use(
         "disks": "opening",
         "search": "pieces",
         "segmentation": "Segmentation",
-        "sheets": "Sheet flattened rectangle",
+        "sheets": "Sheet rectangle",
     },
 )

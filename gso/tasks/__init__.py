@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from gso.errors import OptionError
+from gso.first_use import at_first_use
 from gso.registry import Registry
 from gso.spelling import choices
-from gso.tasks.base import Analysis, Formulation, Plan, Solution, Stage, Task
-from gso.tasks.evaluation import compute_metrics, largest_strain
-from gso.tasks.options import Options
-from gso.tasks.request import Limits, Request, check
-from gso.tasks.start import Start
+
+if TYPE_CHECKING:
+    from gso.tasks.base import Formulation, Plan, Stage, Task
+    from gso.tasks.evaluation import compute_metrics, largest_strain
+    from gso.tasks.options import Options
+    from gso.tasks.request import Limits, check
 
 __all__ = [
-    "Analysis",
     "Formulation",
     "Limits",
     "Options",
     "Plan",
-    "Request",
-    "Solution",
     "Stage",
-    "Start",
     "Task",
     "add",
     "check",
@@ -30,6 +30,17 @@ __all__ = [
     "largest_strain",
     "names",
 ]
+
+# The names of tasks are read without NumPy.
+__getattr__, __dir__ = at_first_use(
+    __name__,
+    {
+        "base": "Formulation Plan Stage Task",
+        "evaluation": "compute_metrics largest_strain",
+        "options": "Options",
+        "request": "Limits check",
+    },
+)
 
 _FILES = Registry(
     __name__,

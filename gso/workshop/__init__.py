@@ -5,23 +5,16 @@
 parts are laid on sheets (:func:`nest`).
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-from gso.first_use import at_first_use
 from gso.pattern import Bend
-
-if TYPE_CHECKING:
-    from gso.workshop.asking import Ask
-    from gso.workshop.designs import Design, designs_of
-    from gso.workshop.finish import Finish
-    from gso.workshop.making import made
-    from gso.workshop.nesting import nest
-    from gso.workshop.panels import Panel
-    from gso.workshop.part import Drawing, Label, Notch, Part
-    from gso.workshop.parts import parts_of
-    from gso.workshop.thickness import Thickness, thickened
+from gso.workshop.asking import Ask
+from gso.workshop.designs import Design, designs_of
+from gso.workshop.finish import Finish
+from gso.workshop.making import made
+from gso.workshop.nesting import nest
+from gso.workshop.panels import Panel
+from gso.workshop.part import Drawing, Label, Notch, Part
+from gso.workshop.parts import parts_of
+from gso.workshop.thickness import Thickness, thickened
 
 __all__ = [
     "Ask",
@@ -40,18 +33,3 @@ __all__ = [
     "parts_of",
     "thickened",
 ]
-
-__getattr__, __dir__ = at_first_use(
-    __name__,
-    {
-        "asking": "Ask",
-        "designs": "Design designs_of",
-        "finish": "Finish",
-        "making": "made",
-        "nesting": "nest",
-        "panels": "Panel",
-        "part": "Drawing Label Notch Part",
-        "parts": "parts_of",
-        "thickness": "Thickness thickened",
-    },
-)

@@ -9,22 +9,10 @@ from gso.first_use import at_first_use
 if TYPE_CHECKING:
     from gso.net.training.config import Config, Phase, from_dict, read
     from gso.net.training.data import Batch
-    from gso.net.training.loop import train
-    from gso.net.training.phase_objective import Cost, Objective
+    from gso.net.training.phase_objective import Objective
     from gso.net.training.solver_energy import Developable, Strain
 
-__all__ = [
-    "Batch",
-    "Config",
-    "Cost",
-    "Developable",
-    "Objective",
-    "Phase",
-    "Strain",
-    "from_dict",
-    "read",
-    "train",
-]
+__all__ = ["Batch", "Config", "Developable", "Objective", "Phase", "Strain", "from_dict", "read"]
 
 # The tasks of nets are read without PyTorch.
 __getattr__, __dir__ = at_first_use(
@@ -32,8 +20,7 @@ __getattr__, __dir__ = at_first_use(
     {
         "config": "Config Phase from_dict read",
         "data": "Batch",
-        "loop": "train",
-        "phase_objective": "Cost Objective",
+        "phase_objective": "Objective",
         "solver_energy": "Developable Strain",
     },
 )

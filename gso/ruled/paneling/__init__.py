@@ -13,20 +13,9 @@ from typing import TYPE_CHECKING
 from gso.first_use import at_first_use
 
 if TYPE_CHECKING:
-    from gso.ruled.paneling.lay_strips import strips
     from gso.ruled.paneling.light_design import LightDesign
-    from gso.ruled.paneling.options import RULED, Options
-    from gso.ruled.paneling.strips_request import StripsRequest
 
-__all__ = ["RULED", "LightDesign", "Options", "StripsRequest", "strips"]
+__all__ = ["LightDesign"]
 
 # These import SciPy.
-__getattr__, __dir__ = at_first_use(
-    __name__,
-    {
-        "lay_strips": "strips",
-        "light_design": "LightDesign",
-        "options": "RULED Options",
-        "strips_request": "StripsRequest",
-    },
-)
+__getattr__, __dir__ = at_first_use(__name__, {"light_design": "LightDesign"})

@@ -19,26 +19,16 @@ if find_spec("torch") is None:
 
 if TYPE_CHECKING:
     from gso.tno.batched.batches import check_batch, solve_batch
-    from gso.tno.batched.device import checked
     from gso.tno.batched.device_executor import DeviceExecutor, minimise_elsewhere
-    from gso.tno.batched.many import planners, solve_all
+    from gso.tno.batched.many import solve_all
 
-__all__ = [
-    "DeviceExecutor",
-    "check_batch",
-    "checked",
-    "minimise_elsewhere",
-    "planners",
-    "solve_all",
-    "solve_batch",
-]
+__all__ = ["DeviceExecutor", "check_batch", "minimise_elsewhere", "solve_all", "solve_batch"]
 
 __getattr__, __dir__ = at_first_use(
     __name__,
     {
         "batches": "check_batch solve_batch",
-        "device": "checked",
         "device_executor": "DeviceExecutor minimise_elsewhere",
-        "many": "planners solve_all",
+        "many": "solve_all",
     },
 )
