@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from importlib import import_module
-from typing import Any
 
 
 def at_first_use(
     package: str, places: Mapping[str, str]
-) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
     """Make the functions ``__getattr__`` and ``__dir__`` of a package.
 
     Parameters
@@ -30,11 +29,11 @@ def at_first_use(
     """
     modules = {name: module for module, names in places.items() for name in names.split()}
 
-    def load(name: str) -> Any:
+    def load(name: str) -> object:
         if name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         here = import_module(package)
-        value = getattr(import_module(f"{package}.{modules[name]}"), name)
+        value: object = getattr(import_module(f"{package}.{modules[name]}"), name)
         setattr(here, name, value)
         return value
 
