@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Nearest
 from gso.ruled.division import Trimmed, meshed
 from gso.ruled.extended import Extended
 from gso.ruled.nodes import Nodes

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gso.energy.base import Term, mean_weights
+from gso.energy import Term, mean_weights
 from gso.ruled.smooth.curves import Curves, hermite
 from gso.ruled.smooth.residuals import (
     bend_residual,
