@@ -135,7 +135,7 @@ class TestSheets:
     """A cylinder of radius 1, and sheets with which it cannot be made."""
 
     @pytest.fixture
-    def why(self, tmp_path, monkeypatch):
+    def reasons_for(self, tmp_path, monkeypatch):
         def reasons(whole, **thickness):
             monkeypatch.setattr("gso.workshop.work.made", lambda *_: whole)
             finish = Finish(thickness=Thickness(**thickness))
@@ -146,38 +146,38 @@ class TestSheets:
 
         return reasons
 
-    def test_a_thin_sheet_is_fine(self, cylinder, why):
-        assert why(cylinder, sheet=0.02) == ()
-        assert why(cylinder, sheet=0.002, radius=0.001) == ()
+    def test_a_thin_sheet_is_fine(self, cylinder, reasons_for):
+        assert reasons_for(cylinder, sheet=0.02) == ()
+        assert reasons_for(cylinder, sheet=0.002, radius=0.001) == ()
 
-    def test_a_sheet_thicker_than_the_radius_is_refused(self, cylinder, why):
-        (why,) = why(cylinder, sheet=2.5, face="outside")
+    def test_a_sheet_thicker_than_the_radius_is_refused(self, cylinder, reasons_for):
+        (why,) = reasons_for(cylinder, sheet=2.5, face="outside")
         assert (why.code, why.bound, why.places.ids) == (Code.TOO_THICK, 2.5, ("arch",))
         assert why.value == pytest.approx(cylinder.record["bend_radius_min"])
 
-    def test_a_bend_beyond_the_table_is_refused(self, cylinder, why):
-        (why,) = why(cylinder, sheet=0.01, table=[[0.0, 0.0], [1e-3, 1e-4]])
+    def test_a_bend_beyond_the_table_is_refused(self, cylinder, reasons_for):
+        (why,) = reasons_for(cylinder, sheet=0.01, table=[[0.0, 0.0], [1e-3, 1e-4]])
         assert (why.code, why.bound) == (Code.BEND_ANGLE, pytest.approx(np.degrees(1e-3)))
         assert why.value == pytest.approx(np.degrees(np.abs(cylinder.panels[0].angles).max()))
 
-    def test_bends_without_room_for_the_tool_are_refused(self, cylinder, why):
-        (why,) = why(cylinder, sheet=0.02, radius=3.0)
+    def test_bends_without_room_for_the_tool_are_refused(self, cylinder, reasons_for):
+        (why,) = reasons_for(cylinder, sheet=0.02, radius=3.0)
         assert why.code is Code.BENDS_NEAR and why.value < why.bound
 
-    def test_a_part_without_bend_lines_is_refused_where_the_thickness_matters(self, why):
+    def test_a_part_without_bend_lines_is_refused_where_the_thickness_matters(self, reasons_for):
         flat = made(Design("arch", arch()), Ask(formulation="curvature"))
         assert not len(flat.panels[0].bends)
         assert flat.record["bend_radius_min"] == pytest.approx(1.0, rel=0.05)
-        assert why(flat, sheet=0.02) == ()
-        (why,) = why(flat, sheet=0.02, face="outside")
+        assert reasons_for(flat, sheet=0.02) == ()
+        (why,) = reasons_for(flat, sheet=0.02, face="outside")
         assert (why.code, why.bound) == (Code.NEUTRAL_STRAIN, 1e-3)
         assert why.value == pytest.approx(0.01, rel=0.05)
-        (why,) = why(flat, sheet=2.5)
+        (why,) = reasons_for(flat, sheet=2.5)
         assert (why.code, why.bound) == (Code.TOO_THICK, 1.25)
 
-    def test_seams_that_the_thickness_parts_are_refused(self, strips, why):
-        assert why(strips, sheet=1e-4, face="outside") == ()
-        why = why(strips, sheet=0.05, face="outside")
+    def test_seams_that_the_thickness_parts_are_refused(self, strips, reasons_for):
+        assert reasons_for(strips, sheet=1e-4, face="outside") == ()
+        why = reasons_for(strips, sheet=0.05, face="outside")
         assert Code.SEAM_SIDES in codes(why)
 
     @pytest.mark.parametrize("formulation", ["curvature", "flatten"])

@@ -117,8 +117,7 @@ def test_halved_strips_stay_planar_and_merged_ends_are_triangles():
 
 @pytest.mark.parametrize("power", [2.0, 4.0])
 @pytest.mark.parametrize("conditions", [False, True])
-@pytest.mark.parametrize("planar", [0.0, 10.0])
-def test_gradient_of_the_energy_is_that_of_differences(power, conditions, planar):
+def test_gradient_of_the_energy_is_that_of_differences(power, conditions):
     there = domain(saddle(17, strength=0.25))
     first, places = chords(there, 9)
     strips, vertices = first.halved(there.points(places))
@@ -129,7 +128,7 @@ def test_gradient_of_the_energy_is_that_of_differences(power, conditions, planar
     rng = np.random.default_rng(0)
     vertices = vertices + 1e-4 * rng.standard_normal(vertices.shape)
     changed = {"back": 0.0, "gap": 0.0, "fold": 1e-6, "hold": 1.0, "radius": 1e-3}
-    w, scale = replace(job.weights, power=power, planar=planar, **changed), 0.01
+    w, scale = replace(job.weights, power=power, **changed), 0.01
     measured = energy.measure(vertices)
     gradient, _ = energy.derivatives(vertices, measured, w, scale)
     step = 1e-7 * rng.standard_normal(vertices.shape)
@@ -310,7 +309,7 @@ def test_flat_sheets_stay_flat_and_whole(settings):
     # The outline keeps its corners.
     corners = sheet[[0, 0, -1, -1], [0, -1, 0, -1]]
     apart = np.linalg.norm(corners[:, None] - result.mesh.vertices, axis=2).min(axis=1)
-    np.testing.assert_allclose(apart, 0.0, atol=1e-9)
+    np.testing.assert_allclose(apart, 0.0, atol=1e-6)
     assert result.rulings.smallest_radius > 1e6
     assert metrics.area(result.mesh) == pytest.approx(128.0, rel=1e-4)
 

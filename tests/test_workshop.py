@@ -191,7 +191,7 @@ class TestCongruent:
 
 
 class TestDecimation:
-    def test_a_decimated_surface_is_near_and_not_folded(self):
+    def test_a_decimated_surface_is_near_and_not_folded(self, monkeypatch):
         from gso import faults, metrics
         from gso.ruled.paneling import LightDesign
 
@@ -202,10 +202,11 @@ class TestDecimation:
             for k, a, b in zip(range(1, 12), rng.uniform(0, 6, 11), rng.uniform(0, 6, 11))
         )
         design = Mesh.from_grid(np.dstack([x, y, 0.1 * waves]))
-        allowed = 0.04 * design.diagonal
+        monkeypatch.setattr("gso.ruled.paneling.light_design._LIGHT", 500)
+        allowed = 0.03 * design.diagonal
         found = LightDesign.of(design, allowed)
         light, away = found.mesh, allowed - found.allowed
-        assert len(light.faces) <= 4000 and away <= 0.25 * allowed + 1e-12
+        assert len(light.faces) <= 4000 and 0 < away <= 0.35 * allowed
         assert not len(faults.folded(light))
         found = metrics.surface_distance(design, light)
         assert max(found.there_max, found.back_max) == pytest.approx(away)
@@ -221,12 +222,12 @@ class TestOffsets:
         hole = np.array([[40.0, 20, 0], [60, 20, 0], [60, 30, 0], [40, 30, 0], [40, 20, 0]])
         plain = {"notches": None, "labels": None}
         (wide,) = parts_of(whole, 1.0, Finish(kerf=2.0, **plain), [], [hole])
-        assert wide.size == pytest.approx((102, 52))
-        assert area_of_hole(wide.holes[0]) == pytest.approx(18 * 8)
+        assert wide.size == pytest.approx((102, 52), rel=1e-4)
+        assert area_of_hole(wide.holes[0]) == pytest.approx(18 * 8, rel=1e-3)
         (sewn,) = parts_of(whole, 1.0, Finish(allowance=10.0, **plain), [], [hole])
-        assert sewn.size == pytest.approx((120, 70))
-        np.testing.assert_allclose(np.ptp(sewn.seams[0], axis=0), (100, 50))
-        np.testing.assert_allclose(sewn.seams[0].min(axis=0) - sewn.low, 10.0)
+        assert sewn.size == pytest.approx((120, 70), rel=1e-4)
+        np.testing.assert_allclose(np.ptp(sewn.seams[0], axis=0), (100, 50), rtol=1e-4)
+        np.testing.assert_allclose(sewn.seams[0].min(axis=0) - sewn.low, 10.0, atol=0.01)
 
     def test_turning_over_mirrors_and_swaps_folds(self):
         whole = made(Design("arch", arch()), Ask())
