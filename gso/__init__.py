@@ -36,10 +36,12 @@ if TYPE_CHECKING:
         GSOError,
         MeshError,
         OptionError,
+        SchedulerError,
         WeightsError,
     )
     from gso.io import as_mesh, load, save, save_spline
     from gso.mesh import Mesh, topology
+    from gso.pattern import Pattern
     from gso.result import Result
     from gso.ruled.loft import loft
     from gso.ruled.paneling.lay_strips import strips
@@ -82,11 +84,13 @@ __all__ = [
     "OnCurve",
     "OptionError",
     "Options",
+    "Pattern",
     "PlanarFaces",
     "Progress",
     "Result",
     "RuledOptions",
     "Ruling",
+    "SchedulerError",
     "SlidingBoundary",
     "SmoothCurves",
     "Status",
@@ -126,10 +130,12 @@ _PLACES = {
         "SmoothCurves SymmetryPlane"
     ),
     "gso.errors": (
-        "BackendError ConvergenceWarning DatasetError GSOError MeshError OptionError WeightsError"
+        "BackendError ConvergenceWarning DatasetError GSOError MeshError OptionError "
+        "SchedulerError WeightsError"
     ),
     "gso.io": "as_mesh load save save_spline",
     "gso.mesh": "Mesh topology",
+    "gso.pattern": "Pattern",
     "gso.result": "Result",
     "gso.ruled.loft": "loft",
     "gso.ruled.paneling.lay_strips": "strips",

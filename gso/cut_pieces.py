@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from gso.components import Component, split
 from gso.errors import MeshError
-from gso.mesh import Mesh
-from gso.mesh.cut import Cut
+from gso.mesh import Cut, Mesh
 from gso.typing import Array, Ints
 
 

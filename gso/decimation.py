@@ -6,8 +6,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from gso import faults, metrics
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Mesh, Nearest
 from gso.mesh.topology import edge_graph
 from gso.typing import Ints
 

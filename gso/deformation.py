@@ -8,8 +8,7 @@ from gso.components import Component, several, split
 from gso.energy import fairness
 from gso.geometry import closest_motion
 from gso.linalg import spd
-from gso.mesh import Mesh
-from gso.mesh.normals import vertex_normals
+from gso.mesh import Mesh, vertex_normals
 from gso.typing import Array, Flags, Ints, Solve
 
 #: Weights of a field's slope and of its size, relative to its bending. They only select a

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from gso.dataset import bezier
+from gso.dataset import generate
 from gso.mesh import Mesh, topology
 from gso.mesh.topology import reverse
 from gso.verdict import Code, Reason
@@ -96,4 +96,4 @@ def meshes() -> dict[str, Mesh]:
 @pytest.fixture(scope="session")
 def surfaces() -> list[np.ndarray]:
     """Four random Bezier surfaces at 32 x 32."""
-    return [s.sample(32) for s in bezier.generate(4, seed=11)]
+    return [s.sample(32) for s in generate(4, seed=11)]

@@ -12,7 +12,7 @@ import trimesh
 import gso
 from gso import Mesh
 from gso.io import left_out
-from gso.mesh.attributes import Attributes
+from gso.mesh import Attributes
 from tests.conftest import saddle
 
 HEAD = "mtllib ../a b.mtl\nmtllib second.mtl\no Gr\xf6\xdfe #2\n"

@@ -10,30 +10,34 @@ import numpy as np
 import pytest
 
 import gso
+from gso import linalg
 from gso.constraints import Compiled
-from gso.dataset import bezier
+from gso.dataset import generate
 from gso.energy import registry
 from gso.executors import SERIAL, ProcessExecutor
-from gso.linalg.base import Pattern
-from gso.pipeline.case import Case
-from gso.solver import kernels
-from gso.solver.problem import Problem
-from gso.tasks.request import check
-from gso.unknowns.base import DIMENSIONS
+from gso.linalg import Pattern
+from gso.pipeline import Case
+from gso.solver import Problem, kernels
+from gso.tasks import check
+from gso.unknowns import DIMENSIONS
 from tests.conftest import codes, cylinder, meshes, saddle
 
 torch = pytest.importorskip("torch")
 
-from gso.linalg import banded as lapack  # noqa: E402
-from gso.solver.directions import GaussNewton  # noqa: E402
-from gso.tno.batched import batch_steps, cholesky, device, many, stage_groups  # noqa: E402
+from gso.solver import GaussNewton  # noqa: E402
+from gso.tno.batched import (  # noqa: E402
+    DeviceExecutor,
+    batch_steps,
+    check_batch,
+    cholesky,
+    device,
+    minimise_elsewhere,
+    solve_all,
+    solve_batch,
+)
 from gso.tno.batched import tensor_kernels as on_tensors  # noqa: E402
 from gso.tno.batched.batch_problem import Problem as Batch  # noqa: E402
-from gso.tno.batched.batches import check_batch, solve_batch  # noqa: E402
-from gso.tno.batched.device_executor import DeviceExecutor, minimise_elsewhere  # noqa: E402
-from gso.tno.batched.many import solve_all  # noqa: E402
 from gso.tno.batched.stage_batch import TooLarge, Unbatchable, gather  # noqa: E402
-from gso.tno.batched.sums import Sums  # noqa: E402
 from gso.tno.batched.tensor_terms import stack_losses  # noqa: E402
 
 CPU = torch.device("cpu")
@@ -50,7 +54,7 @@ TERMS = [
 
 @pytest.fixture(scope="module")
 def designs():
-    return np.stack([s.sample(SIZE) for s in bezier.generate(4, seed=11)])
+    return np.stack([s.sample(SIZE) for s in generate(4, seed=11)])
 
 
 def planned(task, points, **request):
@@ -109,7 +113,7 @@ def test_energy_gradient_and_matrix_are_those_of_the_solver(name, designs):
     task, request, heights = CASES[name]
     points = designs[:2] if heights is None else np.stack([bump(21, h) for h in heights])
     plans = [planned(task, p, **request) for p in points]
-    assert stage_groups.same(*(stage_groups.structure(plan) for plan in plans))
+    assert len({len(plan.stages) for plan in plans}) == 1
     rng = np.random.default_rng(0)
     coordinates = [plan.start for plan in plans]
     for own in zip(*(plan.stages for plan in plans), strict=True):
@@ -190,7 +194,8 @@ def test_only_indefinite_matrices_are_damped():
         exact = -np.linalg.solve(dense(pattern, values[:, k]), gradient[:, k].numpy())
         np.testing.assert_allclose(found[:, k], exact, rtol=1e-6)
     own = np.ascontiguousarray(values[:, 1])
-    wanted = GaussNewton().step(lapack.Solver(pattern), own, diagonal, gradient[:, 1].numpy())
+    solver = linalg.find("banded").Solver(pattern)
+    wanted = GaussNewton().step(solver, own, diagonal, gradient[:, 1].numpy())
     np.testing.assert_allclose(found[:, 1], wanted, rtol=1e-8)
 
 
@@ -210,15 +215,6 @@ def test_a_hopeless_matrix_gives_the_gradient():
     )
     assert (found < 0).all()
     assert float(found.std()) == 0.0
-
-
-def test_sums_add_every_row():
-    targets = np.random.default_rng(0).integers(0, 9, 200)
-    rows = torch.as_tensor(np.random.default_rng(1).standard_normal((200, 3)))
-    sums = Sums(targets, 11, CPU)
-    wanted = np.zeros((11, 3))
-    np.add.at(wanted, targets, rows.numpy())
-    np.testing.assert_allclose(sums(rows), wanted[sums.order], atol=1e-12)
 
 
 def energies(results):
@@ -611,8 +607,8 @@ def test_on_a_device(workers, designs, graphics, processes):
 
 
 def test_large_grids_are_planned_one_by_one(designs, graphics, processes, monkeypatch):
-    monkeypatch.setattr(many, "_VERTICES", SIZE * SIZE)
-    monkeypatch.setattr(many, "_MOST", 2 * SIZE * SIZE)
+    monkeypatch.setattr("gso.tno.batched.many._VERTICES", SIZE * SIZE)
+    monkeypatch.setattr("gso.tno.batched.many._MOST", 2 * SIZE * SIZE)
     gso.tno.optimize_batch(designs, task="flatten", device="cuda", executor=processes)
     assert max(graphics) <= 2
 
@@ -621,7 +617,7 @@ def test_what_fails_in_a_batch_is_solved_alone(designs, monkeypatch):
     def fail(*given):
         raise gso.MeshError("some surface has no image")
 
-    monkeypatch.setattr(stage_groups, "solve", fail)
+    monkeypatch.setattr("gso.tno.batched.stage_groups.solve", fail)
     found = gso.tno.optimize_batch(designs[:2], task="flatten", workers=0)
     assert [one.backend for one in found] == [
         gso.tno.optimize(p, task="flatten", verdict=False).backend for p in designs[:2]

@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 import gso
-from gso import metrics
-from gso.energy import elongation
-from gso.mesh.normals import vertex_normals
+from gso import energy, metrics
+from gso.mesh import vertex_normals
 from tests.conftest import meshes, renumbered, rotation
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 
 import designs
+
+elongation = energy.registry()["elongation"]
 
 BALANCED = partial(gso.tno.optimize, options="balanced")
 ACCURATE = partial(gso.tno.optimize, options="accurate")

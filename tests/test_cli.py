@@ -16,7 +16,7 @@ import pytest
 from click.testing import CliRunner
 
 import gso
-from gso.cli import main, progress, report
+from gso.cli import main
 
 PANEL = Path(__file__).resolve().parents[1] / "examples" / "panel.obj"
 
@@ -407,15 +407,15 @@ def test_a_result_that_cannot_be_written_is_reported(run, small, monkeypatch):
 
 
 def test_progress_is_shown_to_a_person(run, small, monkeypatch):
-    monkeypatch.setattr(progress, "watched", lambda: True)
-    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    monkeypatch.setattr("gso.cli.progress.watched", lambda: True)
+    monkeypatch.setattr("gso.cli.progress.PATIENCE", 0.0)
     assert "stage 1/" in run("optimize", small, "-o", "out.obj").stderr
     assert "file" in run("optimize", small, "-o", "out/", "--workers", 0).stderr
 
 
 def test_short_runs_show_no_progress(run, small, monkeypatch):
-    monkeypatch.setattr(progress, "watched", lambda: True)
-    monkeypatch.setattr(progress, "PATIENCE", 1e9)
+    monkeypatch.setattr("gso.cli.progress.watched", lambda: True)
+    monkeypatch.setattr("gso.cli.progress.PATIENCE", 1e9)
     assert run("optimize", small, "-o", "out.obj").stderr == ""
 
 
@@ -515,12 +515,10 @@ def test_version_and_help(run, monkeypatch):
 
 
 def test_choices_are_those_of_the_library():
-    from gso.quantities import MILLIMETRES
-
     def choices(command, name):
         return set(next(o for o in main.commands[command].params if o.name == name).type.choices)
 
-    assert choices("optimize", "unit") == set(MILLIMETRES)
+    assert choices("optimize", "unit") == {"um", "mm", "cm", "dm", "m", "in", "ft", "yd"}
     assert choices("plot", "colour") == set(gso.plot.COLOURS)
     of_tasks = [gso.DevelopableOptions, gso.IsometryOptions, gso.FlattenOptions]
     of_tasks += [gso.DenoiseOptions, gso.BendOptions, gso.ConformalOptions]
@@ -533,10 +531,13 @@ def test_a_preset_that_the_task_lacks_is_refused(run, small, never, task):
     assert refused(done, "jiang2020", "balanced")
 
 
-def test_numbers_in_json():
-    assert report._number(float("nan")) is None
-    assert report._number(np.int64(3)) == 3
-    assert report._number(np.float64(0.5)) == 0.5
+def test_numbers_in_json(run, small, monkeypatch):
+    values = {"a": np.float64("nan"), "b": np.int64(3), "c": np.float64(0.5), "d": -np.inf}
+    monkeypatch.setattr(gso.Result, "metrics", values)
+    run("optimize", small, "-o", "out.obj", "--metrics", "out.json")
+    found = json.loads(Path("out.json").read_text())["metrics"]
+    assert found == {"a": None, "b": 3, "c": 0.5, "d": None}
+    assert isinstance(found["b"], int)
 
 
 def processor_time(command):

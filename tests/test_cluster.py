@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 import gso
+from gso import SchedulerError
 from gso.cli import main
-from gso.errors import SchedulerError
 from tests.conftest import saddle
 
 distributed = pytest.importorskip("distributed")

@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 
 import gso
-from gso import Mesh, metrics
+from gso import Mesh, Status, metrics
 from gso.components import average, combined, labels, split
-from gso.pipeline import component_solves as solving
-from gso.pipeline.normalise import Canonical
-from gso.status import Status
+from gso.executors import useful_workers
+from gso.pipeline import Canonical
+from gso.tasks import compute_metrics
 from gso.tasks.developable import Options
-from gso.tasks.evaluation import compute_metrics
 
 #: Tasks and formulations, with options.
 ASKED = [
@@ -266,7 +265,7 @@ def test_progress_and_cancelling():
 def test_processes_give_what_one_process_gives(task, monkeypatch):
     whole = together(panel(), moved(irregular(), [5.0, 0, 0]), moved(panel(12), [9.0, 0, 0]))
     plain = gso.tno.optimize(whole, task=task, options="fast")
-    monkeypatch.setattr(solving, "_useful_workers", lambda sizes: 2)
+    monkeypatch.setattr("gso.pipeline.component_solves._useful_workers", lambda sizes: 2)
     seen = []
     shared = gso.tno.optimize(whole, task=task, options="fast", callback=seen.append)
     assert np.array_equal(plain.mesh.vertices, shared.mesh.vertices)
@@ -297,12 +296,11 @@ def test_scripts_without_a_guard_and_workers_of_a_batch(tmp_path, monkeypatch):
         [sys.executable, script], capture_output=True, text=True, check=True, env=environment
     )
     assert done.stdout.split() == ["once", "True"]
-    monkeypatch.setattr(solving, "_WORTH", 0)
-    assert solving._useful_workers([9]) == 0
+    assert useful_workers(1) == 0
     monkeypatch.setattr("gso.executors.base.processors", lambda: 2)
-    assert solving._useful_workers([9, 9, 9]) == 2
+    assert useful_workers(3) == 2
     monkeypatch.setattr("gso.executors.base.parent_process", lambda: object())
-    assert solving._useful_workers([9, 9, 9]) == 0
+    assert useful_workers(3) == 0
 
 
 def test_written_and_read(tmp_path):

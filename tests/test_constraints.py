@@ -10,17 +10,20 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import gso
-from gso import geometry
-from gso.constraints import Constraint, compile_constraints, read_constraints
-from gso.constraints.conflicts import check
-from gso.constraints.equations import Part, Pins, Relations
-from gso.constraints.linear import reduce
-from gso.energy import Term, Weighted
-from gso.energy.multipliers import STIFF, hardened
-from gso.mesh import Frame, Mesh
-from gso.mesh.normals import vertex_normals
-from gso.mesh.polyline import Polylines
-from gso.unknowns import Layout, free, normal_offsets
+from gso import geometry, unknowns
+from gso.constraints import (
+    Constraint,
+    Part,
+    Pins,
+    Relations,
+    check,
+    compile_constraints,
+    read_constraints,
+    reduce,
+)
+from gso.energy import STIFF, Term, Weighted, hardened
+from gso.mesh import Frame, Mesh, Polylines, vertex_normals
+from gso.unknowns import Layout, normal_offsets
 from gso.verdict import Code
 from tests.conftest import codes, saddle, shuffled, sphere_cap
 
@@ -476,7 +479,7 @@ def test_eliminated_unknowns_reach_all_that_is_allowed_and_nothing_else():
     layout = Layout.of(len(V), "surface")
     maps = compiled.reduction.maps(0, layout.size)
     rng = np.random.default_rng(0)
-    for before in (free(layout), normal_offsets(layout, V, vertex_normals(GRID))):
+    for before in (unknowns.free(layout), normal_offsets(layout, V, vertex_normals(GRID))):
         variables = before.constrained(*maps)
         points = variables.points(rng.standard_normal(variables.size)).reshape(-1, 3)
         assert max(m.length for m in compiled.violations(points).values()) < 1e-12
@@ -484,7 +487,7 @@ def test_eliminated_unknowns_reach_all_that_is_allowed_and_nothing_else():
         np.testing.assert_allclose(variables.points(x).reshape(-1, 3), points, atol=1e-9)
     # Of 13 x 13 vertices, 6 x 13 have three freedoms and 13 on the plane two; one pair is
     # pinned, and the glued corners lose the freedom of one.
-    assert free(layout).constrained(*maps).size == 3 * 78 + 2 * 13 - 3 - 3
+    assert unknowns.free(layout).constrained(*maps).size == 3 * 78 + 2 * 13 - 3 - 3
 
 
 def test_files_of_constraints(tmp_path):

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import gso
-from gso import metrics, parametrization
+from gso import Pattern, metrics, parametrization
+from gso import mesh as meshes
 from gso.cli import main
-from gso.mesh import Mesh
-from gso.mesh.cut import cut, joining
-from gso.pattern import Pattern
+from gso.mesh import Mesh, joining
 from gso.result import Result
 from gso.verdict import Code
 from tests.conftest import codes, is_disk, saddle, shuffled
@@ -49,7 +48,7 @@ CYLINDER, CONE, WASHER = ring(0.0, 2.0), ring(1.0, 2.0), ring(1.0, 0.3)
 class TestCut:
     def test_line_inside_opens_a_slit(self):
         mesh = Mesh.from_grid(saddle(7))
-        done = cut(mesh, [[23, 24], [25, 24]])
+        done = meshes.cut(mesh, [[23, 24], [25, 24]])
         assert done.vertex.tolist() == [*range(49), 24]
         assert len(done.mesh.boundary_loops) == 2
         assert done.mesh.euler_characteristic == 0
@@ -61,7 +60,7 @@ class TestCut:
         inner = ~mesh.half_edges.boundary_vertex
         middle = np.flatnonzero(inner & (mesh.half_edges.face_count == 3))[0]
         edges = mesh.edges[(mesh.edges == middle).any(axis=1)]
-        done = cut(mesh, edges)
+        done = meshes.cut(mesh, edges)
         assert len(edges) == 3
         assert (done.vertex == middle).sum() == 3
         assert len(done.seams) == 3
@@ -74,14 +73,14 @@ class TestCut:
         he, up = mesh.half_edges, mesh.vertices[mesh.faces].mean(axis=1)[:, 2] > 0.2
         across = up[he.face] & ~up[he.face[he.twin]]
         round_it = np.stack([he.origin, he.dest], axis=1)[across]
-        halves = cut(mesh, round_it).mesh
+        halves = meshes.cut(mesh, round_it).mesh
         assert np.unique(halves.components[halves.used]).size == 2
         assert [len(loop) for loop in halves.boundary_loops] == [len(round_it)] * 2
-        assert is_disk(cut(mesh, round_it[1:]).mesh)
+        assert is_disk(meshes.cut(mesh, round_it[1:]).mesh)
 
     def test_faces_keep_their_order_and_seams_their_places(self):
         mesh = shuffled(tube(CONE))
-        done = cut(mesh, joining(mesh, mesh.boundary_loops))
+        done = meshes.cut(mesh, joining(mesh, mesh.boundary_loops))
         assert np.array_equal(done.vertex[done.mesh.faces], mesh.faces)
         assert np.array_equal(done.mesh.vertices, mesh.vertices[done.vertex])
         assert np.array_equal(*done.vertex[done.seams].transpose(1, 0, 2))
@@ -91,14 +90,14 @@ class TestCut:
     def test_edges_on_the_boundary_or_none_change_nothing(self):
         mesh = Mesh.from_grid(saddle(5))
         for edges in ([[0, 1], [1, 2]], np.empty((0, 2), int)):
-            done = cut(mesh, edges)
+            done = meshes.cut(mesh, edges)
             assert np.array_equal(done.mesh.faces, mesh.faces)
             assert not len(done.seams)
 
     @pytest.mark.parametrize("pair", [[0, 6], [0, 99], [-1, 0]])
     def test_what_is_no_edge_is_refused(self, pair):
         with pytest.raises(gso.MeshError, match="no edge of a face"):
-            cut(Mesh.from_grid(saddle(5)), [pair])
+            meshes.cut(Mesh.from_grid(saddle(5)), [pair])
 
 
 class TestPattern:
@@ -261,6 +260,8 @@ class TestFiles:
         for task in ("flatten", "conformal"):
             plot_result(gso.tno.optimize(tube(CONE), task=task), tmp_path / f"{task}.png")
         plot_result(gso.tno.optimize(tube(CONE), formulation="isometry"), tmp_path / "i.png")
+        assert all(p.stat().st_size > 5000 for p in tmp_path.iterdir())
+        assert len(list(tmp_path.iterdir())) == 3
 
     def test_command_line(self, tmp_path):
         gso.save(tube(CYLINDER), tmp_path / "tube.obj")

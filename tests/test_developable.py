@@ -112,6 +112,7 @@ def test_a_larger_budget_leaves_less_strain(surfaces):
 
 
 def test_target_curvature_is_met_with_less_displacement(surfaces):
+    compared = 0
     for points in surfaces[:2]:
         result = gso.tno.optimize(points, target_curvature=0.05)
         assert result.status is gso.Status.TARGET_REACHED
@@ -119,6 +120,8 @@ def test_target_curvature_is_met_with_less_displacement(surfaces):
         accurate = gso.tno.optimize(points, options="accurate")
         if accurate.metrics["loss_gc_worst"] <= 0.05:
             assert result.metrics["d_H"] <= accurate.metrics["d_H"]
+            compared += 1
+    assert compared
 
 
 @pytest.mark.parametrize("size", [5, 9])
@@ -279,12 +282,12 @@ def test_a_callback_can_cancel(surfaces):
 
 @pytest.mark.slow
 def test_one_set_of_weights_serves_three_resolutions():
-    from gso.dataset import bezier
+    from gso.dataset import generate
 
     figures = []
     for size in (32, 64, 128):
         rows = []
-        for surface in bezier.generate(12, seed=77):
+        for surface in generate(12, seed=77):
             points = surface.sample(size)
             m = gso.tno.optimize(points).metrics
             rows.append((m["loss_gc"], m["d_H"]))
@@ -326,7 +329,9 @@ def test_no_constraints_at_all_are_fine():
 
     ball = trimesh.creation.icosphere(subdivisions=1)
     options = replace(Options.preset("fast"), iterations=1)
-    gso.tno.optimize(ball, constraints=[gso.FixedBoundary(), gso.Fixed([])], options=options)
+    empty = [gso.FixedBoundary(), gso.Fixed([])]
+    given, none = (gso.tno.optimize(ball, constraints=c, options=options) for c in (empty, []))
+    np.testing.assert_allclose(given.mesh.vertices, none.mesh.vertices, atol=1e-9)
 
 
 def test_unused_vertices_change_nothing():

@@ -16,10 +16,9 @@ import numpy as np
 import pytest
 
 import gso
-from gso.executors import SERIAL, ProcessExecutor, exchange, open_executor
-from gso.executors.base import useful_workers
+from gso.executors import SERIAL, ProcessExecutor, exchange, open_executor, useful_workers
 from gso.mesh import Mesh
-from gso.pipeline.lay_flat import strains_of
+from gso.pipeline import strains_of
 from tests.conftest import sphere_cap
 
 

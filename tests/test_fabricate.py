@@ -10,17 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from click.testing import CliRunner
 
 import gso
-from gso.cli import fabricate_command, main
-from gso.errors import GSOError, MeshError, OptionError
+from gso import GSOError, MeshError, OptionError
+from gso.cli import main
 from gso.mesh import Mesh
 from gso.verdict import Code, describe
-from gso.workshop import work
-from gso.workshop.finish import Finish
-from gso.workshop.part import signed_area
-from gso.workshop.thickness import Thickness
+from gso.workshop import Finish, Thickness, made
 from tests.test_pieces import dome
 from tests.test_workshop import arch
 
@@ -65,7 +63,7 @@ class TestFiles:
             np.testing.assert_allclose(
                 np.ptp(outline, axis=0), [part["length"], part["width"]], rtol=1e-6
             )
-            assert abs(signed_area(outline)) == pytest.approx(part["area"], rel=1e-6)
+            assert shapely.Polygon(outline).area == pytest.approx(part["area"], rel=1e-6)
             text = (job.folder / "parts" / f"{part['name']}.svg").read_text()
             wide, high = (
                 float(x) for x in re.search(r'viewBox="\S+ \S+ (\S+) (\S+)"', text).groups()
@@ -103,26 +101,32 @@ class TestFiles:
 class TestRuns:
     def test_a_run_that_was_ended_goes_on(self, tmp_path, monkeypatch):
         calls = []
-        make = work.made
 
         def count(name, *rest):
             calls.append(name)
             if len(calls) == 2 and not done:
                 raise KeyboardInterrupt
-            return make(name, *rest)
+            return made(name, *rest)
 
         done = []
-        monkeypatch.setattr(work, "made", count)
+        monkeypatch.setattr("gso.workshop.work.made", count)
         with pytest.raises(KeyboardInterrupt):
             gso.fabricate(row(), tmp_path, unit="m", workers=0)
         done.append(True)
         job = gso.fabricate(row(), tmp_path, unit="m", workers=0)
         assert job.usable and len(calls) == 3
         # The same again needs no solve, another request does.
-        gso.fabricate(row(), tmp_path, unit="m", workers=0)
+        again = gso.fabricate(row(), tmp_path, unit="m", workers=0)
         assert len(calls) == 3
+        for one, two in zip(job.parts, again.parts, strict=True):
+            np.testing.assert_allclose(one.outline, two.outline, atol=1e-9)
+        assert again.reasons == job.reasons
         gso.fabricate(row(), tmp_path, unit="m", workers=0, max_deviation=0.1)
         assert len(calls) == 5
+        for path in (tmp_path / "work").glob("*.npz"):
+            path.write_bytes(b"damaged")
+        assert gso.fabricate(row(), tmp_path, unit="m", workers=0, max_deviation=0.1).usable
+        assert len(calls) == 7
 
     def test_files_of_an_earlier_run_are_deleted(self, tmp_path):
         gso.fabricate(row(), tmp_path, unit="m", workers=0)
@@ -150,7 +154,7 @@ class TestRuns:
         for one, two in zip(job.parts, again.parts, strict=True):
             np.testing.assert_allclose(one.outline, two.outline, atol=1e-9)
 
-    def test_what_cannot_be_made_is_refused_with_the_numbers(self, tmp_path):
+    def test_what_cannot_be_made_is_refused_with_the_numbers(self, tmp_path, monkeypatch):
         thick = Finish(thickness=Thickness(50.0))
         job = gso.fabricate(dome(9, 1.0), tmp_path, max_deviation=1e-6, workers=0, finish=thick)
         assert not job.usable
@@ -164,7 +168,12 @@ class TestRuns:
         said = [describe(reason, "mm") for reason in job.reasons]
         assert len(said) > 1 and said == [r["text"] for r in job.certificate["reasons"]]
         assert all(f"<li>{html.escape(text)}</li>" in page for text in said)
-        assert [f"not usable: {text}" for text in said] == fabricate_command.text(job)[-len(said) :]
+        gso.save(dome(5), tmp_path / "dome.obj")
+        monkeypatch.setattr("gso.workshop.fabricate.fabricate", lambda *_, **__: job)
+        words = ["fabricate", str(tmp_path / "dome.obj"), "-o", str(tmp_path / "out")]
+        done = CliRunner().invoke(main, words)
+        told = done.output.splitlines()[-len(said) :]
+        assert told == [f"not usable: {text}" for text in said]
 
     @pytest.mark.parametrize(
         "bad",

@@ -10,21 +10,11 @@ import pytest
 from click.testing import CliRunner
 
 import gso
+from gso import GSOError, MeshError, OptionError
 from gso.cli import main
-from gso.errors import GSOError, MeshError, OptionError
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
-from gso.pattern import Bend
+from gso.mesh import Mesh, Nearest
 from gso.verdict import Code
-from gso.workshop import work
-from gso.workshop.asking import Ask
-from gso.workshop.checks import judge_sheet
-from gso.workshop.designs import Design, designs_of
-from gso.workshop.finish import Finish
-from gso.workshop.making import made
-from gso.workshop.marks import to_pattern, to_surface
-from gso.workshop.parts import drawn, fitted, parts_of
-from gso.workshop.thickness import Thickness, thickened
+from gso.workshop import Ask, Design, Finish, Thickness, designs_of, made, parts_of, thickened
 from tests.conftest import codes
 from tests.test_pieces import dome
 from tests.test_workshop import arch, bent
@@ -81,7 +71,7 @@ class TestFolder:
         def end(*_):
             raise KeyboardInterrupt
 
-        monkeypatch.setattr(work, "made", end)
+        monkeypatch.setattr("gso.workshop.work.made", end)
         with pytest.raises(KeyboardInterrupt):
             gso.fabricate(dome(5), tmp_path, workers=0)
         said = json.loads((tmp_path / "certificate.json").read_text())
@@ -107,7 +97,7 @@ class TestFolder:
         ],
     )
     def test_wrong_options_are_refused_before_anything_is_made(self, tmp_path, monkeypatch, bad):
-        monkeypatch.setattr(work, "made", None)
+        monkeypatch.setattr("gso.workshop.work.made", None)
         with pytest.raises(GSOError):
             gso.fabricate(dome(5), tmp_path / "out", workers=0, **bad)
         assert not (tmp_path / "out").exists()
@@ -144,42 +134,50 @@ class TestNames:
 class TestSheets:
     """A cylinder of radius 1, and sheets with which it cannot be made."""
 
-    def why(self, whole, **thickness):
-        finish = Finish(thickness=Thickness(**thickness))
-        return judge_sheet(fitted(whole, 1.0, finish), Ask(), finish)
+    @pytest.fixture
+    def reasons_for(self, tmp_path, monkeypatch):
+        def reasons(whole, **thickness):
+            monkeypatch.setattr("gso.workshop.work.made", lambda *_: whole)
+            finish = Finish(thickness=Thickness(**thickness))
+            given = {"workers": 0, "finish": finish, "formats": ("svg",)}
+            return gso.fabricate(
+                small(), tmp_path / f"{len(list(tmp_path.iterdir()))}", **given
+            ).reasons
 
-    def test_a_thin_sheet_is_fine(self, cylinder):
-        assert self.why(cylinder, sheet=0.02) == ()
-        assert self.why(cylinder, sheet=0.002, radius=0.001) == ()
+        return reasons
 
-    def test_a_sheet_thicker_than_the_radius_is_refused(self, cylinder):
-        (why,) = self.why(cylinder, sheet=2.5, face="outside")
+    def test_a_thin_sheet_is_fine(self, cylinder, reasons_for):
+        assert reasons_for(cylinder, sheet=0.02) == ()
+        assert reasons_for(cylinder, sheet=0.002, radius=0.001) == ()
+
+    def test_a_sheet_thicker_than_the_radius_is_refused(self, cylinder, reasons_for):
+        (why,) = reasons_for(cylinder, sheet=2.5, face="outside")
         assert (why.code, why.bound, why.places.ids) == (Code.TOO_THICK, 2.5, ("arch",))
         assert why.value == pytest.approx(cylinder.record["bend_radius_min"])
 
-    def test_a_bend_beyond_the_table_is_refused(self, cylinder):
-        (why,) = self.why(cylinder, sheet=0.01, table=[[0.0, 0.0], [1e-3, 1e-4]])
+    def test_a_bend_beyond_the_table_is_refused(self, cylinder, reasons_for):
+        (why,) = reasons_for(cylinder, sheet=0.01, table=[[0.0, 0.0], [1e-3, 1e-4]])
         assert (why.code, why.bound) == (Code.BEND_ANGLE, pytest.approx(np.degrees(1e-3)))
         assert why.value == pytest.approx(np.degrees(np.abs(cylinder.panels[0].angles).max()))
 
-    def test_bends_without_room_for_the_tool_are_refused(self, cylinder):
-        (why,) = self.why(cylinder, sheet=0.02, radius=3.0)
+    def test_bends_without_room_for_the_tool_are_refused(self, cylinder, reasons_for):
+        (why,) = reasons_for(cylinder, sheet=0.02, radius=3.0)
         assert why.code is Code.BENDS_NEAR and why.value < why.bound
 
-    def test_a_part_without_bend_lines_is_refused_where_the_thickness_matters(self):
+    def test_a_part_without_bend_lines_is_refused_where_the_thickness_matters(self, reasons_for):
         flat = made(Design("arch", arch()), Ask(formulation="curvature"))
         assert not len(flat.panels[0].bends)
         assert flat.record["bend_radius_min"] == pytest.approx(1.0, rel=0.05)
-        assert self.why(flat, sheet=0.02) == ()
-        (why,) = self.why(flat, sheet=0.02, face="outside")
+        assert reasons_for(flat, sheet=0.02) == ()
+        (why,) = reasons_for(flat, sheet=0.02, face="outside")
         assert (why.code, why.bound) == (Code.NEUTRAL_STRAIN, 1e-3)
         assert why.value == pytest.approx(0.01, rel=0.05)
-        (why,) = self.why(flat, sheet=2.5)
+        (why,) = reasons_for(flat, sheet=2.5)
         assert (why.code, why.bound) == (Code.TOO_THICK, 1.25)
 
-    def test_seams_that_the_thickness_parts_are_refused(self, strips):
-        assert self.why(strips, sheet=1e-4, face="outside") == ()
-        why = self.why(strips, sheet=0.05, face="outside")
+    def test_seams_that_the_thickness_parts_are_refused(self, strips, reasons_for):
+        assert reasons_for(strips, sheet=1e-4, face="outside") == ()
+        why = reasons_for(strips, sheet=0.05, face="outside")
         assert Code.SEAM_SIDES in codes(why)
 
     @pytest.mark.parametrize("formulation", ["curvature", "flatten"])
@@ -211,10 +209,8 @@ class TestLines:
         ends = np.array([0.8 * low + 0.2 * high, 0.2 * low + 0.8 * high])
         ends[:, 2] = high[2]
         t = np.linspace(0, 1, 200)[:, None]
-        number, flat = to_pattern(strips.panels, ends[0] + t * (ends[1] - ends[0]))
-        line = np.array(
-            [to_surface(strips.panels[k], f[None])[0] for k, f in zip(number, flat, strict=True)]
-        )
+        near = Nearest.of(surface.vertices, surface.triangles)
+        line = near.locate(ends[0] + t * (ends[1] - ends[0]))[2]
         parts = parts_of(strips, 100.0, Finish(), [line])
         drawn_length = sum(
             np.linalg.norm(np.diff(m, axis=0), axis=1).sum() for p in parts for m in p.marks
@@ -251,13 +247,12 @@ class TestLines:
         with pytest.raises(OptionError, match="kerf"):
             Finish(kerf=1.0, registration=(1.0, 3.0))
 
-    def test_small_bends_are_not_lost(self):
-        rng = np.random.default_rng(0)
-        some = [Bend(np.zeros((2, 2)), a, 1.0) for a in 0.002 * rng.normal(size=200)]
-        kept = drawn(some)
-        assert len(kept) < 100
-        assert sum(b.angle for b in kept) == pytest.approx(
-            sum(b.angle for b in some), abs=np.radians(0.2)
+    def test_small_bends_are_not_lost(self, cylinder):
+        panel = bent(0.002 * np.random.default_rng(0).normal(size=200))
+        (part,) = parts_of(replace(cylinder, panels=(panel,)), 1.0, Finish())
+        assert 0 < len(part.bends) < 100
+        assert sum(b.angle for b in part.bends) == pytest.approx(
+            panel.angles.sum(), abs=np.radians(0.2)
         )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from gso import geometry as g
 from gso import metrics
-from gso.dataset import bezier
+from gso.dataset import BezierSurface, generate
 from gso.mesh import Mesh
 from tests.conftest import cylinder, saddle, sphere_cap
 
@@ -82,24 +82,24 @@ def test_isometric_cells_have_no_defect():
 
 
 def test_bezier_surfaces_are_the_same_at_every_resolution():
-    surface = bezier.generate(1, seed=4)[0]
+    surface = generate(1, seed=4)[0]
     coarse, fine = surface.sample(33), surface.sample(65)
     # Both are normalised by their own samples, so shapes agree up to that.
     assert np.abs(coarse - fine[::2, ::2]).max() < 0.05
-    again = bezier.generate(1, seed=4)[0].sample(33)
+    again = generate(1, seed=4)[0].sample(33)
     np.testing.assert_array_equal(coarse, again)
     assert np.linalg.norm(coarse, axis=-1).max() == pytest.approx(1.0)
 
 
 def test_bezier_patch_passes_through_its_corners_and_is_exact_for_lines():
     net = np.stack(np.meshgrid(np.arange(4.0), np.arange(3.0), [1.0], indexing="ij"), -1)[:, :, 0]
-    patch = bezier.BezierSurface(net, np.array([[0.0, 1.0], [0.0, 1.0]])).sample(5, 4)
+    patch = BezierSurface(net, np.array([[0.0, 1.0], [0.0, 1.0]])).sample(5, 4)
     assert patch.shape == (5, 4, 3)
     steps = np.diff(patch, axis=0)
     np.testing.assert_allclose(steps, np.broadcast_to(steps[0, 0], steps.shape), atol=1e-12)
 
 
 def test_recipe_gives_the_published_mean_curvature():
-    surfaces = bezier.generate(150, seed=1)
+    surfaces = generate(150, seed=1)
     mean = np.mean([metrics.loss_gc(s.sample()) for s in surfaces])
     assert mean == pytest.approx(0.31, abs=0.05)

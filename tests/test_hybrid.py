@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import gso
-from gso import hybrid
-from gso.errors import MeshError, OptionError, WeightsError
-from gso.hybrid import solving, warm_start
+from gso import IsometryOptions as JointOptions
+from gso import MeshError, OptionError, WeightsError, hybrid, tno
+from gso.hybrid import net_saves_time
 from gso.hybrid.patch import as_patch
-from gso.hybrid.time_model import net_saves_time
 from gso.mesh import Mesh
 from gso.mesh.topology import reverse
-from gso.pipeline.run import Run
-from gso.tasks.developable.joint_isometry import Options as JointOptions
-from gso.tno import Start, optimize
+from gso.pipeline import Run
+from gso.tno import Start
 from tests.conftest import cylinder, saddle, shuffled, sphere_cap
 
 try:
@@ -57,7 +56,7 @@ def test_a_guarded_start_that_is_worse_is_dropped(surfaces):
     design = surfaces[0]
     rng = np.random.default_rng(0)
     start = Start(design + 0.1 * rng.standard_normal(design.shape), source="guess", guarded=True)
-    cold, result = optimize(design), optimize(design, x0=start)
+    cold, result = tno.optimize(design), tno.optimize(design, x0=start)
     assert same(cold, result)
     assert result.warm_start == "cold"
     assert "the start (guess) was not used: its energy" in result.notes[-1]
@@ -65,8 +64,8 @@ def test_a_guarded_start_that_is_worse_is_dropped(surfaces):
 
 def test_a_guarded_start_that_is_better_is_used(surfaces):
     design = surfaces[0]
-    good = optimize(design)
-    result = optimize(design, x0=Start(good.mesh, source="guess", guarded=True))
+    good = tno.optimize(design)
+    result = tno.optimize(design, x0=Start(good.mesh, source="guess", guarded=True))
     assert result.warm_start == "guess"
     assert energy(result) <= energy(good) * (1 + 1e-9)
 
@@ -75,7 +74,7 @@ def test_a_search_is_the_same_once_its_start_is_dropped():
     design = saddle(9)
     start = Start(2.0 * design, source="guess", guarded=True)
     for keywords in ({"target_curvature": 0.2}, {"max_deviation": 0.05}):
-        cold, result = optimize(design, **keywords), optimize(design, x0=start, **keywords)
+        cold, result = tno.optimize(design, **keywords), tno.optimize(design, x0=start, **keywords)
         assert same(cold, result)
         assert (result.warm_start, result.iterations) == ("cold", cold.iterations)
 
@@ -90,16 +89,16 @@ def test_a_search_may_begin_at_its_own_results(monkeypatch):
         return usable(self, *requests)
 
     monkeypatch.setattr(Run, "usable_start", counted)
-    near = Start(optimize(design).mesh, source="guess", guarded=True)
-    assert optimize(design, x0=near, target_curvature=0.2).warm_start == "guess"
+    near = Start(tno.optimize(design).mesh, source="guess", guarded=True)
+    assert tno.optimize(design, x0=near, target_curvature=0.2).warm_start == "guess"
     assert len(seen) == 1
 
 
 def test_a_spline_is_compared_before_it_is_fitted(surfaces):
     design = surfaces[0][::2, ::2]
     options = JointOptions(variables="surface", controls=6, iterations=1)
-    good = Start(optimize(design).mesh, source="guess", guarded=True)
-    result = optimize(design, formulation="isometry", options=options, x0=good)
+    good = Start(tno.optimize(design).mesh, source="guess", guarded=True)
+    result = tno.optimize(design, formulation="isometry", options=options, x0=good)
     assert result.warm_start == "guess"
 
 
@@ -117,21 +116,21 @@ def test_the_tolerance_of_a_start_is_a_number(tolerance):
 
 def test_a_tolerance_ends_solves_from_a_start_only(surfaces):
     design = surfaces[1]
-    cold = optimize(design)
-    assert same(cold, optimize(design, x0=Start(None, tolerance=0.5)))
-    near = optimize(design, options="fast").mesh
-    closely, loosely = (optimize(design, x0=Start(near, tolerance=t)) for t in (0.0, 0.5))
+    cold = tno.optimize(design)
+    assert same(cold, tno.optimize(design, x0=Start(None, tolerance=0.5)))
+    near = tno.optimize(design, options="fast").mesh
+    closely, loosely = (tno.optimize(design, x0=Start(near, tolerance=t)) for t in (0.0, 0.5))
     assert loosely.iterations < closely.iterations
     assert energy(closely) < energy(loosely)
 
 
 def test_a_joint_solve_that_is_done_does_not_begin_again_on_a_coarser_grid(surfaces):
     design = surfaces[0]
-    cold = optimize(design, options="jiang2020")
-    again = optimize(design, options="jiang2020", x0=cold.mesh)
+    cold = tno.optimize(design, options="jiang2020")
+    again = tno.optimize(design, options="jiang2020", x0=cold.mesh)
     assert {p.name for p in again.history} == {cold.history[-1].name}
     assert energy(again) <= 1.001 * energy(cold)
-    afar = optimize(design, options="jiang2020", x0=design)
+    afar = tno.optimize(design, options="jiang2020", x0=design)
     assert afar.history[0].name != afar.history[-1].name
 
 
@@ -145,19 +144,19 @@ def test_iterations_of_a_start_are_counted_over_all_stages(surfaces, keywords, m
     design = surfaces[1]
     start = design
     if keywords.get("task") == "flatten":
-        start = optimize(design, task="flatten").flat_grid
+        start = tno.optimize(design, task="flatten").flat_grid
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", gso.ConvergenceWarning)
-        result = optimize(design, x0=Start(start, iterations=most), **keywords)
+        result = tno.optimize(design, x0=Start(start, iterations=most), **keywords)
     assert result.iterations <= most
     assert np.isfinite(result.mesh.vertices).all()
 
 
 def test_a_flat_start_that_turns_over_is_dropped():
     design = sphere_cap(17)
-    cold = optimize(design, task="flatten")
+    cold = tno.optimize(design, task="flatten")
     turned = cold.flat_grid[::-1]
-    result = optimize(design, task="flatten", x0=Start(turned, guarded=True))
+    result = tno.optimize(design, task="flatten", x0=Start(turned, guarded=True))
     assert same(cold, result)
     assert "turns" in result.notes[-1]
 
@@ -177,9 +176,9 @@ def test_a_flat_start_that_turns_over_is_dropped():
 )
 def test_a_good_start_stays_good(keywords):
     design = saddle(17)
-    cold = optimize(design, **keywords)
+    cold = tno.optimize(design, **keywords)
     points = cold.flat if keywords.get("task") == "flatten" else cold.mesh
-    result = optimize(design, x0=Start(points, source="guess", guarded=True), **keywords)
+    result = tno.optimize(design, x0=Start(points, source="guess", guarded=True), **keywords)
     assert result.warm_start == "guess"
     if "max_deviation" in keywords:
         # A search takes what has the least strain, whatever weights it took.
@@ -192,12 +191,12 @@ def test_a_good_start_stays_good(keywords):
 @pytest.mark.parametrize("weight", [None, 10.0], ids=["hard", "soft"])
 def test_a_flat_start_is_moved_to_its_constraints(task, weight):
     design = saddle(13)
-    free = optimize(design, task=task).flat
+    free = tno.optimize(design, task=task).flat
     turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
     ids = [0, 12, 156]
     wanted = gso.Handle(ids, free[ids] @ turn + [30.0, -7.0], weight=weight)
-    cold = optimize(design, task=task, constraints=[wanted])
-    result = optimize(design, task=task, constraints=[wanted], x0=Start(free, guarded=True))
+    cold = tno.optimize(design, task=task, constraints=[wanted])
+    result = tno.optimize(design, task=task, constraints=[wanted], x0=Start(free, guarded=True))
     assert result.warm_start == "x0"
     assert energy(result) <= 1.05 * energy(cold) + 1e-9
     assert np.allclose(result.flat, cold.flat, atol=0.05)
@@ -205,15 +204,15 @@ def test_a_flat_start_is_moved_to_its_constraints(task, weight):
 
 def test_a_start_that_is_not_used_did_not_start_anything():
     design = sphere_cap(9)
-    turned = optimize(design, task="flatten").flat_grid[::-1]
-    result = optimize(design, task="flatten", x0=turned)
+    turned = tno.optimize(design, task="flatten").flat_grid[::-1]
+    result = tno.optimize(design, task="flatten", x0=turned)
     assert result.warm_start == "cold"
     assert sum("x0" in note for note in result.notes) == 1
 
 
 def test_a_target_needs_more_than_one_solve_without_a_net():
     with pytest.raises(OptionError, match="target_curvature takes many solves"):
-        optimize(saddle(9), x0=Start(None, iterations=3), target_curvature=0.1)
+        tno.optimize(saddle(9), x0=Start(None, iterations=3), target_curvature=0.1)
 
 
 # ---------------------------------------------------------------- with a net
@@ -223,7 +222,7 @@ def test_a_target_needs_more_than_one_solve_without_a_net():
 @pytest.mark.parametrize("formulation", ["curvature", "isometry"])
 def test_a_random_net_costs_time_not_quality(surfaces, formulation):
     design = surfaces[0]
-    cold = optimize(design, formulation=formulation)
+    cold = tno.optimize(design, formulation=formulation)
     result = hybrid.solve(design, net=made(size=0.5), formulation=formulation)
     assert same(cold, result)
     assert result.warm_start == "cold"
@@ -233,7 +232,7 @@ def test_a_random_net_costs_time_not_quality(surfaces, formulation):
 
 @needs_torch
 def test_a_random_net_costs_time_not_quality_flat(surfaces):
-    cold = optimize(surfaces[0], task="flatten")
+    cold = tno.optimize(surfaces[0], task="flatten")
     result = hybrid.solve(surfaces[0], task="flatten", net=made("flatten", size=5.0))
     assert same(cold, result)
 
@@ -258,24 +257,30 @@ def test_the_net_alone_flattens(surfaces):
     assert np.allclose(*apart)
 
 
+def prediction(points=None, net="", refused=""):
+    return SimpleNamespace(points=points, seconds=0.01, net=net, refused=refused)
+
+
 @pytest.fixture
 def coarse_net(monkeypatch):
     """Predictions like those of a fair net, and why there is none where that is asked."""
 
     def predictions(designs, task, net, passes, alone):
         if net == "none":
-            return [warm_start.Prediction(refused="there is none")] * len(designs)
+            return [prediction(refused="there is none")] * len(designs)
         few = gso.DevelopableOptions(iterations=1)
-        results = [optimize(design, options=few) for design in designs]
-        return [warm_start.Prediction(r.mesh.vertices, 0.01, "fair") for r in results]
+        results = [tno.optimize(design, options=few) for design in designs]
+        return [prediction(r.mesh.vertices, "fair") for r in results]
 
-    monkeypatch.setattr(solving, "predictions", predictions)
+    monkeypatch.setattr("gso.hybrid.solving.predictions", predictions)
 
 
 def predicts(monkeypatch, points):
     """Let every net make the same of every design."""
-    found = warm_start.Prediction(points, 0.01, "odd")
-    monkeypatch.setattr(solving, "predictions", lambda designs, **_: [found] * len(designs))
+    found = prediction(points, "odd")
+    monkeypatch.setattr(
+        "gso.hybrid.solving.predictions", lambda designs, **_: [found] * len(designs)
+    )
 
 
 @pytest.mark.parametrize("polish", [True, False])
@@ -291,7 +296,7 @@ def predicts(monkeypatch, points):
     ids=["nan", "point", "points", "flat point", "mirrored"],
 )
 def test_nonsense_is_dropped_polished_or_not(monkeypatch, keywords, points, words, polish):
-    cold = optimize(saddle(9), **keywords)
+    cold = tno.optimize(saddle(9), **keywords)
     predicts(monkeypatch, points)
     result = hybrid.solve(saddle(9), polish=polish, **keywords)
     assert same(cold, result)
@@ -303,7 +308,7 @@ def test_nonsense_is_dropped_polished_or_not(monkeypatch, keywords, points, word
 @pytest.mark.parametrize("general", [False, True], ids=["grid", "mesh"])
 def test_flat_images_lie_where_the_optimiser_puts_them(monkeypatch, general, polish):
     mesh = ragged(17) if general else shuffled(Mesh.from_grid(saddle(17)))
-    cold = optimize(mesh, task="flatten")
+    cold = tno.optimize(mesh, task="flatten")
     turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
     predicts(monkeypatch, (cold.flat - cold.flat.mean(axis=0)) @ turn)
     result = hybrid.solve(mesh, task="flatten", polish=polish)
@@ -358,8 +363,8 @@ def test_polish_goes_on_where_the_net_ended(surfaces, coarse_net):
     some = hybrid.solve(surfaces[0], polish=3)
     whole = hybrid.solve(surfaces[0])
     assert energy(alone) > energy(some) > energy(whole)
-    assert energy(whole) < 1.1 * energy(optimize(surfaces[0]))
-    assert whole.iterations < optimize(surfaces[0]).iterations
+    assert energy(whole) < 1.1 * energy(tno.optimize(surfaces[0]))
+    assert whole.iterations < tno.optimize(surfaces[0]).iterations
     assert (alone.seconds["net"], alone.iterations) == (0.01, 0)
 
 
@@ -367,7 +372,7 @@ def test_polish_goes_on_where_the_net_ended(surfaces, coarse_net):
 @pytest.mark.parametrize("task", ["denoise", "bend", "conformal"])
 def test_tasks_without_nets_are_solved(task):
     constraints = [gso.Handle([0], [(-1.0, -1.0, 1.0)]), gso.Fixed([80])] if task == "bend" else []
-    cold = optimize(saddle(9), task=task, constraints=constraints)
+    cold = tno.optimize(saddle(9), task=task, constraints=constraints)
     result = hybrid.solve(saddle(9), task=task, constraints=constraints)
     assert same(cold, result)
     assert "no net makes a start" in result.notes[-1]
@@ -434,23 +439,23 @@ def test_a_net_of_another_task_is_refused():
 
 
 def test_without_torch_it_is_the_optimiser(monkeypatch, surfaces):
-    monkeypatch.setattr(warm_start, "find_spec", lambda name: None)
-    cold, result = optimize(surfaces[0]), hybrid.solve(surfaces[0])
+    monkeypatch.setattr("gso.hybrid.warm_start.find_spec", lambda name: None)
+    cold, result = tno.optimize(surfaces[0]), hybrid.solve(surfaces[0])
     assert same(cold, result)
     assert "torch" in result.notes[-1]
     assert result.warm_start == "cold"
 
 
 def test_without_weights_it_is_the_optimiser(monkeypatch, surfaces):
-    monkeypatch.setattr(warm_start, "available", lambda task: [])
-    cold, result = optimize(surfaces[0]), hybrid.solve(surfaces[0])
+    monkeypatch.setattr("gso.hybrid.warm_start.available", lambda task: [])
+    cold, result = tno.optimize(surfaces[0]), hybrid.solve(surfaces[0])
     assert same(cold, result)
     assert "no net" in result.notes[-1]
 
 
 @needs_torch
 def test_a_small_grid_is_the_optimisers():
-    cold, result = optimize(saddle(5)), hybrid.solve(saddle(5), net=made(size=0.01))
+    cold, result = tno.optimize(saddle(5)), hybrid.solve(saddle(5), net=made(size=0.01))
     assert same(cold, result)
     assert "5 x 5" in result.notes[-1]
     assert result.seconds["net"] > 0
@@ -459,7 +464,7 @@ def test_a_small_grid_is_the_optimisers():
 @needs_torch
 def test_a_small_mesh_is_the_optimisers():
     mesh = ragged(7)
-    cold, result = optimize(mesh), hybrid.solve(mesh, net=made(size=0.01))
+    cold, result = tno.optimize(mesh), hybrid.solve(mesh, net=made(size=0.01))
     assert same(cold, result)
     assert "49 vertices" in result.notes[-1]
 
@@ -472,7 +477,7 @@ def test_what_is_no_disk_is_the_optimisers():
         np.concatenate([grid.vertices, other]), np.concatenate([grid.faces, grid.faces + 81])
     )
     tied = {"constraints": [gso.Glue([[80, 81]])]}
-    cold, result = optimize(both, **tied), hybrid.solve(both, net=made(size=0.01), **tied)
+    cold, result = tno.optimize(both, **tied), hybrid.solve(both, net=made(size=0.01), **tied)
     assert same(cold, result)
     assert "one piece" in result.notes[-1]
     apart, alone = (hybrid.solve(mesh, net=made(size=0.01)) for mesh in (both, grid))
@@ -484,7 +489,7 @@ def test_what_is_no_disk_is_the_optimisers():
 def test_a_surface_unlike_all_that_nets_are_taught_is_the_optimisers():
     rough = saddle(17)
     rough[..., 2] += np.random.default_rng(3).normal(0.0, 0.1, rough.shape[:2])
-    cold, result = optimize(rough), hybrid.solve(rough, net=made(size=0.01))
+    cold, result = tno.optimize(rough), hybrid.solve(rough, net=made(size=0.01))
     assert same(cold, result)
     assert "too far from what nets are taught" in result.notes[-1]
     # The net alone is what was asked for.
@@ -606,7 +611,7 @@ def test_a_mesh_is_started_by_a_net(task):
         assert np.allclose(alone.mesh.vertices, mesh.vertices, atol=1e-9)
     else:
         assert alone.metrics["flipped_cells"] == 0
-    cold, result = optimize(mesh, task=task), hybrid.solve(mesh, task=task, net=made(task))
+    cold, result = tno.optimize(mesh, task=task), hybrid.solve(mesh, task=task, net=made(task))
     assert energy(result) <= 1.2 * energy(cold)
 
 
@@ -633,9 +638,9 @@ def test_passes_are_left_out_where_a_whole_solve_follows(surfaces, monkeypatch, 
     def asked(designs, task, net, passes, alone):
         assert alone is (polish is False)
         seen.append(passes)
-        return [warm_start.Prediction(refused="enough")] * len(designs)
+        return [prediction(refused="enough")] * len(designs)
 
-    monkeypatch.setattr(solving, "predictions", asked)
+    monkeypatch.setattr("gso.hybrid.solving.predictions", asked)
     hybrid.solve(surfaces[0], polish=polish)
     list(hybrid.solve_many([surfaces[0]], polish=polish, workers=0))
     assert seen == [passes, passes]
@@ -666,8 +671,10 @@ def test_where_a_net_pays(size, keywords, many, expected):
 
 
 def test_no_net_is_asked_where_it_does_not_pay(surfaces, monkeypatch):
-    monkeypatch.setattr(solving, "predictions", lambda designs, **_: [1 / 0 for _ in designs])
-    cold, result = optimize(surfaces[0]), hybrid.solve(surfaces[0], sparing=True)
+    monkeypatch.setattr(
+        "gso.hybrid.solving.predictions", lambda designs, **_: [1 / 0 for _ in designs]
+    )
+    cold, result = tno.optimize(surfaces[0]), hybrid.solve(surfaces[0], sparing=True)
     (item,) = hybrid.solve_many([surfaces[0]], sparing=True, workers=0)
     for found in (result, item.result):
         assert same(cold, found)

@@ -11,11 +11,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import gso
-from gso import metrics
-from gso.dataset import bezier
-from gso.energy import proximity
-from gso.mesh.closest_point import Nearest
-from gso.mesh.normals import vertex_normals
+from gso import energy, metrics
+from gso.dataset import generate
+from gso.mesh import Nearest, vertex_normals
+
+proximity = energy.registry()["proximity"]
 
 JOINT = {"formulation": "isometry"}
 FLAT = {"task": "flatten", "formulation": "isometry"}
@@ -83,7 +83,7 @@ def apart(flat: np.ndarray, wanted: np.ndarray) -> float:
 
 @pytest.fixture(scope="module")
 def curved() -> np.ndarray:
-    return bezier.generate(3, seed=5)[2].sample(24)
+    return generate(3, seed=5)[2].sample(24)
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +139,7 @@ class TestTruths:
         assert result.metrics["loss_gc"] < 0.3 * result.metrics["loss_gc_before"]
 
     def test_edges_that_the_diagonals_do_not_hold_are_remarked(self):
-        narrow = bezier.generate(3, seed=5)[2].sample(65)[:, ::8]
+        narrow = generate(3, seed=5)[2].sample(65)[:, ::8]
         pattern = gso.tno.optimize(narrow, **FLAT)
         assert metrics.isometry_energy(narrow, pattern.flat_grid) < (2 * 2e-3) ** 2
         assert pattern.metrics["edge_length_error"] > 0.01

@@ -166,3 +166,11 @@ def test_public_names_exist():
     for name in gso.__all__:
         if name != "__version__":
             assert getattr(gso, name) is not None
+
+
+def test_tests_import_faces():
+    """Few tests name an inner module: one that is not the ``__init__.py`` of a package."""
+    faces = {name for name, path in MODULES.items() if path.name == "__init__.py"}
+    named = {name for path in (ROOT / "tests").rglob("*.py") for name in imports(path)}
+    inner = (named & MODULES.keys()) - faces
+    assert len(inner) <= 40, sorted(inner)

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 
 import gso
-from gso import faults
+from gso import faults, tasks
 from gso.constraints import compile_constraints
 from gso.hierarchy import Prolongation, Transfer, coarser, nearest_on_grid, thinned
-from gso.mesh import Mesh
-from gso.mesh.normals import vertex_normals
+from gso.mesh import Mesh, vertex_normals
+from gso.tasks import check
+from gso.tasks.developable import Options
 from gso.tasks.developable import levels as planned
-from gso.tasks.developable.analysis import Analysis
-from gso.tasks.developable.options import Options
-from gso.tasks.request import check
 
 
 def lifted(plane: np.ndarray) -> np.ndarray:
@@ -166,7 +164,7 @@ def test_smooth_curves_are_left_out_and_soft():
 
 def resolutions(mesh, constraints=(), **options):
     frame = Mesh(mesh.vertices, mesh.faces)
-    analysis = Analysis(frame, compile_constraints(constraints, frame))
+    analysis = tasks.get("developable").analysis(frame, compile_constraints(constraints, frame))
     return planned.levels(analysis, check("developable", options=Options(**options)))
 
 
@@ -270,13 +268,13 @@ def test_vertices_that_no_polyline_goes_through_are_carried_too(monkeypatch):
     values = mesh.vertices @ np.diag([0.1, 0.2, -0.1]) + 0.3
     field = Prolongation(mesh, ids)(values[ids])
     np.testing.assert_allclose(field, values, atol=1e-5)
-    monkeypatch.setattr(planned, "_COARSEST", 100)
+    monkeypatch.setattr("gso.tasks.developable.levels._COARSEST", 100)
     options = Options(coarse_vertices=200)
     assert gso.tno.optimize(mesh, options=options, verdict=False).energy["curvature"] < 1e-3
 
 
 def test_sessions_move_vertices_freely_after_coarser_meshes(monkeypatch):
-    monkeypatch.setattr(planned, "_COARSEST", 100)
+    monkeypatch.setattr("gso.tasks.developable.levels._COARSEST", 100)
     mesh = star(10)
     corner = int(np.argmax(mesh.vertices[:, 0]))
     held = np.flatnonzero(mesh.vertices[:, 0] < -0.6)

@@ -12,15 +12,11 @@ import numpy as np
 import pytest
 
 import gso
-from gso.energy import registry
-from gso.energy.base import Weighted
-from gso.energy.losses import Absolute, Distance, Squared
-from gso.mesh.normals import vertex_normals
-from gso.solver import cached_source, loops
-from gso.solver.problem import Problem
-from gso.unknowns import Layout
-from gso.unknowns.free import free
-from gso.unknowns.normal import normal_offsets
+from gso import unknowns
+from gso.energy import Absolute, Distance, Squared, Weighted, registry
+from gso.mesh import vertex_normals
+from gso.solver import Problem, loops
+from gso.unknowns import Layout, normal_offsets
 from tests.conftest import meshes
 from tests.test_pieces import dome
 
@@ -46,7 +42,7 @@ def choice(monkeypatch):
     monkeypatch.setenv(loops.VARIABLE, "numba")
     yield
     forget_loops()
-    for cached in (loops._adder, loops._installed, cached_source._folder):
+    for cached in (loops._adder, loops._installed):
         cached.cache_clear()
 
 
@@ -95,7 +91,7 @@ def check(kind, term, loss, monkeypatch):
     points = mesh.vertices + 0.03 * rng.standard_normal(mesh.vertices.shape)
     layout = Layout.of(len(points), "surface")
     item = Weighted(term, 2.0, loss)
-    problem = Problem([item], free(layout))
+    problem = Problem([item], unknowns.free(layout))
     compared(problem, points.ravel(), monkeypatch)
     # Coordinates that are sums of unknowns.
     normals = vertex_normals(mesh) + 0.1 * rng.standard_normal(points.shape)

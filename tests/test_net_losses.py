@@ -5,19 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gso import metrics
+from gso import metrics, parametrization
 from gso.constraints import Compiled
-from gso.mesh import Mesh
-from gso.mesh.normals import vertex_normals
-from gso.parametrization import rectangle
-from gso.tasks import developable, flatten
-from gso.tasks.request import check
+from gso.mesh import Mesh, vertex_normals
+from gso.tasks import check, developable, flatten
 from tests.conftest import cylinder, saddle
 
 torch = pytest.importorskip("torch")
 
-from gso.net.models import grid_geometry  # noqa: E402
-from gso.net.training import solver_energy, training_losses  # noqa: E402
+from gso.net import models  # noqa: E402
+from gso.net.training import Developable, Strain, training_losses  # noqa: E402
 
 
 def batch(*surfaces):
@@ -53,7 +50,7 @@ def last_stage(points):
 
 def test_developable_energy_is_the_solvers(pair):
     designs, results = pair
-    fast = solver_energy.Developable(batch(*designs), developable.Options())
+    fast = Developable(batch(*designs), developable.Options())
     parts = fast.parts(batch(*results))
     for k, (design, result) in enumerate(zip(designs, results, strict=True)):
         last = last_stage(design)
@@ -68,7 +65,7 @@ def test_developable_energy_is_the_solvers(pair):
 def test_elongation_energy_is_the_solvers_where_it_is_large(pair):
     designs, _ = pair
     results = designs * [0.4, 1.0, 1.6]
-    parts = solver_energy.Developable(batch(*designs), developable.Options()).parts(batch(*results))
+    parts = Developable(batch(*designs), developable.Options()).parts(batch(*results))
     for k, (design, result) in enumerate(zip(designs, results, strict=True)):
         last = last_stage(design)
         value = total(last.items, result.reshape(-1, 3))["elongation"]
@@ -79,8 +76,11 @@ def test_elongation_energy_is_the_solvers_where_it_is_large(pair):
 def test_strain_energy_is_the_solvers(pair):
     designs, _ = pair
     rng = np.random.default_rng(1)
-    flats = [rectangle(p) + 3e-3 * rng.standard_normal((*p.shape[:2], 2)) for p in designs]
-    strain = solver_energy.Strain(batch(*designs), flatten.Options())
+    flats = [
+        parametrization.rectangle(p) + 3e-3 * rng.standard_normal((*p.shape[:2], 2))
+        for p in designs
+    ]
+    strain = Strain(batch(*designs), flatten.Options())
     values, levels = strain(batch(*flats)), strain.level(strain.residuals(batch(*flats)))
     for k, (design, flat) in enumerate(zip(designs, flats, strict=True)):
         mesh, level = Mesh.from_grid(design, weld=False), float(levels[k])
@@ -116,7 +116,7 @@ def test_distances_are_to_the_nearest_vertex(steps):
 
 def test_iso_and_the_metric():
     surface = saddle(9, 8)
-    flat = rectangle(surface)
+    flat = parametrization.rectangle(surface)
     defect = training_losses.iso(batch(surface), batch(flat))
     by_hand = metrics.isometry_defect(surface, flat, scale=1.0)
     assert float(defect) <= (by_hand**2).mean() <= 3 * float(defect)
@@ -143,13 +143,13 @@ def test_curvature_weights():
 
 def test_normals_and_rectangle_are_the_packages(pair):
     designs, _ = pair
-    p = grid_geometry.planes(batch(*designs))
-    normals = grid_geometry.points(grid_geometry.normals(p)).numpy()
-    flat = grid_geometry.rectangle(p).numpy()
+    p = models.planes(batch(*designs))
+    normals = models.points(models.normals(p)).numpy()
+    flat = models.rectangle(p).numpy()
     for k, design in enumerate(designs):
         expected = vertex_normals(Mesh.from_grid(design, weld=False)).reshape(design.shape)
         np.testing.assert_allclose(normals[k], expected, atol=1e-12)
-        start = rectangle(design)
+        start = parametrization.rectangle(design)
         np.testing.assert_allclose(flat[k], start - start.mean(axis=(0, 1)), atol=1e-12)
 
 
@@ -157,7 +157,7 @@ def test_degenerate_surfaces_have_finite_gradients():
     point = torch.zeros(1, 8, 8, 3, requires_grad=True)
     value = (
         training_losses.gc(point).sum()
-        + solver_energy.Strain(point.detach(), flatten.Options())(point[..., :2]).sum()
+        + Strain(point.detach(), flatten.Options())(point[..., :2]).sum()
     )
     value.backward()
     assert torch.isfinite(value) and torch.isfinite(point.grad).all()

@@ -12,37 +12,44 @@ import subprocess
 import sys
 from dataclasses import replace
 from itertools import chain, pairwise
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import gso
+from gso import DatasetError, OptionError, WeightsError
 from gso.cli import main
-from gso.dataset import bezier
-from gso.errors import DatasetError, OptionError, WeightsError
+from gso.dataset import generate
 from tests.conftest import saddle, sphere_cap
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("safetensors")
 
-from gso.net import GSONet, load, save, tasks, train  # noqa: E402
-from gso.net.models.grid_geometry import ball, normalise  # noqa: E402
+from gso.net import GSONet, load, make, save, train  # noqa: E402
+from gso.net.models import Net, ball, normalise  # noqa: E402
 from gso.net.training import (  # noqa: E402
-    augment,
+    Batch,
+    Config,
+    Objective,
+    Phase,
     checkpoint,
+    from_dict,
+    read,
     training_losses,
 )
-from gso.net.training.config import FOLDER, TERMS, Config, Phase, from_dict, read  # noqa: E402
-from gso.net.training.data import Batch, Source, fresh, noisy, open_source  # noqa: E402
+from gso.net.training.data import Source, fresh, noisy, open_source  # noqa: E402
 from gso.net.training.learning_rate import place  # noqa: E402
 from gso.net.training.muon import optimisers, orthogonal  # noqa: E402
-from gso.net.training.phase_objective import _COSTS, Objective, aligned  # noqa: E402
-from gso.net.training.processes import Processes  # noqa: E402
-from gso.net.training.training_curves import Curves  # noqa: E402
-from gso.net.training.training_curves import read as read_curves  # noqa: E402
 from gso.net.training.training_run import begin  # noqa: E402
-from gso.net.training.validate import applied, mean_figures  # noqa: E402
 
+CONFIGS = sorted(Path(gso.net.__file__).with_name("configs").glob("*.toml"))
+#: The only process of a run.
+ALONE = SimpleNamespace(
+    rank=0, world=1, first=True, device=torch.device("cpu"), wait=lambda: None, summed=lambda x: x
+)
 SMALL = {"kind": "coarse", "widths": [8, 8, 8], "depths": [0, 0, 1]}
 PUBLISHED = {"kind": "gsonet", "channels": 4, "blocks": 1}
 
@@ -53,7 +60,7 @@ def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("surfaces")
     for split, count, seed in (("train", 8, 1), ("validation", 2, 2)):
         (path / split).mkdir()
-        for k, surface in enumerate(bezier.generate(count, seed=seed)):
+        for k, surface in enumerate(generate(count, seed=seed)):
             np.save(path / split / f"{k:03d}.npy", surface.sample(32))
     return path
 
@@ -64,17 +71,31 @@ def config(task="developable", model=None, **more):
     return from_dict({**given, "bf16": False, "ema": 0.5, **more})
 
 
+def read_curves(folder):
+    return [json.loads(line) for line in (folder / "curves.jsonl").read_text().splitlines()]
+
+
+def applied(net, surfaces):
+    with torch.no_grad():
+        return net(surfaces, None).double().numpy()
+
+
+def restless(*given, **settings):
+    """A net that does not return its input, as new ones do."""
+    net = GSONet(*given, channels=4, blocks=1, **settings)
+    torch.nn.init.normal_(net.tail.weight, std=0.1)
+    return net
+
+
 def tensors(path):
     return load(path).state_dict()
 
 
-@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.toml")), ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", CONFIGS, ids=lambda p: p.stem)
 def test_shipped_configurations(path):
     made = read(path)
     assert made.name == path.stem
     assert from_dict(made.as_dict()) == made
-    from gso.net.weights import make
-
     with torch.device("meta"):
         net = make({**made.model, "task": made.task})
     assert sum(p.numel() for p in net.parameters()) < 3e6
@@ -171,19 +192,17 @@ def test_batches_are_functions_of_the_step():
 
 
 def test_every_term_of_a_configuration_is_a_loss():
-    designs = normalise(torch.rand(2, 9, 8, 3))
-    results = {name: designs + 0.01 * torch.rand_like(designs) for name in TERMS}
-    for name, result in results.items():
-        phase, flat = Phase(weights={name: 2.0}), name.startswith("iso")
-        cost = _COSTS["published"](
-            tasks.get("flatten" if flat else "developable"),
-            Batch(designs, designs),
-            designs,
-            phase,
-            0.0,
+    with pytest.raises(OptionError, match="needs weights: ") as said:
+        Phase("published")
+    terms = str(said.value).partition("needs weights: ")[2].split(", ")
+    assert len(terms) > 5
+    designs = normalise(torch.rand(2, 16, 8, 3))
+    for name in terms:
+        net = restless("flatten" if name.startswith("iso") else "developable")
+        one, two = (
+            Objective(net)(Batch(designs, designs), Phase(weights={name: w}), 0.0) for w in (1, 2)
         )
-        value = cost(result[..., :2] if flat else result)
-        assert value.shape == (2,) and (value > 0).all()
+        assert 0 < 2 * float(one) == pytest.approx(float(two), rel=1e-5)
 
 
 def test_strides_leave_out_vertices_of_surfaces_and_labels():
@@ -198,14 +217,20 @@ def test_strides_leave_out_vertices_of_surfaces_and_labels():
 def test_augmentation_keeps_what_it_should():
     generator = torch.Generator().manual_seed(0)
     surfaces = normalise(torch.randn(40, 8, 8, 3, generator=generator))
-    first, second = augment.symmetries([surfaces, 2 * surfaces], generator)
+
+    def batch(augment):
+        made = config(augment=augment, phase=[{"loss": "energy", "batch": 40}])
+        found = Source(surfaces, designs=2 * surfaces).batch(made, made.phases[0], 0)
+        return found.surface, found.design
+
+    plain, (first, second) = batch("none")[0], batch("symmetries")
     assert torch.equal(2 * first, second)
-    same = (first == surfaces).all(dim=(1, 2, 3)).float().mean()
+    same = (first == plain).all(dim=(1, 2, 3)).float().mean()
     assert 0 < same < 0.4
-    assert torch.allclose(training_losses.fair(first), training_losses.fair(surfaces), rtol=1e-5)
-    sheared, with_them = augment.shear([surfaces, 2 * surfaces], generator)
+    assert torch.allclose(training_losses.fair(first), training_losses.fair(plain), rtol=1e-5)
+    sheared, with_them = batch("shear")
     assert torch.allclose(sheared.square().sum(-1).amax((1, 2)), torch.ones(40), atol=1e-5)
-    assert not torch.allclose(sheared, surfaces, atol=0.1)
+    assert not torch.allclose(sheared, plain, atol=0.1)
     assert torch.allclose(torch.diff(with_them, dim=1), 2 * torch.diff(sheared, dim=1), atol=1e-5)
 
 
@@ -217,9 +242,15 @@ def test_noise_has_its_size():
 
 
 def test_alignment_finds_turned_images():
-    image = torch.randn(2, 5, 6, 2, dtype=torch.float64)
-    turn = torch.tensor([[0.6, 0.8], [0.8, -0.6]], dtype=torch.float64)
-    assert torch.allclose(aligned(image @ turn + 3.0, image), image)
+    net, surface = restless("flatten"), normalise(torch.rand(2, 8, 16, 3))
+    image, other = torch.from_numpy(applied(net, surface)).float(), torch.rand(2, 8, 16, 2)
+    turn = torch.tensor([[0.6, 0.8], [0.8, -0.6]])
+
+    def miss(target):
+        return float(Objective(net)(Batch(surface, target), Phase("label"), 0.5))
+
+    assert miss(image @ turn + 3.0) == pytest.approx(miss(image), abs=1e-3)
+    assert miss(image) < 0.5 < miss(other)
 
 
 def test_fresh_surfaces_are_kept(tmp_path):
@@ -270,13 +301,13 @@ def test_runs(made, folder, tmp_path):
 def test_bfloat16_spares_the_curvature(name):
     # Where positions go in and displacements come out, its rounding would cover the optimum.
     net = load(name)
-    grids = [surface.sample(64) for surface in bezier.generate(2, seed=5)]
+    grids = [surface.sample(64) for surface in generate(2, seed=5)]
     surfaces = normalise(torch.from_numpy(np.stack(grids))).float()
     found = []
     for net.bf16 in (False, True):
-        results = applied(net, surfaces, None)
-        found.append(mean_figures(net.task, surfaces.double().numpy(), results))
-    exact, rounded = (f[net.kind.score] for f in found)
+        results = zip(surfaces.double().numpy(), applied(net, surfaces), strict=True)
+        found.append(np.mean([net.kind.figures(*both)[net.kind.score] for both in results]))
+    exact, rounded = found
     assert abs(rounded - exact) < 0.05 * exact
 
 
@@ -289,8 +320,6 @@ def test_loss_falls(folder, tmp_path):
 
 
 def test_labels_are_learnt(tmp_path, folder):
-    import gso
-
     recipe = gso.dataset.Recipe(n=10, size=16, labels=("developable", "strain"), extras=False)
     gso.dataset.build(tmp_path / "set", recipe, workers=0)
     for task, label in (("developable", "developable"), ("flatten", "strain")):
@@ -318,6 +347,9 @@ def test_a_killed_run_ends_with_the_same_weights(folder, tmp_path):
     with pytest.raises(_Killed):
         train(made, folder, tmp_path / "killed", show=kill)
     assert 0 < len(read_curves(tmp_path / "killed")) < 4
+    # Written after the last checkpoint, and cut off: these rows do not stay.
+    with (tmp_path / "killed" / "curves.jsonl").open("a") as file:
+        file.write('{"step": 40, "seconds": 9.0, "loss": 1.0}\n{"step": 40, "sec')
     card = train(made, folder, tmp_path / "killed")
     whole, again = (tensors(tmp_path / n / "model.safetensors") for n in ("whole", "killed"))
     assert all(torch.equal(whole[k], again[k]) for k in whole)
@@ -350,23 +382,6 @@ def test_ctrl_c_ends_a_run_between_steps(folder, tmp_path):
     train(made, folder, tmp_path / "interrupted")
     whole, again = (tensors(tmp_path / n / "model.safetensors") for n in ("whole", "interrupted"))
     assert all(torch.equal(whole[k], again[k]) for k in whole)
-
-
-def test_rows_of_the_last_checkpoint_stay(tmp_path):
-    curves = Curves(tmp_path)
-    curves.add(20, 1.0, loss=1.0)
-    curves.add(20, 1.0, theta=2.0)
-    curves.add(21, 1.5, loss=0.9)
-    curves.close()
-    again = Curves(tmp_path, 20)
-    again.add(20, 1.0, theta=3.0)
-    again.add(21, 1.5, loss=0.8)
-    again.close()
-    assert [(r["step"], len(r), r.get("loss")) for r in read_curves(tmp_path)] == [
-        (20, 3, 1.0),
-        (20, 3, None),
-        (21, 3, 0.8),
-    ]
 
 
 def test_sets_in_another_unit_train_the_same_net(tmp_path):
@@ -439,9 +454,6 @@ def test_matrices_are_made_orthogonal_together_as_alone():
     "name", ["developable", "net-c", "net-f", "flatten-strain", "flatten", "denoise"]
 )
 def test_a_step_stays_on_the_device_of_its_batch(name, monkeypatch):
-    from gso.net.models.base import Net
-    from gso.net.weights import make
-
     # The device without storage refuses tensors of others, as a GPU does.
     meta = torch.device("meta")
     monkeypatch.setattr(Net, "autocast", lambda *_: contextlib.nullcontext())
@@ -495,14 +507,11 @@ def test_begin_with_a_net_and_learn_from_its_results(folder, tmp_path):
 
 
 def test_results_stay_close_to_what_surfaces_were(folder, tmp_path):
-    other = GSONet(channels=4, blocks=1)
-    torch.nn.init.normal_(other.tail.weight, std=0.1)
-    save(other, tmp_path / "net.safetensors")
+    save(restless(), tmp_path / "net.safetensors")
     net = str(tmp_path / "net.safetensors")
     phase = [{"batch": 4, "weights": {"d_h": 1}}]
     made = config(model=PUBLISHED, phase=phase, through=net, against="designs", augment="none")
-    here = Processes(0, 1, torch.device("cpu"))
-    run = begin(made, folder, tmp_path / "run", None, here, None)
+    run = begin(made, folder, tmp_path / "run", None, ALONE, None)
     (phase,) = made.phases
     batch = run.source.batch(made, phase, 0)
     assert batch.compared is batch.design and not torch.equal(batch.design, batch.surface)
@@ -527,17 +536,14 @@ def test_results_stay_close_to_what_surfaces_were(folder, tmp_path):
 
 
 def test_labels_are_what_a_teacher_makes_of_what_the_net_sees(folder, tmp_path):
-    teacher = GSONet(channels=4, blocks=1)
-    torch.nn.init.normal_(teacher.tail.weight, std=0.1)
-    save(teacher, tmp_path / "net.safetensors")
+    save(restless(), tmp_path / "net.safetensors")
     net = str(tmp_path / "net.safetensors")
-    here = Processes(0, 1, torch.device("cpu"))
     phases = [
         {"loss": "label", "batch": 4, "rate": 1e-6, "weights": {}},
         {"batch": 4, "weights": {"k_left": 1.0, "label": 0.5}},
     ]
     made = config(model=PUBLISHED, phase=phases, through=net, against="designs", teacher=net)
-    run = begin(made, folder, tmp_path / "run", None, here, None)
+    run = begin(made, folder, tmp_path / "run", None, ALONE, None)
     by_teacher = torch.from_numpy(applied(load(net), run.source.surfaces)).float()
     torch.testing.assert_close(run.source.labels, by_teacher, atol=1e-5, rtol=0)
     for phase in made.phases:
@@ -552,17 +558,15 @@ def test_labels_are_what_a_teacher_makes_of_what_the_net_sees(folder, tmp_path):
     flat = str(tmp_path / "flat.safetensors")
     for wrong in ({"teacher": flat}, {"through": flat}):
         with pytest.raises(OptionError, match="a net for task 'flatten'"):
-            begin(replace(made, **wrong), folder, tmp_path / "other", None, here, None)
+            begin(replace(made, **wrong), folder, tmp_path / "other", None, ALONE, None)
 
 
 def test_a_teacher_labels_fresh_surfaces_for_every_stride(folder, tmp_path):
-    teacher = GSONet("flatten", channels=4, blocks=1, stencils=True)
-    torch.nn.init.normal_(teacher.tail.weight, std=0.1)
-    save(teacher, tmp_path / "net.safetensors")
+    save(restless("flatten", stencils=True), tmp_path / "net.safetensors")
     phases = [{"loss": "label", "batch": 4, "stride": 2}, {"batch": 4, "weights": {"label": 1.0}}]
     changes = {"teacher": str(tmp_path / "net.safetensors"), "fresh": 3, "augment": "none"}
     made = config(task="flatten", model=PUBLISHED, phase=phases, **changes)
-    run = begin(made, folder, tmp_path / "run", None, Processes(0, 1, torch.device("cpu")), None)
+    run = begin(made, folder, tmp_path / "run", None, ALONE, None)
     assert len(run.source.labels) == len(run.source.surfaces)
     for phase in made.phases:
         batch = run.source.batch(made, phase, 0)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gso import Mesh, geometry, metrics
-from gso.energy import congruence, curvature, fairness, stretch
+from gso import Mesh, energy, geometry, metrics, parametrization
 from gso.hybrid import patch
-from gso.mesh.normals import vertex_normals
-from gso.parametrization import rectangle
+from gso.mesh import vertex_normals
 from tests.conftest import saddle
+
+congruence, curvature, fairness, stretch = map(
+    energy.registry().get, ("congruence", "curvature", "fairness", "stretch")
+)
 
 MESH = Mesh.from_grid(saddle(7))
 FLAT = 1.1 * MESH.vertices[:, :2]
@@ -50,10 +52,10 @@ USERS = {
     "doubled_areas": [lambda: metrics.area(MESH), lambda: metrics.area_error(MESH, FLAT)],
     "signed_areas": [lambda: metrics.area_error(MESH, FLAT)],
     "side_lengths": [
-        lambda: rectangle(MESH.grid),
+        lambda: parametrization.rectangle(MESH.grid),
         lambda: np.concatenate([fairness.build(MESH).constants.ravel()]),
     ],
-    "unit_rectangle": [lambda: rectangle(MESH.grid)],
+    "unit_rectangle": [lambda: parametrization.rectangle(MESH.grid)],
     "corner_angles": [lambda: patch._angles(MESH)],
     "quad_area_vectors": [
         lambda: vertex_normals(MESH),

@@ -9,14 +9,10 @@ import pytest
 from click.testing import CliRunner
 
 import gso
-from gso import faults, metrics
+from gso import OptionError, faults, metrics
 from gso.cli import main
-from gso.errors import OptionError
-from gso.mesh import Mesh
-from gso.mesh.paths import Paths
-from gso.mesh.separation import between
+from gso.mesh import Mesh, Paths, between
 from gso.seams import Path
-from gso.seams.disks import opening
 from gso.seams.potential import Potential
 from gso.seams.tree import Ground, cut_tree
 from gso.verdict import Code
@@ -142,10 +138,10 @@ def test_closed_surfaces_with_handles_become_disks(mesh):
 
 def test_opening_cuts_to_disks():
     for mesh in (torus(), plate_with_handles(), cube(), ball()):
-        (piece,) = gso.cut(mesh, opening(mesh))
+        (piece,) = gso.cut(mesh, gso.seams.opening(mesh))
         assert piece.is_disk
     # The shortest cut of a torus: once around the tube, once around the hole.
-    short = gso.cut(torus(), opening(torus())).lengths.sum()
+    short = gso.cut(torus(), gso.seams.opening(torus())).lengths.sum()
     assert short == pytest.approx(2 * np.pi * (0.4 + 0.6), rel=0.1)
 
 
@@ -279,7 +275,7 @@ def test_a_changed_shape_is_developable_and_closed():
     assert found.usable, found.reasons
     assert found.metrics["strain_max"] <= 1e-3
     # Distances by another route: vertices and midpoints of faces, both ways.
-    from gso.mesh.closest_point import Nearest
+    from gso.mesh import Nearest
 
     middles = found.design.vertices[found.design.faces].mean(axis=1)
     assert Nearest(mesh).distances(middles).max() <= 0.13
@@ -432,10 +428,9 @@ def test_a_closed_mesh_that_needs_no_cut_is_opened(darts):
 
 
 def test_a_sphere_is_opened_along_two_edges():
-    from gso.seams.disks import opening
 
     mesh = ball(8)
-    cut = gso.cut(mesh, opening(mesh))
+    cut = gso.cut(mesh, gso.seams.opening(mesh))
     assert len(cut.edges) == 2
     assert cut[0].is_disk
 

@@ -10,10 +10,17 @@ import numpy as np
 import pytest
 
 import gso
-from gso.plot import plot_result, plot_rulings, plot_surface
-from gso.plot.draw import Panel, draw
-from gso.plot.heat import curvatures, distance, numbers, per_face, strain
-from gso.plot.view import View
+from gso.plot import (
+    Panel,
+    View,
+    curvatures,
+    distance,
+    numbers,
+    plot_result,
+    plot_rulings,
+    plot_surface,
+    strain,
+)
 
 pytest.importorskip("matplotlib")
 
@@ -132,7 +139,7 @@ def test_lines_are_painted_over_their_face_and_under_nearer_ones():
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 2], [1, 0, 2], [0, 1, 2.0]])
     panel = Panel(points, np.array([[3, 4, 5], [0, 1, 2]]), shaded=False)
     panel.lines = [np.array([[0.1, 0.1, 0.0], [0.3, 0.1, 0.0], [0.5, 0.1, 0.0]])]
-    painted = draw([panel]).axes[0].collections[0]
+    painted = gso.plot.draw([panel]).axes[0].collections[0]
     assert [len(path.vertices) > 3 for path in painted.get_paths()] == [True, False, False, True]
     assert np.allclose(painted.get_facecolor()[:, 3], [1.0, 0.0, 0.0, 1.0])
 
@@ -210,7 +217,7 @@ def test_nearer_faces_are_painted_later():
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 2], [1, 0, 2], [0, 1, 2.0]])
     panel = Panel(points, np.array([[3, 4, 5], [0, 1, 2]]), shaded=False)
     panel.heat = numbers(gso.Mesh(points, panel.faces), np.array([0.0, 1.0]), "")
-    painted = draw([panel]).axes[0].collections[0].get_facecolor()
+    painted = gso.plot.draw([panel]).axes[0].collections[0].get_facecolor()
     from matplotlib import colormaps
 
     far, near = colormaps[panel.heat.scale.colours]([1.0, 0.0])
@@ -223,14 +230,14 @@ def test_faces_without_a_number_are_grey():
     assert np.isfinite(heat.values).all()  # each face of a grid has an interior corner
     one = gso.Mesh(mesh.vertices[[0, 1, 10, 9]], [[0, 1, 2, 3]])
     assert np.isnan(curvatures([one])[0].values).all()
-    painted = draw([Panel(mixed().vertices, mixed().faces, heat=curvatures([mixed()])[0])])
+    painted = gso.plot.draw([Panel(mixed().vertices, mixed().faces, heat=curvatures([mixed()])[0])])
     colour = painted.axes[0].collections[0].get_facecolor()[:, :3]
     assert np.allclose(colour - colour[:, :1], 0.0)
 
 
 def test_face_values_are_means_of_corners():
     mesh = mixed()
-    values = per_face(mesh, np.array([0.0, 1.0, 2.0, np.nan, 6.0]))
+    values = numbers(mesh, np.array([0.0, 1.0, 2.0, np.nan, 6.0]), "").values
     assert np.allclose(values, [1.0, 3.0])
 
 

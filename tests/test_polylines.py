@@ -7,10 +7,8 @@ import pytest
 
 import gso
 from gso import metrics
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Mesh, Nearest
 from gso.seams import Edges, Path, Polyline, Slice
-from gso.seams.slicing import divided
 from tests.conftest import rotation, saddle, shuffled
 from tests.test_seams import ball
 
@@ -22,18 +20,21 @@ def great_circle(count: int, tilt: float = 0.4) -> np.ndarray:
     return ring @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
 
 
-@pytest.mark.parametrize("which", [[0], [0, 1], [0, 1, 2]])
-def test_triangles_are_divided(which):
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_triangles_are_divided_along_slices(count):
     mesh = ball(8)
-    face = mesh.faces[5]
-    edges = np.stack([face, np.roll(face, -1)], axis=1)[which]
-    shares = np.array([0.3, 0.5, 0.6])[which]
-    finer, _ = divided(mesh, edges, shares)
+    ways = np.array([[1.0, 0.2, 0.1], [0.1, 1.0, 0.3], [0.9, -0.8, 1.0]])[:count]
+    # All through a point of one triangle, which is divided again and again.
+    point = mesh.vertices[mesh.faces[5]].T @ [0.3, 0.3, 0.4]
+    parts = gso.cut(mesh, [Slice(point, way) for way in ways])
+    finer = parts.design
     assert metrics.area(finer) == pytest.approx(metrics.area(mesh), rel=1e-12)
     assert finer.euler_characteristic == 2
-    new = np.arange(len(mesh.vertices), len(finer.vertices))
-    a, b = mesh.vertices[edges].transpose(1, 0, 2)
-    np.testing.assert_allclose(finer.vertices[new], a + shares[:, None] * (b - a))
+    new = finer.vertices[len(mesh.vertices) :]
+    assert len(new) >= 10 * count
+    assert Nearest(mesh).distances(new).max() < 1e-12
+    height = np.abs((new - point) @ (ways / np.linalg.norm(ways, axis=1, keepdims=True)).T)
+    assert height.min(axis=1).max() < 1e-9
 
 
 def test_a_polyline_goes_straight_through_triangles():

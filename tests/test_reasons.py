@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gso import verdict
 from gso.verdict import (
     TIGHT,
     Code,
@@ -20,7 +21,6 @@ from gso.verdict import (
     Measurement,
     Places,
     Reason,
-    compare,
     describe,
     failure,
     merge,
@@ -58,46 +58,48 @@ def test_only_the_verdict_makes_reasons():
 def test_values_are_compared_with_one_tolerance(code, bound, excess):
     edge = bound * (1.0 + (-1 if code.info.least else 1) * code.info.tolerance)
     value = edge * (1.0 + (-1 if code.info.least else 1) * excess)
-    found = compare({code: value}, {code: bound})
+    found = verdict.compare({code: value}, {code: bound})
     assert bool(found) == (excess > 0)
     if found:
         assert (found[0].code, found[0].value, found[0].bound) == (code, value, bound)
 
 
 def test_a_bound_itself_is_kept_and_not_a_number_is_not():
-    assert not compare(dict.fromkeys((Code.NECK, Code.STRAIN), 2.0), dict.fromkeys(Code, 2.0))
-    assert not compare({Code.STRAIN: 2.0 * (1.0 + 0.9 * TIGHT)}, {Code.STRAIN: 2.0})
-    assert codes(compare({Code.STRAIN: np.nan}, {Code.STRAIN: 2.0})) == [Code.STRAIN]
+    assert not verdict.compare(
+        dict.fromkeys((Code.NECK, Code.STRAIN), 2.0), dict.fromkeys(Code, 2.0)
+    )
+    assert not verdict.compare({Code.STRAIN: 2.0 * (1.0 + 0.9 * TIGHT)}, {Code.STRAIN: 2.0})
+    assert codes(verdict.compare({Code.STRAIN: np.nan}, {Code.STRAIN: 2.0})) == [Code.STRAIN]
     slack = Measurement(1.001, slack=0.01)
-    assert not compare({Code.DEVIATION: slack}, {Code.DEVIATION: 1.0})
+    assert not verdict.compare({Code.DEVIATION: slack}, {Code.DEVIATION: 1.0})
 
 
 def test_without_a_limit_that_of_the_code_counts():
     measured = {Code.FOLDED: Measurement.count("face", np.array([7, 9])), Code.STRAIN: 0.5}
-    (why,) = compare(measured, {Code.STRAIN: None})
+    (why,) = verdict.compare(measured, {Code.STRAIN: None})
     assert why == Reason(Code.FOLDED, 2.0, 0.0, Places("face", (7, 9)))
-    assert not compare({Code.FOLDED: Measurement.count("face", [])}, {})
+    assert not verdict.compare({Code.FOLDED: Measurement.count("face", [])}, {})
 
 
 def test_the_worst_place_comes_first_each_with_its_own_bound():
     found = Measurement(np.array([1.0, 5.0, 3.0, 9.0]), "part", ("a", "b", "c", "d"))
-    (why,) = compare({Code.SEAM_SIDES: found}, {Code.SEAM_SIDES: [2.0, 2.0, 2.0, 8.5]})
+    (why,) = verdict.compare({Code.SEAM_SIDES: found}, {Code.SEAM_SIDES: [2.0, 2.0, 2.0, 8.5]})
     assert (why.value, why.bound, why.places.ids) == (5.0, 2.0, ("b", "c", "d"))
-    assert not compare({Code.NECK: Measurement(np.empty(0), "piece")}, {Code.NECK: 1.0})
+    assert not verdict.compare({Code.NECK: Measurement(np.empty(0), "piece")}, {Code.NECK: 1.0})
 
 
 def test_the_most_severe_comes_first():
     given = dict.fromkeys(reversed(MEASURED), 5.0)
     limits = {code: 9.0 if code.info.least else 1.0 for code in MEASURED}
-    reasons = compare(given, limits)
+    reasons = verdict.compare(given, limits)
     assert codes(reasons) == MEASURED
     assert ordered(reversed(reasons)) == reasons
     assert MEASURED.index(Code.FOLDED) < MEASURED.index(Code.STRAIN) < MEASURED.index(Code.PIECES)
 
 
 def test_a_later_measurement_decides_what_it_is_told_to():
-    solve = compare({Code.DEVIATION: 3.0, Code.STRAIN: 0.2}, dict.fromkeys(Code, 0.1))
-    later = compare({Code.STRAIN: 0.3, Code.TOO_LONG: 4.0}, dict.fromkeys(Code, 0.1))
+    solve = verdict.compare({Code.DEVIATION: 3.0, Code.STRAIN: 0.2}, dict.fromkeys(Code, 0.1))
+    later = verdict.compare({Code.STRAIN: 0.3, Code.TOO_LONG: 4.0}, dict.fromkeys(Code, 0.1))
     merged = merge(solve, later, decided=(Code.DEVIATION,))
     assert [(r.code, r.value) for r in merged] == [(Code.STRAIN, 0.2), (Code.TOO_LONG, 4.0)]
     assert merge(solve, later) == (solve[0], *merged)
@@ -121,7 +123,7 @@ def test_records_are_json_and_come_back(code):
 
 def test_words():
     bound = {Code.DEVIATION: 0.49, Code.STRAIN: 0.01}
-    deviation, strain = compare({Code.DEVIATION: 0.5, Code.STRAIN: 0.0123}, bound)
+    deviation, strain = verdict.compare({Code.DEVIATION: 0.5, Code.STRAIN: 0.0123}, bound)
     assert str(deviation).startswith("the result is 0.500 away from the design, more than 0.490; ")
     assert describe(deviation, "mm").startswith("the result is 0.500 mm away")
     assert str(strain).startswith("the largest strain of the pattern is 1.23 %, more than 1.00 %; ")

@@ -11,12 +11,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import gso
-from gso import tasks
+from gso import tasks, unknowns
 from gso.mesh import Mesh
-from gso.pipeline.case import Case
-from gso.solver.problem import Problem
-from gso.tasks.request import check
-from gso.unknowns import free
+from gso.pipeline import Case
+from gso.solver import Problem
+from gso.tasks import check
 from tests.conftest import saddle
 
 TASKS = tasks.names()
@@ -93,7 +92,7 @@ def test_developable_results_have_no_more_energy_than_the_design(surface):
     if not plan.stages:
         return
     stage = plan.stages[-1]
-    energy = Problem(stage.items, free(stage.layout)).energy
+    energy = Problem(stage.items, unknowns.free(stage.layout)).energy
     before = energy(frame.mesh.vertices.ravel())
     after = energy(frame.frame.to_unit(result.mesh.vertices)[frame.order].ravel())
     assert after <= before * (1 + 1e-6)

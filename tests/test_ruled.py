@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,22 +11,11 @@ import pytest
 import gso
 from gso import faults, metrics, parametrization
 from gso.mesh import Mesh
-from gso.ruled import strip_fit
+from gso.ruled import Conditions, Domain, Folds, Strips, strip_fit
 from gso.ruled.chords import chords
-from gso.ruled.conditions import Conditions
 from gso.ruled.copies import copies, with_copies
 from gso.ruled.descent import planarised
-from gso.ruled.diagonal_gap import planarity
-from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
-from gso.ruled.fold_lines import Folds
-from gso.ruled.loft import loft
-from gso.ruled.polygon import resampled
-from gso.ruled.prices import prices
-from gso.ruled.program import sequences
-from gso.ruled.strip_layout import Strips
-from gso.ruled.strip_weights import Weights
-from gso.ruled.system import System
 from gso.verdict import Code
 from tests.conftest import codes, cylinder, rotation, saddle, shuffled
 
@@ -66,16 +56,15 @@ def test_extrapolation_is_exact_for_parabolas():
 
 def test_cheapest_chords_of_a_cylinder_are_its_rulings():
     there = domain(cylinder(33, turn=0.4))
-    outline, _ = resampled(there.flat[there.outline], 96)
-    (branch,), flats = sequences(outline, prices(there, outline)[0])
-    assert len(flats) == 0
-    first, second, _ = branch
-    assert (np.diff(first) >= 0).all()
-    assert (np.diff(second) <= 0).all()
-    assert (second - first)[[0, -1]].tolist() == [95, 1]
-    way = outline[second % 96] - outline[first % 96]
+    strips, places = chords(there, 33)
+    ends = places[strips.index[0]]
+    way = ends[:, 1] - ends[:, 0]
     size = np.linalg.norm(way, axis=1)
     long = size > 0.5 * size.max()
+    assert long.sum() > 16
+    # None crosses the one before: its ends are on one side of it.
+    side = np.einsum("kd,ked->ke", way[:-1] @ [[0, 1], [-1, 0]], ends[1:] - ends[:-1, :1])
+    assert (side > 0).all() or (side < 0).all()
     way = way[long] / size[long, None]
     middle = np.linalg.svd(way)[2][0]
     assert np.degrees(np.arccos(np.clip(np.abs(way @ middle), 0, 1))).max() < 6.0
@@ -95,43 +84,32 @@ def test_chords_do_not_depend_on_numbering():
     np.testing.assert_allclose(lengths[1], lengths[0], atol=0.05)
 
 
-def test_outline_keeps_its_corners():
-    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    points, offsets = resampled(square, 50)
-    for corner in square:
-        k = np.linalg.norm(points - corner, axis=1).argmin()
-        np.testing.assert_array_equal(points[k], corner)
-        assert np.linalg.norm(offsets[k]) == pytest.approx(np.sqrt(2.0))
+def volumes(strips, vertices):
+    """Six times the volumes of the tetrahedra of the quads' corners: zero where they are planar."""
+    corners = vertices[strips.corners]
+    return np.linalg.det(corners[:, 1:] - corners[:, :1])
 
 
-def test_derivatives_of_planarity_are_those_of_differences():
-    strips = Strips.sequence(9)
-    vertices = planarised(System(strips), bent_strip())
-    value, slope = planarity(vertices[strips.corners])
-    np.testing.assert_allclose(value, 0.0, atol=1e-14)
-    step = 1e-6 * np.random.default_rng(0).standard_normal(vertices.shape)
-    two, one = (planarity((vertices + s * step)[strips.corners])[0] for s in (1, -1))
-    wanted = np.einsum("qcd,qcd->q", slope, step[strips.corners])
-    np.testing.assert_allclose(0.5 * (two - one), wanted, atol=1e-11)
+def made_planar(strips, vertices):
+    there = domain(saddle(9))
+    job = strip_fit.Job(Extended(there), there.mesh.vertices)
+    return planarised(job.energy(strips, vertices).system, vertices)
 
 
 def test_planar_strips_are_left_alone_and_others_become_planar():
     strips = Strips.sequence(9)
-    system, vertices = System(strips), bent_strip()
-    assert np.abs(planarity(vertices[strips.corners])[0]).max() > 1e-4
-    planar = planarised(system, vertices)
-    corners = planar[strips.corners]
-    volume = np.linalg.det(corners[:, 1:] - corners[:, :1])
-    np.testing.assert_allclose(volume, 0.0, atol=1e-14)
-    np.testing.assert_array_equal(planarised(system, planar), planar)
+    assert np.abs(volumes(strips, bent_strip())).max() > 1e-4
+    planar = made_planar(strips, bent_strip())
+    np.testing.assert_allclose(volumes(strips, planar), 0.0, atol=1e-14)
+    np.testing.assert_array_equal(made_planar(strips, planar), planar)
 
 
 def test_halved_strips_stay_planar_and_merged_ends_are_triangles():
     strips = Strips.sequence(9)
-    planar = planarised(System(strips), bent_strip())
+    planar = made_planar(strips, bent_strip())
     more, vertices = strips.halved(planar)
     assert more.count == 2
-    np.testing.assert_allclose(planarity(vertices[more.corners])[0], 0.0, atol=1e-14)
+    np.testing.assert_allclose(volumes(more, vertices), 0.0, atol=1e-14)
     fan, there = strips.merged(planar, np.array([[0, 2], [2, 4]]))
     assert len(fan.corners) - len(fan.quads) == 2
     assert fan.size == len(there) == strips.size - 2
@@ -149,7 +127,8 @@ def test_gradient_of_the_energy_is_that_of_differences(power, conditions):
     energy = job.energy(strips, vertices)
     rng = np.random.default_rng(0)
     vertices = vertices + 1e-4 * rng.standard_normal(vertices.shape)
-    w, scale = Weights(power=power, back=0.0, gap=0.0, fold=1e-6, hold=1.0, radius=1e-3), 0.01
+    changed = {"back": 0.0, "gap": 0.0, "fold": 1e-6, "hold": 1.0, "radius": 1e-3}
+    w, scale = replace(job.weights, power=power, **changed), 0.01
     measured = energy.measure(vertices)
     gradient, _ = energy.derivatives(vertices, measured, w, scale)
     step = 1e-7 * rng.standard_normal(vertices.shape)
@@ -327,6 +306,10 @@ def test_flat_sheets_stay_flat_and_whole(settings):
     assert result.usable, result.reasons
     assert result.metrics["distance_max"] < 0.02
     assert np.abs(result.rulings.angles).max() < 1e-6
+    # The outline keeps its corners.
+    corners = sheet[[0, 0, -1, -1], [0, -1, 0, -1]]
+    apart = np.linalg.norm(corners[:, None] - result.mesh.vertices, axis=2).min(axis=1)
+    np.testing.assert_allclose(apart, 0.0, atol=1e-6)
     assert result.rulings.smallest_radius > 1e6
     assert metrics.area(result.mesh) == pytest.approx(128.0, rel=1e-4)
 
@@ -341,7 +324,7 @@ def rails():
 
 def test_lofts_are_planar_between_rails():
     curves = rails()
-    strip = loft(*curves)
+    strip = gso.loft(*curves)
     assert strip.sound
     off = np.linalg.norm(strip.moved - np.concatenate(curves), axis=1)
     assert off.max() < 1e-3
@@ -353,7 +336,7 @@ def test_lofts_are_planar_between_rails():
     there, here = (np.linalg.norm(x[a] - x[b], axis=1) for x in (mesh.vertices, flat))
     np.testing.assert_allclose(here, there, atol=1e-12)
     # Twice as many rulings: a quarter of the distance.
-    finer = loft(*curves, rulings=65)
+    finer = gso.loft(*curves, rulings=65)
     less = np.linalg.norm(finer.moved - np.concatenate(curves), axis=1)
     assert less.max() < 0.35 * off.max()
 
@@ -361,7 +344,7 @@ def test_lofts_are_planar_between_rails():
 def test_lofts_of_cones_are_cones_and_impossible_ones_are_not_sound():
     t = np.linspace(0.0, 1.0, 50)
     circle = np.stack([np.cos(t), np.sin(t), 0.0 * t], axis=1)
-    cone = loft(circle, 2.0 * circle + [0.0, 0.0, 1.0])
+    cone = gso.loft(circle, 2.0 * circle + [0.0, 0.0, 1.0])
     a, b = cone.mesh.vertices[cone.rulings.edges].transpose(1, 0, 2)
     apex = np.array([0.0, 0.0, -1.0])
     way, true = b - a, 0.5 * (a + b) - apex
@@ -369,11 +352,11 @@ def test_lofts_of_cones_are_cones_and_impossible_ones_are_not_sound():
     sine /= np.linalg.norm(way, axis=1) * np.linalg.norm(true, axis=1)
     assert np.degrees(sine.max()) < 0.05
     wave = np.stack([4.0 * t, 1.0 + 0.4 * np.sin(3.0 * t), 0.3 * np.cos(4.0 * t)], axis=1)
-    assert not loft(rails()[0], wave).sound
+    assert not gso.loft(rails()[0], wave).sound
     with pytest.raises(gso.MeshError, match="curve `other`"):
-        loft(circle, circle[:2])
+        gso.loft(circle, circle[:2])
     with pytest.raises(gso.OptionError, match="rulings"):
-        loft(circle, circle + 1.0, rulings=2)
+        gso.loft(circle, circle + 1.0, rulings=2)
 
 
 @pytest.mark.parametrize("strips", [1, 2])

@@ -14,8 +14,7 @@ import gso
 from gso import geometry, metrics
 from gso.cli import main
 from gso.mesh import topology
-from gso.rulings import gauss_image, shape_operator, trace
-from gso.rulings.spread import chosen, spread
+from gso.rulings import shape_operator, trace
 from gso.rulings.walk import Field, walk
 from tests.conftest import meshes, saddle, shuffled, sphere_cap
 
@@ -148,7 +147,7 @@ def test_first_order_on_irregular_meshes(layout, surface):
 
 def test_curvature_is_the_ratio_of_determinants():
     mesh = grid(torus, 9)
-    shape, image = shape_operator(mesh), gauss_image(mesh)
+    shape, image = shape_operator(mesh), gso.rulings.gauss_image(mesh)
     v, n = mesh.vertices[mesh.faces], image[mesh.faces]
 
     def det(p):
@@ -180,7 +179,11 @@ def test_gauss_image_satisfies_the_relation_of_jiang():
     unit, scaled = [], []
     for n in (17, 33):
         mesh = grid(torus, n)
-        image, faces, normals = gauss_image(mesh), mesh.faces, metrics.face_normals(mesh)
+        image, faces, normals = (
+            gso.rulings.gauss_image(mesh),
+            mesh.faces,
+            metrics.face_normals(mesh),
+        )
         cosine = (image[faces] * normals[:, None]).sum(axis=2)
         mean = np.bincount(faces.ravel(), cosine.ravel()) / np.bincount(faces.ravel())
 
@@ -289,7 +292,7 @@ def test_odd_meshes_give_numbers(kind):
         assert len(getattr(shape, name)) == len(mesh.faces)
     assert np.allclose(np.linalg.norm(shape.directions, axis=2), 1.0)
     assert np.allclose(shape.directions @ shape.normals[..., None], 0.0, atol=1e-12)
-    image = gauss_image(mesh)
+    image = gso.rulings.gauss_image(mesh)
     assert np.allclose(np.linalg.norm(image, axis=1), mesh.used)
     assert all(np.isfinite(line).all() and len(line) > 1 for line in rulings.lines)
 
@@ -410,13 +413,11 @@ def test_a_line_between_two_regions_goes_along_their_common_side():
     assert (np.diff(points[:, 0]) > -1e-2).all()
 
 
-def test_spreading():
-    points = np.random.default_rng(0).random((50, 3))
-    order = spread(points, 100)
-    assert sorted(order) == list(range(50))
-    lines = [np.array([[x, 0.0, 0.0], [x, 1.0, 0.0]]) for x in np.linspace(0, 1, 21)]
-    kept = chosen(np.array([line.mean(axis=0) for line in lines]), lines, 3, np.ones(21))
-    assert np.allclose([lines[k][0, 0] for k in kept], [0.15, 0.5, 0.85], atol=0.06)
+def test_a_few_lines_lie_in_the_middles_of_their_shares():
+    u, v = parameters(33)
+    rulings = trace(gso.Mesh.from_grid(stack(u, v, 0.3 * u**2)), count=3)
+    at = np.sort([line[:, 0].mean() for line in rulings.lines])
+    assert np.allclose(at, [-2 / 3, 0.0, 2 / 3], atol=0.12)
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,7 @@ import pytest
 
 import gso
 from gso import metrics
-from gso.mesh import Mesh
-from gso.mesh.attributes import Attributes, Labels
+from gso.mesh import Attributes, Labels, Mesh
 from gso.seams import Creases, Edges, Path, Slice
 from gso.seams import Labels as ByLabel
 from tests.conftest import rotation, saddle, shuffled

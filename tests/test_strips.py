@@ -11,12 +11,10 @@ from gso.cli import main
 from gso.components import split
 from gso.mesh import Mesh
 from gso.result import StripsResult
-from gso.ruled.paneling.lay_strips import lay_strips
-from gso.ruled.paneling.light_design import LightDesign
-from gso.ruled.paneling.options import Options
-from gso.ruled.paneling.strips_request import StripsRequest
-from gso.seams.sheets import rectangle
-from gso.tasks.request import Limits
+from gso.ruled.paneling import LightDesign
+from gso.seams import rectangle
+from gso.workshop import Ask, Design
+from gso.workshop import made as workshop_made
 from tests.conftest import cylinder, saddle
 from tests.test_pieces import ball, dome
 
@@ -127,10 +125,12 @@ def test_given_pieces_stay_and_one_piece_is_the_whole():
 def test_edges_that_are_kept_are_cut():
     design = cap(9)
     kept = gso.cut(design, gso.seams.Path([4, 76])).edges
-    request = StripsRequest(Options.preset("fast"), Limits(0.05 * design.diagonal), kept=kept)
-    result = lay_strips(design, request)
-    assert len(result.pieces) >= 2
-    ends = result.pieces.design.vertices[result.pieces.edges].mean(axis=1)
+    whole = workshop_made(
+        Design("cap", design, kept=kept), Ask(max_deviation=0.05 * design.diagonal)
+    )
+    assert len(whole.panels) >= 2
+    sides = [seam.one for seam in whole.matings]
+    ends = np.concatenate([s.on(whole.panels[s.panel].surface.vertices) for s in sides])
     assert np.abs(ends[:, 1]).min() < 0.05
 
 

@@ -11,17 +11,14 @@ import pytest
 from click.testing import CliRunner
 
 import gso
-from gso import metrics
+from gso import Pattern, Status, metrics, tasks, verdict
 from gso.cli import main
-from gso.dataset import bezier
+from gso.dataset import generate
 from gso.mesh import Mesh
-from gso.pattern import Pattern
-from gso.pipeline.judgement import add_verdict
-from gso.pipeline.lay_flat import largest_strain, lay_out
+from gso.pipeline import add_verdict, lay_out
 from gso.result import headline
-from gso.status import Status
-from gso.tasks.request import Limits
-from gso.verdict import Code, judge
+from gso.tasks import Limits
+from gso.verdict import Code
 from tests.conftest import codes, cylinder, saddle, shuffled
 
 pytestmark = pytest.mark.filterwarnings("ignore::gso.ConvergenceWarning")
@@ -105,7 +102,7 @@ def test_tubes_are_cut_and_closed_surfaces_have_no_pattern():
     k = np.arange(24)
     tube = Mesh(rings.reshape(-1, 3), np.stack([k, np.roll(k, -1), np.roll(k, -1) + 24, k + 24], 1))
     assert lay_out(tube).is_cut
-    assert largest_strain(tube, lay_out(tube)) < 1e-9
+    assert tasks.largest_strain(tube, lay_out(tube)) < 1e-9
     ball = Mesh(np.r_[np.eye(3), -np.eye(3)], [
         [0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5],
     ])  # fmt: skip
@@ -139,12 +136,16 @@ def test_strain_is_judged_as_it_was_asked_for(good):
     strain = good.metrics["strain_max"]
     for factor, fine in ((1.1, True), (1.0, True), (0.99, False)):
         limits = Limits(max_strain=factor * strain)
-        reasons = judge(result_of(good.design, good.mesh.vertices, pattern=good.pattern), limits)
+        reasons = verdict.judge(
+            result_of(good.design, good.mesh.vertices, pattern=good.pattern), limits
+        )
         assert codes(reasons) == ([] if fine else [Code.STRAIN])
     # A distance beside it does not bring its own limit of half a percent.
     curved = result_of(saddle(9), 0.9 * saddle(9), pattern=lay_out(Mesh.from_grid(saddle(9))))
-    assert Code.STRAIN not in codes(judge(curved, Limits(max_strain=0.5, max_deviation=1.0)))
-    assert Code.STRAIN in codes(judge(curved, Limits(max_deviation=1.0)))
+    assert Code.STRAIN not in codes(
+        verdict.judge(curved, Limits(max_strain=0.5, max_deviation=1.0))
+    )
+    assert Code.STRAIN in codes(verdict.judge(curved, Limits(max_deviation=1.0)))
 
 
 def test_a_distance_that_is_passed():
@@ -252,7 +253,7 @@ def test_coordinates_that_are_not_finite():
     flat = FLAT.reshape(-1, 3)[:, :2].copy()
     result = result_of(FLAT, FLAT, "flatten", flat=flat)
     result.flat[3] = np.nan
-    (why,) = judge(result, Limits())
+    (why,) = verdict.judge(result, Limits())
     assert why.code is Code.NOT_FINITE and why.places.ids == (3,)
 
 
@@ -294,13 +295,13 @@ def test_a_face_that_no_pattern_fits():
     flat = design.vertices[:, :2].copy()
     flat[40] = flat[41]
     result = result_of(design, 0.9 * saddle(9), pattern=Pattern.whole(design, flat))
-    why = next(r for r in judge(result, Limits()) if r.code is Code.NOT_FLATTENED)
+    why = next(r for r in verdict.judge(result, Limits()) if r.code is Code.NOT_FLATTENED)
     assert why.value >= 0.99 and why.places.kind == "face"
     assert set(why.places.ids) <= {27, 28, 35, 36}
 
 
 def test_isometry_with_a_fixed_boundary():
-    design = bezier.generate(1, seed=5)[0].sample(17)
+    design = generate(1, seed=5)[0].sample(17)
     held = [gso.FixedBoundary()]
     result = gso.tno.optimize(design, formulation="isometry", constraints=held)
     # Usable only with less curvature than the design.
@@ -337,9 +338,9 @@ def test_hybrid_results_are_judged():
 
 
 def test_batches_may_leave_it_out():
-    for verdict in (True, False):
-        (item,) = gso.tno.optimize_many([saddle(9)], workers=0, options="fast", verdict=verdict)
-        assert (item.result.pattern is not None) is verdict
+    for judged in (True, False):
+        (item,) = gso.tno.optimize_many([saddle(9)], workers=0, options="fast", verdict=judged)
+        assert (item.result.pattern is not None) is judged
 
 
 @pytest.mark.parametrize(("unit", "said"), [(["--unit", "cm"], " cm"), ([], "")])

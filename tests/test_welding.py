@@ -7,8 +7,7 @@ import pytest
 
 import gso
 from gso import Mesh, MeshError, OptionError
-from gso.mesh import topology
-from gso.mesh.welding import collapse, equal, near
+from gso.mesh import collapse, equal, near, topology
 from tests.conftest import meshes, saddle
 
 

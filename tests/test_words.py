@@ -11,10 +11,15 @@ import numpy as np
 import pytest
 
 import gso
+from gso import OptionError
 from gso.cli import main
-from gso.errors import OptionError
-from gso.quantities import MILLIMETRES, as_length, as_strain
+from gso.tasks import check
 
+#: Units of length, in millimetres.
+MILLIMETRES = {
+    "um": 1e-3, "mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "ft": 304.8,
+    "yd": 914.4,
+}  # fmt: skip
 COMMANDS = dict(main.commands)
 FUNCTIONS = {
     "optimize": gso.tno.optimize,
@@ -72,24 +77,31 @@ def test_options_of_a_command_have_the_defaults_of_its_function(command):
             assert (default if plain else None) == given[param.name], param.name
 
 
+def length(given, diagonal=1.0, unit="mm"):
+    request = check("developable", max_deviation=given, diagonal=diagonal, unit=unit)
+    return request.limits.max_deviation
+
+
 def test_every_spelling_of_a_length_is_one_length():
     for text in ("5", " 5.0 ", "5mm", "5 mm", "0.5cm", "5e-3m", 5, np.float64(5.0), "2.5%"):
-        assert as_length(text, "it", diagonal=200.0, unit="mm") == pytest.approx(5.0)
+        assert length(text, diagonal=200.0) == pytest.approx(5.0)
     for unit, size in MILLIMETRES.items():
-        assert as_length(f"3{unit}", "it", diagonal=1.0, unit="m") == pytest.approx(3e-3 * size)
-        assert as_length("3", "it", diagonal=1.0, unit=unit) == 3.0
+        assert length(f"3{unit}", unit="m") == pytest.approx(3e-3 * size)
+        assert length("3", unit=unit) == 3.0
+    for option in options("unit").values():
+        assert set(option.type.choices) == set(MILLIMETRES)
 
 
 def test_every_spelling_of_a_strain_is_one_strain():
     for text in ("0.01", "1%", " 1 %", 0.01, np.float32(0.01)):
-        assert as_strain(text, "it") == pytest.approx(0.01)
+        assert check("developable", max_strain=text).limits.max_strain == pytest.approx(0.01)
 
 
-@pytest.mark.parametrize("bad", ["", "-1", "0", "5 miles", "nan", "inf", True, None, [1], "1%%"])
+@pytest.mark.parametrize("bad", ["", "-1", "0", "5 miles", "nan", "inf", True, [1], "1%%"])
 def test_what_is_no_quantity_is_named(bad):
     with pytest.raises(OptionError, match=re.escape("max_deviation")):
-        as_length(bad, "max_deviation", diagonal=1.0)
+        check("developable", max_deviation=bad)
     with pytest.raises(OptionError, match="max_strain"):
-        as_strain(bad, "max_strain")
+        check("developable", max_strain=bad)
     with pytest.raises(OptionError, match="max_strain"):
-        as_strain("5mm", "max_strain")
+        check("developable", max_strain="5mm")

@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 import shapely
 
-from gso.errors import OptionError
-from gso.workshop import sparrow
-from gso.workshop.nesting import nest
-from gso.workshop.part import Part
-from gso.workshop.rectangles import ORDERS, packed
+from gso import OptionError
+from gso.workshop import Part, nest
 
 
 def gore(long=600.0, wide=120.0, n=40):
@@ -55,30 +52,21 @@ def checked(nested, parts, sheet, spacing):
                 assert shape.intersection(other).area <= 1e-6
 
 
+def rectangle(name, wide, high, count=1):
+    return Part(name, np.array([[0.0, 0], [wide, 0], [wide, high], [0, high]]), count=count)
+
+
 class TestRectangles:
-    @pytest.mark.parametrize("order", ORDERS)
-    def test_they_do_not_overlap(self, order):
-        rng = np.random.default_rng(1)
-        sizes = [[(x, y), (y, x)] for x, y in rng.uniform(1, 9, (60, 2)).tolist()]
-        placed = packed(sizes, (30.0, 20.0), order)
-        assert [p.item for p in placed] == list(range(60))
-        boxes = [
-            (
-                p.sheet,
-                shapely.box(
-                    p.x, p.y, p.x + sizes[p.item][p.choice][0], p.y + sizes[p.item][p.choice][1]
-                ),
-            )
-            for p in placed
-        ]
-        for k, (sheet, box) in enumerate(boxes):
-            assert box.bounds[2] <= 30 + 1e-6 and box.bounds[3] <= 20 + 1e-6
-            for other, two in boxes[k + 1 :]:
-                assert sheet != other or box.intersection(two).area < 1e-6
+    @pytest.mark.parametrize("seed", range(3))
+    def test_they_do_not_overlap(self, seed):
+        sizes = np.random.default_rng(seed).uniform(10, 90, (60, 2))
+        parts = [rectangle(f"r{k}", *size) for k, size in enumerate(sizes)]
+        nested = nest(parts, (300.0, 200.0), rotations=4, spacing=0.5, method="rectangles")
+        checked(nested, parts, (300.0, 200.0), 0.5)
 
     def test_squares_fill_a_sheet(self):
-        placed = packed([[(5.0, 5.0)]] * 12, (20.0, 15.0), "area")
-        assert {p.sheet for p in placed} == {0}
+        nested = nest([rectangle("s", 5, 5, 12)], (20.0, 15.0), spacing=0, method="rectangles")
+        assert [len(sheet.parts) for sheet in nested.sheets] == [12]
 
 
 class TestNest:
@@ -149,7 +137,9 @@ class TestFallback:
             raise subprocess.TimeoutExpired("spyrrow", 1)
 
         monkeypatch.setattr("gso.workshop.sparrow.subprocess.run", slow)
-        assert sparrow.solved([], 1.0, 1.0, 0) == (None, "spyrrow took too long")
+        nested = nest(triangles(4), (500.0, 400.0))
+        assert nested.method == "rectangles"
+        assert "spyrrow took too long" in nested.notes[0]
 
     def test_a_wrong_answer_is_not_taken(self, monkeypatch):
         def odd(*words, **given):

@@ -11,10 +11,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from gso.errors import GSOError, MeshError, OptionError
-from gso.pattern import Bend
-from gso.workshop import writers
-from gso.workshop.part import Drawing, Label, Notch, Part
+from gso import GSOError, MeshError, OptionError
+from gso.workshop import Bend, Drawing, Label, Notch, Part, writers
 from gso.workshop.writers.tiles import tiled
 
 ezdxf = pytest.importorskip("ezdxf")

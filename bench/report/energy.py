@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from gso.energy.losses import Absolute, Distance, Loss, Squared
+from gso.energy import Absolute, Distance, Loss, Squared
 from gso.mesh import Mesh
-from gso.pipeline.case import Case
-from gso.solver.kernels import casadi_function
-from gso.solver.problem import Problem
-from gso.tasks.request import check
+from gso.pipeline import Case
+from gso.solver import Problem, casadi_function
+from gso.tasks import check
 from gso.typing import Array
 
 

@@ -13,11 +13,10 @@ import numpy as np
 from harness import BENCH
 
 from gso import geometry, metrics
-from gso.dataset.screen import CURVATURE
+from gso.dataset import CURVATURE
 from gso.mesh import Mesh
-from gso.plot.draw import GRAZING, Panel, draw
-from gso.plot.heat import Heat, Scale, curvatures, distance, strain
-from gso.plot.view import View
+from gso.plot import GRAZING, Heat, Panel, Scale, View, curvatures, distance, strain
+from gso.plot.draw import draw
 from gso.typing import Array
 from report.examples import Example, Examples
 from report.method import TASKS

@@ -15,9 +15,8 @@ import numpy as np
 
 import gso
 from gso.mesh import Mesh
-from gso.pipeline.normalise import Canonical
-from gso.solver import minimise
-from gso.solver.problem import Problem
+from gso.pipeline import Canonical
+from gso.solver import Problem, minimise
 from report import energy
 from report.energy import last_problem
 from report.method import Array, Method, Solved, combinations

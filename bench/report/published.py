@@ -6,8 +6,7 @@ not given; neither are fairness, strain and flipped cells.
 
 from __future__ import annotations
 
-from gso.dataset.noise import LEVELS
-from gso.dataset.summary import PUBLISHED, PUBLISHED_FLAT
+from gso.dataset import LEVELS, PUBLISHED, PUBLISHED_FLAT
 
 #: Mean loss_gc of the input surfaces.
 INPUT = PUBLISHED["loss_gc_before"]

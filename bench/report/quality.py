@@ -12,7 +12,7 @@ import numpy as np
 from harness import quietly
 
 from gso import metrics, tasks
-from gso.dataset.noise import LEVELS
+from gso.dataset import LEVELS
 from gso.executors import open_executor
 from gso.linalg import blas_threads
 from gso.mesh import Mesh

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gso.dataset.noise import LEVELS
+from gso.dataset import LEVELS
 from gso.metrics import INFO
 from report.method import Method
 from report.methods import DEFAULT, methods

@@ -16,13 +16,11 @@ from typing import Any
 import harness
 import numpy as np
 
-from gso import dataset
+from gso import DatasetError, dataset
+from gso.dataset import Recipe, select
 from gso.dataset import noise as noises
 from gso.dataset.builder import tasks
-from gso.dataset.recipe import Recipe
-from gso.dataset.screen import select
 from gso.dataset.shard import surfaces as sampled
-from gso.errors import DatasetError
 from gso.hierarchy import resample
 from gso.io import replacing
 from gso.linalg import blas_threads

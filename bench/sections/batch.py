@@ -13,8 +13,7 @@ from harness import energy, tabulate, timed
 
 import gso
 from gso.dataset import bezier
-from gso.executors import ProcessExecutor
-from gso.executors.base import processors
+from gso.executors import ProcessExecutor, processors
 
 #: Relative change of one axis by which the natural sensitivity of a solve is measured.
 _STRETCH = 1e-6

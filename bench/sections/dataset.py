@@ -13,7 +13,7 @@ from typing import Any
 from harness import BENCH
 
 from gso import dataset
-from gso.dataset.summary import differences
+from gso.dataset import differences
 
 COMMITTED = BENCH / "data" / "dataset_manifest.json"
 

@@ -23,8 +23,8 @@ from gso import hybrid
 from gso.executors import open_executor
 from gso.hierarchy import resample
 from gso.mesh import Mesh
+from gso.net import available
 from gso.net import tasks as net_tasks
-from gso.net.catalogue import available
 from gso.tno import Start, optimize
 
 #: Task and keywords.

@@ -18,8 +18,7 @@ from harness import energy, progress, run_apart, tabulate
 from report.measure import peak_mb
 
 import gso
-from gso.tasks.developable import levels
-from gso.tasks.developable.options import Options
+from gso.tasks.developable import Options, levels
 
 #: Heights of the designs over the plane.
 SHAPES = {

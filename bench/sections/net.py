@@ -20,12 +20,11 @@ from report.published import NETS, TABLE_3
 
 from gso import dataset, net
 from gso.cli.progress import share
-from gso.dataset.noise import LEVELS
+from gso.dataset import LEVELS
 from gso.dataset.shapes import NAMES
 from gso.io import replacing
 from gso.net import catalogue, tasks, weights
-from gso.net.training import checkpoint
-from gso.net.training.config import from_dict
+from gso.net.training import checkpoint, from_dict
 from gso.net.training.training_curves import read
 from gso.net.training.training_run import CHECKPOINT
 

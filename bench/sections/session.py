@@ -16,8 +16,7 @@ from harness import energy, medians, progress, tabulate
 
 import gso
 from gso.dataset import bezier
-from gso.mesh import Mesh
-from gso.mesh.normals import vertex_normals
+from gso.mesh import Mesh, vertex_normals
 
 #: Task and formulation.
 TASKS = (("developable", "curvature"), ("bend", "isometry"), ("developable", "isometry"))

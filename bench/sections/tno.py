@@ -17,7 +17,7 @@ from report.peers_flatten import arap
 import gso
 from gso import metrics
 from gso.dataset import bezier
-from gso.pipeline.lay_flat import strains_of
+from gso.pipeline import strains_of
 
 PURE = "pure SciPy"
 #: Largest acceptable angle of denoised surfaces, by the standard deviation of the noise.

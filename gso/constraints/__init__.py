@@ -2,6 +2,7 @@
 
 from gso.constraints.base import Constraint
 from gso.constraints.compiled import TIGHT, Compiled, compile_constraints, listed
+from gso.constraints.conflicts import check
 from gso.constraints.equations import (
     Lengths,
     OnLines,
@@ -14,15 +15,16 @@ from gso.constraints.equations import (
 )
 from gso.constraints.face_shape import FixedLengths, PlanarFaces
 from gso.constraints.glue import Glue
-from gso.constraints.linear import Reduction
+from gso.constraints.linear import Reduction, reduce
 from gso.constraints.on_curve import OnCurve, SlidingBoundary
 from gso.constraints.positions import Fixed, FixedBoundary, Handle
-from gso.constraints.read import add, read_constraints
+from gso.constraints.read import KINDS, add, read_constraints
 from gso.constraints.ruling import Ruling
 from gso.constraints.smooth import SmoothCurves
 from gso.constraints.symmetry import SymmetryPlane
 
 __all__ = [
+    "KINDS",
     "TIGHT",
     "Compiled",
     "Constraint",
@@ -47,7 +49,9 @@ __all__ = [
     "Straight",
     "SymmetryPlane",
     "add",
+    "check",
     "compile_constraints",
     "listed",
     "read_constraints",
+    "reduce",
 ]

@@ -13,11 +13,9 @@ from typing import ClassVar, TypeVar
 import numpy as np
 
 from gso import geometry
-from gso.energy import Term, Weighted, curve, equation, length, planarity, position
-from gso.energy.multipliers import STIFF, hardened
+from gso.energy import STIFF, Term, Weighted, curve, equation, hardened, length, planarity, position
 from gso.hierarchy import Transfer
-from gso.mesh import Frame
-from gso.mesh.polyline import Polylines
+from gso.mesh import Frame, Polylines
 from gso.typing import Array, Flags, Ints
 
 P = TypeVar("P", bound="Part")

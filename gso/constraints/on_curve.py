@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.equations import OnLines, Part, Pins
-from gso.mesh.polyline import CORNER, Polylines, turns
+from gso.mesh import Polylines
+from gso.mesh.polyline import CORNER, turns
 from gso.typing import Array, Ints
 
 

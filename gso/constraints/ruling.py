@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.equations import Part, Straight
-from gso.mesh.polyline import Polylines
+from gso.mesh import Polylines
 
 
 @dataclass(frozen=True, eq=False)

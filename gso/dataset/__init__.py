@@ -2,33 +2,56 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING
 
+from gso.first_use import at_first_use
+
 if TYPE_CHECKING:
+    from gso.dataset.bezier import BezierSurface, generate
     from gso.dataset.builder import build
+    from gso.dataset.drawing import draw_many
+    from gso.dataset.labels import LABELS
+    from gso.dataset.noise import LEVELS
     from gso.dataset.npy_folder import export
     from gso.dataset.recipe import Recipe
+    from gso.dataset.screen import CURVATURE, select
     from gso.dataset.store import Dataset, Split, open
+    from gso.dataset.summary import INTERVALS, PUBLISHED, PUBLISHED_FLAT, differences, summarise
 
-# Imported on first use, so that reading a dataset does not load the solver.
-_NAMES = {
-    "Dataset": "gso.dataset.store",
-    "Recipe": "gso.dataset.recipe",
-    "Split": "gso.dataset.store",
-    "build": "gso.dataset.builder",
-    "export": "gso.dataset.npy_folder",
-    "open": "gso.dataset.store",
-}
+__all__ = [
+    "CURVATURE",
+    "INTERVALS",
+    "LABELS",
+    "LEVELS",
+    "PUBLISHED",
+    "PUBLISHED_FLAT",
+    "BezierSurface",
+    "Dataset",
+    "Recipe",
+    "Split",
+    "build",
+    "differences",
+    "draw_many",
+    "export",
+    "generate",
+    "open",
+    "select",
+    "summarise",
+]
 
-__all__ = ["Dataset", "Recipe", "Split", "build", "export", "open"]
-
-
-def __getattr__(name: str) -> object:
-    if name not in _NAMES:
-        raise AttributeError(f"module 'gso.dataset' has no attribute {name!r}")
-    return getattr(importlib.import_module(_NAMES[name]), name)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+# Reading a dataset does not load the solver.
+__getattr__, __dir__ = at_first_use(
+    __name__,
+    {
+        "bezier": "BezierSurface generate",
+        "builder": "build",
+        "drawing": "draw_many",
+        "labels": "LABELS",
+        "noise": "LEVELS",
+        "npy_folder": "export",
+        "recipe": "Recipe",
+        "screen": "CURVATURE select",
+        "store": "Dataset Split open",
+        "summary": "INTERVALS PUBLISHED PUBLISHED_FLAT differences summarise",
+    },
+)

@@ -10,10 +10,25 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from gso.energy.base import Limit, Term, Weighted
+from gso.energy.base import Limit, Term, Weighted, mean_weights
+from gso.energy.losses import Absolute, Distance, Loss, Squared
+from gso.energy.multipliers import STIFF, hardened
 from gso.registry import Registry
 
-__all__ = ["Limit", "Term", "Weighted", "add", "registry"]
+__all__ = [
+    "STIFF",
+    "Absolute",
+    "Distance",
+    "Limit",
+    "Loss",
+    "Squared",
+    "Term",
+    "Weighted",
+    "add",
+    "hardened",
+    "mean_weights",
+    "registry",
+]
 
 _MODULES = Registry(__name__, __path__)
 #: Register a term module from outside the package: ``add(name, module)``.

@@ -9,8 +9,7 @@ import numpy as np
 
 from gso.energy.base import Term
 from gso.geometry import dot, sub
-from gso.mesh import Mesh
-from gso.mesh.polyline import Polylines
+from gso.mesh import Mesh, Polylines
 from gso.typing import Array, Ints, S, Vec
 
 #: The curve does not move with the surface.

@@ -9,9 +9,7 @@ import numpy as np
 
 from gso.energy.base import Term
 from gso.geometry import dot, sub
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
-from gso.mesh.normals import vertex_normals
+from gso.mesh import Mesh, Nearest, vertex_normals
 from gso.typing import Array, S, Vec
 
 #: The reference does not move with the surface.

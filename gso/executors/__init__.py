@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from gso.executors.base import SERIAL, Executor, Item, check_workers
+from gso.executors.base import SERIAL, Executor, Item, check_workers, processors, useful_workers
 from gso.executors.dask import DaskExecutor
 from gso.executors.process_pool import ProcessExecutor
 
-__all__ = ["SERIAL", "DaskExecutor", "Executor", "Item", "ProcessExecutor", "open_executor"]
+__all__ = [
+    "SERIAL",
+    "DaskExecutor",
+    "Executor",
+    "Item",
+    "ProcessExecutor",
+    "open_executor",
+    "processors",
+    "useful_workers",
+]
 
 
 def open_executor(

@@ -32,6 +32,7 @@ from gso.typing import AnyPath, MeshLike, Unwelded
 __all__ = [
     "SPLINE_SUFFIXES",
     "SUFFIXES",
+    "Surface",
     "Unwelded",
     "add_format",
     "as_mesh",
@@ -97,7 +98,7 @@ def add_format(suffix: str, module: ModuleType) -> None:
         Such as ".msh".
     module : module
         With ``read(data)``, which returns an object whose ``mesh(weld)`` makes the mesh, and
-        ``write(mesh, file)``; see :class:`gso.io.raw_surface.Surface`.
+        ``write(mesh, file)``; see :class:`gso.io.Surface`.
 
     Raises
     ------

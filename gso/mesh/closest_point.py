@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gso import geometry
-from gso.mesh import Mesh
+from gso.mesh.mesh import Mesh
 from gso.typing import Array, Ints
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import MeshError
-from gso.mesh import Mesh
+from gso.mesh.mesh import Mesh
 from gso.mesh.topology import edge_graph, edge_keys, label_components
 from gso.typing import Ints
 

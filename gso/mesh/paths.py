@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gso.mesh import Mesh
+from gso.mesh.mesh import Mesh
 from gso.mesh.topology import edge_graph
 from gso.typing import Array, Flags, Ints
 

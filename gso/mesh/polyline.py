@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gso import geometry
-from gso.mesh import Frame
+from gso.mesh.mesh import Frame
 from gso.typing import Array, Flags, Ints
 
 #: Vertices do not slide round corners of more than this many degrees.

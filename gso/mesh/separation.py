@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.mesh import Mesh
+from gso.mesh.mesh import Mesh
 from gso.typing import Array, Flags, Ints
 
 #: Lengths are rounded to this share of the longest edge, for whole numbers in the flow.

@@ -2,43 +2,47 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING
 
+from gso.first_use import at_first_use
+
 if TYPE_CHECKING:
-    from gso.net.catalogue import available as available
-    from gso.net.inference.prediction import predict as predict
-    from gso.net.models.coarse import CoarseNet as CoarseNet
-    from gso.net.models.gsonet import GSONet as GSONet
-    from gso.net.tasks import add_task as add_task
-    from gso.net.training.loop import train as train
-    from gso.net.weights import add_kind as add_kind
-    from gso.net.weights import load as load
-    from gso.net.weights import save as save
+    from gso.net.catalogue import CHAINS, available, located, read_card
+    from gso.net.inference.prediction import predict
+    from gso.net.models.coarse import CoarseNet
+    from gso.net.models.gsonet import GSONet
+    from gso.net.tasks import add_task
+    from gso.net.training.loop import train
+    from gso.net.weights import KINDS, add_kind, kind_of, load, make, save
 
-# Imported on first use, so that torch is loaded only when a net is used.
-_NAMES = {
-    "CoarseNet": "gso.net.models.coarse",
-    "GSONet": "gso.net.models.gsonet",
-    "add_kind": "gso.net.weights",
-    "add_task": "gso.net.tasks",
-    "available": "gso.net.catalogue",
-    "load": "gso.net.weights",
-    "predict": "gso.net.inference.prediction",
-    "save": "gso.net.weights",
-    "train": "gso.net.training.loop",
-}
+__all__ = [
+    "CHAINS",
+    "KINDS",
+    "CoarseNet",
+    "GSONet",
+    "add_kind",
+    "add_task",
+    "available",
+    "kind_of",
+    "load",
+    "located",
+    "make",
+    "predict",
+    "read_card",
+    "save",
+    "train",
+]
 
-__all__ = list(_NAMES)
-
-
-def __getattr__(name: str) -> object:
-    if name not in _NAMES:
-        raise AttributeError(f"module 'gso.net' has no attribute {name!r}")
-    value = getattr(importlib.import_module(_NAMES[name]), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+# PyTorch is loaded only when a net is used.
+__getattr__, __dir__ = at_first_use(
+    __name__,
+    {
+        "catalogue": "CHAINS available located read_card",
+        "inference.prediction": "predict",
+        "models.coarse": "CoarseNet",
+        "models.gsonet": "GSONet",
+        "tasks": "add_task",
+        "training.loop": "train",
+        "weights": "KINDS add_kind kind_of load make save",
+    },
+)

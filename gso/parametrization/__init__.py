@@ -5,10 +5,12 @@ from gso.parametrization.arap import Relaxed, relax, strain_level
 from gso.parametrization.embedding import embeddings, flattens, parts, spanned
 from gso.parametrization.initial import begin, flips, given, oriented_triangles, refine, strain
 from gso.parametrization.opening import Opened, by_rows, opened, turning
+from gso.parametrization.orientation import SAFETY, orientation
 from gso.parametrization.packing import beside, closest_motion, place, upright
 from gso.parametrization.rectangle import rectangle
 
 __all__ = [
+    "SAFETY",
     "Opened",
     "Relaxed",
     "align",
@@ -21,6 +23,7 @@ __all__ = [
     "flips",
     "given",
     "opened",
+    "orientation",
     "oriented_triangles",
     "parts",
     "place",

@@ -22,7 +22,7 @@ from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.plot.draw import GRAZING, SUFFIXES, Panel, available, draw, facing, require, write
-from gso.plot.heat import curvatures, distance, numbers, scales, strain, stretch
+from gso.plot.heat import Heat, Scale, curvatures, distance, numbers, scales, strain, stretch
 from gso.plot.piece_panels import pieces
 from gso.plot.rulings import gauss, ruled
 from gso.plot.strips import strips
@@ -37,13 +37,23 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COLOURS",
+    "GRAZING",
     "SUFFIXES",
+    "Heat",
+    "Panel",
+    "Scale",
+    "View",
     "available",
+    "curvatures",
+    "distance",
+    "draw",
+    "numbers",
     "plot_pieces",
     "plot_result",
     "plot_rulings",
     "plot_surface",
     "require",
+    "strain",
 ]
 
 COLOURS = ("curvature", "distance", "strain", "none")

@@ -10,9 +10,7 @@ import numpy as np
 
 from gso.cut_pieces import Pieces
 from gso.errors import MeshError
-from gso.mesh import Mesh
-from gso.mesh.attributes import Attributes
-from gso.mesh.cut import Cut
+from gso.mesh import Attributes, Cut, Mesh
 from gso.result.result import Result
 from gso.result.strips_result import StripsResult
 from gso.spline import BSplineSurface

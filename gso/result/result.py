@@ -20,7 +20,7 @@ from gso.verdict.reason import Reason
 if TYPE_CHECKING:
     from gso.cut_pieces import Pieces
     from gso.metrics import Distances
-    from gso.ruled.fold_lines import Folds
+    from gso.ruled import Folds
     from gso.ruled.ruled_surface import RuledSurface
 
 
@@ -197,7 +197,7 @@ class Result:
         from gso import tasks
         from gso.components import combined
         from gso.metrics import area, strains
-        from gso.tasks.evaluation import compute_metrics
+        from gso.tasks import compute_metrics
 
         if self.components:
             areas = [area(part.design) for part in self.components]

@@ -16,7 +16,7 @@ from gso.typing import AnyPath, Ints, Keywords
 
 if TYPE_CHECKING:
     from gso.metrics import Distances
-    from gso.ruled.fold_lines import Folds
+    from gso.ruled import Folds
     from gso.ruled.ruled_surface import RuledSurface
 
 #: Largest distance of smooth strips from planar faces, relative to the diagonal, up to which they

@@ -9,3 +9,11 @@ along the outline (:mod:`~gso.ruled.trim`) and unrolled (:mod:`~gso.ruled.unroll
 :func:`gso.ruled.solve.solve` does all of it; :mod:`gso.ruled.paneling` asks it, with designs and
 pieces of designs.
 """
+
+from gso.ruled.conditions import Conditions
+from gso.ruled.domain import Domain
+from gso.ruled.fold_lines import Folds
+from gso.ruled.strip_layout import Strips
+from gso.ruled.untrimmed import Untrimmed
+
+__all__ = ["Conditions", "Domain", "Folds", "Strips", "Untrimmed"]

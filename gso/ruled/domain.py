@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
-from gso.mesh.normals import vertex_normals
+from gso.mesh import Mesh, Nearest, vertex_normals
 from gso.ruled.polygon import enclosed_area, resampled, turning
 from gso.ruled.vectors import lengths, unit
 from gso.typing import Array, Flags, Ints

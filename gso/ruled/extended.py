@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso import geometry
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Nearest
 from gso.ruled.domain import Domain
 from gso.ruled.polygon import resampled
 from gso.ruled.vectors import lengths, unit

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import MeshError, OptionError
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Mesh, Nearest
 from gso.ruled.descent import planarised
 from gso.ruled.diagonal_gap import planarity
 from gso.ruled.fold_lines import folds

@@ -11,8 +11,7 @@ import numpy as np
 
 from gso import faults, metrics
 from gso.errors import MeshError
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Mesh, Nearest
 from gso.pattern import Bend, Folded, Pattern
 from gso.ruled.fold_lines import Folds, folds
 from gso.ruled.sheet import unrolled_pattern

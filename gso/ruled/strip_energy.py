@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Nearest
 from gso.ruled.conditions import Conditions, Radius, on_lines
 from gso.ruled.diagonal_gap import planarity
 from gso.ruled.extended import Extended

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Mesh, Nearest
 from gso.mesh.validation import have_area
 from gso.parametrization import beside
 from gso.pattern import Pattern

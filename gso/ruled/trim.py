@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Nearest
 from gso.ruled.division import Trimmed, meshed
 from gso.ruled.extended import Extended
 from gso.ruled.nodes import Nodes

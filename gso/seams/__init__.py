@@ -7,18 +7,19 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 from gso.cut_pieces import Piece, Pieces
+from gso.first_use import at_first_use
 from gso.seams.cutting import cut
 from gso.seams.kinds import Creases, Edges, Labels, Path, Seam, Slice
 from gso.seams.polyline_seam import Polyline
 
 if TYPE_CHECKING:
+    from gso.seams.disks import opening
     from gso.seams.search import pieces
     from gso.seams.segmentation import Segmentation
-    from gso.seams.sheets import Sheet
+    from gso.seams.sheets import Sheet, rectangle
 
 __all__ = [
     "Creases",
@@ -33,16 +34,18 @@ __all__ = [
     "Sheet",
     "Slice",
     "cut",
+    "opening",
     "pieces",
+    "rectangle",
 ]
 
-#: Names that are imported at first use, as they import SciPy, and their modules.
-_SEARCH = {"pieces": "search", "Segmentation": "segmentation", "Sheet": "sheets"}
-
-
-def __getattr__(name: str) -> object:
-    if name not in _SEARCH:
-        raise AttributeError(f"module 'gso.seams' has no attribute {name!r}")
-    value = getattr(import_module(f"gso.seams.{_SEARCH[name]}"), name)
-    globals()[name] = value
-    return value
+# These import SciPy.
+__getattr__, __dir__ = at_first_use(
+    __name__,
+    {
+        "disks": "opening",
+        "search": "pieces",
+        "segmentation": "Segmentation",
+        "sheets": "Sheet rectangle",
+    },
+)

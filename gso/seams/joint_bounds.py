@@ -11,10 +11,10 @@ import numpy as np
 from gso import metrics
 from gso.cut_pieces import Pieces
 from gso.errors import OptionError
-from gso.pipeline.lay_flat import strains_of
+from gso.pipeline import strains_of
 from gso.result import Result
 from gso.status import Status
-from gso.tasks.options import Options as BaseOptions
+from gso.tasks import Options as BaseOptions
 
 if TYPE_CHECKING:
     from gso.tasks.developable import Options
@@ -47,7 +47,8 @@ def within(
         The one with the least weight if none is within the distance.
     """
     # Imported here because it imports SciPy.
-    from gso.tasks.developable.options import DEVELOPABLE, Options
+    from gso.tasks.developable import Options
+    from gso.tasks.developable.options import DEVELOPABLE
 
     if not isinstance(options, Options):
         raise OptionError(

@@ -12,16 +12,16 @@ import numpy as np
 from gso.constraints import Constraint, Glue, SmoothCurves
 from gso.cut_pieces import Pieces
 from gso.errors import OptionError
-from gso.mesh import Mesh
-from gso.mesh.cut import Cut
+from gso.mesh import Cut, Mesh
+from gso.pipeline import add_verdict
 from gso.pipeline.component_solves import solve_mesh
-from gso.pipeline.judgement import add_verdict
 from gso.result import Result
 from gso.seams import joint_bounds
 from gso.seams.chains import chains
 from gso.solver import Callback
+from gso.tasks import Limits
 from gso.tasks.base import Options
-from gso.tasks.request import Limits, Request
+from gso.tasks.request import Request
 from gso.typing import Ints
 
 #: Weight of the smoothness of seams.

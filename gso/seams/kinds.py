@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike
 
 from gso import metrics
 from gso.errors import MeshError, OptionError
-from gso.mesh import Mesh
+from gso.mesh import Mesh, between
 from gso.mesh.attributes import LABELS
-from gso.mesh.separation import between
 from gso.mesh.topology import edge_graph
 from gso.seams.slicing import sliced
 from gso.spelling import choices

@@ -13,8 +13,7 @@ import numpy as np
 
 from gso import io
 from gso.errors import MeshError
-from gso.mesh import Mesh
-from gso.mesh.attributes import Attributes, Labels
+from gso.mesh import Attributes, Labels, Mesh
 from gso.typing import AnyPath, Json
 
 #: Names of files that an earlier call may have left.

@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import MeshError, OptionError
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
-from gso.mesh.paths import Paths
+from gso.mesh import Mesh, Nearest, Paths
 from gso.seams.kinds import Placed, Seam
 from gso.seams.slicing import divided, followed
 from gso.seams.walking import Walker

@@ -10,7 +10,7 @@ import numpy as np
 from gso import faults, metrics
 from gso.cut_pieces import Pieces
 from gso.errors import MeshError
-from gso.pipeline.lay_flat import strains_of
+from gso.pipeline import strains_of
 from gso.result import Result
 from gso.seams.candidates import Candidate, cuts, joined, measured, neck_of
 from gso.seams.facets import FACETS, facet_ratio

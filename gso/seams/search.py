@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 
 from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning, OptionError
-from gso.executors import open_executor
-from gso.executors.base import processors
+from gso.executors import open_executor, processors
 from gso.mesh import Mesh
 from gso.pipeline.component_solves import solve_mesh
 from gso.quantities import Length, Strain, as_length, as_strain
@@ -37,7 +36,7 @@ from gso.seams.search_result import packed
 from gso.seams.segmentation import Segmentation
 from gso.seams.straight import straight
 from gso.seams.tree import Ground
-from gso.tasks.request import check
+from gso.tasks import check
 from gso.typing import MeshLike
 
 #: Seams that stay: what :func:`gso.cut` takes, or an earlier result for the same mesh.

@@ -156,7 +156,7 @@ class Segmentation(Pieces):
 
 def whole_pattern(found: Segmentation) -> tuple[Mesh, Array]:
     """Return all pieces as one mesh, and their patterns side by side, (p, 2)."""
-    from gso.parametrization.packing import beside, upright
+    from gso.parametrization import beside, upright
 
     own = [s for s in found.sheets if s is not None]
     flats = beside([upright(s.flat) for s in own])

@@ -8,9 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from gso import faults, metrics
-from gso.mesh import Mesh
-from gso.mesh.paths import Paths
-from gso.pipeline.lay_flat import lay_out
+from gso.mesh import Mesh, Paths
+from gso.pipeline import lay_out
 from gso.typing import Array, Ints
 
 #: Smallest share of a piece's area on both sides of a neck.

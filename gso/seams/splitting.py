@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from gso.mesh.separation import between, spans
+from gso.mesh import between
+from gso.mesh.separation import spans
 from gso.mesh.topology import edge_graph
 from gso.seams.sheets import Sheet, rectangle
 from gso.typing import Array, Ints

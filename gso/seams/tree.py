@@ -16,8 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from gso.mesh import Mesh
-from gso.mesh.paths import Paths
+from gso.mesh import Mesh, Paths
 from gso.seams.compact_patches import patches
 from gso.seams.estimates import Estimates
 from gso.seams.potential import Potential

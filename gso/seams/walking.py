@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gso.mesh import Mesh
-from gso.mesh.normals import vertex_normals
+from gso.mesh import Mesh, vertex_normals
 from gso.typing import Array, Ints
 
 #: A walk passes through a vertex when it crosses an edge this close to it, relative to its length.

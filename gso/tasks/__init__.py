@@ -5,12 +5,42 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from gso.errors import OptionError
+from gso.first_use import at_first_use
 from gso.registry import Registry
 from gso.spelling import choices
 
 if TYPE_CHECKING:
-    from gso.tasks.base import Formulation, Task
+    from gso.tasks.base import Formulation, Plan, Stage, Task
+    from gso.tasks.evaluation import compute_metrics, largest_strain
     from gso.tasks.options import Options
+    from gso.tasks.request import Limits, check
+
+__all__ = [
+    "Formulation",
+    "Limits",
+    "Options",
+    "Plan",
+    "Stage",
+    "Task",
+    "add",
+    "check",
+    "choose",
+    "compute_metrics",
+    "get",
+    "largest_strain",
+    "names",
+]
+
+# The names of tasks are read without NumPy.
+__getattr__, __dir__ = at_first_use(
+    __name__,
+    {
+        "base": "Formulation Plan Stage Task",
+        "evaluation": "compute_metrics largest_strain",
+        "options": "Options",
+        "request": "Limits check",
+    },
+)
 
 _SUPPORT = "base constrained evaluation options per_component request stage_constraints start"
 _FILES = Registry(__name__, __path__, tuple(_SUPPORT.split()))

@@ -26,7 +26,6 @@ from gso.constraints import Compiled
 from gso.energy import Weighted, congruence, scale, shear
 from gso.errors import OptionError
 from gso.mesh import Mesh
-from gso.parametrization import orientation
 from gso.tasks import constrained, per_component
 from gso.tasks.base import Analysis, Formulation, Plan, Stage, Task
 from gso.tasks.options import Options as BaseOptions
@@ -97,7 +96,7 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
         lambda _: free(layout),
         iterations=options.iterations,
         tolerance=options.tolerance,
-        limits=[orientation.orientation(parametrization.oriented_triangles(mesh), layout)],
+        limits=[parametrization.orientation(parametrization.oriented_triangles(mesh), layout)],
     )
     stages = [stage]
     if not constraints.empty:

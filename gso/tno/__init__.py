@@ -1,5 +1,6 @@
 """The traditional numerical optimiser: sparse Gauss-Newton on CasADi's derivatives."""
 
+from gso.first_use import at_first_use
 from gso.tasks.start import Start
 from gso.tno.optimize import check, optimize
 from gso.tno.optimize_many import optimize_many
@@ -8,16 +9,4 @@ from gso.tno.session import Session
 #: ``optimize_batch`` is not among them, as it needs PyTorch.
 __all__ = ["Session", "Start", "check", "optimize", "optimize_many"]
 
-
-def __getattr__(name: str) -> object:
-    if name != "optimize_batch":
-        raise AttributeError(f"module 'gso.tno' has no attribute {name!r}")
-    from importlib import import_module
-
-    value = import_module("gso.tno.batched.optimize_batch").optimize_batch
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted([*__all__, "optimize_batch"])
+__getattr__, __dir__ = at_first_use(__name__, {"batched.optimize_batch": "optimize_batch"})

@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import csc_matrix, random_array, tril
 
 from gso import BackendError, OptionError, linalg
-from gso.linalg.base import Pattern, SingularError
+from gso.linalg import Pattern, SingularError
 
 
 def banded(n: int, width: int, seed: int = 0) -> csc_matrix:

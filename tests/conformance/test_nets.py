@@ -10,9 +10,17 @@ from tests.conftest import saddle
 
 torch = pytest.importorskip("torch")
 
-from gso.errors import OptionError, WeightsError  # noqa: E402
-from gso.net import available, load, predict, save, tasks  # noqa: E402
-from gso.net.weights import KINDS, kind_of, make  # noqa: E402
+from gso import OptionError, WeightsError  # noqa: E402
+from gso.net import (  # noqa: E402
+    KINDS,
+    available,
+    kind_of,
+    load,
+    make,
+    predict,
+    save,
+    tasks,
+)
 
 #: Small nets of every kind for every task; a kind may refuse a task.
 SMALL = {

@@ -96,8 +96,9 @@ def test_a_callback_ends_a_solve_with_the_best_so_far(task, formulation):
 
     result = solve(DESIGN, task, formulation, callback=once)
     assert np.isfinite(result.mesh.vertices).all()
+    # Denoising solves one linear system; there is nothing to end.
+    assert len(seen) == (task != "denoise")
     if seen:
-        assert len(seen) == 1
         assert result.status is gso.Status.CANCELLED
         assert not result.usable
 

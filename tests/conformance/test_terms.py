@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from gso.energy import Term, registry
 from gso.solver import kernels
-from gso.unknowns.base import DIMENSIONS
+from gso.unknowns import DIMENSIONS
 from tests.conftest import meshes
 
 MESHES = meshes()

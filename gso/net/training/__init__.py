@@ -1,1 +1,26 @@
 """Training of nets."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gso.first_use import at_first_use
+
+if TYPE_CHECKING:
+    from gso.net.training.config import Config, Phase, from_dict, read
+    from gso.net.training.data import Batch
+    from gso.net.training.phase_objective import Objective
+    from gso.net.training.solver_energy import Developable, Strain
+
+__all__ = ["Batch", "Config", "Developable", "Objective", "Phase", "Strain", "from_dict", "read"]
+
+# The tasks of nets are read without PyTorch.
+__getattr__, __dir__ = at_first_use(
+    __name__,
+    {
+        "config": "Config Phase from_dict read",
+        "data": "Batch",
+        "phase_objective": "Objective",
+        "solver_energy": "Developable Strain",
+    },
+)

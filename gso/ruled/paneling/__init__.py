@@ -5,3 +5,17 @@
 (:mod:`~gso.ruled.paneling.piece_strips`). ``gso.optimize`` with ``formulation="ruled"`` and
 ``gso.fabricate`` ask the same function.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gso.first_use import at_first_use
+
+if TYPE_CHECKING:
+    from gso.ruled.paneling.light_design import LightDesign
+
+__all__ = ["LightDesign"]
+
+# These import SciPy.
+__getattr__, __dir__ = at_first_use(__name__, {"light_design": "LightDesign"})

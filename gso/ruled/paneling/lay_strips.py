@@ -23,14 +23,11 @@ from gso.ruled.paneling.options import MOST, Options
 from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import case_of, check_whole, of_surface
-from gso.seams.cutting import cut
-from gso.seams.kinds import Edges
+from gso.seams import Edges, Segmentation, cut, rectangle
 from gso.seams.options import as_sheet
-from gso.seams.segmentation import Segmentation
-from gso.seams.sheets import rectangle
 from gso.solver import Callback
 from gso.status import Status
-from gso.tasks.request import Limits
+from gso.tasks import Limits
 from gso.tasks.start import Start
 from gso.typing import Keywords, MeshLike
 from gso.verdict import Code, Measurement, Reason, compare, judge, ordered

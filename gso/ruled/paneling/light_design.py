@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from gso import decimation
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Mesh, Nearest
 from gso.result import Result, StripsResult
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import wanted

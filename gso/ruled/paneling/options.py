@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gso.errors import OptionError
-from gso.tasks.options import Options as BaseOptions
+from gso.tasks import Options as BaseOptions
 
 #: The formulation of the developable task by which :func:`gso.optimize` makes strips.
 RULED = "ruled"

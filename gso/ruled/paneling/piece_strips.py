@@ -25,13 +25,14 @@ from gso.ruled.paneling.surface_strips import check_whole, of_surface, wanted
 from gso.ruled.ruled_surface import RuledSurface
 from gso.ruled.together import together
 from gso.rulings import smallest_radius
+from gso.seams import Sheet
+from gso.seams import pieces as search
 from gso.seams.joint_solve import gap, solve_pieces
-from gso.seams.search import pieces as search
 from gso.seams.segmentation import Segmentation
-from gso.seams.sheets import Sheet, flattened
+from gso.seams.sheets import flattened
 from gso.solver import Callback
 from gso.status import Progress, Status
-from gso.tasks.request import Limits, check
+from gso.tasks import Limits, check
 from gso.tasks.start import Start
 from gso.verdict import Code, Measurement, Reason, compare, judge, ordered
 from gso.wording import length

@@ -11,7 +11,7 @@ from gso.constraints import Constraint
 from gso.ruled.paneling.options import Options
 from gso.seams.options import CHANGES
 from gso.solver import Callback
-from gso.tasks.request import Limits
+from gso.tasks import Limits
 from gso.tasks.start import Start
 from gso.typing import Ints
 

@@ -8,13 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from gso import parametrization
-from gso.constraints import Compiled, compile_constraints
-from gso.constraints.equations import OnPlane, Pins, Relations, Straight
+from gso.constraints import Compiled, OnPlane, Pins, Relations, Straight, compile_constraints
 from gso.errors import MeshError, OptionError
-from gso.mesh import Mesh
-from gso.mesh.normals import vertex_normals
-from gso.pipeline.case import Case
-from gso.pipeline.run import Run
+from gso.mesh import Mesh, vertex_normals
+from gso.pipeline import Case, Run
 from gso.pipeline.user_result import pack, record_violations
 from gso.result import Result, StripsResult
 from gso.ruled.conditions import Conditions

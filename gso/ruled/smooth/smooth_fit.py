@@ -7,16 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gso.energy.base import Weighted, mean_weights
+from gso.energy import Weighted, mean_weights
 from gso.energy.position import build as position
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Mesh, Nearest
 from gso.ruled.smooth.curves import Curves
 from gso.ruled.smooth.smooth_terms import Terms
 from gso.ruled.untrimmed import Untrimmed
 from gso.ruled.vectors import cross, lengths, unit
-from gso.solver import minimise
-from gso.solver.problem import Problem
+from gso.solver import Problem, minimise
 from gso.typing import Array, Ints
 from gso.unknowns import Layout, Variables
 

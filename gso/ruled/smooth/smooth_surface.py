@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from gso.errors import MeshError
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Mesh, Nearest
 from gso.ruled.ruled_surface import RuledSurface
 from gso.ruled.smooth.patches import Patch, bends, patches
 from gso.ruled.smooth.smooth_fit import Fitter, Smooth

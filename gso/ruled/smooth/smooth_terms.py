@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from gso.energy.base import Residual, Term, mean_weights
+from gso.energy import Term, mean_weights
+from gso.energy.base import Residual
 from gso.ruled.smooth.curves import Curves, hermite
 from gso.ruled.smooth.residuals import (
     bend_residual,

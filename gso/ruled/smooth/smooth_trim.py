@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gso.mesh import Mesh
-from gso.mesh.closest_point import Nearest
+from gso.mesh import Mesh, Nearest
 from gso.ruled.polygon import turning
 from gso.ruled.smooth.patches import Patch
 from gso.ruled.vectors import lengths, unit

@@ -31,7 +31,6 @@ from gso.hierarchy import coarser, resample_like
 from gso.mesh import Mesh
 from gso.mesh.cut import Cut
 from gso.mesh.normals import vertex_normals
-from gso.parametrization import orientation
 from gso.status import Status
 from gso.tasks import constrained, per_component
 from gso.tasks.base import Plan, Stage
@@ -312,7 +311,7 @@ def _stage(
         per_component.objective(mesh, make) if cut is None else make(mesh),
         partial(_unknowns, bound, mesh, layout),
         tolerance=_NEARLY,
-        limits=[orientation.orientation(parametrization.oriented_triangles(sheet), layout)],
+        limits=[parametrization.orientation(parametrization.oriented_triangles(sheet), layout)],
         bounds=None if bound is None else partial(_bounds, layout, len(mesh.vertices), bound),
         imposed=analysis.imposed if mesh is analysis.mesh else None,
     )

@@ -24,7 +24,6 @@ from gso.energy import (
 from gso.energy.losses import Absolute
 from gso.geometry import ops
 from gso.mesh import Mesh
-from gso.parametrization import orientation
 from gso.tasks import per_component
 from gso.tasks.base import Stage, same
 from gso.tasks.flatten.options import Options
@@ -203,7 +202,7 @@ def _stage(name: str, mesh: Mesh, items: list[Weighted]) -> Stage:
         items,
         lambda _: free(layout),
         tolerance=_NEARLY,
-        limits=[orientation.orientation(parametrization.oriented_triangles(mesh), layout)],
+        limits=[parametrization.orientation(parametrization.oriented_triangles(mesh), layout)],
     )
 
 
