@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 
@@ -18,9 +20,17 @@ from gso.parametrization.rectangle import rectangle
 from gso.typing import Array, Ints
 
 #: Largest side of a grid whose image starts from a rectangle.
-_COARSE = 40
+COARSE = 40
 #: Strain above which an initial image may be a bad one.
 DOUBTFUL = 0.1
+
+
+class Relaxation(Protocol):
+    """A way to lower the squared strain of a plane image, such as :func:`relax`."""
+
+    def __call__(
+        self, vertices: Array, triangles: Ints, flat: Array, *, oriented: Ints, iterations: int
+    ) -> Relaxed: ...
 
 
 def strained_triangles(mesh: Mesh) -> Ints:
@@ -61,7 +71,13 @@ def strain(mesh: Mesh, flat: Array) -> float:
     return strain_level(mesh.vertices, strained_triangles(mesh), flat)
 
 
-def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> Relaxed:
+def begin(
+    mesh: Mesh,
+    *,
+    iterations: int = 100,
+    doubtful: float = DOUBTFUL,
+    relaxation: Relaxation = relax,
+) -> Relaxed:
     """Compute an image of low squared strain without inverted triangles, and its strain.
 
     Grids start from their rectangle, fine ones from the image of a coarser copy; other meshes
@@ -74,9 +90,11 @@ def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> R
     mesh : Mesh
         Components with a boundary and without handles.
     iterations : int
-        Largest number of iterations of :func:`gso.parametrization.arap`.
+        Largest number of iterations of `relaxation`.
     doubtful : float
         Strain above which the other embeddings are tried.
+    relaxation : callable
+        What lowers the strain, by default local and global steps.
 
     Raises
     ------
@@ -84,10 +102,11 @@ def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> R
         A component is closed or has handles.
     """
     strained, kept = strained_triangles(mesh), oriented_triangles(mesh)
-    relaxed = partial(relax, mesh.vertices, strained, oriented=kept, iterations=iterations)
+    relaxed = partial(relaxation, mesh.vertices, strained, oriented=kept, iterations=iterations)
     if mesh.grid is not None:
-        first = relaxed(_grid_image(mesh, mesh.grid, iterations))
-        if first.level <= doubtful or max(mesh.grid.shape) > _COARSE:
+        start = partial(begin, iterations=iterations, relaxation=relaxation)
+        first = relaxed(_grid_image(mesh, mesh.grid, start))
+        if first.level <= doubtful or max(mesh.grid.shape) > COARSE:
             return first
         images = [flat for flat in embeddings(mesh, strained, kept) if not flips(mesh, flat)]
     else:
@@ -98,10 +117,10 @@ def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> R
     return min([first, *map(relaxed, images)], key=lambda image: image.level)
 
 
-def _grid_image(mesh: Mesh, grid: Array, iterations: int) -> Array:
-    levels = coarser(mesh, _COARSE) if max(grid.shape) > _COARSE else []
+def _grid_image(mesh: Mesh, grid: Array, start: Callable[[Mesh], Relaxed]) -> Array:
+    levels = coarser(mesh, COARSE) if max(grid.shape) > COARSE else []
     if levels:
-        image = _interpolated(begin(levels[-1], iterations=iterations).flat, levels[-1], mesh)
+        image = _interpolated(start(levels[-1]).flat, levels[-1], mesh)
         if not flips(mesh, image):
             return image
     return rectangle(grid).reshape(-1, 2)
