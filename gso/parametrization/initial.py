@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 
@@ -23,14 +22,6 @@ from gso.typing import Array, Ints
 COARSE = 40
 #: Strain above which an initial image may be a bad one.
 DOUBTFUL = 0.1
-
-
-class Relaxation(Protocol):
-    """A way to lower the squared strain of a plane image, such as :func:`relax`."""
-
-    def __call__(
-        self, vertices: Array, triangles: Ints, flat: Array, *, oriented: Ints, iterations: int
-    ) -> Relaxed: ...
 
 
 def strained_triangles(mesh: Mesh) -> Ints:
@@ -76,7 +67,7 @@ def begin(
     *,
     iterations: int = 100,
     doubtful: float = DOUBTFUL,
-    relaxation: Relaxation = relax,
+    relaxation: Callable[[Array], Relaxed] | None = None,
 ) -> Relaxed:
     """Compute an image of low squared strain without inverted triangles, and its strain.
 
@@ -90,11 +81,11 @@ def begin(
     mesh : Mesh
         Components with a boundary and without handles.
     iterations : int
-        Largest number of iterations of `relaxation`.
+        Largest number of iterations of :func:`gso.parametrization.arap`.
     doubtful : float
         Strain above which the other embeddings are tried.
-    relaxation : callable
-        What lowers the strain, by default local and global steps.
+    relaxation : callable, optional
+        What lowers the squared strain of an image (n, 2), in place of local and global steps.
 
     Raises
     ------
@@ -102,10 +93,11 @@ def begin(
         A component is closed or has handles.
     """
     strained, kept = strained_triangles(mesh), oriented_triangles(mesh)
-    relaxed = partial(relaxation, mesh.vertices, strained, oriented=kept, iterations=iterations)
+    relaxed = relaxation or partial(
+        relax, mesh.vertices, strained, oriented=kept, iterations=iterations
+    )
     if mesh.grid is not None:
-        start = partial(begin, iterations=iterations, relaxation=relaxation)
-        first = relaxed(_grid_image(mesh, mesh.grid, start))
+        first = relaxed(_grid_image(mesh, mesh.grid, iterations))
         if first.level <= doubtful or max(mesh.grid.shape) > COARSE:
             return first
         images = [flat for flat in embeddings(mesh, strained, kept) if not flips(mesh, flat)]
@@ -117,10 +109,10 @@ def begin(
     return min([first, *map(relaxed, images)], key=lambda image: image.level)
 
 
-def _grid_image(mesh: Mesh, grid: Array, start: Callable[[Mesh], Relaxed]) -> Array:
+def _grid_image(mesh: Mesh, grid: Array, iterations: int) -> Array:
     levels = coarser(mesh, COARSE) if max(grid.shape) > COARSE else []
     if levels:
-        image = _interpolated(start(levels[-1]).flat, levels[-1], mesh)
+        image = _interpolated(begin(levels[-1], iterations=iterations).flat, levels[-1], mesh)
         if not flips(mesh, image):
             return image
     return rectangle(grid).reshape(-1, 2)

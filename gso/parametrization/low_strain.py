@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -20,17 +21,17 @@ from gso.parametrization.initial import (
     strained_triangles,
 )
 from gso.parametrization.opening import by_rows
-from gso.parametrization.quasi_newton import quasi_newton
+from gso.parametrization.quasi_newton import QuasiNewton
 
 #: Multiple of the typical strain above which strains cost more and more.
-_KNEE = 2.2
-#: Largest numbers of iterations: on the coarsest mesh, and on finer grids.
-_FIRST, _FINER = 30, 20
+_KNEE = 2.15
+#: Largest numbers of iterations: of the first image, of the coarsest mesh, and of finer grids.
+_START, _FIRST, _FINER = 100, 30, 12
 #: Number of vertices from which on an image from a coarser grid is wrong in details only, and the
 #: number of iterations there.
-_DETAILED, _DETAILS = 20_000, 6
+_DETAILED, _DETAILS = 10_000, 9
 #: Relative decrease of the energy at which to stop, on coarse meshes and on the finest.
-_ROUGH, _CLOSE = 1e-2, 3e-4
+_ROUGH, _CLOSE = 1e-2, 5e-4
 #: Smaller typical strains are rounding errors.
 _SMALLEST = 1e-7
 
@@ -73,23 +74,33 @@ def low_strain(mesh: Mesh, *, doubtful: float = DOUBTFUL) -> Relaxed:
 
 def _of_component(mesh: Mesh, doubtful: float) -> Relaxed:
     levels = [*(coarser(mesh, COARSE) if mesh.grid_index is not None else []), mesh]
-    start = begin(levels[0], doubtful=doubtful, relaxation=partial(quasi_newton, tolerance=_ROUGH))
+    steps = _steps(levels[0])
+    start = begin(
+        levels[0],
+        doubtful=doubtful,
+        relaxation=partial(steps.lower, iterations=_START, tolerance=_ROUGH),
+    )
     level = max(start.level, _SMALLEST)
     loss = TwoPowerLoss(level, knee=lowered(_KNEE, np.float64(level))).of_squares
-    flat = start.flat
-    for number, at in enumerate(levels):
-        below = levels[number - 1] if number else None
-        near = below is not None and len(at.vertices) > _DETAILED
-        if below is not None:
-            flat = refine(below, at, flat)
-        flat = quasi_newton(
-            at.vertices,
-            strained_triangles(at),
-            flat,
-            loss=loss,
-            oriented=oriented_triangles(at),
-            iterations=_FIRST if below is None else _DETAILS if near else _FINER,
-            tolerance=_ROUGH if below is None and at is not mesh else _CLOSE,
-            near=near,
+    flat = steps.lower(
+        start.flat,
+        loss=loss,
+        iterations=_FIRST,
+        tolerance=_ROUGH if len(levels) > 1 else _CLOSE,
+    ).flat
+    for below, at in pairwise(levels):
+        near = len(at.vertices) > _DETAILED
+        steps = _steps(at, near=near)
+        flat = refine(below, at, flat)
+        if not near:
+            # Interpolation may have left strains that are far above the knee.
+            flat = steps.lower(flat, iterations=1, tolerance=_CLOSE).flat
+        flat = steps.lower(
+            flat, loss=loss, iterations=_DETAILS if near else _FINER, tolerance=_CLOSE
         ).flat
     return Relaxed(flat, start.level)
+
+
+def _steps(mesh: Mesh, *, near: bool = False) -> QuasiNewton:
+    strained, oriented = strained_triangles(mesh), oriented_triangles(mesh)
+    return QuasiNewton(mesh.vertices, strained, oriented, near=near)
