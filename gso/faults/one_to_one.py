@@ -56,6 +56,8 @@ def simple_boundary(mesh: Mesh, flat: Array) -> bool:
         for loop, following in zip(loops, after, strict=True)
         if _cross(flat[loop] - flat[loop[0]], flat[following] - flat[loop[0]]).sum() > 0
     ]
+    if not boxes:
+        return False
     low, high = (np.array(side) for side in zip(*boxes, strict=True))
     return not len(overlapping(low, high))
 
