@@ -11,9 +11,9 @@ from gso.typing import Array, Ints
 #: Spacing of the points that are tried first.
 _STRIDE = 8
 #: Side of the blocks of cells that have a bounding box.
-_BLOCK = 16
+_BLOCK = 8
 #: Steps of a point towards its closest one.
-_STEPS = 3
+_STEPS = 2
 #: Largest number of queries before one for all points that are left.
 _QUERIES = 24
 #: Relative size of rounding errors of distances.
