@@ -60,8 +60,7 @@ def within(mesh: Mesh, distance: float, count: int) -> tuple[Mesh, float]:
     """
     while 2 * count <= len(mesh.triangles):
         light = decimated(mesh, count)
-        away = metrics.surface_distance(mesh, light)
-        far = max(away.there_max, away.back_max)
+        far = metrics.largest_distance(mesh, light)
         if light is not mesh and far <= distance:
             return light, far
         count *= 2

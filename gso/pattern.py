@@ -107,7 +107,7 @@ class Pattern:
     @property
     def is_cut(self) -> bool:
         """Whether some vertex of the surface has several copies in the pattern."""
-        return np.unique(self.vertex).size < len(self.vertex)
+        return bool(np.bincount(self.vertex).max(initial=0) > 1)
 
     @cached_property
     def mesh(self) -> Mesh:

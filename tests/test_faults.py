@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from gso import faults, metrics
+from gso import faults, geometry, metrics
 from gso.mesh import Mesh
 from tests.conftest import cylinder, meshes, rotation, saddle, shuffled
 
@@ -115,7 +115,9 @@ def test_sound_surfaces_raise_no_alarm(make, kind):
 def beside(*parts):
     """Meshes as the components of one."""
     start = np.cumsum([0, *(len(p.vertices) for p in parts)])
-    faces = [p.faces + s for p, s in zip(parts, start, strict=False)]
+    faces = [np.where(p.faces < 0, -1, p.faces + s) for p, s in zip(parts, start, strict=False)]
+    width = max(f.shape[1] for f in faces)
+    faces = [np.pad(f, ((0, 0), (0, width - f.shape[1])), constant_values=-1) for f in faces]
     return Mesh(np.concatenate([p.vertices for p in parts]), np.concatenate(faces))
 
 
@@ -254,6 +256,100 @@ def test_flipped_faces_are_numbered(kind):
     np.testing.assert_array_equal(
         metrics.flipped_faces(mesh, flat * [-1.0, 1.0]), np.arange(len(mesh.faces))
     )
+
+
+def rough(seed):
+    """A sheet whose height, and slide in its plane, are random waves."""
+    rng = np.random.default_rng(seed)
+    wave = [
+        sum(
+            rng.normal() * np.cos(a * np.pi * T + b * np.pi * V / 2 + rng.uniform(0, 6))
+            for a in range(4)
+            for b in range(4)
+        )
+        for _ in range(3)
+    ]
+    size = rng.uniform(0.02, 0.2)
+    return grid(2 * T + size * wave[0], V + size * wave[1], 0.15 * wave[2])
+
+
+def wound(seed):
+    """A sheet rolled into a spiral or a ramp by a random angle."""
+    rng = np.random.default_rng(seed)
+    angle, slope = rng.uniform(2, 9) * T, rng.uniform(-0.5, 0.5)
+    radius = 1.0 - rng.uniform(0, 0.3) * T + slope * V
+    return grid(radius * np.cos(angle), radius * np.sin(angle) + 0.3 * T, V + rng.uniform(0, 3) * T)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("make", [rough, wound])
+def test_surfaces_that_need_no_test_of_pairs_have_no_crossings(make, kind):
+    """Beside a part that crosses itself nothing is proved, and all pairs are tested."""
+    wall = Mesh.from_grid(np.dstack([np.full((3, 3), 0.2), *np.mgrid[-1:1:3j, -1:1:3j]]))
+    trouble = moved(beside(Mesh.from_grid(saddle(3)), wall), [70.0, 0, 0])
+    proved = crossed = 0
+    for seed in range(24):
+        mesh = kinds(make(seed))[kind]
+        found = faults.crossings(mesh)
+        every = faults.crossings(beside(mesh, trouble))
+        assert len(every) > len(found)
+        np.testing.assert_array_equal(found, every[every[:, 0] < len(mesh.faces)])
+        axis = faults.one_to_one.upright(geometry.area_vectors(mesh.vertices, mesh.triangles))
+        proved += axis is not None
+        crossed += len(found) > 0
+    assert 4 <= proved <= 24 - crossed and crossed >= 1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_patterns_that_need_no_test_of_pairs_have_no_overlaps(kind):
+    flat_grid = grid(T, V, 0 * T)
+    mesh = kinds(flat_grid)[kind]
+    order = np.argmin(((mesh.vertices[:, None] - flat_grid.vertices) ** 2).sum(axis=2), axis=1)
+    tile = Mesh.from_grid(np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))]))
+    both = beside(mesh, tile, tile)
+    proved = lying = 0
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        angle, radius = rng.uniform(1, 8) * T, 1.5 + rng.uniform(0.2, 0.7) * V + 0.1 * T
+        z = radius * np.exp(1j * angle) + 0.005 * seed * T**2 * np.exp(6j * V)
+        flat = np.stack([z.real, -z.imag], axis=-1).reshape(-1, 2)[order]
+        found = faults.overlaps(mesh, flat)
+        square = tile.vertices[:, :2] + 20.0
+        every = faults.overlaps(both, np.r_[flat, square, square + 0.5])
+        assert len(every) > len(found)
+        np.testing.assert_array_equal(found, every[every < len(mesh.faces)])
+        proved += (
+            faults.one_to_one.simple_boundary(mesh, flat)
+            and not metrics.flipped_faces(mesh, flat).size
+        )
+        lying += len(found) > 0
+    assert min(proved, lying) >= 5
+
+
+def test_a_boundary_that_touches_or_crosses_itself_proves_nothing():
+    square = Mesh.from_grid(np.dstack([*np.mgrid[:4.0, :4.0], np.zeros((4, 4))]))
+    flat = square.vertices[:, :2]
+    assert faults.one_to_one.simple_boundary(square, flat)
+    for corner in ([0.0, 2.0], [-0.5, 1.5]):
+        bent = flat.copy()
+        bent[0] = corner
+        assert not faults.one_to_one.simple_boundary(square, bent)
+    holed = Mesh(square.vertices, np.delete(square.faces, 4, axis=0))
+    assert faults.one_to_one.simple_boundary(holed, flat)
+    pair = beside(square, moved(square, [9, 0, 0]))
+    assert faults.one_to_one.simple_boundary(pair, pair.vertices[:, :2])
+    # Without a crossing of boundaries, but one inside the other.
+    assert not faults.one_to_one.simple_boundary(pair, np.r_[flat, 0.1 * flat + 1.1])
+
+
+def test_directions_from_which_a_surface_is_seen_from_one_side():
+    for seed in range(5):
+        turn = rotation(seed)
+        cone = np.random.default_rng(seed).standard_normal((40, 3)) + np.array([0, 0, 3.0])
+        cone = cone[cone[:, 2] > 0.5] @ turn.T
+        axis = faults.one_to_one.upright(cone)
+        assert axis is not None and (cone @ axis > 0).all()
+    assert faults.one_to_one.upright(np.concatenate([np.eye(3), -np.eye(3)])) is None
 
 
 def test_it_is_fast():

@@ -387,6 +387,61 @@ def test_starts_are_valid_and_relaxing_lowers_their_strain():
     )
 
 
+def test_steps_near_the_image_need_no_factorisation():
+    mesh = Mesh.from_grid(sphere_cap(33))
+    triangles = corner_triangles(mesh.faces)
+    good = parametrization.relax(mesh.vertices, triangles, mesh.vertices[:, :2])
+    noisy = good.flat + 1e-3 * np.random.default_rng(0).standard_normal(good.flat.shape)
+    for near in (False, True):
+        steps = parametrization.quasi_newton.QuasiNewton(
+            mesh.vertices, triangles, triangles, near=near
+        )
+        again = steps.lower(noisy, iterations=8, tolerance=1e-3)
+        assert again.level < 1.1 * good.level
+        assert again.level == pytest.approx(parametrization.strain(mesh, again.flat))
+    assert parametrization.strain(mesh, noisy) > 2.0 * good.level
+
+
+def test_low_strain_is_as_low_as_that_of_the_task():
+    """On results of the recipe, from which patterns are made."""
+    ratios = []
+    for shape in generate(5, seed=43):
+        mesh = gso.tno.optimize(shape.sample(40), options="fast", verdict=False).mesh
+        image = parametrization.low_strain(mesh).flat
+        assert not metrics.flips(mesh, image)
+        task = solve(mesh, options="fast").flat
+        found, known = (metrics.strains(mesh, flat) for flat in (image, task))
+        ratios.append([found[k] / known[k] for k in ("strain_max", "strain_p99", "strain_mean")])
+    assert (np.median(ratios, axis=0) <= [1.0, 1.0, 1.02]).all()
+    assert np.max(ratios) <= 1.1
+
+
+@pytest.mark.parametrize("make", [disk_mesh, lambda: with_hole(disk_mesh(11))])
+def test_low_strain_of_meshes_that_are_no_grids(make):
+    mesh = make()
+    image = parametrization.low_strain(mesh)
+    found, known = (
+        metrics.strains(mesh, flat) for flat in (image.flat, solve(mesh, options="fast").flat)
+    )
+    assert not metrics.flips(mesh, image.flat)
+    assert found["strain_mean"] <= 1.02 * known["strain_mean"]
+    assert found["strain_max"] <= 1.05 * known["strain_max"]
+
+
+def test_components_have_low_strain_as_they_have_alone():
+    one, two = Mesh.from_grid(cone(21)), disk_mesh(9)
+    count = len(one.vertices)
+    both = Mesh(
+        np.r_[two.vertices + 5.0, one.vertices], np.r_[two.faces, one.faces + len(two.vertices)]
+    )
+    image = parametrization.low_strain(both).flat
+    for mesh, own in ((two, image[:-count]), (one, image[-count:])):
+        alone = metrics.strains(mesh, parametrization.low_strain(mesh).flat)
+        assert metrics.strains(mesh, own)["strain_max"] == pytest.approx(
+            alone["strain_max"], rel=0.05, abs=1e-6
+        )
+
+
 def test_tutte_image_always_exists(monkeypatch):
     mesh = with_hole(disk_mesh(9))
     rng = np.random.default_rng(4)

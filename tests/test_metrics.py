@@ -77,6 +77,26 @@ def test_distances_between_parallel_planes():
     assert metrics.surface_distance(lower, lower[1:-1, 1:-1]).there_max == pytest.approx(0.0)
 
 
+@pytest.mark.parametrize("kind", ["grid", "shuffled", "other faces"])
+@pytest.mark.parametrize("slide", [0.0, 0.02, 0.3])
+def test_the_largest_distance_is_that_of_all_vertices(kind, slide):
+    rng = np.random.default_rng(3)
+    for k in range(6):
+        before = saddle(31, 24, strength=0.2 * k)
+        shift = rng.normal(size=3) * slide
+        waves = np.cos(before[..., :2] @ rng.normal(size=(2, 3)) * 4)
+        after = before + shift + 0.05 * waves + 1e-3 * k * rng.normal(size=before.shape)
+        a, b = Mesh.from_grid(before), Mesh.from_grid(after)
+        if kind == "shuffled":
+            a, b = shuffled(a, k), shuffled(b, k)
+        elif kind == "other faces":
+            b = Mesh(b.vertices, b.triangles)
+        far = metrics.surface_distance(a, b)
+        found = metrics.largest_distance(a, b)
+        assert found == pytest.approx(max(far.there_max, far.back_max), rel=1e-12)
+    assert metrics.largest_distance(a, a) == 0.0
+
+
 def test_strain_and_edges_of_a_uniform_stretch():
     plane = saddle(6, strength=0.0)
     flat = plane[..., :2] * [1.1, 0.95]

@@ -53,6 +53,9 @@ def test_results_write_meshes_and_those_with_one_patterns(tmp_path):
 def test_seconds_and_backend_are_reported():
     result = gso.tno.optimize(saddle(12))
     assert result.seconds["total"] >= result.seconds["factor"] > 0
+    names = ("setup", "evaluate", "factor", "search", "pattern", "verdict")
+    assert min(result.seconds[k] for k in names) > 0
+    assert sum(result.seconds[k] for k in names) <= result.seconds["total"]
     assert result.backend in gso.linalg.backends()
     assert result.history[0].iteration == 0
 

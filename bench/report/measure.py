@@ -101,7 +101,7 @@ def solve(task: str, method: str, model: str, points: np.ndarray) -> Any:
         return gso.net.predict(points, task=task, model=model)
     if method == "hybrid":
         return gso.hybrid.solve(points, task=task, net=model)
-    return gso.tno.optimize(points, task=task, verdict=False)
+    return gso.tno.optimize(points, task=task)
 
 
 def shares(run: Callable[[], Any]) -> dict[str, Any]:
@@ -127,9 +127,8 @@ def shares(run: Callable[[], Any]) -> dict[str, Any]:
         total = time.perf_counter() - start
     spent = dict(clock.spent)
     # A net alone returns an array, and all of its time is the net's.
-    net = total if isinstance(result, np.ndarray) else result.seconds.get("net")
-    if net is not None:
-        spent["net"] = net
+    known = {"net": total} if isinstance(result, np.ndarray) else result.seconds
+    spent |= {name: known[name] for name in ("net", "pattern", "verdict") if name in known}
     spent["setup"] = total - sum(v for k, v in spent.items() if k != "setup")
     found = {"shares": {k: v / total for k, v in spent.items()}, "seconds": total}
     return found | limit(result, stages)

@@ -76,7 +76,7 @@ def _quality(row: Mapping[str, Any], columns: Cells, both: bool) -> Cells:
 def timing_table(timings: Iterable[Timing]) -> str:
     """Return a table of time against size."""
     head = ["task", "method", "grid", "median", "fastest", "slowest", "solves", "iterations"]
-    head += ["peak MB", *(f"{p} %" for p in PHASES), "limit", "time / limit", "backend"]
+    head += ["peak MB", *(f"{p} %" for p in PHASES), "limit", "solve / limit", "backend"]
     rows = []
     for t in timings:
         row = [t.task, t.method, f"{t.size} x {t.size}", t.absent]
@@ -84,7 +84,7 @@ def timing_table(timings: Iterable[Timing]) -> str:
             row[3:] = [duration(v) for v in (t.median, min(t.seconds), max(t.seconds))]
             row += [str(len(t.seconds)), str(t.iterations or ""), f"{t.peak_mb:.0f}"]
             row += [f"{100.0 * t.shares[p]:.0f}" if p in t.shares else "" for p in PHASES]
-            row += [duration(t.limit), number(t.median / t.limit) if t.limit else "", t.backend]
+            row += [duration(t.limit), number(t.solve / t.limit) if t.limit else "", t.backend]
         rows.append(row + [""] * (len(head) - len(row)))
     return table(head, rows)
 

@@ -26,7 +26,7 @@ _BUDGET = 20.0
 #: Smallest side used for the exponent; below it the time hardly depends on the size.
 _LEAST = 32
 #: Phases, in the order in which they are shown.
-PHASES = ("net", "setup", "evaluation", "assembly", "factor", "solve")
+PHASES = ("net", "setup", "evaluation", "assembly", "factor", "solve", "pattern", "verdict")
 #: Methods that are compared; :func:`_named` maps them to the methods of each task.
 METHODS = ("TNO", "TNO, NumPy", "Net", "hybrid")
 
@@ -70,8 +70,14 @@ class Timing:
 
     @property
     def median(self) -> float:
-        """Median time."""
+        """Median time, with the flat pattern and the verdict."""
         return float(np.median(self.seconds))
+
+    @property
+    def solve(self) -> float:
+        """Median time of the solve alone."""
+        rest = sum(self.shares.get(part, 0.0) for part in ("pattern", "verdict"))
+        return (1.0 - rest) * self.median
 
 
 def pieces(settings: Settings) -> list[tuple[str, str, int]]:

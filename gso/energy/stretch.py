@@ -23,6 +23,8 @@ _ROOT2 = 2.0**0.5
 FLAT_CORNER = 1e-6
 #: Multiple of the knee beyond which the loss continues quadratically in the strain.
 _STEEPEST = 1.3
+#: Strain level above which the knee is lowered.
+_LARGE_STRAIN = 0.03
 
 
 def corners_of(size: int) -> tuple[tuple[int, int, int], ...]:
@@ -96,26 +98,50 @@ class TwoPowerLoss:
         parts = r.reshape(3, -1, *r.shape[1:])
         return parts, 0.5 / self.level**2 * (parts * parts).sum(0)
 
+    def of_squares(self, squares: B) -> tuple[B, B]:
+        """Return the loss of mean squared strains ``((s1 - 1)^2 + (s2 - 1)^2) / 2``, and its slope.
+
+        >>> loss, slope = TwoPowerLoss(0.01).of_squares(np.array([0.0, 1e-4]))
+        >>> [round(float(x), 3) for x in slope]
+        [10.0, 0.996]
+        """
+        y = squares / self.level**2
+        e, half = self.eps**2, 0.5 * self.p
+        root, rise, held = self._powers(y)
+        value = (root - e**half) / half + rise * (2.0 / self.q * held + y - held)
+        return self.level**2 * value, root / (y + e) + rise
+
+    def _powers(self, y: B) -> tuple[B, B, B]:
+        """Return the first power of y, the second one's slope, and y where that still grows."""
+        held = ops.minimum(y, (_STEEPEST * self.knee) ** 2)
+        rise = self.peak * ops.power(held, 0.5 * self.q - 1.0)
+        return ops.power(y + self.eps**2, 0.5 * self.p), rise, held
+
     def value(self, r: B) -> B:
         """Return the loss of each corner."""
-        y = self._squares(r)[1]
-        e = self.eps**2
-        low = 2.0 / self.p * ((y + e) ** (0.5 * self.p) - e ** (0.5 * self.p))
-        held = ops.minimum(y, (_STEEPEST * self.knee) ** 2)
-        rise = self.peak * held ** (0.5 * self.q - 1.0)
-        loss: B = self.level**2 * (low + rise * (2.0 / self.q * held + y - held))
-        return loss
+        return self.of_squares(self.level**2 * self._squares(r)[1])[0]
 
     def weights(self, r: B) -> tuple[B, B]:
         """Return the derivative, and the curvature without negative part and cross terms."""
         parts, y = self._squares(r)
-        held = ops.minimum(y, (_STEEPEST * self.knee) ** 2)
-        low = (y + self.eps**2) ** (0.5 * self.p - 1.0)
-        first = low + self.peak * held ** (0.5 * self.q - 1.0)
+        root, rise, held = self._powers(y)
+        low = root / (y + self.eps**2)
+        first = low + rise
         growth = (0.5 * self.p - 1.0) * low / (y + self.eps**2)
-        rising = (0.5 * self.q - 1.0) * self.peak * held ** (0.5 * self.q - 2.0)
+        rising = (0.5 * self.q - 1.0) * self.peak * ops.power(held, 0.5 * self.q - 2.0)
         growth = ops.maximum(growth + ops.where(y > held, 0.0, rising), 0.0) / self.level**2
         return (first * parts).reshape(*r.shape), (first + growth * parts**2).reshape(*r.shape)
+
+
+def lowered(knee: float, level: B) -> B:
+    """Return the knee of a :class:`TwoPowerLoss`, lower where the strain level is large.
+
+    Large strains then cost more.
+
+    >>> [round(float(lowered(2.0, np.float64(level))), 2) for level in (0.01, 0.06)]
+    [2.0, 1.59]
+    """
+    return knee * ((_LARGE_STRAIN / level) ** (1 / 3)).clip(0.68, 1.0)
 
 
 @dataclass(frozen=True)
@@ -185,13 +211,17 @@ def corner_shares(vertices: Array, quads: Ints) -> Array:
 
     The sign is relative to the normal of the face.
     """
-    normal = geometry.quad_area_vectors(vertices, quads).T
-    normal = normal / np.maximum(geometry.norm(tuple(normal)), 1e-300)
-    corners = geometry.quad_corner_vectors(vertices, quads)
-    side2 = ((np.roll(vertices[quads], -1, axis=1) - vertices[quads]) ** 2).sum(axis=2).T
-    around = np.maximum(side2 + np.roll(side2, 1, axis=0), 1e-300)
-    shares: Array = np.stack([geometry.dot(tuple(c), tuple(normal)) for c in corners]) / around
-    return shares
+    normal = tuple(geometry.quad_area_vectors(vertices, quads).T)
+    length = np.maximum(geometry.norm(normal), 1e-300)
+    v = geometry.corners(vertices, quads)
+    side2 = [geometry.norm2(geometry.sub(v[(k + 1) % 4], v[k])) for k in range(4)]
+    return np.stack(
+        [
+            geometry.dot(tuple(corner), normal)
+            / (length * np.maximum(side2[k] + side2[k - 1], 1e-300))
+            for k, corner in enumerate(geometry.quad_corner_vectors(vertices, quads))
+        ]
+    )
 
 
 def rest_constants(vertices: Array, faces: Ints) -> Array:

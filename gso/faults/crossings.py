@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.faults.face_pairs import DEPTH, by_triangles, candidates, split
+from gso import geometry
+from gso.faults.face_pairs import DEPTH, by_triangles, candidates, every, split
+from gso.faults.one_to_one import simple_boundary, upright
 from gso.mesh import Mesh
 from gso.typing import Array, Flags, Ints
 
@@ -38,12 +40,26 @@ def crossings(mesh: Mesh) -> Ints:
     array([[0, 1]])
     """
     points = mesh.vertices - mesh.frame.centre
+    triangles, count = split(mesh.faces)
+    if _is_graph(mesh, points, every(triangles, count)):
+        return np.empty((0, 2), np.int64)
     pairs, width = candidates(points, mesh.faces)
-    which, first, second = by_triangles(pairs, *split(mesh.faces))
+    which, first, second = by_triangles(pairs, triangles, count)
     crossed = np.zeros(len(pairs), bool)
     crossed[which[_cross(points[first], points[second], DEPTH * width[which])]] = True
     found = pairs[crossed]
     return found[np.lexsort(found.T[::-1])]
+
+
+def _is_graph(mesh: Mesh, points: Array, triangles: Ints) -> bool:
+    """Tell whether the surface certainly lies over a plane without covering a point twice."""
+    axis = upright(geometry.area_vectors(points, triangles))
+    if axis is None:
+        return False
+    # Two vectors that make a right-handed frame with the axis.
+    plane = np.linalg.svd(axis[None])[2][1:]
+    plane[1] *= np.sign(axis @ np.cross(*plane))
+    return simple_boundary(mesh, points @ plane.T)
 
 
 def _cross(a: Array, b: Array, depth: Array) -> Flags:

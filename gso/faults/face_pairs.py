@@ -70,6 +70,11 @@ def split(faces: Ints, other: Flags | None = None) -> tuple[Ints, Ints]:
     return triangles, count
 
 
+def every(triangles: Ints, count: Ints) -> Ints:
+    """List the valid triangles (t, 3) of :func:`split`, the first ones of all faces first."""
+    return np.concatenate([triangles[:, 0], triangles[count == 2, 1]])
+
+
 def by_triangles(pairs: Ints, triangles: Ints, count: Ints) -> tuple[Ints, Ints, Ints]:
     """Expand pairs of faces into pairs of their triangles.
 

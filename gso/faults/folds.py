@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.geometry import cross, dot, norm, norm2, sub
+from gso.geometry import corners, cross, dot, norm, norm2, sub
 from gso.mesh import Mesh
 from gso.mesh.topology import are_quads, four_corners
 from gso.typing import Array, Flags, Ints
@@ -55,21 +55,40 @@ def folded(mesh: Mesh, *, below: float = SHARP) -> Ints:
     # Triangles of a diagonal along which the quad folds are not tested against neighbours.
     sound = ~fold
     h = he.interior
-    local = np.arange(he.face.size) - np.searchsorted(he.face, he.face)
-    size = np.where(quad, 4, 3)[he.face]
+    h = h[_sharp(normals, he.face[h], he.face[he.twin[h]], below)]
     sides = (h, he.twin[h])
+    local = [s - np.searchsorted(he.face, he.face[s]) for s in sides]
+    size = np.where(quad, 4, 3)
     for k in range(2):
         for j in range(2):
             # On each side, the corner triangle at one of the two ends of the edge.
             here, there = (
-                (he.face[s], (local[s] + turn) % size[s])
-                for s, turn in zip(sides, (k, j), strict=True)
+                (he.face[s], (own + turn) % size[he.face[s]])
+                for s, own, turn in zip(sides, local, (k, j), strict=True)
             )
             cosine = dot(*(tuple(n[c, f] for n in normals) for f, c in (here, there)))
             both = sound[(here[1] + 1) % 2, here[0]] & sound[(there[1] + 1) % 2, there[0]]
             found = h[(cosine < below) & both]
             bad += [he.face[found], he.face[he.twin[found]]]
     return np.unique(np.concatenate(bad))
+
+
+def _sharp(normals: tuple[Array, ...], left: Ints, right: Ints, below: float) -> Flags:
+    """Mark the edges between two faces (e,) of which some corner triangles may make a fold.
+
+    The angle between two of them is at most that between the faces' mean normals and, on each
+    side, the largest angle between mean and corners.
+    """
+    mean = [x.sum(axis=0) for x in normals]
+    scale = np.maximum(norm(tuple(mean)), 1e-300)
+    mean = [x / scale for x in mean]
+    cosine = dot(tuple(mean), normals)
+    # A degenerate triangle makes no fold.
+    cosine[norm2(normals) == 0.0] = 1.0
+    spread = np.arccos(np.clip(cosine.min(axis=0), -1.0, 1.0))
+    between = dot(tuple(x[left] for x in mean), tuple(x[right] for x in mean))
+    most = np.arccos(np.clip(between, -1.0, 1.0)) + spread[left] + spread[right]
+    return np.asarray(~(most < np.arccos(below) - 1e-6))
 
 
 def _corner_normals(
@@ -124,7 +143,5 @@ def collapsed(before: Mesh, after: Array, *, share: float = SHORT) -> Ints:
     >>> collapsed(mesh, np.array([[1.0, 0, 0], [0.99, 0, 0], [0, 0, 1]]))
     array([[0, 1]])
     """
-    a, b = before.edges.T
-    was = np.linalg.norm(before.vertices[a] - before.vertices[b], axis=1)
-    now = np.linalg.norm(after[a] - after[b], axis=1)
+    was, now = (norm(sub(*corners(x, before.edges))) for x in (before.vertices, after))
     return np.sort(before.edges[now < share * was], axis=1)

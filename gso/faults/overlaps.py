@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gso import geometry
-from gso.faults.face_pairs import DEPTH, by_triangles, candidates, split
+from gso.faults.face_pairs import DEPTH, by_triangles, candidates, every, split
+from gso.faults.one_to_one import simple_boundary
 from gso.mesh import Mesh
 from gso.mesh.topology import are_quads
 from gso.typing import Array, Flags, Ints
@@ -43,31 +44,43 @@ def overlaps(mesh: Mesh, flat: Array) -> Ints:
     array([], dtype=int64)
     """
     points = flat - flat[mesh.used].mean(axis=0)
-    triangles, count = split(mesh.faces, _other_diagonal(points, mesh.faces))
+    triangles, count = _split(points, mesh.faces)
+    if _covers_once(mesh, points, every(triangles, count)):
+        return np.empty(0, np.int64)
     wound = _wound(points, mesh.faces, triangles, count)
-    return np.unique(np.r_[overlapping(mesh, flat).ravel(), wound])
+    pairs = _overlapping(mesh, points, triangles, count)
+    return np.unique(np.r_[pairs.ravel(), wound])
 
 
 def overlapping(mesh: Mesh, flat: Array) -> Ints:
     """Find the pairs of faces (p, 2) without a common vertex that overlap, as :func:`overlaps`."""
     points = flat - flat[mesh.used].mean(axis=0)
+    triangles, count = _split(points, mesh.faces)
+    if _covers_once(mesh, points, every(triangles, count)):
+        return np.empty((0, 2), np.int64)
+    return _overlapping(mesh, points, triangles, count)
+
+
+def _covers_once(mesh: Mesh, points: Array, triangles: Ints) -> bool:
+    """Tell whether triangles (t, 3) certainly cover no point of the plane twice."""
+    sound = bool((geometry.signed_areas(points, triangles) > 0).all())
+    return sound and simple_boundary(mesh, points)
+
+
+def _overlapping(mesh: Mesh, points: Array, triangles: Ints, count: Ints) -> Ints:
+    """Find the pairs of faces by testing all that are close, split into given triangles."""
     pairs, width = candidates(points, mesh.faces)
-    triangles, count = split(mesh.faces, _other_diagonal(points, mesh.faces))
     which, first, second = by_triangles(pairs, triangles, count)
     met = _meet(points[first], points[second], DEPTH * width[which])
     return np.unique(pairs[which[met]], axis=0)
 
 
-def _other_diagonal(points: Array, faces: Ints) -> Flags:
-    """Mark the quads that have an inverted triangle when split along the diagonal 0-2."""
-    triangles, _ = split(faces)
-    return np.asarray(are_quads(faces) & (_areas(points, triangles).min(axis=1) <= 0))
-
-
-def _areas(points: Array, triangles: Ints) -> Array:
-    """Return the doubled signed areas of triangles (..., 3)."""
-    corners = (tuple(points[triangles[..., k]].T) for k in range(3))
-    return np.asarray(geometry.corner_area2(*corners).T)
+def _split(points: Array, faces: Ints) -> tuple[Ints, Ints]:
+    """Split faces as :func:`split`; along the other diagonal where the first one inverts any."""
+    triangles, count = split(faces)
+    areas = geometry.signed_areas(points, triangles.reshape(-1, 3)).reshape(-1, 2)
+    other = are_quads(faces) & (areas.min(axis=1) <= 0)
+    return split(faces, other) if other.any() else (triangles, count)
 
 
 def _meet(a: Array, b: Array, depth: Array) -> Flags:
@@ -91,8 +104,8 @@ def _meet(a: Array, b: Array, depth: Array) -> Flags:
 
 def _wound(points: Array, faces: Ints, triangles: Ints, count: Ints) -> Ints:
     """Find the faces at vertices whose face angles sum to more than a full turn."""
-    every = np.concatenate([triangles[:, 0], triangles[count == 2, 1]])
+    each = every(triangles, count)
     face = np.r_[np.arange(len(faces)), np.flatnonzero(count == 2)]
-    angles = geometry.corner_angles(points, every)
-    turn = np.bincount(every.ravel(), angles.ravel(), minlength=len(points))
-    return np.asarray(face[(turn[every] > _TURN).any(axis=1)])
+    angles = geometry.corner_angles(points, each)
+    turn = np.bincount(each.ravel(), angles.ravel(), minlength=len(points))
+    return np.asarray(face[(turn[each] > _TURN).any(axis=1)])

@@ -72,6 +72,19 @@ def maximum(x: S, y: S | float) -> S:
     return large
 
 
+def power(x: B, exponent: float) -> B:
+    """Return ``x**exponent``, by multiplications where the exponent is whole and at most eight.
+
+    >>> power(np.array([2.0]), 7.0)
+    array([128.])
+    """
+    whole = int(exponent) if 2.0 < exponent <= 8.0 else 0
+    if whole != exponent:
+        return x**exponent
+    half = power(x, whole // 2)
+    return half * half * x if whole % 2 else half * half
+
+
 def where(condition: object, x: S | float, y: S | float) -> S:
     """Return x where a condition on NumPy arrays or torch tensors holds, and y elsewhere."""
     chosen: S = _module_of(condition).where(condition, x, y)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.geometry.cells import corner_area2
-from gso.geometry.vector import angle, cross, sub
+from gso.geometry.vector import angle, cross, norm2, sub
 from gso.typing import Array, Ints, Vec
 
 
@@ -16,18 +16,22 @@ def area_vectors(points: Array, triangles: Ints) -> Array:
     >>> area_vectors(corners, np.array([[0, 1, 2]]))
     array([[0., 0., 6.]])
     """
-    p, q, r = corners(points, triangles)
-    return np.stack(cross(sub(q, p), sub(r, p)), axis=1)
+    return np.stack(_area_vectors(points, triangles), axis=1)
 
 
 def doubled_areas(points: Array, triangles: Ints) -> Array:
     """Return the doubled areas (t,) of triangles of points (n, 3)."""
-    return np.asarray(np.linalg.norm(area_vectors(points, triangles), axis=1))
+    return np.asarray(np.sqrt(norm2(_area_vectors(points, triangles))))
+
+
+def _area_vectors(points: Array, triangles: Ints) -> Vec[Array]:
+    p, q, r = corners(points, triangles)
+    return cross(sub(q, p), sub(r, p))
 
 
 def signed_areas(flat: Array, triangles: Ints) -> Array:
     """Return the doubled signed areas (t,) of triangles of points (n, 2)."""
-    return corner_area2(*(tuple(flat[triangles[:, k]].T) for k in range(3)))
+    return corner_area2(*corners(flat, triangles))
 
 
 def quad_area_vectors(points: Array, quads: Ints) -> Array:
@@ -52,9 +56,9 @@ def quad_corner_vectors(points: Array, quads: Ints) -> Array:
 
 def corners(points: Array, faces: Ints) -> list[Vec[Array]]:
     """Return the corners (k) of faces (m, k) as component arrays (m,), which are contiguous."""
-    x, y, z = np.ascontiguousarray(points.T)
+    rows = np.ascontiguousarray(points.T)
     columns = (np.ascontiguousarray(c) for c in faces.T)
-    return [(x.take(c), y.take(c), z.take(c)) for c in columns]
+    return [tuple(row.take(c) for row in rows) for c in columns]
 
 
 def corner_angles(points: Array, triangles: Ints) -> Array:

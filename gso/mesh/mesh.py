@@ -225,6 +225,8 @@ class Mesh:
     @cached_property
     def components(self) -> Ints:
         """Component number of each vertex, (n,)."""
+        if self.grid_index is not None:
+            return np.zeros(len(self.vertices), np.int64)
         return topology.label_components(len(self.vertices), *self.edges.T)
 
     def restricted(self, ids: Ints) -> tuple[Mesh, Ints]:

@@ -16,6 +16,7 @@ from gso.metrics.distance import (
     boundary_distance,
     d_H,
     displacement,
+    largest_distance,
     point_to_surface,
     surface_distance,
 )
@@ -79,6 +80,7 @@ __all__ = [
     "flips",
     "isometry_defect",
     "isometry_energy",
+    "largest_distance",
     "loop_ratios",
     "loss_gc",
     "loss_gc_half",

@@ -59,7 +59,7 @@ def _flipped(points: Array, faces: Ints, space: Array | None, *, grid: bool) -> 
     bad = corner_areas(points, quads).reshape(4, -1) <= 0
     turned = bad.any(axis=0) if grid else (bad[0] | bad[2]) & (bad[1] | bad[3])
     flipped: Flags = np.r_[turned, corner_areas(points, tris) <= 0]
-    if space is not None:
+    if space is not None and flipped.any():
         area = space_areas(space, quads).reshape(4, -1).min(axis=0, initial=np.inf)
         area = np.r_[area, space_areas(space, tris)]
         flipped &= area > 1e-12 * np.max(area, initial=0.0)

@@ -10,8 +10,12 @@ from gso import geometry
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.mesh.polyline import Polylines
+from gso.metrics.farthest import farthest
 from gso.metrics.surfaces import SurfaceLike, mesh_of, used_points
 from gso.typing import Array
+
+#: Share of the points that are asked for first: one in so many.
+_FIRST = 64
 
 
 class Distances(NamedTuple):
@@ -47,6 +51,34 @@ def surface_distance(before: SurfaceLike, after: SurfaceLike) -> Distances:
     there = point_to_surface(used_points(b), a)
     back = point_to_surface(used_points(a), b)
     return Distances(float(there.mean()), float(there.max()), float(back.mean()), float(back.max()))
+
+
+def largest_distance(before: SurfaceLike, after: SurfaceLike) -> float:
+    """Return the largest distance of :func:`surface_distance`, in either direction.
+
+    It is found sooner where both surfaces are the same grid, or have the same faces.
+
+    >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
+    >>> largest_distance(grid, grid + [0.0, 0.0, 0.5])
+    0.5
+    """
+    a, b = mesh_of(before), mesh_of(after)
+    here, there, one, two = a.grid, b.grid, a.grid_index, b.grid_index
+    grids = one is not None and two is not None and np.array_equal(one, two)
+    if grids and here is not None and there is not None:
+        return farthest(there, here, farthest(here, there))
+    if not np.array_equal(a.faces, b.faces):
+        found = surface_distance(a, b)
+        return max(found.there_max, found.back_max)
+    bound = np.linalg.norm(a.vertices - b.vertices, axis=1)
+    order = np.flatnonzero(a.used)[np.argsort(-bound[a.used])]
+    known = 0.0
+    for points, surface in ((b, a), (a, b)):
+        tree = Nearest(surface)
+        for ids in np.split(order, [len(order) // _FIRST]):
+            ids = ids[bound[ids] > known]
+            known = max(known, float(tree.distances(points.vertices[ids]).max(initial=0.0)))
+    return known
 
 
 def boundary_distance(before: SurfaceLike, after: SurfaceLike) -> tuple[float, float]:

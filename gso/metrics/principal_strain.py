@@ -8,9 +8,11 @@ import numpy as np
 
 from gso import geometry
 from gso.mesh import topology
-from gso.metrics.areas import space_areas
 from gso.metrics.surfaces import SurfaceLike, components, faces_of, image_of, in_range, points_of
 from gso.typing import Array
+
+#: Triangles per block: their numbers stay in the processor's cache.
+_BLOCK = 16384
 
 
 class Strains(NamedTuple):
@@ -60,20 +62,26 @@ def corner_strains(surface: SurfaceLike, flat: SurfaceLike) -> Array:
 
     In the order of :func:`gso.mesh.topology.corner_triangles`; NaN for triangles without area.
     """
-    tri = topology.corner_triangles(faces_of(surface))
     p, q = in_range(points_of(surface), image_of(surface, flat))
-    area = space_areas(p, tri)
-    keep = area > 1e-12 * area.max()
-    here, there = ([components(x[k]) for k in tri[keep].T] for x in (p, q))
-    if q.shape[1] == 2:
-        a, b, c = there
-        s1, s2 = geometry.singular_values(a, b, c, geometry.rest_frame(*here))
-    else:
-        s1, s2 = geometry.principal_stretches(
-            geometry.first_form(*here), geometry.first_form(*there)
-        )
-    values = np.full(len(tri), np.nan)
-    values[keep] = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0))
+    rows = np.ascontiguousarray(p.T), np.ascontiguousarray(q.T)
+    triangles = topology.corner_triangles(faces_of(surface)).T
+    area, values = np.empty(triangles.shape[1]), np.empty(triangles.shape[1])
+    for start in range(0, len(area), _BLOCK):
+        at = slice(start, start + _BLOCK)
+        here, there = ([tuple(x.take(k, axis=1)) for k in triangles[:, at]] for x in rows)
+        sides = geometry.sub(here[1], here[0]), geometry.sub(here[2], here[0])
+        area[at] = np.sqrt(geometry.norm2(geometry.cross(*sides)))
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            if q.shape[1] == 2:
+                s1, s2 = geometry.singular_values(
+                    there[0], there[1], there[2], geometry.rest_frame(*here)
+                )
+            else:
+                s1, s2 = geometry.principal_stretches(
+                    geometry.first_form(*here), geometry.first_form(*there)
+                )
+            values[at] = np.maximum(np.abs(s1 - 1.0), np.abs(s2 - 1.0))
+    values[~(area > 1e-12 * area.max(initial=0.0))] = np.nan
     return values
 
 

@@ -4,6 +4,7 @@ from gso.parametrization.alignment import align, settle
 from gso.parametrization.arap import Relaxed, relax, strain_level
 from gso.parametrization.embedding import embeddings, flattens, parts, spanned
 from gso.parametrization.initial import begin, flips, given, oriented_triangles, refine, strain
+from gso.parametrization.low_strain import low_strain
 from gso.parametrization.opening import Opened, by_rows, opened, turning
 from gso.parametrization.orientation import SAFETY, orientation
 from gso.parametrization.packing import beside, closest_motion, place, upright
@@ -22,6 +23,7 @@ __all__ = [
     "flattens",
     "flips",
     "given",
+    "low_strain",
     "opened",
     "orientation",
     "oriented_triangles",

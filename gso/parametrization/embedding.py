@@ -60,9 +60,10 @@ def flattens(mesh: Mesh) -> bool:
     >>> flattens(Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
     True
     """
+    every = parts(mesh)
     try:
-        for ids in parts(mesh):
-            _check(mesh.restricted(ids)[0], int(ids[0]))
+        for ids in every:
+            _check(mesh.restricted(ids)[0] if len(every) > 1 else mesh, int(ids[0]))
     except MeshError:
         return False
     return True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -18,7 +19,7 @@ from gso.parametrization.rectangle import rectangle
 from gso.typing import Array, Ints
 
 #: Largest side of a grid whose image starts from a rectangle.
-_COARSE = 40
+COARSE = 40
 #: Strain above which an initial image may be a bad one.
 DOUBTFUL = 0.1
 
@@ -61,7 +62,13 @@ def strain(mesh: Mesh, flat: Array) -> float:
     return strain_level(mesh.vertices, strained_triangles(mesh), flat)
 
 
-def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> Relaxed:
+def begin(
+    mesh: Mesh,
+    *,
+    iterations: int = 100,
+    doubtful: float = DOUBTFUL,
+    relaxation: Callable[[Array], Relaxed] | None = None,
+) -> Relaxed:
     """Compute an image of low squared strain without inverted triangles, and its strain.
 
     Grids start from their rectangle, fine ones from the image of a coarser copy; other meshes
@@ -77,6 +84,8 @@ def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> R
         Largest number of iterations of :func:`gso.parametrization.arap`.
     doubtful : float
         Strain above which the other embeddings are tried.
+    relaxation : callable, optional
+        What lowers the squared strain of an image (n, 2), in place of local and global steps.
 
     Raises
     ------
@@ -84,10 +93,12 @@ def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> R
         A component is closed or has handles.
     """
     strained, kept = strained_triangles(mesh), oriented_triangles(mesh)
-    relaxed = partial(relax, mesh.vertices, strained, oriented=kept, iterations=iterations)
+    relaxed = relaxation or partial(
+        relax, mesh.vertices, strained, oriented=kept, iterations=iterations
+    )
     if mesh.grid is not None:
         first = relaxed(_grid_image(mesh, mesh.grid, iterations))
-        if first.level <= doubtful or max(mesh.grid.shape) > _COARSE:
+        if first.level <= doubtful or max(mesh.grid.shape) > COARSE:
             return first
         images = [flat for flat in embeddings(mesh, strained, kept) if not flips(mesh, flat)]
     else:
@@ -99,7 +110,7 @@ def begin(mesh: Mesh, *, iterations: int = 100, doubtful: float = DOUBTFUL) -> R
 
 
 def _grid_image(mesh: Mesh, grid: Array, iterations: int) -> Array:
-    levels = coarser(mesh, _COARSE) if max(grid.shape) > _COARSE else []
+    levels = coarser(mesh, COARSE) if max(grid.shape) > COARSE else []
     if levels:
         image = _interpolated(begin(levels[-1], iterations=iterations).flat, levels[-1], mesh)
         if not flips(mesh, image):

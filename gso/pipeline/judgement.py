@@ -77,8 +77,10 @@ def _planarity(result: Result) -> tuple[str, ...]:
     """Make a note if the design's quads are planar and the result's are not."""
     if result.design.is_triangles:
         return ()
-    before, after = (float(nonplanarity(m).max()) for m in (result.design, result.mesh))
-    if before > _PLANAR or after <= _BENT:
+    if nonplanarity(result.design).max() > _PLANAR:
+        return ()
+    after = float(nonplanarity(result.mesh).max())
+    if after <= _BENT:
         return ()
     return (
         f"the input's quads are planar, those of the result are not: their diagonals are up to "

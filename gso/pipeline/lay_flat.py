@@ -12,7 +12,7 @@ from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.pipeline.case import Case
 from gso.pipeline.run import Run
-from gso.pipeline.user_result import pattern_of
+from gso.pipeline.user_result import in_user_frame, pattern_of
 from gso.tasks.evaluation import largest_strain
 from gso.tasks.request import Request
 
@@ -21,13 +21,9 @@ _GROUPS, _LARGE = 4, 2000
 
 
 def lay_out(
-    surface: Mesh,
-    given: Pattern | None = None,
-    *,
-    options: str = "fast",
-    formulation: str = "strain",
+    surface: Mesh, given: Pattern | None = None, *, formulation: str = "strain"
 ) -> Pattern | None:
-    """Flatten a surface with little strain, by the flatten task.
+    """Flatten a surface with little strain.
 
     A surface that closes around itself is cut open.
 
@@ -37,10 +33,8 @@ def lay_out(
         In any frame.
     given : Pattern, optional
         An existing pattern of the surface; the one with the smaller maximal strain is returned.
-    options : str
-        Preset of the flatten task.
     formulation : str
-        Formulation of the flatten task.
+        Formulation of the flatten task. By "strain" the task solves only what is far from flat.
 
     Returns
     -------
@@ -58,23 +52,41 @@ def lay_out(
     >>> largest_strain(mesh, lay_out(mesh)) < 1e-3
     True
     """
+    if not parametrization.flattens(surface):
+        return given
     # Imported here because it imports SciPy.
     from gso.tasks import flatten
 
-    if not parametrization.flattens(surface):
-        return given
-    request = Request("flatten", formulation, flatten.Options.preset(options), verdict=False)
-    run = Run(Case(request, surface, Compiled(flat=True)))
+    request = Request("flatten", formulation, flatten.Options.preset("fast"), verdict=False)
+    case = Case(request, surface, Compiled(flat=True))
     try:
-        solution = run.solve()
+        found = _low_strain(case) or _solved(case)
     except MeshError:
         return given
-    found = pattern_of(run.case, solution)
-    if found is None or (solution.cut is not None and surface.grid_index is not None):
+    if found is None or (found.is_cut and surface.grid_index is not None):
         return given
     if given is not None and largest_strain(surface, given) <= largest_strain(surface, found):
         return given
     return found
+
+
+def _low_strain(case: Case) -> Pattern | None:
+    """Return the pattern by the direct method; None where the surface is too far from flat."""
+    from gso.tasks import flatten
+
+    opened = case.analysis.opened
+    if case.request.formulation != "strain":
+        return None
+    image = parametrization.low_strain(opened.mesh, doubtful=opened.doubtful)
+    if image.level > flatten.FAR_FROM_FLAT:
+        return None
+    flat = opened.back(parametrization.place(opened.mesh, image.flat))
+    return in_user_frame(case, flat, opened.cut)
+
+
+def _solved(case: Case) -> Pattern | None:
+    """Return the pattern that the flatten task finds."""
+    return pattern_of(case, Run(case).solve())
 
 
 def strains_of(surface: Mesh, executor: Executor = SERIAL) -> dict[str, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.constraints import TIGHT
+from gso.mesh.cut import Cut
 from gso.pattern import Pattern
 from gso.pipeline.case import Case
 from gso.pipeline.run import Run
@@ -36,9 +37,12 @@ def record_violations(case: Case, points: Array, out: Solution | Result) -> None
 
 def pattern_of(case: Case, solution: Solution) -> Pattern | None:
     """Return the flat image of a solution in the user's unit and numbering; None without one."""
-    flat, cut = solution.blocks.get("flat"), solution.cut
-    if flat is None:
-        return None
+    flat = solution.blocks.get("flat")
+    return None if flat is None else in_user_frame(case, flat, solution.cut)
+
+
+def in_user_frame(case: Case, flat: Array, cut: Cut | None) -> Pattern:
+    """Return a flat image of the design, or of the design cut open, in the user's frame."""
     if cut is None:
         return Pattern.whole(case.design, case.frame.back("flat", flat) * case.frame.scale)
     # The numbering of a cut mesh begins with the user's.

@@ -57,7 +57,9 @@ class Result:
     history : list of Progress
         One entry per iteration.
     seconds : dict of str to float
-        Time by phase.
+        Time by part. Those of the solve are "setup", "evaluate" and "factor" (of the equations)
+        and "search" (along lines); "pattern", of `developable`, to lay the result flat; "verdict",
+        to judge it; "total", these and what is left.
     backend : str
         Linear solver of the last stage, and where it ran.
     warm_start : str

@@ -97,5 +97,4 @@ def within(
 def deviation(pieces: Pieces, result: Result) -> float:
     """Return the largest distance between the design and a result, in both directions."""
     shape = pieces if result.pieces is None else result.pieces
-    away = metrics.surface_distance(pieces.design, shape.design)
-    return max(away.there_max, away.back_max)
+    return metrics.largest_distance(pieces.design, shape.design)

@@ -138,8 +138,7 @@ def _attempt(
             strained = strains_of(cut_open.opened.mesh).get("strain_max", np.inf) / strain
             return _Attempt(level, proximity, cut_open, None, cut_open, strained)
         shape = cut_open if result.pieces is None else result.pieces
-        away = metrics.surface_distance(ground.mesh, shape.design)
-        far = max(away.there_max, away.back_max) / allowed
+        far = metrics.largest_distance(ground.mesh, shape.design) / allowed
         strained = uneven = 0.0
         if far <= _HOPELESS:
             strains = strains_of(result.mesh, wishes.executor)

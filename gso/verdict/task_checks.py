@@ -33,7 +33,7 @@ def developable(result: Result, limits: Limits, violation: float) -> tuple[Measu
 
     design, mesh = result.design, result.mesh
     measured, bounds = _away(
-        result, metrics.surface_distance(design, mesh), limits, violation, _FAR
+        result, metrics.largest_distance(design, mesh), limits, violation, _FAR
     )
     strain, allowed = np.inf, limits.max_strain
     if allowed is None and limits.max_deviation is not None:
@@ -47,11 +47,12 @@ def developable(result: Result, limits: Limits, violation: float) -> tuple[Measu
     elif limits.max_strain is not None:
         measured[Code.NO_PATTERN] = Measurement(1.0)
     scale = metrics.unit(design)
-    before, after = (metrics.loss_gc_worst(m, scale=scale) for m in (design, mesh))
+    after = metrics.loss_gc_worst(mesh, scale=scale)
     target = limits.target_curvature
     measured[Code.TARGET_CURVATURE] = curvature = Measurement(after)
     bounds[Code.TARGET_CURVATURE] = target
     if violation <= 0 and after > max(Options().developable_below, target or 0.0):
+        before = metrics.loss_gc_worst(design, scale=scale)
         measured[Code.CURVATURE_ROSE] = curvature
         bounds[Code.CURVATURE_ROSE] = before
         same = after <= (1.0 + Code.CURVATURE_ROSE.info.tolerance) * before
@@ -67,7 +68,9 @@ def strips(result: Result, limits: Limits, violation: float) -> tuple[Measured, 
     surface = result.ruled
     if surface is None:
         return {}, {}
-    measured, bounds = _away(result, result.distances, limits, violation, _STRIPS)
+    far = result.distances
+    deviation = max(far.there_max, far.back_max)
+    measured, bounds = _away(result, deviation, limits, violation, _STRIPS)
     measured[Code.RULINGS_CROSS] = Measurement(float(surface.crossed))
     measured[Code.STRAIN] = Measurement(_strains(result.mesh, surface.pattern).max())
     bounds[Code.STRAIN] = limits.max_strain
@@ -83,10 +86,10 @@ def denoise(result: Result, limits: Limits, violation: float) -> tuple[Measured,
 
 
 def _away(
-    result: Result, far: metrics.Distances, limits: Limits, violation: float, share: float
+    result: Result, deviation: float, limits: Limits, violation: float, share: float
 ) -> tuple[Measured, Bounds]:
     """Measure the distance to the design, also as a share of its diagonal."""
-    deviation, diagonal = max(far.there_max, far.back_max), result.design.diagonal
+    diagonal = result.design.diagonal
     # Far from the origin, distances are only known up to the rounding of the coordinates.
     return {
         Code.DEVIATION: Measurement(deviation, slack=1e-12 * diagonal),

@@ -193,7 +193,7 @@ class Strain:
         o = self.options
         r = self.residuals(flat)
         level = self.level(r.detach()).clamp_min(_LEAST_STRAIN)[:, None, None].expand_as(r[0])
-        knee = o.knee * flatten.knee_factor(level)
+        knee = stretch.lowered(o.knee, level)
         # The terms' losses take elements along a single axis.
         spread = stretch.TwoPowerLoss(level.reshape(-1), knee=knee.reshape(-1))  # type: ignore[arg-type]
         cost = spread.value(r.reshape(12, -1)).reshape(4, *r.shape[1:]).mean(dim=(0, 2, 3))

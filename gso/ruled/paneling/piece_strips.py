@@ -178,8 +178,7 @@ def _distance_left(joint: _Joint, request: StripsRequest, light: LightDesign) ->
     allowed = light.allowed
     if allowed is None:
         return None if request.options.number else _NEAR * joint.design.diagonal
-    away = metrics.surface_distance(light.mesh, joint.shape.design)
-    left = allowed - max(away.there_max, away.back_max)
+    left = allowed - metrics.largest_distance(light.mesh, joint.shape.design)
     return float(np.clip(left, _LEAST * allowed, _MOST * allowed))
 
 

@@ -146,5 +146,4 @@ def _with_end_of(best: Solution, last: Solution) -> Solution:
 
 def _distance(analysis: Analysis, solution: Solution) -> float:
     """Return the largest distance between the design and a solution, in both directions."""
-    found = metrics.surface_distance(analysis.mesh, analysis.mesh.replaced(solution.points))
-    return max(found.there_max, found.back_max)
+    return metrics.largest_distance(analysis.mesh, analysis.mesh.replaced(solution.points))

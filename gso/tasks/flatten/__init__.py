@@ -30,7 +30,6 @@ from gso.tasks.flatten.stages import (
     FAR_FROM_FLAT,
     SMALLEST_LEVEL,
     STRAINED,
-    knee_factor,
     planned_stages,
     strain_stage,
 )
@@ -38,7 +37,7 @@ from gso.tasks.request import Request
 from gso.typing import Array
 from gso.unknowns import Layout
 
-__all__ = ["TASK", "Options", "knee_factor"]
+__all__ = ["FAR_FROM_FLAT", "TASK", "Options"]
 
 
 def plan(analysis: Analysis, request: Request[Options]) -> Plan:

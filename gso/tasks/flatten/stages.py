@@ -22,21 +22,18 @@ from gso.energy import (
     stretch,
 )
 from gso.energy.losses import Absolute
-from gso.geometry import ops
 from gso.mesh import Mesh
 from gso.tasks import per_component
 from gso.tasks.base import Stage, same
 from gso.tasks.flatten.options import Options
 from gso.tasks.request import Request
-from gso.typing import Array, N
+from gso.typing import Array
 from gso.unknowns import Layout, free
 
 #: Lower bound on the strain level: smaller strains are rounding errors.
 SMALLEST_LEVEL = 1e-7
 #: Root-mean-square strain above which the user is told to cut the surface.
 FAR_FROM_FLAT = 0.1
-#: Strain level above which the knee is lowered, so that large strains cost more.
-_LARGE_STRAIN = 0.03
 #: Tolerance (relative decrease of the energy) of all stages but the last.
 _NEARLY = 1e-2
 #: Ratio of a start's strain to the level above which an "l2" stage precedes the other loss.
@@ -125,16 +122,11 @@ def _strain_terms(options: Options, mesh: Mesh, level: float) -> list[Weighted]:
         loss = stretch.TwoPowerLoss(level, knee=np.inf, eps=0.03)
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
     else:
-        loss = stretch.TwoPowerLoss(level, knee=options.knee * float(knee_factor(level)))
+        loss = stretch.TwoPowerLoss(level, knee=stretch.lowered(options.knee, np.float64(level)))
         items += [Weighted(t, 1.0, loss) for t in stretch.build(mesh)]
         # `TwoPowerLoss` too costs level times the strain where strains are small.
         items.append(Weighted(edges.build(mesh), options.w_edges * level, Absolute(0.1 * level)))
     return items
-
-
-def knee_factor(level: N) -> N:
-    """Compute the factor on the knee: below one where the strain level is large."""
-    return ops.minimum(ops.maximum((_LARGE_STRAIN / level) ** (1 / 3), 0.68), 1.0)
 
 
 def _length_stage(options: Options, mesh: Mesh, level: float) -> Stage:
