@@ -26,7 +26,7 @@ from gso.dataset.store import Dataset
 from gso.dataset.summary import summarise
 from gso.errors import DatasetError, MeshError, OptionError
 from gso.executors import Executor, open_executor
-from gso.io import replacing
+from gso.io.atomic import write_bytes
 from gso.linalg import blas_threads
 from gso.spelling import choices
 from gso.typing import AnyPath, Json
@@ -250,8 +250,7 @@ def _make(
         with _kept(f"; {done} of {total} {what}"):
             path = place / task.name
             path.parent.mkdir(exist_ok=True)
-            with replacing(path) as file:
-                file.write(made.result)
+            write_bytes(path, made.result)
         done += len(task.ids)
         if tick is not None:
             tick(what, done, total)

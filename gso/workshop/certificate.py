@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gso.io.json_file import plain
 from gso.mesh import Mesh
 from gso.workshop.panels import Panel
 from gso.workshop.part import Part
@@ -115,17 +115,3 @@ def chord(outline: np.ndarray[Any, Any]) -> float:
     smooth = np.where(turn < np.radians(30.0), turn, 0.0)
     at_ends = np.maximum(smooth, np.roll(smooth, -1))
     return float((size * at_ends / 8.0).max(initial=0.0))
-
-
-def plain(value: Any) -> Any:
-    """Replace what JSON lacks: NumPy numbers, and numbers that are not finite by None."""
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(v) for v in value]
-    if isinstance(value, bool | str) or value is None:
-        return value
-    if isinstance(value, int | np.integer):
-        return int(value)
-    number = float(value)
-    return number if math.isfinite(number) else None

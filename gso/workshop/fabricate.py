@@ -14,17 +14,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
+from gso.io.json_file import plain, write_json
 from gso.mesh import Mesh
 from gso.quantities import Length, Strain, as_length, as_strain, millimetres
 from gso.seams.options import as_sheet
 from gso.verdict import Code, Reason, failure, ordered
 from gso.workshop.asking import Ask
-from gso.workshop.certificate import design_record, digest, plain, versions
+from gso.workshop.certificate import design_record, digest, versions
 from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
 from gso.workshop.designs import designs_of, several
 from gso.workshop.finish import Finish
-from gso.workshop.job_folder import WORK, close, opened
+from gso.workshop.job_folder import CERTIFICATE, WORK, opened
 from gso.workshop.marks import check_lines
 from gso.workshop.names import different
 from gso.workshop.nesting import checked_options, nest
@@ -277,7 +278,7 @@ def fabricate(
     files = written(place, parts, sheets, found.values(), certificate, drawings, earlier)
     certificate["files"] = files
     certificate["seconds"] = time.perf_counter() - clock
-    close(place, certificate)
+    write_json(place / CERTIFICATE, certificate)
     return Fabrication(place, tuple(parts), tuple(sheets), certificate, tuple(files))
 
 

@@ -15,9 +15,10 @@ import numpy as np
 from gso import io
 from gso.errors import GSOError, MeshError
 from gso.executors import open_executor
+from gso.io.json_file import plain
 from gso.verdict import Reason
 from gso.workshop.asking import Ask
-from gso.workshop.certificate import digest, plain
+from gso.workshop.certificate import digest
 from gso.workshop.designs import Design
 from gso.workshop.making import made
 from gso.workshop.panels import Made

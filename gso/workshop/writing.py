@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gso import io
+from gso.io.atomic import write_bytes
 from gso.workshop import writers
 from gso.workshop.job_folder import CERTIFICATE, PAGE, PAPER
 from gso.workshop.page import page
@@ -90,8 +91,7 @@ def written(
             (place / name).parent.mkdir(exist_ok=True)
             io.write(panel.surface, place / name)
             files.append(name)
-    with io.replacing(place / PAGE) as file:
-        file.write(page(certificate, parts, sheets).encode())
+    write_bytes(place / PAGE, page(certificate, parts, sheets).encode())
     files += [PAGE, CERTIFICATE]
     for name in earlier - set(files):
         (place / name).unlink(missing_ok=True)
