@@ -15,11 +15,11 @@ from click.testing import CliRunner
 import gso
 from gso.cli import fabricate_command, main
 from gso.errors import GSOError, MeshError, OptionError
+from gso.geometry.polygon import signed_area
 from gso.mesh import Mesh
 from gso.verdict import Code, describe
 from gso.workshop import work
 from gso.workshop.finish import Finish
-from gso.workshop.part import signed_area
 from gso.workshop.thickness import Thickness
 from tests.test_pieces import dome
 from tests.test_workshop import arch

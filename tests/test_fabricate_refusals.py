@@ -22,12 +22,12 @@ from gso.workshop.checks import judge_sheet
 from gso.workshop.designs import Design, designs_of
 from gso.workshop.finish import Finish
 from gso.workshop.making import made
-from gso.workshop.marks import to_pattern, to_surface
-from gso.workshop.parts import drawn, fitted, parts_of
+from gso.workshop.marks import to_pattern
+from gso.workshop.parts import drawn, fitted
 from gso.workshop.thickness import Thickness, thickened
 from tests.conftest import codes
 from tests.test_pieces import dome
-from tests.test_workshop import arch, bent
+from tests.test_workshop import arch, bent, parts_of, to_surface
 
 pytest.importorskip("ezdxf")
 shapely = pytest.importorskip("shapely")

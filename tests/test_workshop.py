@@ -10,7 +10,9 @@ import shapely
 
 import gso
 from gso.errors import MeshError, OptionError
+from gso.geometry.polygon import signed_area
 from gso.mesh import Mesh
+from gso.mesh.closest_point import Nearest
 from gso.pattern import Bend
 from gso.verdict import Code
 from gso.workshop.asking import Ask
@@ -20,8 +22,8 @@ from gso.workshop.finish import Finish
 from gso.workshop.making import made
 from gso.workshop.offsets import offset, with_allowance
 from gso.workshop.panels import Made
-from gso.workshop.part import Part, signed_area
-from gso.workshop.parts import mirrored, parts_of, scaled
+from gso.workshop.part import Part
+from gso.workshop.parts import fitted, parts_from, scaled
 from gso.workshop.thickness import Thickness
 from tests.test_pieces import dome
 
@@ -42,6 +44,22 @@ def cone(n: int = 65, turn: float = np.pi / 2) -> Mesh:
 
 
 SQUARE = Part("square", np.array([[0.0, 0], [100, 0], [100, 50], [0, 50]]))
+
+
+def parts_of(whole, scale, finish, marks=(), holes=()):
+    """The parts of a design, whose holes can all be cut."""
+    own = fitted(whole, scale, finish, marks, holes)
+    if own.reasons:
+        raise OptionError("; ".join(map(str, own.reasons)))
+    return parts_from(own, finish)
+
+
+def to_surface(panel, points):
+    """Points (k, 2) of a panel's pattern, carried to its surface, (k, 3)."""
+    triangles = panel.surface.triangles
+    flat, given = (np.pad(x, ((0, 0), (0, 1))) for x in (panel.flat, points))
+    place, shares, _ = Nearest.of(flat, triangles).locate(given)
+    return np.einsum("kc,kcd->kd", shares, panel.surface.vertices[triangles[place]])
 
 
 def bent(angles, width=1.0, radius=np.inf):
@@ -234,7 +252,7 @@ class TestOffsets:
 
     def test_turning_over_mirrors_and_swaps_folds(self):
         part = parts_of(made(Design("arch", arch()), Ask()), 100.0, Finish())[0]
-        back = mirrored(part)
+        back = part.mirrored()
         assert back.area == pytest.approx(part.area)
         assert [b.angle for b in back.bends] == [-b.angle for b in part.bends]
 
@@ -382,7 +400,7 @@ class TestMaking:
 
 class TestMarks:
     def test_points_go_to_the_pattern_and_back(self):
-        from gso.workshop.marks import to_pattern, to_surface
+        from gso.workshop.marks import to_pattern
 
         whole = made(Design("dome", dome(17, height=0.6)), Ask())
         rng = np.random.default_rng(0)

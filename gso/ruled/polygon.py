@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso.geometry.polygon import arc_lengths
 from gso.typing import Array, Ints
 
 #: Turning angles of sharp corners, and the largest for which offsets are lengthened.
 _SHARP, _MITRE = 0.5, 2.0
-
-
-def enclosed_area(loop: Array) -> float:
-    """Return the signed area of a polygon (k, 2)."""
-    x, y = loop.T
-    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
 
 
 def resampled(loop: Array, count: int) -> tuple[Array, Array]:
@@ -23,7 +18,7 @@ def resampled(loop: Array, count: int) -> tuple[Array, Array]:
     the offset is longer, so that the offset polygon has corners too.
     """
     closed = np.vstack([loop, loop[:1]])
-    along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))]
+    along = arc_lengths(closed)
     at = np.linspace(0.0, along[-1], count, endpoint=False)
     turn = turning(loop)
     for k in np.argsort(turn):

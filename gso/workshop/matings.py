@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from gso.cut_pieces import Pieces
+from gso.geometry.polygon import arc_lengths
 from gso.mesh.polyline import Polylines
 from gso.pattern import Pattern
 from gso.seams.chains import chains
@@ -45,7 +46,7 @@ def of_pattern(points: Array, pattern: Pattern, label: Ints, local: Ints) -> lis
             for side, ends in zip(both, copies if first else copies[::-1], strict=True):
                 side += ends.tolist() if not side else [int(ends[1])]
         one, two = (_side(np.array(side), label, local) for side in both)
-        out.append(Mating(0, _lengths(points[line]), one, two))
+        out.append(Mating(0, arc_lengths(points[line]), one, two))
     return out
 
 
@@ -102,10 +103,6 @@ def _directed(pattern: Pattern, seams: Ints) -> list[bool]:
 
 def _side(vertices: Ints, label: Ints, local: Ints) -> Side:
     return Side.of(int(label[vertices[0]]), local[vertices])
-
-
-def _lengths(line: Array) -> Array:
-    return np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
 
 
 def _nearest(

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from gso.errors import OptionError
+from gso.geometry.polygon import anticlockwise, signed_area
 from gso.typing import Array
 from gso.workshop import sparrow
-from gso.workshop.part import Drawing, Part, signed_area
+from gso.workshop.part import Drawing, Part
 from gso.workshop.rectangles import ORDERS, packed
 
 #: Largest number of corners of the polygons that are nested.
@@ -220,8 +221,7 @@ def _item(part: Part, rotations: Any, spacing: float) -> _Item:
         if len(outline) <= _CORNERS:
             break
         grow *= 2.0
-    shape = outline if signed_area(outline) > 0 else outline[::-1]
-    return _Item(own, shape, by, angles)
+    return _Item(own, anticlockwise(outline), by, angles)
 
 
 def _angles(rotations: Any) -> tuple[float, ...] | None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gso.errors import MeshError
+from gso.geometry.polygon import arc_lengths
 from gso.mesh import Mesh
 from gso.pattern import Bend, Folded
 from gso.typing import Array, Ints
@@ -113,11 +114,8 @@ class Mating:
 
     def mismatch(self, panels: tuple[Panel, ...]) -> float:
         """Return how much the lengths of both sides in the patterns differ at most."""
-        both = []
-        for side in (self.one, self.two):
-            line = side.on(panels[side.panel].flat)
-            both.append(np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-        return float(np.ptp(both[0] - both[1]))
+        one, two = (arc_lengths(s.on(panels[s.panel].flat)) for s in (self.one, self.two))
+        return float(np.ptp(one - two))
 
 
 @dataclass(frozen=True, eq=False)

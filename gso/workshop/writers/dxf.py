@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from gso.pattern import Bend
-from gso.workshop.part import Drawing
+from gso.workshop.part import Drawing, Label
 from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import Layer
-from gso.workshop.writers.strokes import Line, Text
+from gso.workshop.writers.strokes import Line
 
 SUFFIX = ".dxf"
 PACKAGE = "ezdxf"
@@ -119,7 +119,7 @@ def _data(bend: Bend) -> list[tuple[int, str | float]]:
     return [*data, (1041, float(bend.radius))] if np.isfinite(bend.radius) else data
 
 
-def _text(space: Any, text: Text, layer: str) -> Any:
+def _text(space: Any, text: Label, layer: str) -> Any:
     from ezdxf.enums import TextEntityAlignment
 
     made = space.add_text(
