@@ -14,6 +14,7 @@ from gso.workshop.job_folder import CERTIFICATE, PAGE, PAPER
 from gso.workshop.page import page
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
+from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import layer_set
 from gso.workshop.writers.pdf import check_paper
 
@@ -78,8 +79,7 @@ def written(
 
     for suffix in drawings.formats:
         for part in parts:
-            times = f", {part.count} times" if part.count > 1 else ""
-            drawing = Drawing((part,), title=part.name + times)
+            drawing = Drawing((part,), title=strokes.title(part))
             write(drawing, f"parts/{part.name}.{suffix}", suffix)
         for number, drawing in enumerate(sheets, start=1):
             write(drawing, f"sheets/sheet-{number}.{suffix}", suffix)

@@ -200,20 +200,20 @@ def _depth(part: Part) -> float:
 
 def _grain(part: Part, grain: Array) -> list[Line]:
     """Return the grain line, inside the part and close to its middle, and the head of its arrow."""
+    import shapely
+
     along = grain / np.hypot(*grain)
     across = np.array([-along[1], along[0]])
-    low, high = part.outline.min(axis=0), part.outline.max(axis=0)
-    middle = 0.5 * (low + high)
-    crossed = []
-    for polygon in (part.outline, *part.holes):
-        x, y = (polygon - middle) @ along, (polygon - middle) @ across
-        x1, y1 = np.roll(x, -1), np.roll(y, -1)
-        cut = (y > 0) != (y1 > 0)
-        crossed.append(x[cut] + (x1 - x)[cut] * (y / np.where(cut, y - y1, 1.0))[cut])
-    ends = np.sort(np.concatenate(crossed))[: 2 * (sum(map(len, crossed)) // 2)].reshape(-1, 2)
-    if len(ends) == 0:
-        ends = 0.5 * min(part.size) * np.array([[-1.0, 1.0]])
-    start, end = ends[np.argmax(np.ptp(ends, axis=1))]
+    middle = part.low + 0.5 * np.array(part.size)
+    far = np.hypot(*part.size) * along
+    inside = shapely.intersection(
+        shapely.make_valid(shapely.Polygon(part.outline, part.holes)),
+        shapely.LineString([middle - far, middle + far]),
+    )
+    chord = max(shapely.get_parts(inside), key=shapely.length, default=inside)
+    least = 0.5 * min(part.size)
+    ends = (shapely.get_coordinates(chord) - middle) @ along
+    start, end = (ends.min(), ends.max()) if chord.length > 0 else (-least, least)
     half = 0.5 * _GRAIN * (end - start)
     centre = middle + 0.5 * (start + end) * along
     tail, tip = centre - half * along, centre + half * along
