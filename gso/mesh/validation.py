@@ -95,7 +95,7 @@ def checked_table(faces: ArrayLike, count: int) -> Ints:
     tri = table[:, 3] == -1 if table.shape[1] == 4 else np.ones(len(table), bool)
     inside = (table >= 0) & (table < count)
     inside[tri, 3:] = True
-    _refuse(table, ~inside.all(axis=1), f"points outside the {count} vertices")
+    _refuse(table, np.asarray(~inside.all(axis=1)), f"points outside the {count} vertices")
     return table
 
 
