@@ -17,11 +17,11 @@ from gso.mesh.closest_point import Nearest
 from gso.pattern import Bend
 from gso.verdict import Code
 from gso.workshop import work
-from gso.workshop.asking import Ask
 from gso.workshop.checks import judge_sheet
+from gso.workshop.design_panels import made
 from gso.workshop.designs import Design, designs_of
+from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
-from gso.workshop.making import made
 from gso.workshop.marks import to_pattern
 from gso.workshop.parts import drawn, fitted
 from gso.workshop.thickness import Thickness, thickened
@@ -40,12 +40,12 @@ def small():
 
 @pytest.fixture(scope="module")
 def cylinder():
-    return made(Design("arch", arch()), Ask())
+    return made(Design("arch", arch()), FabricationSettings())
 
 
 @pytest.fixture(scope="module")
 def strips():
-    return made(Design("dome", dome(17, height=0.6)), Ask(max_deviation="3%"))
+    return made(Design("dome", dome(17, height=0.6)), FabricationSettings(max_deviation="3%"))
 
 
 class TestFolder:
@@ -146,7 +146,7 @@ class TestSheets:
 
     def why(self, whole, **thickness):
         finish = Finish(thickness=Thickness(**thickness))
-        return judge_sheet(fitted(whole, 1.0, finish), Ask(), finish)
+        return judge_sheet(fitted(whole, 1.0, finish), FabricationSettings(), finish)
 
     def test_a_thin_sheet_is_fine(self, cylinder):
         assert self.why(cylinder, sheet=0.02) == ()
@@ -167,7 +167,7 @@ class TestSheets:
         assert why.code is Code.BENDS_NEAR and why.value < why.bound
 
     def test_a_part_without_bend_lines_is_refused_where_the_thickness_matters(self):
-        flat = made(Design("arch", arch()), Ask(formulation="curvature"))
+        flat = made(Design("arch", arch()), FabricationSettings(formulation="curvature"))
         assert not len(flat.panels[0].bends)
         assert flat.record["bend_radius_min"] == pytest.approx(1.0, rel=0.05)
         assert self.why(flat, sheet=0.02) == ()
@@ -184,9 +184,13 @@ class TestSheets:
 
     @pytest.mark.parametrize("formulation", ["curvature", "flatten"])
     def test_the_smallest_radius_counts_without_bend_lines(self, formulation):
-        flat = made(Design("arch", arch()), Ask(formulation=formulation, min_radius=0.5))
+        flat = made(
+            Design("arch", arch()), FabricationSettings(formulation=formulation, min_radius=0.5)
+        )
         assert not flat.reasons
-        flat = made(Design("arch", arch()), Ask(formulation=formulation, min_radius=2.0))
+        flat = made(
+            Design("arch", arch()), FabricationSettings(formulation=formulation, min_radius=2.0)
+        )
         (why,) = flat.reasons
         assert (why.code, why.bound) == (Code.BEND_RADIUS, 2.0)
         assert why.value == flat.record["bend_radius_min"] < 2.0

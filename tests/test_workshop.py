@@ -15,11 +15,11 @@ from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.pattern import Bend
 from gso.verdict import Code
-from gso.workshop.asking import Ask
 from gso.workshop.congruent import origins
+from gso.workshop.design_panels import made
 from gso.workshop.designs import Design
+from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
-from gso.workshop.making import made
 from gso.workshop.offsets import offset, with_allowance
 from gso.workshop.panels import Made
 from gso.workshop.part import Part
@@ -251,7 +251,7 @@ class TestOffsets:
             offset(SQUARE, -30.0)
 
     def test_turning_over_mirrors_and_swaps_folds(self):
-        part = parts_of(made(Design("arch", arch()), Ask()), 100.0, Finish())[0]
+        part = parts_of(made(Design("arch", arch()), FabricationSettings()), 100.0, Finish())[0]
         back = part.mirrored()
         assert back.area == pytest.approx(part.area)
         assert [b.angle for b in back.bends] == [-b.angle for b in part.bends]
@@ -259,7 +259,9 @@ class TestOffsets:
 
 class TestParts:
     def test_a_cylinder_is_a_rectangle_with_mountain_folds(self):
-        part = parts_of(made(Design("arch", arch()), Ask()), 1000.0, Finish(notches=None))[0]
+        part = parts_of(
+            made(Design("arch", arch()), FabricationSettings()), 1000.0, Finish(notches=None)
+        )[0]
         # The arc is a polygon of 64 chords; the strip is fitted within a tenth of a per mille.
         assert part.size == pytest.approx((2000.0, 500 * np.pi), rel=3e-4)
         assert part.area == pytest.approx(part.size[0] * part.size[1], rel=1e-3)
@@ -273,12 +275,14 @@ class TestParts:
     def test_the_inside_of_a_cylinder_has_valley_folds(self):
         mesh = arch()
         inside = Mesh(mesh.vertices, mesh.faces[:, ::-1])
-        part = parts_of(made(Design("arch", inside), Ask()), 1000.0, Finish())[0]
+        part = parts_of(made(Design("arch", inside), FabricationSettings()), 1000.0, Finish())[0]
         assert all(bend.angle < 0 for bend in part.bends if abs(bend.angle) > np.radians(2))
 
     def test_notches_of_strips_are_at_the_same_places_of_both_sides(self):
         design = dome(17, height=0.6)
-        whole = made(Design("dome", design), Ask(max_deviation=0.03 * design.diagonal))
+        whole = made(
+            Design("dome", design), FabricationSettings(max_deviation=0.03 * design.diagonal)
+        )
         assert len(whole.panels) > 1
         parts = parts_of(whole, 100.0, Finish(notches=20.0))
         strips = [s for s in whole.matings if s.mismatch(whole.panels) < 1e-9]
@@ -299,7 +303,9 @@ class TestParts:
     @pytest.mark.slow
     def test_notches_of_pieces_are_at_equal_arc_lengths(self):
         design = dome(9, height=1.0)
-        whole = made(Design("dome", design), Ask(max_deviation=0.01 * design.diagonal))
+        whole = made(
+            Design("dome", design), FabricationSettings(max_deviation=0.01 * design.diagonal)
+        )
         assert any(whole.record["strips"]) and not all(seam.common for seam in whole.matings)
         parts = parts_of(whole, 1000.0, Finish(notches=100.0, labels=None))
         for seam in whole.matings:
@@ -309,7 +315,9 @@ class TestParts:
     @pytest.mark.slow
     def test_seams_of_strained_patterns_differ_by_no_more_than_the_strain(self):
         design = dome(17, height=0.6)
-        whole = made(Design("dome", design), Ask(formulation="flatten", max_strain=0.02))
+        whole = made(
+            Design("dome", design), FabricationSettings(formulation="flatten", max_strain=0.02)
+        )
         assert len(whole.panels) > 1 and not whole.reasons
         for seam in whole.matings:
             most = 2.0 * whole.record["strain_max"] * seam.length
@@ -317,7 +325,9 @@ class TestParts:
 
     def test_notches_point_into_the_part(self):
         design = dome(17, height=0.6)
-        whole = made(Design("dome", design), Ask(max_deviation=0.03 * design.diagonal))
+        whole = made(
+            Design("dome", design), FabricationSettings(max_deviation=0.03 * design.diagonal)
+        )
         for part in parts_of(whole, 100.0, Finish(notches=30.0, labels=None)):
             shape = shapely.Polygon(part.outline)
             assert part.notches
@@ -327,7 +337,9 @@ class TestParts:
 
     def test_tabs_lie_outside_and_do_not_overlap(self):
         design = dome(17, height=0.6)
-        whole = made(Design("dome", design), Ask(max_deviation=0.03 * design.diagonal))
+        whole = made(
+            Design("dome", design), FabricationSettings(max_deviation=0.03 * design.diagonal)
+        )
         plain = parts_of(whole, 100.0, Finish(notches=None, labels=None))
         tabbed = parts_of(whole, 100.0, Finish(notches=None, labels=None, tabs=5.0))
         assert sum(len(part.creases) for part in tabbed) > 0
@@ -337,7 +349,9 @@ class TestParts:
 
     def test_registration_holes_are_inside(self):
         design = dome(17, height=0.6)
-        whole = made(Design("dome", design), Ask(max_deviation=0.03 * design.diagonal))
+        whole = made(
+            Design("dome", design), FabricationSettings(max_deviation=0.03 * design.diagonal)
+        )
         parts = parts_of(whole, 100.0, Finish(notches=30.0, registration=(1.0, 2.0)))
         assert any(part.holes for part in parts)
         for part in parts:
@@ -346,7 +360,9 @@ class TestParts:
 
     def test_areas_agree_with_the_surface(self):
         design = dome(17, height=0.4)
-        whole = made(Design("dome", design), Ask(formulation="flatten", max_strain=0.01))
+        whole = made(
+            Design("dome", design), FabricationSettings(formulation="flatten", max_strain=0.01)
+        )
         strain = whole.record["strain_max"]
         for panel, part in zip(
             whole.panels, parts_of(whole, 1.0, Finish(labels=None)), strict=True
@@ -357,7 +373,7 @@ class TestParts:
 
 class TestMaking:
     def test_a_strongly_curved_design_is_cut_into_pieces(self):
-        whole = made(Design("dome", dome(17, height=1.0)), Ask())
+        whole = made(Design("dome", dome(17, height=1.0)), FabricationSettings())
         assert not whole.reasons
         assert whole.record["pieces"] > 1
         assert whole.record["deviation_max"] <= 1.000001 * whole.record["allowed"]
@@ -367,7 +383,7 @@ class TestMaking:
 
     def test_what_cannot_be_made_says_so_and_gives_the_best(self):
         design = dome(9, height=1.0)
-        whole = made(Design("dome", design), Ask(max_deviation=1e-6))
+        whole = made(Design("dome", design), FabricationSettings(max_deviation=1e-6))
         assert len(whole.panels) > 0
         why = next(r for r in whole.reasons if r.code is Code.DEVIATION)
         assert (why.value, why.bound) == (whole.record["deviation_max"], 1e-6)
@@ -376,19 +392,19 @@ class TestMaking:
     def test_it_can_be_stored_and_read_again(self, tmp_path):
         from gso.workshop.work import key, store, stored
 
-        design, ask = dome(9), Ask()
-        whole = made(Design("dome", design), ask)
+        design, settings = dome(9), FabricationSettings()
+        whole = made(Design("dome", design), settings)
         path = tmp_path / "dome.npz"
-        store(whole, key(Design("dome", design), ask), path)
-        again = stored("dome", key(Design("dome", design), ask), path)
+        store(whole, key(Design("dome", design), settings), path)
+        again = stored("dome", key(Design("dome", design), settings), path)
         assert isinstance(again, Made)
         assert len(again.matings) == len(whole.matings)
         assert again.reasons == whole.reasons
         for one, two in zip(scaled(whole.panels, 1, Finish()), again.panels, strict=True):
             np.testing.assert_array_equal(one.flat, two.flat)
-        assert stored("dome", key(Design("dome", dome(9, 0.3)), ask), path) is None
+        assert stored("dome", key(Design("dome", dome(9, 0.3)), settings), path) is None
         path.write_bytes(b"damaged")
-        assert stored("dome", key(Design("dome", design), ask), path) is None
+        assert stored("dome", key(Design("dome", design), settings), path) is None
 
     def test_moved_copies_are_found_and_mirrored_ones_are_not(self):
         mesh = dome(9)
@@ -402,7 +418,7 @@ class TestMarks:
     def test_points_go_to_the_pattern_and_back(self):
         from gso.workshop.marks import to_pattern
 
-        whole = made(Design("dome", dome(17, height=0.6)), Ask())
+        whole = made(Design("dome", dome(17, height=0.6)), FabricationSettings())
         rng = np.random.default_rng(0)
         for k, panel in enumerate(whole.panels):
             triangles = panel.surface.triangles
@@ -419,7 +435,7 @@ class TestMarks:
         turn = np.linspace(0, 2 * np.pi, 30)
         angle, y = 0.8 + 0.1 * np.cos(turn), 1.2 + 0.1 * np.sin(turn)
         ring = np.stack([np.sin(angle), y, np.cos(angle)], axis=1)
-        whole = made(Design("arch", arch()), Ask())
+        whole = made(Design("arch", arch()), FabricationSettings())
         (part,) = parts_of(whole, 100.0, Finish(), [line], [ring])
         assert len(part.marks) == 1
         size = np.linalg.norm(np.diff(part.marks[0], axis=0), axis=1).sum()

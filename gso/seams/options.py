@@ -26,7 +26,7 @@ NECK = 0.1
 
 
 @dataclass(frozen=True)
-class Wishes:
+class PieceSettings:
     """Budgets and preferences of :func:`gso.pieces`."""
 
     max_strain: float

@@ -17,20 +17,20 @@ from gso.errors import MeshError
 from gso.executors import open_executor
 from gso.io.json_file import plain
 from gso.verdict import Reason
-from gso.workshop.asking import Ask
 from gso.workshop.certificate import digest
+from gso.workshop.design_panels import made
 from gso.workshop.designs import Design
-from gso.workshop.making import made
+from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made
 
 #: Version of the files; those of another one are made again.
 _FORMAT = 3
 
 
-def key(design: Design, ask: Ask) -> str:
+def key(design: Design, settings: FabricationSettings) -> str:
     """Return what identifies the work on a design: its digest and what was asked."""
     own = [digest(design.mesh), design.kept.tolist()]
-    said = json.dumps([_FORMAT, version("gso"), *own, plain(ask.record())], sort_keys=True)
+    said = json.dumps([_FORMAT, version("gso"), *own, plain(settings.record())], sort_keys=True)
     return hashlib.sha256(said.encode()).hexdigest()
 
 
@@ -43,15 +43,15 @@ def store(one: Made, own: str, path: Path) -> None:
 
 
 def work_on(
-    ask: Ask,
+    settings: FabricationSettings,
     folder: Path,
     design: Design,
     say: Callable[[str], None] = lambda said: None,
     workers: int | None = 0,
 ) -> None:
     """Make one design and store it; in worker processes too."""
-    one = made(design, ask, say, workers)
-    store(one, key(design, ask), folder / f"{design.name}.npz")
+    one = made(design, settings, say, workers)
+    store(one, key(design, settings), folder / f"{design.name}.npz")
 
 
 def stored(name: str, own: str, path: Path) -> Made | None:
@@ -73,7 +73,7 @@ def stored(name: str, own: str, path: Path) -> Made | None:
 def made_all(
     designs: Sequence[Design],
     chosen: Iterable[int],
-    ask: Ask,
+    settings: FabricationSettings,
     folder: Path,
     workers: int | None,
     scheduler: str | None,
@@ -85,7 +85,7 @@ def made_all(
     todo = []
 
     def read(design: Design) -> Made | None:
-        return stored(design.name, key(design, ask), folder / f"{design.name}.npz")
+        return stored(design.name, key(design, settings), folder / f"{design.name}.npz")
 
     for k in chosen:
         one = read(designs[k])
@@ -96,7 +96,7 @@ def made_all(
     # The largest first, so that no large one runs alone at the end.
     todo.sort(key=lambda k: -len(designs[k].mesh.vertices))
     here = scheduler is None and (workers == 0 or len(todo) == 1)
-    work = partial(work_on, ask, folder.resolve())
+    work = partial(work_on, settings, folder.resolve())
     if here:
         work = partial(work, say=say, workers=workers)
     items = (designs[k] for k in todo)
