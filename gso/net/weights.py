@@ -174,7 +174,7 @@ def _filled(settings: Json, data: bytes, path: Path) -> Net:
     return net
 
 
-def cached(path: Path, device: str) -> Net:
+def cached(path: Path, device: torch.device) -> Net:
     """Load a net with :func:`load`, and cache it by path, device and modification time."""
     try:
         stamp = path.stat().st_mtime_ns
@@ -184,5 +184,5 @@ def cached(path: Path, device: str) -> Net:
 
 
 @lru_cache(maxsize=8)
-def _cached(path: Path, device: str, stamp: int) -> Net:
+def _cached(path: Path, device: torch.device, stamp: int) -> Net:
     return load(path, device=device)

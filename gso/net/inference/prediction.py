@@ -13,7 +13,7 @@ from gso.hierarchy import resample
 from gso.net import tasks
 from gso.net.catalogue import NetLike, chain
 from gso.net.inference import denoising
-from gso.net.models.base import SIZE, Net, exact
+from gso.net.models.base import SIZE, Net, device_of, exact
 from gso.net.weights import cached
 from gso.typing import Array
 
@@ -90,7 +90,7 @@ def predict(
     """
     points = _checked(surface)
     batch = points[None] if points.ndim == 3 else points
-    kind, where = tasks.get(task), _device(device)
+    kind, where = tasks.get(task), device_of(device)
     nets = _nets(model, task, where)
     if isinstance(repeat, bool) or not isinstance(repeat, int) or not 1 <= repeat <= 100:
         raise OptionError(f"repeat is {repeat!r}; take a whole number from 1 to 100")
@@ -112,7 +112,7 @@ def predict(
 
 
 def _denoised(
-    batch: Array, nets: list[Net], passes: int | None, sigma: float | None, device: str
+    batch: Array, nets: list[Net], passes: int | None, sigma: float | None, device: torch.device
 ) -> Array:
     """Predict for noisy grids of any size, which :mod:`gso.net.inference.denoising` converts."""
     height, width = batch.shape[1:3]
@@ -135,7 +135,11 @@ def _denoised(
 
 
 def _predicted(
-    batch: Array, nets: list[Net], passes: int | None, sigma: float | Array | None, device: str
+    batch: Array,
+    nets: list[Net],
+    passes: int | None,
+    sigma: float | Array | None,
+    device: torch.device,
 ) -> Array:
     out: Array = batch
     for net in nets:
@@ -157,7 +161,7 @@ def _predicted(
     return out
 
 
-def _nets(model: NetLike | None, task: str, device: str) -> list[Net]:
+def _nets(model: NetLike | None, task: str, device: torch.device) -> list[Net]:
     if isinstance(model, Net):
         nets = [model.to(device)]
     else:
@@ -166,15 +170,6 @@ def _nets(model: NetLike | None, task: str, device: str) -> list[Net]:
         if net.task != task:
             raise OptionError(f"the net is for task {net.task!r}, not {task!r}")
     return nets
-
-
-def _device(device: str | None) -> str:
-    name = device or ("cuda" if torch.cuda.is_available() else "cpu")
-    try:
-        torch.empty(0, device=name)
-    except (RuntimeError, AssertionError):
-        raise OptionError(f"there is no device {name!r}; take 'cpu'") from None
-    return name
 
 
 def _checked(surface: ArrayLike) -> Array:
@@ -226,7 +221,7 @@ def _told(net: Net) -> bool:
 
 
 def _sigma(
-    net: Net, unit: Array, scale: Array, sigma: float | Array | None, device: str
+    net: Net, unit: Array, scale: Array, sigma: float | Array | None, device: torch.device
 ) -> torch.Tensor | None:
     """Return the noise (B,) of each surface in the unit ball, None if the net does not use it."""
     if not _told(net):
