@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,7 +88,7 @@ def build(
     labels = () if labels == ("none",) else labels
     recipe = sets.Recipe(n, seed, size, labels, extras)
     start = time.perf_counter()
-    with progress.counts() as bars:
+    with closing(progress.Counts()) as bars:
         data = sets.build(out, recipe, tick=bars.tick, **given)
     if quiet:
         return
