@@ -11,7 +11,6 @@ from gso.energy.base import Term
 from gso.geometry import dot, sub
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
-from gso.mesh.normals import vertex_normals
 from gso.typing import Array, S, Vec
 
 #: The reference does not move with the surface.
@@ -76,8 +75,3 @@ def closest(mesh: Mesh, normals: Array, *, tangential: float = 0.0) -> Term:
         return np.concatenate([feet.points.T, feet.normals.T, own.constants[6:]])
 
     return replace(own, name="closest", refresh=refresh)
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return [build(mesh, vertex_normals(mesh), tangential=0.5)]
