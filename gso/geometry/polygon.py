@@ -13,8 +13,8 @@ def signed_area(polygon: Array) -> float:
     >>> signed_area(np.array([[0.0, 0], [2, 0], [2, 1], [0, 1]]))
     2.0
     """
-    x, y = (polygon - polygon[0]).T
-    return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+    x, y = polygon.T
+    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
 
 
 def anticlockwise(polygon: Array) -> Array:
