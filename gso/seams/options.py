@@ -13,7 +13,7 @@ from gso.errors import OptionError
 from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
-from gso.quantities import Length, as_length, millimetres
+from gso.quantities import Length, as_length, as_positive, millimetres
 from gso.typing import Array
 from gso.verdict import Code
 
@@ -41,8 +41,8 @@ class PieceSettings:
     executor: Executor = SERIAL
 
     def __post_init__(self) -> None:
-        if self.seam is not None and not _positive(self.seam):
-            raise OptionError(f"seam is {self.seam!r}; it must be a positive number")
+        if self.seam is not None:
+            as_positive(self.seam, "seam")
         if not callable(self.say):
             raise OptionError(f"callback is {self.say!r}; it must be a function of a text")
         count = self.max_pieces
@@ -139,8 +139,3 @@ def _faces(given: ArrayLike, count: int) -> Any:
     if bad.size:
         raise OptionError(f"avoid names face {bad[0]}; the mesh has {count}")
     return faces
-
-
-def _positive(value: Any) -> bool:
-    real = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    return bool(real and 0 < value < np.inf)

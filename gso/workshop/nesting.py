@@ -10,6 +10,7 @@ import numpy as np
 
 from gso.errors import OptionError
 from gso.geometry.polygon import anticlockwise, signed_area
+from gso.quantities import as_positive
 from gso.typing import Array
 from gso.workshop import sparrow
 from gso.workshop.part import Drawing, Part
@@ -180,11 +181,9 @@ def checked_options(
     """
     size = _checked_sheet(sheet)
     _angles(rotations)
-    for name, value in (("spacing", spacing), ("margin", margin)):
-        if not 0 <= value < np.inf:
-            raise OptionError(f"{name} is {value!r}; it must be a length of 0 or more")
-    if not 0 < seconds < np.inf:
-        raise OptionError(f"seconds is {seconds!r}; it must be a positive number")
+    as_positive(spacing, "spacing", zero=True)
+    as_positive(margin, "margin", zero=True)
+    as_positive(seconds, "seconds")
     long, wide = (size - 2.0 * margin).tolist()
     if min(long, wide) <= 0:
         raise OptionError(f"margin is {margin!r}, which leaves nothing of the sheet; lower it")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from numbers import Real
-
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
@@ -15,6 +13,7 @@ from gso.net.catalogue import NetLike, chain
 from gso.net.inference import denoising
 from gso.net.models.base import SIZE, Net, device_of, exact
 from gso.net.weights import cached
+from gso.quantities import as_positive
 from gso.typing import Array
 
 #: Smallest side of a grid that is resampled to the size of the nets.
@@ -100,8 +99,8 @@ def predict(
     if passes is not None and not (whole and passes >= 1):
         raise OptionError(f"passes is {passes!r}; take a whole number from 1 up, or None for all")
     nets += [nets[-1]] * (repeat - 1)
-    if sigma is not None and not (isinstance(sigma, Real) and np.isfinite(sigma) and sigma >= 0):
-        raise OptionError(f"sigma is {sigma!r}; it must be a number, zero or more")
+    if sigma is not None:
+        as_positive(sigma, "sigma", zero=True)
     work = _denoised if kind.noisy else _predicted
     blocks = [
         work(batch[k : k + _BATCH], nets, passes, sigma, where)

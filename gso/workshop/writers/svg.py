@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from gso.io.svg_page import SVGPage
+from gso.quantities import as_positive
 from gso.workshop.part import Drawing
 from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import Layer
-from gso.workshop.writers.writer_checks import length
 
 SUFFIX = ".svg"
 
@@ -57,7 +57,7 @@ def content(
     """
     low, high = drawing.bounds
     size = float((high - low).max())
-    width = max(_FINEST, _SHARE * size) if stroke is None else length("stroke", stroke)
+    width = max(_FINEST, _SHARE * size) if stroke is None else as_positive(stroke, "stroke")
     margin = 0.0 if drawing.sheet is not None else _MARGIN * width
     page = SVGPage(low - margin, high + margin)
     names = strokes.identifiers(drawing.parts)
