@@ -16,7 +16,8 @@ import pytest
 from click.testing import CliRunner
 
 import gso
-from gso.cli import main, progress, report
+from gso.cli import main, progress
+from gso.io.json_file import plain
 
 PANEL = Path(__file__).resolve().parents[1] / "examples" / "panel.obj"
 
@@ -534,9 +535,8 @@ def test_a_preset_that_the_task_lacks_is_refused(run, small, never, task):
 
 
 def test_numbers_in_json():
-    assert report._number(float("nan")) is None
-    assert report._number(np.int64(3)) == 3
-    assert report._number(np.float64(0.5)) == 0.5
+    given = {"a": float("nan"), "b": np.int64(3), "c": (np.float64(0.5), -np.inf), 4: True}
+    assert plain(given) == {"a": None, "b": 3, "c": [0.5, None], "4": True}
 
 
 def processor_time(command):
