@@ -93,6 +93,27 @@ def as_strain(value: Strain, name: str) -> float:
     return number
 
 
+def as_positive(value: object, name: str, *, zero: bool = False) -> float:
+    """Return a finite number above zero, or of zero or more.
+
+    Raises
+    ------
+    OptionError
+        It is not.
+
+    Examples
+    --------
+    >>> as_positive(2, "spacing"), as_positive(0.0, "spacing", zero=True)
+    (2.0, 0.0)
+    """
+    real = isinstance(value, Real) and not isinstance(value, bool)
+    number = float(value) if real else math.nan  # type: ignore[arg-type]
+    if 0.0 < number < math.inf or (zero and number == 0.0):
+        return number
+    what = "a number of 0 or more" if zero else "a positive number"
+    raise OptionError(f"{name} is {value!r}; it must be {what}")
+
+
 def millimetres(unit: str, name: str = "unit") -> float:
     """Return the length of a unit in millimetres; an OptionError if it is not known.
 

@@ -356,7 +356,7 @@ def test_a_file_too_large_for_memory_is_an_error_of_the_package(tmp_path, monkey
     def read(data):
         raise MemoryError
 
-    monkeypatch.setattr("gso.io.obj.read", read)
+    monkeypatch.setitem(gso.io._FORMATS, ".obj", (read, gso.io.obj.write))
     with pytest.raises(MeshError, match=r"a\.obj: does not fit into memory"):
         gso.load(tmp_path / "a.obj")
 

@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
 
@@ -760,7 +760,7 @@ class TestCommands:
         assert picture.read_bytes().startswith(b"\x89PNG")
         record = json.loads(table.read_text())
         assert "files" not in record
-        assert not dataset.differences(record["summary"], dataset.summarise(tiny))
+        assert record["summary"] == json.loads(json.dumps(dataset.summarise(tiny)))
 
     def test_info_reads_folders_of_files(self, tiny, tmp_path):
         self.run("export", tiny.path, "-o", tmp_path, "--split", "test")
@@ -775,26 +775,12 @@ class TestCommands:
 
 
 class TestSummary:
-    def test_small_differences_are_none(self, tiny):
-        one = dataset.summarise(tiny)
-        other = json.loads(json.dumps(one))
-        other["train"]["intervals"]["K_A"][0] += 2
-        other["train"]["labels"]["strain"]["strain_mean"]["mean"] *= 1.01
-        other["hard"]["features"]["K_A"]["mean"] *= 100.0
-        assert dataset.differences(one, other) == []
-        other["train"]["labels"]["strain"]["strain_mean"]["mean"] *= 1.03
-        other["test"]["status"]["strain"]["FAILED"] = 3
-        assert [line.split(":")[0] for line in dataset.differences(one, other)] == [
-            "test/status/strain/FAILED",
-            "train/labels/strain/strain_mean/mean",
-        ]
-
     def test_the_committed_manifest_is_that_of_the_published_size(self):
         path = ROOT / "bench" / "data" / "dataset_manifest.json"
         if not path.exists():
             pytest.skip("the manifest of the large set is not there")
         record = json.loads(path.read_text())
-        recipe = Recipe.from_dict(record["recipe"])
+        recipe = Recipe(**{f.name: record["recipe"][f.name] for f in fields(Recipe)})
         assert record["splits"] == recipe.splits == Recipe().splits
         main_splits = [record["summary"][name] for name in ("train", "validation", "test")]
         total = sum(s["count"] * s["features"]["K_A"]["mean"] for s in main_splits)

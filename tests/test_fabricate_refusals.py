@@ -14,10 +14,10 @@ from gso import GSOError, MeshError, OptionError
 from gso.cli import main
 from gso.mesh import Mesh, Nearest
 from gso.verdict import Code
-from gso.workshop import Ask, Design, Finish, Thickness, designs_of, made, parts_of, thickened
+from gso.workshop import Design, FabricationSettings, Finish, Thickness, designs_of, made, thickened
 from tests.conftest import codes
 from tests.test_pieces import dome
-from tests.test_workshop import arch, bent
+from tests.test_workshop import arch, bent, parts_of
 
 pytest.importorskip("ezdxf")
 shapely = pytest.importorskip("shapely")
@@ -30,12 +30,12 @@ def small():
 
 @pytest.fixture(scope="module")
 def cylinder():
-    return made(Design("arch", arch()), Ask())
+    return made(Design("arch", arch()), FabricationSettings())
 
 
 @pytest.fixture(scope="module")
 def strips():
-    return made(Design("dome", dome(17, height=0.6)), Ask(max_deviation="3%"))
+    return made(Design("dome", dome(17, height=0.6)), FabricationSettings(max_deviation="3%"))
 
 
 class TestFolder:
@@ -165,7 +165,7 @@ class TestSheets:
         assert why.code is Code.BENDS_NEAR and why.value < why.bound
 
     def test_a_part_without_bend_lines_is_refused_where_the_thickness_matters(self, reasons_for):
-        flat = made(Design("arch", arch()), Ask(formulation="curvature"))
+        flat = made(Design("arch", arch()), FabricationSettings(formulation="curvature"))
         assert not len(flat.panels[0].bends)
         assert flat.record["bend_radius_min"] == pytest.approx(1.0, rel=0.05)
         assert reasons_for(flat, sheet=0.02) == ()
@@ -182,9 +182,13 @@ class TestSheets:
 
     @pytest.mark.parametrize("formulation", ["curvature", "flatten"])
     def test_the_smallest_radius_counts_without_bend_lines(self, formulation):
-        flat = made(Design("arch", arch()), Ask(formulation=formulation, min_radius=0.5))
+        flat = made(
+            Design("arch", arch()), FabricationSettings(formulation=formulation, min_radius=0.5)
+        )
         assert not flat.reasons
-        flat = made(Design("arch", arch()), Ask(formulation=formulation, min_radius=2.0))
+        flat = made(
+            Design("arch", arch()), FabricationSettings(formulation=formulation, min_radius=2.0)
+        )
         (why,) = flat.reasons
         assert (why.code, why.bound) == (Code.BEND_RADIUS, 2.0)
         assert why.value == flat.record["bend_radius_min"] < 2.0

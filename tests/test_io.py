@@ -328,7 +328,7 @@ def test_a_failed_write_leaves_what_was_there(error, there, tmp_path, monkeypatc
         file.write(b"half of it")
         raise error
 
-    monkeypatch.setattr("gso.io.obj.write", write)
+    monkeypatch.setitem(gso.io._FORMATS, ".obj", (gso.io.obj.read, write))
     expected = MeshError if isinstance(error, OSError) else error
     with pytest.raises(expected, match="disk full" if expected is not error else None):
         gso.save(irregular(), path)

@@ -347,7 +347,7 @@ def test_what_is_no_surface_is_refused():
         ({"avoid": [999]}, "face 999"),
     ],
 )
-def test_bad_wishes_are_named(given, said):
+def test_bad_settings_are_named(given, said):
     with pytest.raises(gso.OptionError, match=said):
         gso.pieces(dome(7), **given)
 

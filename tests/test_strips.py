@@ -13,7 +13,7 @@ from gso.mesh import Mesh
 from gso.result import StripsResult
 from gso.ruled.paneling import LightDesign
 from gso.seams import rectangle
-from gso.workshop import Ask, Design
+from gso.workshop import Design
 from gso.workshop import made as workshop_made
 from tests.conftest import cylinder, saddle
 from tests.test_pieces import ball, dome
@@ -126,7 +126,7 @@ def test_edges_that_are_kept_are_cut():
     design = cap(9)
     kept = gso.cut(design, gso.seams.Path([4, 76])).edges
     whole = workshop_made(
-        Design("cap", design, kept=kept), Ask(max_deviation=0.05 * design.diagonal)
+        Design("cap", design, kept=kept), FabricationSettings(max_deviation=0.05 * design.diagonal)
     )
     assert len(whole.panels) >= 2
     sides = [seam.one for seam in whole.matings]

@@ -10,19 +10,20 @@ import shapely
 
 import gso
 from gso import OptionError
-from gso.mesh import Mesh
+from gso.mesh import Mesh, Nearest
 from gso.verdict import Code
 from gso.workshop import (
-    Ask,
     Bend,
     Design,
+    FabricationSettings,
     Finish,
     Notch,
     Panel,
     Part,
     Thickness,
+    fitted,
     made,
-    parts_of,
+    parts_from,
     thickened,
 )
 from gso.workshop.congruent import origins, united
@@ -45,6 +46,22 @@ def cone(n: int = 65, turn: float = np.pi / 2) -> Mesh:
 
 
 SQUARE = Part("square", np.array([[0.0, 0], [100, 0], [100, 50], [0, 50]]))
+
+
+def parts_of(whole, scale, finish, marks=(), holes=()):
+    """The parts of a design, whose holes can all be cut."""
+    own = fitted(whole, scale, finish, marks, holes)
+    if own.reasons:
+        raise OptionError("; ".join(map(str, own.reasons)))
+    return parts_from(own, finish)
+
+
+def to_surface(panel, points):
+    """Points (k, 2) of a panel's pattern, carried to its surface, (k, 3)."""
+    triangles = panel.surface.triangles
+    flat, given = (np.pad(x, ((0, 0), (0, 1))) for x in (panel.flat, points))
+    place, shares, _ = Nearest.of(flat, triangles).locate(given)
+    return np.einsum("kc,kcd->kd", shares, panel.surface.vertices[triangles[place]])
 
 
 def bent(angles, width=1.0, radius=np.inf):
@@ -218,7 +235,7 @@ class TestOffsets:
     def test_kerf_and_allowance_move_the_outline_outwards(self):
         x, y = np.meshgrid(np.linspace(0, 100, 11), np.linspace(0, 50, 6), indexing="ij")
         flat = gso.as_mesh(np.dstack([x, y, 0 * x]))
-        whole = made(Design("square", flat), Ask())
+        whole = made(Design("square", flat), FabricationSettings())
         hole = np.array([[40.0, 20, 0], [60, 20, 0], [60, 30, 0], [40, 30, 0], [40, 20, 0]])
         plain = {"notches": None, "labels": None}
         (wide,) = parts_of(whole, 1.0, Finish(kerf=2.0, **plain), [], [hole])
@@ -230,7 +247,7 @@ class TestOffsets:
         np.testing.assert_allclose(sewn.seams[0].min(axis=0) - sewn.low, 10.0, atol=0.01)
 
     def test_turning_over_mirrors_and_swaps_folds(self):
-        whole = made(Design("arch", arch()), Ask())
+        whole = made(Design("arch", arch()), FabricationSettings())
         part, back = (parts_of(whole, 100.0, Finish(face=f))[0] for f in ("outside", "inside"))
         assert back.area == pytest.approx(part.area)
         assert [b.angle for b in back.bends] == [-b.angle for b in part.bends]
@@ -238,7 +255,9 @@ class TestOffsets:
 
 class TestParts:
     def test_a_cylinder_is_a_rectangle_with_mountain_folds(self):
-        part = parts_of(made(Design("arch", arch()), Ask()), 1000.0, Finish(notches=None))[0]
+        part = parts_of(
+            made(Design("arch", arch()), FabricationSettings()), 1000.0, Finish(notches=None)
+        )[0]
         # The arc is a polygon of 64 chords; the strip is fitted within a tenth of a per mille.
         assert part.size == pytest.approx((2000.0, 500 * np.pi), rel=3e-4)
         assert part.area == pytest.approx(part.size[0] * part.size[1], rel=1e-3)
@@ -252,12 +271,14 @@ class TestParts:
     def test_the_inside_of_a_cylinder_has_valley_folds(self):
         mesh = arch()
         inside = Mesh(mesh.vertices, mesh.faces[:, ::-1])
-        part = parts_of(made(Design("arch", inside), Ask()), 1000.0, Finish())[0]
+        part = parts_of(made(Design("arch", inside), FabricationSettings()), 1000.0, Finish())[0]
         assert all(bend.angle < 0 for bend in part.bends if abs(bend.angle) > np.radians(2))
 
     def test_notches_of_strips_are_at_the_same_places_of_both_sides(self):
         design = dome(17, height=0.6)
-        whole = made(Design("dome", design), Ask(max_deviation=0.03 * design.diagonal))
+        whole = made(
+            Design("dome", design), FabricationSettings(max_deviation=0.03 * design.diagonal)
+        )
         assert len(whole.panels) > 1
         parts = parts_of(whole, 100.0, Finish(notches=20.0))
         strips = [s for s in whole.matings if s.mismatch(whole.panels) < 1e-9]
@@ -278,7 +299,9 @@ class TestParts:
     @pytest.mark.slow
     def test_notches_of_pieces_are_at_equal_arc_lengths(self):
         design = dome(9, height=1.0)
-        whole = made(Design("dome", design), Ask(max_deviation=0.01 * design.diagonal))
+        whole = made(
+            Design("dome", design), FabricationSettings(max_deviation=0.01 * design.diagonal)
+        )
         assert any(whole.record["strips"]) and not all(seam.common for seam in whole.matings)
         parts = parts_of(whole, 1000.0, Finish(notches=100.0, labels=None))
         for seam in whole.matings:
@@ -288,7 +311,9 @@ class TestParts:
     @pytest.mark.slow
     def test_seams_of_strained_patterns_differ_by_no_more_than_the_strain(self):
         design = dome(17, height=0.6)
-        whole = made(Design("dome", design), Ask(formulation="flatten", max_strain=0.02))
+        whole = made(
+            Design("dome", design), FabricationSettings(formulation="flatten", max_strain=0.02)
+        )
         assert len(whole.panels) > 1 and not whole.reasons
         for seam in whole.matings:
             most = 2.0 * whole.record["strain_max"] * seam.length
@@ -296,7 +321,9 @@ class TestParts:
 
     def test_notches_point_into_the_part(self):
         design = dome(17, height=0.6)
-        whole = made(Design("dome", design), Ask(max_deviation=0.03 * design.diagonal))
+        whole = made(
+            Design("dome", design), FabricationSettings(max_deviation=0.03 * design.diagonal)
+        )
         for part in parts_of(whole, 100.0, Finish(notches=30.0, labels=None)):
             shape = shapely.Polygon(part.outline)
             assert part.notches
@@ -306,7 +333,9 @@ class TestParts:
 
     def test_tabs_lie_outside_and_do_not_overlap(self):
         design = dome(17, height=0.6)
-        whole = made(Design("dome", design), Ask(max_deviation=0.03 * design.diagonal))
+        whole = made(
+            Design("dome", design), FabricationSettings(max_deviation=0.03 * design.diagonal)
+        )
         plain = parts_of(whole, 100.0, Finish(notches=None, labels=None))
         tabbed = parts_of(whole, 100.0, Finish(notches=None, labels=None, tabs=5.0))
         assert sum(len(part.creases) for part in tabbed) > 0
@@ -316,7 +345,9 @@ class TestParts:
 
     def test_registration_holes_are_inside(self):
         design = dome(17, height=0.6)
-        whole = made(Design("dome", design), Ask(max_deviation=0.03 * design.diagonal))
+        whole = made(
+            Design("dome", design), FabricationSettings(max_deviation=0.03 * design.diagonal)
+        )
         parts = parts_of(whole, 100.0, Finish(notches=30.0, registration=(1.0, 2.0)))
         assert any(part.holes for part in parts)
         for part in parts:
@@ -325,7 +356,9 @@ class TestParts:
 
     def test_areas_agree_with_the_surface(self):
         design = dome(17, height=0.4)
-        whole = made(Design("dome", design), Ask(formulation="flatten", max_strain=0.01))
+        whole = made(
+            Design("dome", design), FabricationSettings(formulation="flatten", max_strain=0.01)
+        )
         strain = whole.record["strain_max"]
         for panel, part in zip(
             whole.panels, parts_of(whole, 1.0, Finish(labels=None)), strict=True
@@ -336,7 +369,7 @@ class TestParts:
 
 class TestMaking:
     def test_a_strongly_curved_design_is_cut_into_pieces(self):
-        whole = made(Design("dome", dome(17, height=1.0)), Ask())
+        whole = made(Design("dome", dome(17, height=1.0)), FabricationSettings())
         assert not whole.reasons
         assert whole.record["pieces"] > 1
         assert whole.record["deviation_max"] <= 1.000001 * whole.record["allowed"]
@@ -346,7 +379,7 @@ class TestMaking:
 
     def test_what_cannot_be_made_says_so_and_gives_the_best(self):
         design = dome(9, height=1.0)
-        whole = made(Design("dome", design), Ask(max_deviation=1e-6))
+        whole = made(Design("dome", design), FabricationSettings(max_deviation=1e-6))
         assert len(whole.panels) > 0
         why = next(r for r in whole.reasons if r.code is Code.DEVIATION)
         assert (why.value, why.bound) == (whole.record["deviation_max"], 1e-6)
@@ -362,7 +395,7 @@ class TestMaking:
 
 class TestMarks:
     def test_marks_in_a_triangle_keep_their_part_and_length(self):
-        whole = made(Design("dome", dome(17, height=0.6)), Ask())
+        whole = made(Design("dome", dome(17, height=0.6)), FabricationSettings())
         rng = np.random.default_rng(0)
         lines = []
         for panel in whole.panels:
@@ -383,7 +416,7 @@ class TestMarks:
         turn = np.linspace(0, 2 * np.pi, 30)
         angle, y = 0.8 + 0.1 * np.cos(turn), 1.2 + 0.1 * np.sin(turn)
         ring = np.stack([np.sin(angle), y, np.cos(angle)], axis=1)
-        whole = made(Design("arch", arch()), Ask())
+        whole = made(Design("arch", arch()), FabricationSettings())
         (part,) = parts_of(whole, 100.0, Finish(), [line], [ring])
         assert len(part.marks) == 1
         size = np.linalg.norm(np.diff(part.marks[0], axis=0), axis=1).sum()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
+import importlib
+import os
+import time
 
 import numpy as np
 import pytest
@@ -10,6 +12,8 @@ import shapely
 
 from gso import OptionError
 from gso.workshop import Part, nest
+
+sparrow = importlib.import_module("gso.workshop.sparrow")
 
 
 def gore(long=600.0, wide=120.0, n=40):
@@ -116,6 +120,21 @@ class TestNest:
                 np.testing.assert_array_equal(p.outline, q.outline)
 
 
+def dies(*given):
+    """In place of the packing: the process ends."""
+    os._exit(6)
+
+
+def sleeps(*given):
+    """In place of the packing: it does not end."""
+    time.sleep(600)
+
+
+def refuses(*given):
+    """In place of the packing: it fails."""
+    raise ValueError("no such shape")
+
+
 class TestFallback:
     def test_without_spyrrow_rectangles_are_packed(self, monkeypatch):
         monkeypatch.setattr("gso.workshop.sparrow.find_spec", lambda name: None)
@@ -124,29 +143,21 @@ class TestFallback:
         assert "pip install" in nested.notes[0]
 
     def test_its_death_ends_nothing(self, monkeypatch):
-        def dead(*words, **given):
-            return subprocess.CompletedProcess(words, -6, "", "panicked")
-
-        monkeypatch.setattr("gso.workshop.sparrow.subprocess.run", dead)
+        monkeypatch.setattr(sparrow, "packed", dies)
         nested = nest(triangles(4), (500.0, 400.0))
         assert nested.method == "rectangles"
-        assert "code -6" in nested.notes[0]
+        assert "ended its process" in nested.notes[0]
 
     def test_it_is_not_waited_for_for_ever(self, monkeypatch):
-        def slow(*words, **given):
-            raise subprocess.TimeoutExpired("spyrrow", 1)
+        monkeypatch.setattr(sparrow, "packed", sleeps)
+        monkeypatch.setattr(sparrow, "_START", -1.5)
+        assert sparrow.solved([], 1.0, 1.0, 0) == (None, "spyrrow took too long")
 
-        monkeypatch.setattr("gso.workshop.sparrow.subprocess.run", slow)
+    def test_an_error_is_no_answer(self, monkeypatch):
+        monkeypatch.setattr(sparrow, "packed", refuses)
         nested = nest(triangles(4), (500.0, 400.0))
         assert nested.method == "rectangles"
-        assert "spyrrow took too long" in nested.notes[0]
-
-    def test_a_wrong_answer_is_not_taken(self, monkeypatch):
-        def odd(*words, **given):
-            return subprocess.CompletedProcess(words, 0, "nonsense", "")
-
-        monkeypatch.setattr("gso.workshop.sparrow.subprocess.run", odd)
-        assert nest(triangles(4), (500.0, 400.0)).method == "rectangles"
+        assert "no such shape" in nested.notes[0]
 
     def test_results_that_overlap_are_not_taken(self, monkeypatch):
         def same(items, *rest):

@@ -23,6 +23,7 @@ from gso.cli.progress import share
 from gso.dataset import LEVELS
 from gso.dataset.shapes import NAMES
 from gso.io import replacing
+from gso.io.json_file import write_json
 from gso.net import catalogue, tasks, weights
 from gso.net.training import checkpoint, from_dict
 from gso.net.training.training_curves import read
@@ -109,7 +110,7 @@ def rows(
             card[f"test{of}"] = counted(found, opened["test"], n)
             if elsewhere:
                 card[f"other splits{of}"] = elsewhere
-            weights.write_card(path.with_suffix(".json"), card)
+            write_json(path.with_suffix(".json"), card)
     return out
 
 

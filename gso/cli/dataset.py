@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,11 +28,9 @@ def dataset() -> None:
 @click.option(
     "-o", "--output", "out", metavar="DIR", required=True, type=click.Path(), help="Folder."
 )
-@click.option(
-    "--n", default=10401, show_default=True, help="Surfaces, without hard and named ones."
-)
-@click.option("--seed", default=0, show_default=True, help="Seed of all random numbers.")
-@click.option("--size", default=64, show_default=True, help="Samples along each side.")
+@click.option("--n", default=10401, help="Surfaces, without hard and named ones.")
+@click.option("--seed", default=0, help="Seed of all random numbers.")
+@click.option("--size", default=64, help="Samples along each side.")
 @click.option(
     "--label",
     "labels",
@@ -42,7 +41,6 @@ def dataset() -> None:
 @click.option(
     "--extras/--no-extras",
     default=True,
-    show_default=True,
     help="Small splits of other shapes: analytic surfaces, teapot, terrain.",
 )
 @click.option(
@@ -57,7 +55,6 @@ def dataset() -> None:
     multiple=True,
     metavar="SPLIT",
     default=("test",),
-    show_default=True,
     help="Split that gets them. May be repeated.",
 )
 @shared.workers
@@ -66,7 +63,16 @@ def dataset() -> None:
     "--device", metavar="NAME", help="cpu, cuda ...: label in batches there (needs PyTorch)."
 )
 @shared.quiet
-def build(out: str, quiet: bool, **given: Any) -> None:
+def build(
+    out: str,
+    quiet: bool,
+    labels: tuple[str, ...],
+    n: int,
+    seed: int,
+    size: int,
+    extras: bool,
+    **given: Any,
+) -> None:
     """Build a dataset of surfaces in the folder DIR.
 
     To resume an interrupted build, run the same command again. The finished dataset is
@@ -76,23 +82,14 @@ def build(out: str, quiet: bool, **given: Any) -> None:
     from gso.cli import progress
     from gso.dataset.labels import LABELS
 
-    labels = given["labels"] or LABELS
+    labels = labels or LABELS
     if "none" in labels and len(labels) > 1:
         raise OptionError("--label none goes with no other label")
     labels = () if labels == ("none",) else labels
-    recipe = sets.Recipe(given["n"], given["seed"], given["size"], labels, given["extras"])
+    recipe = sets.Recipe(n, seed, size, labels, extras)
     start = time.perf_counter()
-    with progress.counts() as bars:
-        data = sets.build(
-            out,
-            recipe,
-            reference=given["reference"],
-            reference_splits=given["reference_splits"],
-            workers=given["workers"],
-            scheduler=given["scheduler"],
-            device=given["device"],
-            tick=bars.tick,
-        )
+    with closing(progress.Counts()) as bars:
+        data = sets.build(out, recipe, tick=bars.tick, **given)
     if quiet:
         return
     for what, (count, seconds) in bars.spent.items():
@@ -137,16 +134,16 @@ def _memory() -> str:
 def info(folder: str, split: str | None, verify: bool, table: str | None, plot: str | None) -> None:
     """Print statistics of the dataset in DIR: surfaces per interval, metrics of the labels."""
     from gso import dataset as sets
-    from gso.cli import report
     from gso.cli.dataset_text import lines
     from gso.dataset.summary import summarise
+    from gso.io.json_file import write_json
 
     data = sets.open(folder)
     summary = data.manifest.get("summary") or summarise(data)
     click.echo("\n".join(lines(data, summary, split)))
     if table is not None:
         kept = {k: v for k, v in data.manifest.items() if k != "files"}
-        report.write_json(table, kept | {"summary": summary})
+        write_json(table, kept | {"summary": summary})
     if plot is not None:
         _plot(data, plot)
     if verify:
@@ -180,7 +177,6 @@ def _plot(data: Dataset, path: str) -> None:
 @click.option(
     "--array",
     default="surface",
-    show_default=True,
     help="What to write: surface, developable, strain, noisy_0.005 ...",
 )
 @click.option(

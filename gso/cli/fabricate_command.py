@@ -15,6 +15,7 @@ from gso.errors import OptionError
 if TYPE_CHECKING:
     from gso.typing import Array
     from gso.workshop.fabricate import Fabrication
+    from gso.workshop.thickness import Thickness
 
 
 @click.command(short_help="Make designs of flat parts, for the cutter.")
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     "--formulation",
     type=click.Choice(("ruled", "curvature", "isometry", "flatten")),
     default="ruled",
-    show_default=True,
     help="How surfaces are made developable; flatten: the shape stays as it is.",
 )
 @shared.max_deviation
@@ -47,16 +47,13 @@ if TYPE_CHECKING:
 @click.option(
     "--k-factor",
     metavar="K",
-    type=float,
     default=0.5,
-    show_default=True,
     help="Where the neutral surface is: its distance from a bend's inner face over the thickness.",
 )
 @click.option(
     "--face",
     type=click.Choice(("middle", "outside", "inside")),
     default="middle",
-    show_default=True,
     help="The face of the sheet that the design's surface is; outside: the one from which its "
     "faces are anticlockwise.",
 )
@@ -73,16 +70,12 @@ if TYPE_CHECKING:
     help="Bend deductions (CSV): rows of the angle of bending in degrees, 0 for flat, and a length "
     "in mm.",
 )
-@click.option(
-    "--kerf", metavar="MM", type=float, default=0.0, help="Width that the cutter removes."
-)
-@click.option("--allowance", metavar="MM", type=float, default=0.0, help="Width added about parts.")
+@click.option("--kerf", metavar="MM", default=0.0, help="Width that the cutter removes.")
+@click.option("--allowance", metavar="MM", default=0.0, help="Width added about parts.")
 @click.option(
     "--notches",
     metavar="MM",
-    type=float,
     default=50.0,
-    show_default=True,
     help="Distance of the notches along seams: an odd number of them, at most 51, one in the "
     "middle.",
 )
@@ -96,14 +89,7 @@ if TYPE_CHECKING:
     "their distance from the seam.",
 )
 @click.option("--tabs", metavar="MM", type=float, help="Width of tabs along seams, for paper.")
-@click.option(
-    "--labels",
-    metavar="MM",
-    type=float,
-    default=6.0,
-    show_default=True,
-    help="Height of the names on parts.",
-)
+@click.option("--labels", metavar="MM", default=6.0, help="Height of the names on parts.")
 @click.option("--no-labels", is_flag=True, help="No names on parts.")
 @click.option("--grain", is_flag=True, help="The grain runs along each part.")
 @click.option(
@@ -113,38 +99,26 @@ if TYPE_CHECKING:
     "outside, from which its faces are anticlockwise.",
 )
 @shared.sheet
-@click.option(
-    "--spacing",
-    metavar="MM",
-    type=float,
-    default=2.0,
-    show_default=True,
-    help="Distance between parts on a sheet.",
-)
+@click.option("--spacing", metavar="MM", default=2.0, help="Distance between parts on a sheet.")
 @click.option(
     "--rotations",
     metavar="N",
     default="2",
-    show_default=True,
     help="Number of rotations on the sheet, evenly, or any.",
 )
-@click.option(
-    "--seconds", metavar="S", type=float, default=10.0, show_default=True, help="Time for nesting."
-)
+@click.option("--seconds", metavar="S", default=10.0, help="Time for nesting.")
 @click.option(
     "--format",
     "formats",
     metavar="NAME",
     multiple=True,
     default=("dxf", "svg"),
-    show_default=True,
     help="Format of the drawings, dxf, svg or pdf; may be given several times.",
 )
 @click.option(
     "--layers",
     type=click.Choice(("operations", "astm")),
     default="operations",
-    show_default=True,
     help="Names of layers: CUT, BEND_UP and so on, or the numbers of ASTM D6673.",
 )
 @click.option("--bend-text", is_flag=True, help="Write angle and radius beside each bend.")
@@ -153,7 +127,14 @@ if TYPE_CHECKING:
 @shared.scheduler
 @file_options.weld
 @shared.quiet
-def fabricate(inputs: tuple[str, ...], folder: str, **given: Any) -> None:
+def fabricate(
+    inputs: tuple[str, ...],
+    folder: str,
+    weld: float | None,
+    quiet: bool,
+    rotations: str,
+    **given: Any,
+) -> None:
     """Make the designs IN of flat parts, and write what a workshop needs to DIR.
 
     The exit code is 0 only if everything can be made as it was asked for; otherwise the reasons
@@ -162,56 +143,28 @@ def fabricate(inputs: tuple[str, ...], folder: str, **given: Any) -> None:
     from gso.cli.progress import words
     from gso.workshop import fabricate as make
     from gso.workshop.finish import Finish
-    from gso.workshop.thickness import Thickness
 
     _check_together()
-    thickness = None
-    if given["thickness"] is not None:
-        thickness = Thickness(
-            given["thickness"],
-            given["k_factor"],
-            given["face"],
-            given["bend_radius"],
-            None if given["bend_table"] is None else _table(given["bend_table"]),
-        )
+    for name in ("notches", "labels"):
+        if given.pop(f"no_{name}"):
+            given[name] = None
+
+    def taken(*names: str) -> dict[str, Any]:
+        return {name: given.pop(name) for name in names}
+
     finish = Finish(
-        kerf=given["kerf"],
-        allowance=given["allowance"],
-        notches=None if given["no_notches"] else given["notches"],
-        registration=given["holes"] or None,
-        tabs=given["tabs"],
-        labels=None if given["no_labels"] else given["labels"],
-        grain=given["grain"],
-        face="inside" if given["inside_up"] else "outside",
-        thickness=thickness,
+        **taken("kerf", "allowance", "notches", "tabs", "labels", "grain"),
+        registration=given.pop("holes"),
+        face="inside" if given.pop("inside_up") else "outside",
+        thickness=_thickness(**taken("thickness", *_NEEDED["thickness"])),
     )
-    meshes = [file_options.source(name, given["weld"]) for name in inputs]
+    meshes = [file_options.source(name, weld) for name in inputs]
+    if rotations != "any" and not rotations.isdecimal():
+        raise OptionError(f"--rotations is {rotations!r}; it must be a number or any")
+    turns = rotations if rotations == "any" else int(rotations)
     with words() as say:
-        done = make.fabricate(
-            meshes,
-            folder,
-            unit=given["unit"],
-            formulation=given["formulation"],
-            max_deviation=given["max_deviation"],
-            max_strain=given["max_strain"],
-            max_strips=given["max_strips"],
-            darts=given["darts"],
-            keep_groups=given["keep_groups"],
-            min_radius=given["min_radius"],
-            finish=finish,
-            sheet=given["sheet"] or None,
-            spacing=given["spacing"],
-            rotations=_rotations(given["rotations"]),
-            seconds=given["seconds"],
-            formats=given["formats"],
-            layers=given["layers"],
-            paper=given["paper"],
-            bend_text=given["bend_text"],
-            workers=given["workers"],
-            scheduler=given["scheduler"],
-            callback=say,
-        )
-    if not given["quiet"]:
+        done = make.fabricate(meshes, folder, finish=finish, rotations=turns, callback=say, **given)
+    if not quiet:
         click.echo("\n".join(text(done)))
     click.get_current_context().exit(0 if done.usable else 1)
 
@@ -273,13 +226,19 @@ def _check_together() -> None:
                 raise OptionError(f"--{option} needs --{needed}; give both or none")
 
 
-def _rotations(given: str) -> int | str:
-    if given == "any":
-        return given
-    try:
-        return int(given)
-    except ValueError:
-        raise OptionError(f"--rotations is {given!r}; it must be a number or any") from None
+def _thickness(
+    thickness: float | None,
+    k_factor: float,
+    face: str,
+    bend_radius: float | None,
+    bend_table: str | None,
+) -> Thickness | None:
+    from gso.workshop.thickness import Thickness
+
+    if thickness is None:
+        return None
+    table = None if bend_table is None else _table(bend_table)
+    return Thickness(thickness, k_factor, face, bend_radius, table)
 
 
 def _table(name: str) -> Array:

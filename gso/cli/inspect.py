@@ -42,12 +42,11 @@ def metrics(before: str, after: str, weld: float | None, as_json: bool) -> None:
 
 def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[str]]:
     """Compute the metrics that apply to a pair of surfaces, and notes on omitted ones."""
-    import math
-
     import numpy as np
 
     from gso import metrics as measure
     from gso.components import average
+    from gso.io.json_file import plain
     from gso.pipeline.lay_flat import strains_of
     from gso.tasks.evaluation import compute_metrics
 
@@ -66,7 +65,7 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
         )
     elif flat:
         notes.append("AFTER is flat, but its faces are not those of BEFORE: strains left out")
-    return {k: v if math.isfinite(v) else None for k, v in values.items()}, notes
+    return plain(values), notes
 
 
 @click.command(short_help="Say what a mesh file holds.")

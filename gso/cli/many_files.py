@@ -11,6 +11,7 @@ import click
 
 from gso.cli import progress, report
 from gso.errors import GSOError, MeshError, OptionError
+from gso.io.json_file import write_json
 
 if TYPE_CHECKING:
     from gso.cli.optimize_job import Job
@@ -22,17 +23,17 @@ def many(
     folder: str,
     *,
     suffix: str | None,
-    plots: str | None,
+    plot: str | None,
     table: str | None,
     workers: int | None,
     scheduler: str | None = None,
 ) -> bool:
     """Optimise files into a folder, and return whether all results are usable."""
     outs = _outputs(files, folder, suffix)
-    pictures = [None if plots is None else str(Path(plots, f"{Path(o).stem}.png")) for o in outs]
+    pictures = [None if plot is None else str(Path(plot, f"{Path(o).stem}.png")) for o in outs]
     _each_its_own(files, [p for p in pictures if p is not None])
     job.spare(files, *outs, *pictures, table)
-    for path in filter(None, (folder, plots)):
+    for path in filter(None, (folder, plot)):
         _make_folder(path)
     for out, picture in zip(outs, pictures, strict=True):
         job.check(out, picture)
@@ -57,7 +58,7 @@ def many(
             records[item.index] = done
             bar.update(1)
     if table is not None:
-        report.write_json(table, [records[k] for k in sorted(records)])
+        write_json(table, [records[k] for k in sorted(records)])
     good = sum(bool(r["usable"]) for r in records.values())
     if not job.quiet:
         click.echo(f"{good} of {len(files)} results usable")

@@ -30,20 +30,13 @@ from gso.errors import OptionError
     "surface as a B-spline, which is then what is optimised (fitted to the result where something "
     "bounds or constrains it).",
 )
-@click.option(
-    "--task",
-    type=click.Choice(tasks.names()),
-    default="developable",
-    show_default=True,
-    help="What to do.",
-)
+@click.option("--task", type=click.Choice(tasks.names()), default="developable", help="What to do.")
 @click.option("--formulation", metavar="NAME", help="Which energy; the task's own by default.")
 @click.option(
     "--options",
     "preset",
     type=click.Choice(["fast", "balanced", "accurate", "jiang2020"]),
     default="balanced",
-    show_default=True,
     help="How much work to do; jiang2020: the classical reference, by isometry.",
 )
 @shared.max_deviation
@@ -63,7 +56,6 @@ from gso.errors import OptionError
     "--method",
     type=click.Choice(["auto", "tno", "net", "hybrid"]),
     default="auto",
-    show_default=True,
     help="Who solves: the optimiser, a net alone, the optimiser from a net's result, or that "
     "where it saves time, which is on large grids. Where there is no net, or its result is of no "
     "use, the optimiser does, and a note says so.",
@@ -91,17 +83,8 @@ def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
     """
     if given["net"] is not None and given["method"] in ("auto", "tno"):
         raise OptionError("--net goes with --method net or hybrid")
-    job = Job(
-        _keywords(given, given["suffix"] or out),
-        given["method"],
-        given["net"],
-        given["unit"],
-        given["quiet"],
-        given["weld"],
-        given["force"],
-        tuple(name for name in (given["constraints"], given["net"]) if name is not None),
-        shared.named_unit(given["unit"]),
-    )
+    keywords = _keywords(given, given["suffix"] or out)
+    job = Job.of(keywords, given, given["constraints"], given["net"])
     if given["table"] is not None:
         from gso.io import check_writable
 
@@ -109,16 +92,8 @@ def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
     if len(names) > 1 or os.path.isdir(out) or out.endswith(("/", os.sep)):
         from gso.cli.many_files import many
 
-        good = many(
-            job,
-            names,
-            out,
-            suffix=given["suffix"],
-            plots=given["plot"],
-            table=given["table"],
-            workers=given["workers"],
-            scheduler=given["scheduler"],
-        )
+        spread = ("suffix", "plot", "table", "workers", "scheduler")
+        good = many(job, names, out, **{option: given[option] for option in spread})
     else:
         if given["suffix"] is not None:
             raise OptionError("--suffix is for many inputs; name the format in -o")

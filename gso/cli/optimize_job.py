@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 from gso import tasks
+from gso.cli import shared_options as shared
 from gso.cli.file_options import here, source, spare
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
+
+    from typing_extensions import Self
 
     from gso.executors import Item
     from gso.mesh import Mesh
@@ -46,7 +49,7 @@ class Job:
         The unit if ``--unit`` was given, else "": lengths are then printed without a unit.
     """
 
-    keywords: Keywords = field(default_factory=dict)
+    keywords: Keywords
     method: str = "auto"
     net: str | None = None
     unit: str = "mm"
@@ -55,6 +58,13 @@ class Job:
     force: bool = False
     inputs: tuple[str, ...] = ()
     named: str = ""
+
+    @classmethod
+    def of(cls, keywords: Keywords, given: Keywords, *inputs: str | None) -> Self:
+        """Make the settings from the options of a command."""
+        known = {f.name: given[f.name] for f in fields(cls) if f.name in given}
+        read = tuple(name for name in inputs if name is not None)
+        return cls(keywords, inputs=read, named=shared.named_unit(given["unit"]), **known)
 
     def spare(self, files: Iterable[str], *outputs: str | None) -> None:
         """Raise an error if an output is also an input, unless `force` is set."""

@@ -47,7 +47,15 @@ if TYPE_CHECKING:
 @file_options.weld
 @file_options.force
 @shared.quiet
-def pieces(name: str, folder: str, **given: Any) -> None:
+def pieces(
+    name: str,
+    folder: str,
+    weld: float | None,
+    force: bool,
+    quiet: bool,
+    keep_groups: bool,
+    **given: Any,
+) -> None:
     """Find seams of the design IN, and write its pieces and their patterns to DIR.
 
     The exit code is 0 only if the pieces are what was asked for; otherwise the reasons are
@@ -62,33 +70,17 @@ def pieces(name: str, folder: str, **given: Any) -> None:
     if os.path.isfile(folder):
         raise OptionError(f"{folder} is a file; -o names a folder")
     outputs = [os.path.join(folder, end) for end in ("pieces.obj", "pieces.json")]
-    file_options.spare([name], outputs, given["force"])
-    mesh = file_options.load(name, given["weld"])
+    file_options.spare([name], outputs, force)
+    mesh = file_options.load(name, weld)
     with words() as say:
-        found = search(
-            mesh,
-            max_strain=given["max_strain"],
-            max_deviation=given["max_deviation"],
-            max_pieces=given["max_pieces"],
-            seam=given["seam"],
-            darts=given["darts"],
-            symmetric=given["symmetric"],
-            min_neck=given["min_neck"],
-            min_size=given["min_size"],
-            sheet=given["sheet"] or None,
-            unit=given["unit"],
-            workers=given["workers"],
-            keep=Labels("g") if given["keep_groups"] else None,
-            denoise=given["denoise"],
-            callback=say,
-        )
+        found = search(mesh, keep=Labels("g") if keep_groups else None, callback=say, **given)
     save(found, folder, given["unit"])
     if plot.available():
         try:
             plot.plot_pieces(found, os.path.join(folder, "pieces.png"))
         except ImportError as error:
             click.echo(f"note: no picture, as Matplotlib cannot be imported: {error}", err=True)
-    if not given["quiet"]:
+    if not quiet:
         click.echo("\n".join(text(found, given["unit"])))
     click.get_current_context().exit(0 if found.usable else 1)
 

@@ -73,13 +73,11 @@ def words() -> Iterator[Callable[[str], None] | None]:
         yield bar.set_description_str
 
 
-@contextmanager
-def files(count: int) -> Iterator[Any]:
-    """Provide a bar over files, with `update(n)` and `write(line, file=...)`."""
+def files(count: int) -> Any:
+    """Return a bar over files, a context with `update(n)` and `write(line, file=...)`."""
     from tqdm import tqdm
 
-    with tqdm(total=count, disable=not watched(), leave=False, unit="file") as bar:
-        yield bar
+    return tqdm(total=count, disable=not watched(), leave=False, unit="file")
 
 
 @dataclass
@@ -121,16 +119,6 @@ class Counts:
         """Close the last bar."""
         if self._bar is not None:
             self._bar.close()
-
-
-@contextmanager
-def counts() -> Iterator[Counts]:
-    """Provide bars over counted items, and close them at the end of the block."""
-    bars = Counts()
-    try:
-        yield bars
-    finally:
-        bars.close()
 
 
 @contextmanager

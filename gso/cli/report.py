@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from gso.errors import ConvergenceWarning
+from gso.io.json_file import plain
 from gso.metrics import INFO
 from gso.typing import Json
 
@@ -47,7 +44,7 @@ def record(file: str, out: str, result: Result, unit: str = "") -> Json:
         "notes": list(result.notes),
         "spline": result.details.get("spline"),
         "details": {k: v for k, v in result.details.items() if isinstance(v, (int, float, str))},
-        "metrics": {name: _number(value) for name, value in result.metrics.items()},
+        "metrics": plain(result.metrics),
     }
 
 
@@ -111,22 +108,6 @@ def unit(name: str) -> str:
     """Return the unit of a metric, "" if it has none or is unknown."""
     info = INFO.get(name) or INFO.get(name.removesuffix("_before"))
     return info.unit if info else ""
-
-
-def write_json(path: str, content: object) -> None:
-    """Write JSON to a file."""
-    from gso.io import replacing
-
-    with replacing(path) as file:
-        file.write(json.dumps(content, indent=2, ensure_ascii=False).encode() + b"\n")
-
-
-def _number(value: float) -> float | int | None:
-    """Convert a metric to a JSON number, or None for NaN and infinity, which JSON lacks."""
-    number = float(value)
-    if not math.isfinite(number):
-        return None
-    return int(value) if isinstance(value, (int, np.integer)) else number
 
 
 def _short(value: float | str | None) -> str:

@@ -86,7 +86,6 @@ max_strips = click.option(
     metavar="N",
     type=click.IntRange(1, 64),
     default=64,
-    show_default=True,
     help="Largest number of strips side by side of one piece.",
 )
 sheet = click.option(
@@ -96,18 +95,12 @@ sheet = click.option(
     nargs=2,
     help="Length and width of a sheet, in mm: every part must fit on one.",
 )
-darts = click.option(
-    "--darts/--no-darts", default=False, show_default=True, help="Whether cuts may end in a piece."
-)
+darts = click.option("--darts/--no-darts", default=False, help="Whether cuts may end in a piece.")
 keep_groups = click.option(
     "--keep-groups", is_flag=True, help="Cut between the groups (g) of IN in any case."
 )
 unit = click.option(
-    "--unit",
-    type=click.Choice(tuple(MILLIMETRES)),
-    default="mm",
-    show_default=True,
-    help="Unit of the coordinates.",
+    "--unit", type=click.Choice(tuple(MILLIMETRES)), default="mm", help="Unit of the coordinates."
 )
 workers = click.option(
     "--workers",

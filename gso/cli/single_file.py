@@ -20,6 +20,7 @@ def single(job: Job, file: str, out: str, plot: str | None, table: str | None) -
     """Solve for one file, and return whether the result is usable."""
     from gso.cli import report
     from gso.cli.progress import iterations
+    from gso.io.json_file import write_json
     from gso.solver import loops
 
     job.check(out, plot)
@@ -38,7 +39,7 @@ def single(job: Job, file: str, out: str, plot: str | None, table: str | None) -
     job.write(result, out, plot)
     record = report.record(file, out, result, job.named)
     if table is not None:
-        report.write_json(table, record)
+        write_json(table, record)
     if not job.quiet:
         click.echo(report.text(record))
     return bool(record["usable"])

@@ -62,7 +62,6 @@ class _StripsJob(Job):
     "--options",
     type=click.Choice(["fast", "balanced", "accurate"]),
     default="balanced",
-    show_default=True,
     help="How much work to do.",
 )
 @shared.constraints
@@ -77,16 +76,9 @@ class _StripsJob(Job):
 def strips(
     name: str,
     out: str,
-    unit: str,
     plot: str | None,
     table: str | None,
-    quiet: bool,
-    weld: float | None,
-    force: bool,
-    strips: str | None,
     constraints: str | None,
-    flats: bool,
-    sheet: tuple[float, float] | None,
     **given: Any,
 ) -> None:
     """Make strips of planar faces near the design IN, and write them to OUT.
@@ -95,16 +87,13 @@ def strips(
     pieces, and each piece becomes strips. The exit code is 0 only if the result is usable;
     otherwise the reasons are printed.
     """
-    keywords = {
-        **given,
-        "strips": int(strips) if strips is not None and strips.isdecimal() else strips,
-        "flats": flats or None,
-        "sheet": sheet or None,
-    }
+    own = {option: given.pop(option) for option in ("unit", "quiet", "weld", "force")}
+    count = given["strips"]
+    given["strips"] = int(count) if count is not None and count.isdecimal() else count
+    given["flats"] = given["flats"] or None
     if constraints is not None:
         from gso.constraints import read_constraints
 
-        keywords["constraints"] = read_constraints(constraints)
-    read = () if constraints is None else (constraints,)
-    job = _StripsJob(keywords, "tno", None, unit, quiet, weld, force, read, shared.named_unit(unit))
+        given["constraints"] = read_constraints(constraints)
+    job = _StripsJob.of(given, own, constraints)
     click.get_current_context().exit(0 if single(job, name, out, plot, table) else 1)

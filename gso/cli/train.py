@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -55,7 +56,7 @@ def train(
     from gso.net.training.loop import train as run
 
     made = read(config, **changes)
-    with progress.counts() as bars, progress.share() as show:
+    with closing(progress.Counts()) as bars, progress.share() as show:
         card = run(
             made,
             data,

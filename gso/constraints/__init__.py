@@ -18,13 +18,12 @@ from gso.constraints.glue import Glue
 from gso.constraints.linear import Reduction, reduce
 from gso.constraints.on_curve import OnCurve, SlidingBoundary
 from gso.constraints.positions import Fixed, FixedBoundary, Handle
-from gso.constraints.read import KINDS, add, read_constraints
+from gso.constraints.read import add, kinds, read_constraints
 from gso.constraints.ruling import Ruling
 from gso.constraints.smooth import SmoothCurves
 from gso.constraints.symmetry import SymmetryPlane
 
 __all__ = [
-    "KINDS",
     "TIGHT",
     "Compiled",
     "Constraint",
@@ -51,6 +50,7 @@ __all__ = [
     "add",
     "check",
     "compile_constraints",
+    "kinds",
     "listed",
     "read_constraints",
     "reduce",

@@ -64,13 +64,7 @@ class Subject:
 
     def ids(self, given: ArrayLike) -> Ints:
         """Vertex indices (k,), from a list or a mask."""
-        ids = np.atleast_1d(_array(given))
-        count = len(self.mesh.vertices)
-        if ids.dtype == bool:
-            if ids.shape != (count,):
-                raise self.refuse(f"has a mask of shape {ids.shape}; the mesh has {count} vertices")
-            ids = np.flatnonzero(ids)
-        return self._indices(ids, 1, "a list of vertex indices", count, "vertex")
+        return self._chosen(given, self.count, "vertex", "vertices")
 
     def pairs(self, given: ArrayLike, what: str) -> Ints:
         """Pairs of vertex indices (k, 2)."""
@@ -80,10 +74,17 @@ class Subject:
 
     def faces(self, given: ArrayLike) -> Ints:
         """Face indices (k,), from a list or a mask."""
-        ids, count = np.atleast_1d(_array(given)), len(self.mesh.faces)
-        if ids.dtype == bool and ids.shape == (count,):
+        return self._chosen(given, len(self.mesh.faces), "face", "faces")
+
+    def _chosen(self, given: ArrayLike, count: int, kind: str, several: str) -> Ints:
+        ids = np.atleast_1d(_array(given))
+        if ids.dtype == bool:
+            if ids.shape != (count,):
+                raise self.refuse(
+                    f"has a mask of shape {ids.shape}; the mesh has {count} {several}"
+                )
             ids = np.flatnonzero(ids)
-        return self._indices(ids, 1, "a list of face indices", count, "face")
+        return self._indices(ids, 1, f"a list of {kind} indices", count, kind)
 
     @property
     def count(self) -> int:

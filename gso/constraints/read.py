@@ -6,33 +6,19 @@ import json
 from dataclasses import fields
 
 from gso.constraints.base import Constraint
-from gso.constraints.face_shape import FixedLengths, PlanarFaces
-from gso.constraints.glue import Glue
-from gso.constraints.on_curve import OnCurve, SlidingBoundary
-from gso.constraints.positions import Fixed, FixedBoundary, Handle
-from gso.constraints.ruling import Ruling
-from gso.constraints.smooth import SmoothCurves
-from gso.constraints.symmetry import SymmetryPlane
 from gso.errors import OptionError
 from gso.spelling import check_keywords, choices, nearest
 from gso.typing import AnyPath
 
-KINDS: dict[str, type[Constraint]] = {
-    kind.__name__: kind
-    for kind in (
-        Fixed,
-        FixedBoundary,
-        FixedLengths,
-        Glue,
-        Handle,
-        OnCurve,
-        PlanarFaces,
-        Ruling,
-        SlidingBoundary,
-        SmoothCurves,
-        SymmetryPlane,
-    )
-}
+#: Constraints from outside the package.
+_ADDED: list[type[Constraint]] = []
+
+
+def kinds() -> dict[str, type[Constraint]]:
+    """Return the constraints of this package and those that were added, by name."""
+    here = __name__.rpartition(".")[0]
+    own = [kind for kind in Constraint.__subclasses__() if kind.__module__.startswith(f"{here}.")]
+    return {kind.__name__: kind for kind in sorted([*own, *_ADDED], key=lambda k: k.__name__)}
 
 
 def add(kind: type[Constraint]) -> None:
@@ -43,9 +29,9 @@ def add(kind: type[Constraint]) -> None:
     OptionError
         The name of the class is taken.
     """
-    if kind.__name__ in KINDS:
+    if kind.__name__ in kinds():
         raise OptionError(f"{kind.__name__!r} is taken among the constraints; rename the class")
-    KINDS[kind.__name__] = kind
+    _ADDED.append(kind)
 
 
 def read_constraints(path: AnyPath) -> list[Constraint]:
@@ -75,16 +61,17 @@ def read_constraints(path: AnyPath) -> list[Constraint]:
 
 
 def _constraint(entry: object, where: str) -> Constraint:
+    there = kinds()
     if not isinstance(entry, dict) or not isinstance(entry.get("type"), str):
         # Name a field that looks like a misspelt "type".
         wrong = [repr(k) for k in entry if nearest(k, ["type"])] if isinstance(entry, dict) else []
         instead = f", not {wrong[0]}" if wrong else ""
-        raise OptionError(f'{where} needs a "type"{instead}: {", ".join(KINDS)}')
-    if entry["type"] not in KINDS:
+        raise OptionError(f'{where} needs a "type"{instead}: {", ".join(there)}')
+    if entry["type"] not in there:
         raise OptionError(
-            f"{where}: there is no constraint {entry['type']!r}; {choices(entry['type'], KINDS)}"
+            f"{where}: there is no constraint {entry['type']!r}; {choices(entry['type'], there)}"
         )
-    kind = KINDS[entry["type"]]
+    kind = there[entry["type"]]
     given = {name: value for name, value in entry.items() if name != "type"}
     known = [f.name for f in fields(kind)]  # type: ignore[arg-type]
     check_keywords(f"{where}: {kind.__name__}", given, known)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from gso.dataset.recipe import Recipe
     from gso.dataset.screen import CURVATURE, select
     from gso.dataset.store import Dataset, Split, open
-    from gso.dataset.summary import INTERVALS, PUBLISHED, PUBLISHED_FLAT, differences, summarise
+    from gso.dataset.summary import INTERVALS, PUBLISHED, PUBLISHED_FLAT, summarise
 
 __all__ = [
     "CURVATURE",
@@ -30,7 +30,6 @@ __all__ = [
     "Recipe",
     "Split",
     "build",
-    "differences",
     "draw_many",
     "export",
     "generate",
@@ -52,6 +51,6 @@ __getattr__, __dir__ = at_first_use(
         "recipe": "Recipe",
         "screen": "CURVATURE select",
         "store": "Dataset Split open",
-        "summary": "INTERVALS PUBLISHED PUBLISHED_FLAT differences summarise",
+        "summary": "INTERVALS PUBLISHED PUBLISHED_FLAT summarise",
     },
 )

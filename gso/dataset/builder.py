@@ -26,7 +26,7 @@ from gso.dataset.store import Dataset
 from gso.dataset.summary import summarise
 from gso.errors import DatasetError, MeshError, OptionError
 from gso.executors import Executor, open_executor
-from gso.io import replacing
+from gso.io.atomic import write_bytes
 from gso.linalg import blas_threads
 from gso.spelling import choices
 from gso.typing import AnyPath, Json
@@ -101,6 +101,7 @@ def build(
     (8, 16, 16, 3)
     """
     recipe = Recipe() if recipe is None else recipe
+    tick = tick or (lambda what, count, total: None)
     wanted = _references(recipe, reference, reference_splits)
     if find_spec("h5py") is None or find_spec("filelock") is None:
         raise DatasetError(
@@ -127,7 +128,7 @@ def build(
                 recipe.n,
                 recipe.splits["hard"],
                 seed=recipe.seed,
-                tick=None if tick is None else partial(tick, "surfaces drawn"),
+                tick=partial(tick, "surfaces drawn"),
             )
         everything = list(tasks(recipe, selection, wanted))
         for part in (shard.LABELS, *REFERENCES):
@@ -229,7 +230,7 @@ def _make(
     todo: list[shard.Task],
     bad: set[str],
     executor: Executor,
-    tick: Tick | None,
+    tick: Tick,
 ) -> None:
     """Make the files that are missing or damaged."""
     missing = [task for task in todo if task.name in bad or not _intact(place, task)]
@@ -239,8 +240,7 @@ def _make(
         return
     reference = missing[0].part != shard.LABELS
     what = f"surfaces with {missing[0].part}" if reference else "surfaces labelled"
-    if tick is not None:
-        tick(what, done, total)
+    tick(what, done, total)
     for made in executor.as_completed(work, missing):
         task = missing[made.index]
         if made.result is None:
@@ -250,11 +250,9 @@ def _make(
         with _kept(f"; {done} of {total} {what}"):
             path = place / task.name
             path.parent.mkdir(exist_ok=True)
-            with replacing(path) as file:
-                file.write(made.result)
+            write_bytes(path, made.result)
         done += len(task.ids)
-        if tick is not None:
-            tick(what, done, total)
+        tick(what, done, total)
 
 
 def _check_device(device: str) -> None:

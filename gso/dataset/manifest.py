@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 from gso.errors import DatasetError
-from gso.io import replacing
+from gso.io.json_file import write_json
 from gso.typing import Json
 
 NAME = "manifest.json"
@@ -41,8 +41,7 @@ def load(folder: Path) -> Json:
 
 def write(folder: Path, record: Json) -> None:
     """Write a manifest atomically."""
-    with replacing(folder / NAME) as file:
-        file.write(json.dumps(record, indent=1).encode() + b"\n")
+    write_json(folder / NAME, record)
 
 
 def pairs(record: Json) -> References:

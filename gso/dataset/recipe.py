@@ -85,13 +85,6 @@ class Recipe:
             "options": {name: KINDS[name].options for name in self.labels},
         }
 
-    @classmethod
-    def from_dict(cls, given: Json) -> Recipe:
-        """Return the recipe stored in a manifest."""
-        return cls(
-            given["n"], given["seed"], given["size"], tuple(given["labels"]), given["extras"]
-        )
-
 
 def versions(device: str | None = None) -> dict[str, str]:
     """Return the versions that may affect the bytes; "" for a package that is not installed.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from gso.dataset.screen import CURVATURE, CURVED, SHAPE
@@ -23,8 +21,6 @@ INTERVALS: dict[str, tuple[float, ...]] = {
 #: surfaces and for flat images.
 PUBLISHED = {"loss_gc_before": 0.307, "loss_gc": 0.0283, "K_A_r": 0.8888, "d_H": 0.823}
 PUBLISHED_FLAT = {"loss_iso_cell": 3.30e-4}
-#: Splits whose means are compared; in other splits extreme values dominate the mean.
-_EVEN = ("train", "validation", "test")
 
 
 def summarise(data: Dataset) -> Json:
@@ -83,49 +79,3 @@ def _statistics(values: Array) -> dict[str, float | None]:
         "median": float(np.median(known)),
         "p90": float(np.percentile(known, 90)),
     }
-
-
-def differences(one: Json, other: Json, *, tolerance: float = 0.02) -> list[str]:
-    """List where two summaries differ by more than a tolerance, relative to the larger number.
-
-    Counts may differ by two in any case: a draw on the border of an interval can fall on
-    either side of it on another machine. For the hard and named splits, means and 90th
-    percentiles are not compared.
-
-    Examples
-    --------
-    >>> a = {"test": {"count": 10, "features": {"K_A": {"mean": 0.300, "median": 0.2}}}}
-    >>> b = {"test": {"count": 11, "features": {"K_A": {"mean": 0.307, "median": 0.2}}}}
-    >>> differences(a, b)
-    ['test/features/K_A/mean: 0.3 and 0.307']
-    """
-    left, right = dict(_leaves(one)), dict(_leaves(other))
-    found = []
-    for path in sorted(left.keys() | right.keys()):
-        split, *_, last = path.split("/")
-        if split not in _EVEN and last in ("mean", "p90"):
-            continue
-        a, b = left.get(path), right.get(path)
-        if not _close(a, b, tolerance):
-            found.append(f"{path}: {a} and {b}")
-    return found
-
-
-def _leaves(
-    tree: Json | list[float] | float | None, path: str = ""
-) -> Iterator[tuple[str, float | None]]:
-    if isinstance(tree, dict | list):
-        for key, value in tree.items() if isinstance(tree, dict) else enumerate(tree):
-            yield from _leaves(value, f"{path}/{key}" if path else str(key))
-    else:
-        yield path, tree
-
-
-def _close(a: float | None, b: float | None, tolerance: float) -> bool:
-    if isinstance(a, int) or isinstance(b, int):
-        # A count that only one summary has is zero in the other.
-        a, b = a or 0, b or 0
-        return abs(a - b) <= max(2, tolerance * max(abs(a), abs(b)))
-    if a is None or b is None:
-        return a is b
-    return abs(a - b) <= tolerance * max(abs(a), abs(b)) + 1e-12

@@ -2,8 +2,7 @@
 
 A term is a stencil, constants per element, and the residual of *one* element, written
 once for NumPy, torch and CasADi numbers. Any module of this package that defines
-``residual`` is in the registry. It also defines ``examples`` for the conformance tests,
-which find it there.
+``residual`` is in the registry, where the conformance tests find it.
 """
 
 from __future__ import annotations

@@ -104,8 +104,3 @@ def _lengths(*vectors: Array) -> Array:
     """Average the lengths of vectors (e, 3) by element, with a lower bound."""
     length: Array = np.mean([np.linalg.norm(x, axis=1) for x in vectors], axis=0)
     return length.clip(_SHORTEST * length.mean() if len(length) else 0.0)
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return build(mesh, tangential=0.5)

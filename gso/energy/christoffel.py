@@ -89,8 +89,3 @@ def _lengths(chords: Array) -> Array:
     """Measure chords (t, 3), bounded below by :data:`_SHORTEST` times their mean length."""
     length: Array = np.linalg.norm(chords, axis=1)
     return length.clip(_SHORTEST * length.mean())
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return [*build(mesh, "surface", counterpart="flat"), *build(mesh, "flat")]

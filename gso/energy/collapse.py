@@ -51,8 +51,3 @@ def _squeezed_areas(vertices: Array, faces: Ints) -> Array:
         p, q, r = (tuple(vertices[faces[:, k]].T) for k in corner)
         out.append(geometry.norm(geometry.cross(geometry.sub(q, p), geometry.sub(r, p))))
     return SQUEEZED * np.stack(out)
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return build(mesh)

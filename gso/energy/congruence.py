@@ -107,14 +107,3 @@ def edges(mesh: Mesh, block: str) -> Term:
 def _products(vertices: Array, faces: Ints) -> Array:
     corners = [tuple(vertices[faces[:, k]].T) for k in range(faces.shape[1])]
     return np.stack(geometry.face_products(*corners))
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return [
-        *build(mesh, "surface"),
-        *build(mesh, "flat"),
-        *build(mesh, "surface", counterpart="flat"),
-        *build(mesh, "flat", scale="scale"),
-        edges(mesh, "surface"),
-    ]

@@ -60,8 +60,3 @@ def star_areas(vertices: Array, centre: Ints, ring: Ints) -> Array:
     return star_area(
         tuple(vertices[centre].T), [tuple(vertices[ring[:, k]].T) for k in range(ring.shape[1])]
     )
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return build(mesh)

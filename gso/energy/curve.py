@@ -9,7 +9,7 @@ import numpy as np
 
 from gso.energy.base import Term
 from gso.geometry import dot, sub
-from gso.mesh import Mesh, Polylines
+from gso.mesh import Polylines
 from gso.typing import Array, Ints, S, Vec
 
 #: The curve does not move with the surface.
@@ -91,15 +91,3 @@ class _Sliding:
             target = np.where(held[:, None], ends[segment], target)
             tangent = np.where(held[:, None], 0.0, tangent)
         return target, tangent
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    ids = np.arange(4)
-    out = []
-    for block, dim in (("surface", 3), ("flat", 2)):
-        points = mesh.vertices[[0, 5, 11], :dim]
-        term = build(ids, Polylines.of(points, closed=False), block=block, weight=1.0)
-        constants = term.refresh({block: mesh.vertices[:, :dim] + 0.01})  # type: ignore[misc]
-        out.append(replace(term, constants=constants, refresh=None))
-    return out

@@ -38,8 +38,3 @@ def build(mesh: Mesh) -> Term:
         constants=1.0 / length[None],
         vectors=vectors,
     )
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return [build(mesh)]

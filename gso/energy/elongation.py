@@ -51,8 +51,3 @@ def build(mesh: Mesh) -> Term:
         weights=np.full(int(measured.sum()), 1.0 / count),
         constants=constants[:, measured],
     )
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return [build(mesh)]

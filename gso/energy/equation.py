@@ -8,7 +8,6 @@ import numpy as np
 
 from gso.energy.base import Term
 from gso.geometry import dot
-from gso.mesh import Mesh
 from gso.typing import Array, Ints, S, Vec
 
 #: The equations do not move with the surface.
@@ -44,15 +43,3 @@ def build(index: Ints, rows: Array, *, block: str = "surface") -> Term:
         constants=rows.T.copy(),
         linear=True,
     )
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    ids, out = np.arange(4), []
-    for block, dim in (("surface", 3), ("flat", 2)):
-        normal = np.full(dim, dim**-0.5)
-        plane = np.tile(np.r_[normal, 0.1], (4, 1))
-        out.append(build(ids[:, None], plane, block=block))
-        mirror = np.r_[2.0 * normal[0] * normal, normal, 0.2]
-        out.append(build(np.stack([ids, ids + 5], axis=1), np.tile(mirror, (4, 1)), block=block))
-    return out

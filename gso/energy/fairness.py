@@ -133,8 +133,3 @@ def build(
         constants=np.concatenate([coefficients, wanted]),
         linear=True,
     )
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return [build(mesh), build(mesh, block="flat")]

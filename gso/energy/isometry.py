@@ -71,8 +71,3 @@ def _rest(vertices: Array, faces: Ints) -> Array:
     if len(points) == 4:
         rows.append(geometry.dot(*geometry.diagonals(*points)))
     return np.stack(rows)
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return build(mesh)

@@ -8,7 +8,6 @@ import numpy as np
 
 from gso import geometry
 from gso.energy.base import Term
-from gso.mesh import Mesh
 from gso.typing import Array, Ints, S, Vec
 
 #: Rigid motions change no length.
@@ -34,9 +33,3 @@ def build(pairs: Ints, lengths: Array, *, block: str = "surface", weight: float 
         weights=np.full(len(pairs), weight),
         constants=np.stack([lengths, np.zeros(len(pairs))]),
     )
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    lengths = np.full(len(mesh.edges), 0.3)
-    return [build(mesh.edges, lengths), build(mesh.edges, lengths, block="flat")]

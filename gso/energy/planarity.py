@@ -8,7 +8,6 @@ import numpy as np
 
 from gso import geometry
 from gso.energy.base import Term
-from gso.mesh import Mesh, topology
 from gso.typing import Ints, S, Vec
 
 #: Rigid motions do not change planarity.
@@ -29,9 +28,3 @@ def build(quads: Ints, *, weight: float = 1.0) -> Term:
         weights=np.full(len(quads), weight),
         constants=np.zeros((1, len(quads))),
     )
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    quads = topology.by_size(mesh.faces)[0]
-    return [build(quads)] if len(quads) else []

@@ -8,7 +8,6 @@ import numpy as np
 
 from gso.energy.base import Term
 from gso.geometry import sub
-from gso.mesh import Mesh
 from gso.typing import Array, Ints, S, Vec
 
 #: The targets do not move with the surface.
@@ -30,9 +29,3 @@ def build(ids: Ints, positions: Array, weights: Array, *, block: str = "surface"
         constants=np.asarray(positions, float).T.copy(),
         linear=True,
     )
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    ids = np.arange(3)
-    return [build(ids, mesh.vertices[ids] + 0.1, np.ones(3))]

@@ -9,7 +9,7 @@ import numpy as np
 
 from gso.energy.base import Term
 from gso.geometry import dot, sub
-from gso.mesh import Mesh, Nearest, vertex_normals
+from gso.mesh import Mesh, Nearest
 from gso.typing import Array, S, Vec
 
 #: The reference does not move with the surface.
@@ -74,8 +74,3 @@ def closest(mesh: Mesh, normals: Array, *, tangential: float = 0.0) -> Term:
         return np.concatenate([feet.points.T, feet.normals.T, own.constants[6:]])
 
     return replace(own, name="closest", refresh=refresh)
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return [build(mesh, vertex_normals(mesh), tangential=0.5)]

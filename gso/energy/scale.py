@@ -25,8 +25,3 @@ def build(mesh: Mesh) -> Term:
     return Term(
         "scale", residual, (("scale", np.arange(count)[:, None]),), mean_weights(count), linear=True
     )
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return [build(mesh)]

@@ -33,8 +33,3 @@ def build(mesh: Mesh) -> list[Term]:
     It is a cheap regulariser: its Hessian is constant, and couples only vertices of one face.
     """
     return per_corner(mesh, "shear", residual, rest_constants, linear=True)
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return build(mesh)

@@ -6,7 +6,6 @@ import numpy as np
 
 from gso.energy import fairness
 from gso.energy.base import Term
-from gso.mesh import Mesh, topology
 from gso.typing import Array, Ints
 
 #: Translations cancel, as the coefficients sum to zero; rotations turn the vector of residuals.
@@ -42,15 +41,3 @@ def build(triples: Ints, steps: Array, *, block: str = "surface", weight: float 
         constants=np.concatenate([coefficients, np.zeros((dim, len(triples)))]),
         linear=True,
     )
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    if mesh.grid_index is not None:
-        triples = mesh.grid_index[0][[[0, 1, 2], [1, 2, 3]]]
-    else:
-        triples = topology.polyline_triples(mesh.half_edges, mesh.faces)[:2]
-        if not len(triples):
-            triples = mesh.faces[:2, :3]
-    steps = np.tile([1.0, 0.7], (len(triples), 1))
-    return [build(triples, steps, block=block) for block in ("surface", "flat")]

@@ -276,8 +276,3 @@ def build(mesh: Mesh) -> list[Term]:
     as-rigid-as-possible energy of Liu et al. 2008 with equal weights.
     """
     return per_corner(mesh, "strain", residual, rest_constants, vectors=vectors)
-
-
-def examples(mesh: Mesh) -> list[Term]:
-    """Build terms for the conformance tests."""
-    return build(mesh)

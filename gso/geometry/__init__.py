@@ -4,7 +4,8 @@ The functions take *component tuples* ``(x, y, z)`` or ``(x, y)`` and use only
 ``+ - * /`` and the few functions of :mod:`gso.geometry.ops`. The same code runs on
 NumPy arrays (metrics), torch tensors (losses) and CasADi symbols (derivatives), so
 solver residuals, training losses and metrics always agree. Only :mod:`gso.geometry.size`,
-:mod:`gso.geometry.triangle` and :mod:`gso.geometry.rigid` take NumPy arrays of points.
+:mod:`gso.geometry.triangle`, :mod:`gso.geometry.rigid` and :mod:`gso.geometry.polygon` take NumPy
+arrays of points.
 """
 
 from gso.geometry.angle_defect import (

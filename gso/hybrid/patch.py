@@ -109,8 +109,8 @@ def _filled(mesh: Mesh, outer: Ints) -> Mesh:
     for loop in mesh.boundary_loops:
         if outer[0] in loop:
             continue
-        # The new faces are on the other side of the loop.
-        edge = loop[::-1] if _surface_on_left(mesh, loop) else loop
+        # The surface is to the left of the loop, and the new faces on its other side.
+        edge = loop[::-1]
         middle = len(mesh.vertices) + len(points) - 1
         points.append(mesh.vertices[loop].mean(axis=0, keepdims=True))
         triangles.append(np.stack([edge, np.roll(edge, -1), np.full(len(edge), middle)], axis=1))
@@ -126,8 +126,6 @@ def _filled(mesh: Mesh, outer: Ints) -> Mesh:
 def _boundary(mesh: Mesh) -> tuple[Ints, Array, Array]:
     """Return the outer boundary loop from a corner on, its image, and the rectangle's sides."""
     loop = max(mesh.boundary_loops, key=lambda ids: _lengths(mesh.vertices[ids]).sum())
-    if not _surface_on_left(mesh, loop):
-        loop = loop[::-1]
     turning = np.pi - _angles(mesh)[loop]
     corners = _corners(turning, _lengths(mesh.vertices[loop]))
     loop = np.roll(loop, -corners[0])
@@ -143,12 +141,6 @@ def _boundary(mesh: Mesh) -> tuple[Ints, Array, Array]:
 def _lengths(points: Array) -> Array:
     """Return the edge lengths of a closed polygon; edge k starts at vertex k."""
     return np.asarray(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))
-
-
-def _surface_on_left(mesh: Mesh, loop: Ints) -> bool:
-    t = mesh.triangles
-    edges = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
-    return bool((edges == loop[:2]).all(axis=1).any())
 
 
 def _angles(mesh: Mesh) -> Array:

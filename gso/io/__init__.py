@@ -11,13 +11,14 @@ Mesh(12 vertices, 6 faces, grid 3 x 4)
 
 from __future__ import annotations
 
-import importlib
 import os
 import warnings
+from collections.abc import Callable
 from types import ModuleType
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
 from gso.errors import MeshError, OptionError
+from gso.io import arrays, glb, obj, off, ply, stl
 from gso.io.atomic import check_writable, replacing, suffix_of
 from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_faces, save_patches, save_spline
 from gso.io.convert import as_mesh
@@ -54,37 +55,17 @@ __all__ = [
 ]
 
 
-class _Format(NamedTuple):
-    """Module and function names of a file format; the module is imported on first use."""
-
-    module: str | ModuleType
-    reader: str = "read"
-    writer: str = "write"
-
-    @property
-    def _module(self) -> ModuleType:
-        if isinstance(self.module, str):
-            return importlib.import_module(f"gso.io.{self.module}")
-        return self.module
-
-    def read(self, data: bytes) -> Surface:
-        surface: Surface = getattr(self._module, self.reader)(data)
-        return surface
-
-    def write(self, mesh: Mesh, file: BinaryIO) -> None:
-        getattr(self._module, self.writer)(mesh, file)
-
-
-_FORMATS = {
-    ".obj": _Format("obj"),
-    ".ply": _Format("ply"),
-    ".off": _Format("off"),
-    ".stl": _Format("stl"),
-    ".glb": _Format("glb"),
-    ".npy": _Format("arrays", "read_npy", "write_npy"),
-    ".npz": _Format("arrays", "read_npz", "write_npz"),
+#: Reader and writer of a file format.
+_Format = tuple[Callable[[bytes], Surface], Callable[[Mesh, BinaryIO], None]]
+_FORMATS: dict[str, _Format] = {
+    ".obj": (obj.read, obj.write),
+    ".ply": (ply.read, ply.write),
+    ".off": (off.read, off.write),
+    ".stl": (stl.read, stl.write),
+    ".glb": (glb.read, glb.write),
+    ".npy": (arrays.read_npy, arrays.write_npy),
+    ".npz": (arrays.read_npz, arrays.write_npz),
 }
-
 SUFFIXES = tuple(_FORMATS)
 """Suffixes of the mesh files that are read and written."""
 
@@ -107,7 +88,7 @@ def add_format(suffix: str, module: ModuleType) -> None:
     """
     if not suffix.startswith(".") or suffix.lower() in _FORMATS:
         raise OptionError(f"{suffix!r} is taken or is no suffix; give a new one such as '.msh'")
-    _FORMATS[suffix.lower()] = _Format(module)
+    _FORMATS[suffix.lower()] = (module.read, module.write)
 
 
 def load(path: AnyPath, *, weld: float | None = None) -> Mesh:
@@ -146,7 +127,7 @@ def load(path: AnyPath, *, weld: float | None = None) -> Mesh:
             what = f"a {suffix!r} file" if suffix else "a file without a suffix"
             raise MeshError(f"cannot read {what}; use {', '.join(_FORMATS)}")
         data = read_bytes(name)
-        return _FORMATS[suffix].read(data).mesh(weld)
+        return _FORMATS[suffix][0](data).mesh(weld)
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from error.__cause__
     except MemoryError:
@@ -188,10 +169,10 @@ def write(mesh: MeshLike, path: AnyPath) -> tuple[str, ...]:
     check_writable(path, tuple(_FORMATS))
     name = os.fsdecode(path)
     surface = as_mesh(mesh)
-    form = _FORMATS[suffix_of(name)]
+    write_surface = _FORMATS[suffix_of(name)][1]
     with replacing(path) as file:
         try:
-            form.write(surface, file)
+            write_surface(surface, file)
         except MeshError as error:
             raise MeshError(f"{name}: {error}") from None
     return left_out(surface, path)

@@ -99,3 +99,9 @@ def replacing(path: AnyPath) -> Iterator[BinaryIO]:
         raise MeshError(
             f"{os.fsdecode(path)}: cannot be written: {error.strerror or error}"
         ) from error
+
+
+def write_bytes(path: AnyPath, content: bytes) -> None:
+    """Write a file, which replaces an earlier one when it is complete."""
+    with replacing(path) as file:
+        file.write(content)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import MeshError
-from gso.io.atomic import check_writable, replacing
+from gso.io.atomic import check_writable, write_bytes
 from gso.io.lines import polyline
 from gso.io.svg_page import SVGPage
 from gso.mesh import Mesh
@@ -104,5 +104,4 @@ def save_flat(
     layer = page.layer("outline", "#000000", width)
     for loop in loops:
         page.path(layer, [points[loop]], closed=True)
-    with replacing(path) as file:
-        file.write(page.content())
+    write_bytes(path, page.content())

@@ -7,7 +7,6 @@ import json
 from typing import Any, BinaryIO
 
 import numpy as np
-import trimesh
 
 from gso.errors import MeshError
 from gso.io.raw_surface import Surface, merged
@@ -25,6 +24,8 @@ def read(data: bytes) -> Surface:
     Duplicate vertices at texture or shading seams of a mesh are merged. Vertices of
     different nodes are never merged: each node gives its own components.
     """
+    import trimesh
+
     _check(data)
     points: list[np.ndarray] = []
     faces: list[np.ndarray] = []
@@ -88,6 +89,8 @@ def _check(data: bytes) -> None:
 
 def write(mesh: Mesh, file: BinaryIO) -> None:
     """Write the triangulated mesh as GLB, in single precision."""
+    import trimesh
+
     if np.abs(mesh.vertices).max() > np.finfo(np.float32).max:
         raise MeshError("the coordinates are too large for the single precision of GLB")
     body = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.errors import MeshError, OptionError
+from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.attributes import Attributes
 from gso.mesh.validation import checked_table, checked_vertices
 from gso.mesh.welding import collapse, equal, near
+from gso.quantities import as_positive
 from gso.typing import Array, Ints
 
 
@@ -52,11 +53,7 @@ def checked(weld: object) -> float:
     OptionError
         `weld` is not a finite number of 0 or more.
     """
-    if isinstance(weld, int | float | np.integer | np.floating) and not isinstance(weld, bool):
-        length = float(weld)
-        if 0 <= length < np.inf:
-            return length
-    raise OptionError(f"weld is {weld!r}; it must be a length, 0 or more")
+    return as_positive(weld, "weld", zero=True)
 
 
 def welded(mesh: Mesh, weld: float) -> Mesh:

@@ -175,11 +175,7 @@ class Words:
     def refuse(self, rows: Ints, bad: Flags, message: str) -> None:
         """Raise a MeshError that names the line of the first bad row, if there is one."""
         if bad.any():
-            self.fail_row(rows[bad.argmax()], message)
-
-    def fail_row(self, row: int | np.integer, message: str) -> NoReturn:
-        """Raise a MeshError that names the line of a row."""
-        self.fail(self.first[row], message)
+            self.fail(self.first[rows[bad.argmax()]], message)
 
 
 def write_rows(file: BinaryIO, formats: str | list[str], values: Array | Ints) -> None:

@@ -143,12 +143,5 @@ class _Turns:
         values = np.r_[weight[keep], each[begin]]
         graph = edge_graph(count + 1, rows, columns, values)
         away, before = dijkstra(graph, indices=count, return_predecessors=True)
-        goals = np.flatnonzero(reached[self.head] & np.isfinite(away[:-1]))
-        if not goals.size:
-            return np.array([target])
-        path = [int(goals[away[goals].argmin()])]
-        while before[path[-1]] != count:
-            path.append(int(before[path[-1]]))
-        out: Ints = np.r_[target, self.head[path[::-1]]]
-        stop = np.flatnonzero(reached[out[1:]])
-        return out[: stop[0] + 2] if stop.size else out
+        path = _traced(away, before, count, np.append(reached[self.head], False))
+        return np.asarray(np.r_[target, self.head[path[1:]]])

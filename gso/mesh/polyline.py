@@ -29,16 +29,6 @@ class Feet(NamedTuple):
     along: Array
 
 
-def arc_lengths(points: Array) -> Array:
-    """Return the length of a polyline (k, dim) from its first point to each (k,).
-
-    >>> arc_lengths(np.array([[0.0, 0], [3, 4], [3, 5]])).tolist()
-    [0.0, 5.0, 6.0]
-    """
-    along: Array = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))]
-    return along
-
-
 @dataclass(frozen=True)
 class Polylines:
     """Segments of one or more polylines.

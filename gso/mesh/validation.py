@@ -95,13 +95,18 @@ def checked_table(faces: ArrayLike, count: int) -> Ints:
     tri = table[:, 3] == -1 if table.shape[1] == 4 else np.ones(len(table), bool)
     inside = (table >= 0) & (table < count)
     inside[tri, 3:] = True
-    bad = np.flatnonzero(~inside.all(axis=1))
-    if bad.size:
-        raise MeshError(
-            f"face {bad[0]} = {table[bad[0]].tolist()} points outside the {count} vertices "
-            f"({bad.size} such faces)"
-        )
+    _refuse(table, np.asarray(~inside.all(axis=1)), f"points outside the {count} vertices")
     return table
+
+
+def _refuse(table: Ints, bad: Flags, what: str, instead: str = "") -> None:
+    """Raise a MeshError that names the first of some faces, if there are any."""
+    if bad.any():
+        k = int(bad.argmax())
+        raise MeshError(
+            f"face {k} = {table[k].tolist()} {what} ({int(bad.sum())} such faces)"
+            + (f"; {instead}" if instead else "")
+        )
 
 
 def checked_faces(faces: ArrayLike, points: Array) -> tuple[Ints, Flags, tuple[str, ...]]:
@@ -128,12 +133,8 @@ def checked_faces(faces: ArrayLike, points: Array) -> tuple[Ints, Flags, tuple[s
 
 def check_corners(table: Ints) -> None:
     ordered = np.sort(table, axis=1)
-    bad = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
-    if bad.size:
-        raise MeshError(
-            f"face {bad[0]} = {table[bad[0]].tolist()} repeats a vertex ({bad.size} such faces); "
-            "write it with one corner less or delete it"
-        )
+    twice: Flags = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    _refuse(table, twice, "repeats a vertex", "write it with one corner less or delete it")
     _, first, count = np.unique(ordered, axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
         raise MeshError(
@@ -155,12 +156,8 @@ def check_area(table: Ints, points: Array) -> None:
             f"the surface is {size:.3g} wide and reaches to {farthest:.3g}: all its vertices are "
             "one point, or its unit of length needs changing"
         )
-    bad = np.flatnonzero(~have_area(table, points - used.mean(axis=0), size))
-    if bad.size:
-        raise MeshError(
-            f"face {bad[0]} = {table[bad[0]].tolist()} has no area ({bad.size} such faces); "
-            "merge its vertices or delete it"
-        )
+    thin = ~have_area(table, points - used.mean(axis=0), size)
+    _refuse(table, thin, "has no area", "merge its vertices or delete it")
 
 
 def have_area(table: Ints, points: Array, size: float | None = None) -> Flags:

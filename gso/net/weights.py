@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from functools import lru_cache
 from pathlib import Path
 
@@ -13,7 +12,8 @@ from safetensors.torch import load as unpacked
 from safetensors.torch import save as packed
 
 from gso.errors import GSOError, OptionError, WeightsError
-from gso.io import replacing
+from gso.io.atomic import write_bytes
+from gso.io.json_file import write_json
 from gso.net.catalogue import FORMAT, located, read_card
 from gso.net.models.base import Net
 from gso.net.models.coarse import CoarseNet
@@ -113,16 +113,9 @@ def save(
         "sha256": hashlib.sha256(data).hexdigest(),
     }
     target = Path(path)
-    with replacing(target) as file:
-        file.write(data)
-    write_card(target.with_suffix(".json"), record)
+    write_bytes(target, data)
+    write_json(target.with_suffix(".json"), record)
     return record
-
-
-def write_card(path: Path, card: Json) -> None:
-    """Write a card."""
-    with replacing(path) as file:
-        file.write((json.dumps(card, indent=1) + "\n").encode())
 
 
 def load(model: AnyPath, *, device: str | torch.device = "cpu") -> Net:
@@ -181,7 +174,7 @@ def _filled(settings: Json, data: bytes, path: Path) -> Net:
     return net
 
 
-def cached(path: Path, device: str) -> Net:
+def cached(path: Path, device: torch.device) -> Net:
     """Load a net with :func:`load`, and cache it by path, device and modification time."""
     try:
         stamp = path.stat().st_mtime_ns
@@ -191,5 +184,5 @@ def cached(path: Path, device: str) -> Net:
 
 
 @lru_cache(maxsize=8)
-def _cached(path: Path, device: str, stamp: int) -> Net:
+def _cached(path: Path, device: torch.device, stamp: int) -> Net:
     return load(path, device=device)

@@ -21,11 +21,9 @@ from gso.errors import OptionError
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.plot.draw import GRAZING, SUFFIXES, Panel, available, draw, facing, require, write
+from gso.plot.draw import GRAZING, SUFFIXES, Panel, available, draw, facing, require, turned, write
 from gso.plot.heat import Heat, Scale, curvatures, distance, numbers, scales, strain, stretch
-from gso.plot.piece_panels import pieces
-from gso.plot.rulings import gauss, ruled
-from gso.plot.strips import strips
+from gso.plot.picture_panels import gauss, pieces, ruled, strips
 from gso.plot.view import View
 from gso.result import Result
 from gso.seams import Segmentation
@@ -147,9 +145,7 @@ def _flattened(design: Mesh, pattern: Pattern, scale: np.ndarray | None = None) 
     heat = strain(opened, flat) if scale is None else scales(opened, flat, scale)
     surface = _plain([design])[0]
     surface.title, surface.heat = "surface", heat
-    turned = (flat - flat.mean(axis=0)) @ np.array([1.0, 1j])
-    turned = turned * facing(flat, surface.points[pattern.vertex])
-    points = np.stack([turned.real, turned.imag, np.zeros(len(turned))], axis=1)
+    points = turned(flat - flat.mean(axis=0), facing(flat, surface.points[pattern.vertex]))
     sheet = Panel(points / design.frame.scale, pattern.faces, shaded=False, heat=heat)
     sheet.title = "flat pattern: " + heat.summary
     return [surface, sheet]

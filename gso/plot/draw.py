@@ -158,6 +158,12 @@ def facing(flat: Array, seen: Array) -> complex:
     return complex(np.exp(1j * np.angle((np.conj(z) * (w - w.mean())).sum())))
 
 
+def turned(flat: Array, turn: complex) -> Array:
+    """Return points (n, 2), rotated by a complex number, in the plane z = 0."""
+    z = flat @ np.array([1.0, 1j]) * turn
+    return np.stack([z.real, z.imag, np.zeros(len(z))], axis=1)
+
+
 def _seen(panel: Panel) -> Array:
     if panel.circle:
         return panel.circle * np.array([(-1.0, -1.0), (1.0, 1.0)])

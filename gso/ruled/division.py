@@ -8,10 +8,10 @@ import numpy as np
 
 from gso import geometry
 from gso.errors import MeshError
+from gso.geometry.polygon import signed_area
 from gso.mesh import topology
 from gso.ruled.copies import with_copies
 from gso.ruled.nodes import Nodes
-from gso.ruled.polygon import enclosed_area
 from gso.ruled.unroll import Unrolled
 from gso.ruled.vectors import lengths
 from gso.typing import Array, Flags, Ints
@@ -57,9 +57,9 @@ def meshed(
         kept = [_simplified(x, inner[ring]) for x, ring in zip(flat, whole, strict=True)]
         every = [ring[at] for ring, at in zip(whole, kept, strict=True)]
         flats = [x[at] for x, at in zip(flat, kept, strict=True)]
-        if len(every[0]) < 3 or abs(enclosed_area(flats[0])) < _SLIVER:
+        if len(every[0]) < 3 or abs(signed_area(flats[0])) < _SLIVER:
             continue
-        if enclosed_area(flats[0]) < 0:
+        if signed_area(flats[0]) < 0:
             every[0], flats[0] = every[0][::-1], flats[0][::-1]
         found = _divided(every, flats, inner)
         if not found:
@@ -98,7 +98,7 @@ def _divided(rings: list[Ints], flats: list[Array], inner: Flags) -> list[list[i
         side = np.arange(a, (b if b > a else b + len(ring)) + 1) % len(ring)
         if side.size == 2:
             continue
-        if enclosed_area(flat[side]) < _SLIVER or not _outside(flat, side):
+        if signed_area(flat[side]) < _SLIVER or not _outside(flat, side):
             return _triangles(rings, flats)
         more = _triangles([ring[side]], [flat[side]])
         if not more:
@@ -126,8 +126,8 @@ def _triangles(rings: list[Ints], flats: list[Array]) -> list[list[int]]:
     for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(piece)):
         xy = np.asarray(triangle.exterior.coords)[:3]
         three = [node[tuple(p)] for p in xy.tolist()]
-        if abs(enclosed_area(xy)) > 1e-4 * _SLIVER:
-            out.append([*(three if enclosed_area(xy) > 0 else three[::-1]), -1])
+        if abs(signed_area(xy)) > 1e-4 * _SLIVER:
+            out.append([*(three if signed_area(xy) > 0 else three[::-1]), -1])
     return out
 
 

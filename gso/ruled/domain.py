@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from gso.geometry.polygon import anticlockwise, signed_area
 from gso.mesh import Mesh, Nearest, vertex_normals
-from gso.ruled.polygon import enclosed_area, resampled, turning
+from gso.ruled.polygon import resampled, turning
 from gso.ruled.vectors import lengths, unit
 from gso.typing import Array, Flags, Ints
 
@@ -49,7 +50,7 @@ class Domain:
         self.mesh, self.flat = mesh, flat
         self.normals = vertex_normals(mesh)
         self._nearest = Nearest.of(np.pad(flat, ((0, 0), (0, 1))), mesh.triangles)
-        areas = [enclosed_area(flat[loop]) for loop in mesh.boundary_loops]
+        areas = [signed_area(flat[loop]) for loop in mesh.boundary_loops]
         largest = int(np.abs(areas).argmax())
         loop = mesh.boundary_loops[largest]
         loop = loop if areas[largest] > 0 else loop[::-1]
@@ -75,7 +76,7 @@ class Domain:
         if not len(slots) or whole.geom_type != "Polygon":
             return self.flat[self.outline]
         loop = np.asarray(shapely.normalize(whole).exterior.coords)[:-1]
-        loop = loop if enclosed_area(loop) > 0 else loop[::-1]
+        loop = anticlockwise(loop)
         return np.roll(loop, -_start(loop), axis=0)
 
     def encloses(self, places: Array) -> Flags:
@@ -124,7 +125,7 @@ class Domain:
         frame = np.array([[x, -y], [y, x]])
         turned = self.flat @ frame
         low, high = turned.min(axis=0), turned.max(axis=0)
-        area = abs(enclosed_area(self.flat[self.outline]))
+        area = abs(signed_area(self.flat[self.outline]))
         box = high - low
         # Of a sliver, the lattice is coarser.
         least = max(np.sqrt(box.prod() / (_SPARSE * count)), box.max() / count)

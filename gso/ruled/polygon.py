@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.mesh.polyline import arc_lengths
+from gso.geometry.polygon import arc_lengths
 from gso.typing import Array, Ints
 
 #: Turning angles of sharp corners, and the largest for which offsets are lengthened.
 _SHARP, _MITRE = 0.5, 2.0
-
-
-def enclosed_area(loop: Array) -> float:
-    """Return the signed area of a polygon (k, 2)."""
-    x, y = loop.T
-    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
 
 
 def resampled(loop: Array, count: int) -> tuple[Array, Array]:

@@ -14,7 +14,7 @@ from gso.seams.cutting import cut
 from gso.seams.disks import opening
 from gso.seams.kinds import Edges
 from gso.seams.merging import Merging
-from gso.seams.options import NECK, Wishes
+from gso.seams.options import NECK, PieceSettings
 from gso.seams.sheets import Sheet, flattened
 from gso.seams.shorter_seams import straightened
 from gso.seams.splitting import apart, halves
@@ -57,25 +57,25 @@ class Candidate:
         return np.array([limit if s is None else s.neck(limit) for s in self.sheets])
 
 
-def ranked(found: Candidate, wishes: Wishes) -> tuple[int, float, float]:
-    """Rank pieces by :meth:`Wishes.value`."""
-    return wishes.value(len(found.pieces), found.pieces.seam_length)
+def ranked(found: Candidate, settings: PieceSettings) -> tuple[int, float, float]:
+    """Rank pieces by :meth:`PieceSettings.value`."""
+    return settings.value(len(found.pieces), found.pieces.seam_length)
 
 
-def neck_of(ground: Ground, wishes: Wishes) -> float:
+def neck_of(ground: Ground, settings: PieceSettings) -> float:
     """Return the width of necks to aim at."""
-    if wishes.min_neck is not None:
-        return wishes.min_neck
+    if settings.min_neck is not None:
+        return settings.min_neck
     return NECK * float(np.sqrt(ground.potential.area.sum()))
 
 
-def cuts(ground: Ground, wishes: Wishes, strain: float) -> Pieces:
+def cuts(ground: Ground, settings: PieceSettings, strain: float) -> Pieces:
     """Cut a design for a bound on the estimated strain."""
-    if wishes.darts:
-        firm = wishes.min_neck is not None
-        return with_darts(ground, strain, neck_of(ground, wishes), firm=firm)
+    if settings.darts:
+        firm = settings.min_neck is not None
+        return with_darts(ground, strain, neck_of(ground, settings), firm=firm)
     some = without_darts(ground, strain)
-    return pieces_of(min(some, key=lambda one: merged_value(one, wishes)))
+    return pieces_of(min(some, key=lambda one: merged_value(one, settings)))
 
 
 def with_darts(ground: Ground, strain: float, neck: float, *, firm: bool) -> Pieces:
@@ -99,10 +99,10 @@ def without_darts(ground: Ground, strain: float) -> list[Merging]:
     return out
 
 
-def merged_value(merging: Merging, wishes: Wishes) -> tuple[int, float, float]:
-    """Rank merged pieces by :meth:`Wishes.value`, before their seams are straightened."""
+def merged_value(merging: Merging, settings: PieceSettings) -> tuple[int, float, float]:
+    """Rank merged pieces by :meth:`PieceSettings.value`, before their seams are straightened."""
     length = merging.cost / float(np.sqrt(merging.ground.potential.area.sum()))
-    return wishes.value(int(merging.label.max()) + 1, length)
+    return settings.value(int(merging.label.max()) + 1, length)
 
 
 def pieces_of(merging: Merging) -> Pieces:
@@ -222,12 +222,12 @@ def joined(
     found: Candidate,
     strain: float,
     neck: float,
-    wishes: Wishes,
+    settings: PieceSettings,
     *,
     whole: bool = False,
 ) -> Candidate:
     """Join pieces along parts of their seams (:func:`gso.seams.stitching.stitched`)."""
-    most = wishes.max_size
+    most = settings.max_size
     sheets = [s for s in found.sheets if s is not None]
     if len(sheets) < len(found.sheets) or len(sheets) < 2 or ground.mirror is not None:
         return found
@@ -238,9 +238,9 @@ def joined(
         strain,
         neck,
         lambda sheet: most is None or fits(sheet, most),
-        least=wishes.min_size or 0.0,
+        least=settings.min_size or 0.0,
         whole=whole,
-        progress=wishes.say,
+        progress=settings.say,
     )
     pieces = cut(ground.mesh, Edges(edges))
     return Candidate(pieces, tuple(_renumbered(p.mesh.faces, p, known) for p in pieces))

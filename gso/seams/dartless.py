@@ -13,7 +13,7 @@ from gso.seams.candidates import (
     ranked,
     without_darts,
 )
-from gso.seams.options import Wishes
+from gso.seams.options import PieceSettings
 from gso.seams.straight import straight
 from gso.seams.tree import Ground
 
@@ -26,7 +26,7 @@ _ATTEMPTS, _MEASURED = 4, 3
 _ENOUGH = 3
 
 
-def dartless(ground: Ground, wishes: Wishes) -> Candidate:
+def dartless(ground: Ground, settings: PieceSettings) -> Candidate:
     """Merge patches in several ways, and take the best result that holds the strain.
 
     The bound of the estimate is adapted to what was measured.
@@ -34,28 +34,28 @@ def dartless(ground: Ground, wishes: Wishes) -> Candidate:
     found: list[Candidate] = []
     ratio = _RATIO
     for attempt in range(_ATTEMPTS):
-        wishes.say(f"seams without darts, attempt {attempt + 1}")
-        pool = without_darts(ground, ratio * wishes.max_strain)
+        settings.say(f"seams without darts, attempt {attempt + 1}")
+        pool = without_darts(ground, ratio * settings.max_strain)
         strains = []
-        for some in sorted(pool, key=lambda one: merged_value(one, wishes))[:_MEASURED]:
-            one = measured(ground, pieces_of(some), wishes.max_size, wishes.say)
-            if one.strain <= wishes.max_strain and one.sound:
-                one = _finished(ground, one, wishes)
+        for some in sorted(pool, key=lambda one: merged_value(one, settings))[:_MEASURED]:
+            one = measured(ground, pieces_of(some), settings.max_size, settings.say)
+            if one.strain <= settings.max_strain and one.sound:
+                one = _finished(ground, one, settings)
             found.append(one)
             strains.append(one.strain)
-        good = [one for one in found if one.strain <= wishes.max_strain and one.sound]
+        good = [one for one in found if one.strain <= settings.max_strain and one.sound]
         if len(good) >= _ENOUGH or (good and attempt):
-            return min(good, key=lambda one: ranked(one, wishes))
+            return min(good, key=lambda one: ranked(one, settings))
         middle = float(np.median(strains))
-        ratio *= float(np.clip(_AIM * wishes.max_strain / max(middle, 1e-300), 0.5, 1.0))
+        ratio *= float(np.clip(_AIM * settings.max_strain / max(middle, 1e-300), 0.5, 1.0))
         ratio *= 1.0 if len(good) else 0.98
     if good:
-        return min(good, key=lambda one: ranked(one, wishes))
+        return min(good, key=lambda one: ranked(one, settings))
     return min(found, key=lambda one: (not one.sound, one.strain))
 
 
-def _finished(ground: Ground, found: Candidate, wishes: Wishes) -> Candidate:
+def _finished(ground: Ground, found: Candidate, settings: PieceSettings) -> Candidate:
     """Join pieces that are too short to a neighbour, and straighten seams."""
-    if wishes.min_size is not None:
-        found = joined(ground, found, wishes.max_strain, np.inf, wishes, whole=True)
-    return straight(ground, found, wishes)
+    if settings.min_size is not None:
+        found = joined(ground, found, settings.max_strain, np.inf, settings, whole=True)
+    return straight(ground, found, settings)

@@ -12,7 +12,7 @@ from gso.errors import OptionError
 from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
-from gso.quantities import Length, as_length, millimetres
+from gso.quantities import Length, as_length, as_positive, millimetres
 from gso.typing import Array, Ints
 from gso.verdict import Code
 
@@ -25,7 +25,7 @@ NECK = 0.1
 
 
 @dataclass(frozen=True)
-class Wishes:
+class PieceSettings:
     """Budgets and preferences of :func:`gso.pieces`."""
 
     max_strain: float
@@ -40,8 +40,8 @@ class Wishes:
     executor: Executor = SERIAL
 
     def __post_init__(self) -> None:
-        if self.seam is not None and not _positive(self.seam):
-            raise OptionError(f"seam is {self.seam!r}; it must be a positive number")
+        if self.seam is not None:
+            as_positive(self.seam, "seam")
         if not callable(self.say):
             raise OptionError(f"callback is {self.say!r}; it must be a function of a text")
         count = self.max_pieces
@@ -138,8 +138,3 @@ def _faces(given: ArrayLike, count: int) -> Ints:
     if bad.size:
         raise OptionError(f"avoid names face {bad[0]}; the mesh has {count}")
     return faces
-
-
-def _positive(value: float) -> bool:
-    real = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    return bool(real and 0 < value < np.inf)

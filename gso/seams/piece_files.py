@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from gso import io
 from gso.errors import MeshError
+from gso.io.json_file import plain, write_json
 from gso.mesh import Attributes, Labels, Mesh
 from gso.typing import AnyPath, Json
 
@@ -45,8 +45,7 @@ def save(found: Segmentation, folder: AnyPath, unit: str = "mm") -> list[str]:
             io.save_flat(sheet.flat, sheet.mesh, place / names[-1], unit=unit)
     names.append("pieces.json")
     known = record(found, unit) | {"files": names}
-    with io.replacing(place / names[-1]) as file:
-        file.write(json.dumps(known, indent=2).encode() + b"\n")
+    write_json(place / names[-1], known)
     for name in earlier - set(names):
         (place / name).unlink(missing_ok=True)
     return names
@@ -80,22 +79,14 @@ def record(found: Segmentation, unit: str) -> Json:
     return {
         "unit": unit,
         "usable": found.usable,
-        "metrics": _plain(found.metrics),
+        "metrics": plain(found.metrics),
         "reasons": [reason.record(unit) for reason in found.reasons],
         "notes": list(found.notes),
-        "pieces": [_plain(row) for row in found.table()],
+        "pieces": [plain(row) for row in found.table()],
         "seams": [
             {"between": [found.name(a), found.name(b)], "length": length}
             for (a, b), length in found.seams().items()
         ],
         "alike": [[found.name(k) for k in group] for group in found.alike() if len(group) > 1],
         "seconds": found.seconds,
-    }
-
-
-def _plain(values: Json) -> Json:
-    """Replace numbers that JSON lacks by None."""
-    return {
-        k: v if isinstance(v, str) else (float(v) if math.isfinite(v) else None)
-        for k, v in values.items()
     }

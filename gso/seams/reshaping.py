@@ -15,7 +15,7 @@ from gso.result import Result
 from gso.seams.candidates import Candidate, cuts, joined, measured, neck_of
 from gso.seams.facets import FACETS, facet_ratio
 from gso.seams.joint_solve import solve_pieces
-from gso.seams.options import Wishes
+from gso.seams.options import PieceSettings
 from gso.seams.straight import straightened_pieces
 from gso.seams.tree import Ground
 from gso.tasks.developable import Options
@@ -50,43 +50,43 @@ class _Attempt:
     excess: float
 
 
-def reshaped(ground: Ground, wishes: Wishes) -> tuple[Candidate, Result | None]:
+def reshaped(ground: Ground, settings: PieceSettings) -> tuple[Candidate, Result | None]:
     """Search for the fewest cuts whose pieces become developable within the allowed distance."""
-    allowed = np.inf if wishes.max_deviation is None else wishes.max_deviation
+    allowed = np.inf if settings.max_deviation is None else settings.max_deviation
     tried: list[_Attempt] = []
     for level in _levels(tried, len(ground.kept)):
-        wishes.say(f"seams and shape, attempt {len(tried) + 1}")
-        cut_open = cuts(ground, wishes, level)
+        settings.say(f"seams and shape, attempt {len(tried) + 1}")
+        cut_open = cuts(ground, settings, level)
         # An attempt begins with the weight of the distance that the one before ended with.
         begin = tried[-1].proximity / _STRONGER if tried else 1.0
-        tried.append(_attempt(ground, cut_open, level, max(begin, 1.0), allowed, wishes))
+        tried.append(_attempt(ground, cut_open, level, max(begin, 1.0), allowed, settings))
     best = min(
         tried,
         key=lambda a: (
             max(a.excess, 1.0),
-            *wishes.value(len(a.pieces), a.pieces.seam_length),
+            *settings.value(len(a.pieces), a.pieces.seam_length),
         ),
     )
-    best = _with_straight_seams(ground, best, wishes, allowed)
+    best = _with_straight_seams(ground, best, settings, allowed)
     shape = best.pieces
     surface = ground.moved(shape.design)
-    found = measured(surface, shape, wishes.max_size, wishes.say, executor=wishes.executor)
-    if wishes.darts and found.strain <= wishes.max_strain:
-        found = joined(surface, found, wishes.max_strain, neck_of(ground, wishes), wishes)
+    found = measured(surface, shape, settings.max_size, settings.say, executor=settings.executor)
+    if settings.darts and found.strain <= settings.max_strain:
+        found = joined(surface, found, settings.max_strain, neck_of(ground, settings), settings)
     return found, best.result
 
 
 def _with_straight_seams(
-    ground: Ground, best: _Attempt, wishes: Wishes, allowed: float
+    ground: Ground, best: _Attempt, settings: PieceSettings, allowed: float
 ) -> _Attempt:
     """Solve again with straight seams instead of zigzags, if that is as good."""
     if best.result is None:
         return best
-    wishes.say("straight seams")
+    settings.say("straight seams")
     own = straightened_pieces(ground, best.cut)
     if own is None:
         return best
-    new = _attempt(ground, own, best.level, best.proximity, allowed, wishes)
+    new = _attempt(ground, own, best.level, best.proximity, allowed, settings)
     return new if new.excess <= max(best.excess, 1.0) else best
 
 
@@ -121,10 +121,10 @@ def _attempt(
     level: float,
     proximity: float,
     allowed: float,
-    wishes: Wishes,
+    settings: PieceSettings,
 ) -> _Attempt:
     """Solve one cut, again with other weights where distance, strain or facets are too large."""
-    strain = wishes.max_strain
+    strain = settings.max_strain
     own = replace(Options().for_pieces(), w_proximity=proximity)
     sound = not len(faults.folded(ground.mesh))
     best: _Attempt | None = None
@@ -141,7 +141,7 @@ def _attempt(
         far = metrics.largest_distance(ground.mesh, shape.design) / allowed
         strained = uneven = 0.0
         if far <= _HOPELESS:
-            strains = strains_of(result.mesh, wishes.executor)
+            strains = strains_of(result.mesh, settings.executor)
             strained = strains.get("strain_max", np.inf) / strain
         if far <= 1.0:
             folds = len(faults.folded(shape.design)) if sound else 0

@@ -30,7 +30,7 @@ from gso.seams.dartless import dartless
 from gso.seams.design_noise import noise
 from gso.seams.kinds import Seam
 from gso.seams.mirror_plane import mirror_of
-from gso.seams.options import CHANGES, STAYS, Wishes, as_sheet, prices, too_large
+from gso.seams.options import CHANGES, STAYS, PieceSettings, as_sheet, prices, too_large
 from gso.seams.reshaping import reshaped
 from gso.seams.search_result import packed
 from gso.seams.segmentation import Segmentation
@@ -161,7 +161,7 @@ def pieces(
         return as_length(value, name, diagonal=design.diagonal, unit=unit)
 
     default = STAYS if max_deviation is None else CHANGES
-    wishes = Wishes(
+    settings = PieceSettings(
         max_strain=default if max_strain is None else as_strain(max_strain, "max_strain"),
         max_deviation=length(max_deviation, "max_deviation"),
         max_pieces=max_pieces,
@@ -172,24 +172,24 @@ def pieces(
         max_size=as_sheet(sheet, unit),
         say=callback or (lambda said: None),
     )
-    max_size = wishes.max_size
+    max_size = settings.max_size
     notes: list[str] = []
     ground = _ground(design, keep, along, avoid, symmetric, denoise)
-    aim = wishes
+    aim = settings
     if max_size is not None and too_large(ground.mesh, max_size):
         # The pieces are not cut to size in vain; the reason names the largest.
-        aim = replace(wishes, max_size=None)
+        aim = replace(settings, max_size=None)
     said = noise(ground.mesh, ground.potential)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         if max_deviation is None:
             found = _as_is(ground, aim)
-            out = packed(found, None, ground, wishes)
+            out = packed(found, None, ground, settings)
         else:
             # This process does its share.
             others = max((processors() if workers is None else workers) - 1, 0)
             with open_executor(others) as executor:
-                out = packed(*reshaped(ground, replace(aim, executor=executor)), ground, wishes)
+                out = packed(*reshaped(ground, replace(aim, executor=executor)), ground, settings)
     if said:
         notes.append(said)
     return replace(out, notes=(*out.notes, *notes), seconds=time.perf_counter() - clock)
@@ -234,22 +234,24 @@ def _again(design: Mesh, keep: Pieces) -> Mesh:
     )
 
 
-def _as_is(ground: Ground, wishes: Wishes) -> Candidate:
+def _as_is(ground: Ground, settings: PieceSettings) -> Candidate:
     """Find seams of a shape that does not change."""
-    if wishes.darts:
-        return straight(ground, _darted(ground, wishes), wishes)
-    return dartless(ground, wishes)
+    if settings.darts:
+        return straight(ground, _darted(ground, settings), settings)
+    return dartless(ground, settings)
 
 
-def _darted(ground: Ground, wishes: Wishes) -> Candidate:
+def _darted(ground: Ground, settings: PieceSettings) -> Candidate:
     """Cut with darts, and adapt the bound on the estimated strain to the measured one."""
     # The strain of triangle meshes changes when seams are straightened.
-    most = (_ROOM if ground.mesh.is_triangles else 1.0) * wishes.max_strain
+    most = (_ROOM if ground.mesh.is_triangles else 1.0) * settings.max_strain
     ratio = _RATIO
     found: list[Candidate] = []
     for attempt in range(_ATTEMPTS):
-        wishes.say(f"seams, attempt {attempt + 1}")
-        last = measured(ground, cuts(ground, wishes, ratio * most), wishes.max_size, wishes.say)
+        settings.say(f"seams, attempt {attempt + 1}")
+        last = measured(
+            ground, cuts(ground, settings, ratio * most), settings.max_size, settings.say
+        )
         found.append(last)
         good = any(one.strain <= most and one.sound for one in found)
         whole = len(last.pieces.edges) == len(ground.kept)
@@ -258,7 +260,7 @@ def _darted(ground: Ground, wishes: Wishes) -> Candidate:
         if whole and last.strain <= most:
             break
         ratio *= float(np.clip(0.985 * most / max(last.strain, 1e-300), 0.5, 1.6))
-    best = min(found, key=lambda one: (one.strain > most or not one.sound, *ranked(one, wishes)))
+    best = min(found, key=lambda one: (one.strain > most or not one.sound, *ranked(one, settings)))
     if best.strain > most:
         return best
-    return joined(ground, best, most, neck_of(ground, wishes), wishes)
+    return joined(ground, best, most, neck_of(ground, settings), settings)

@@ -12,7 +12,7 @@ from gso.mesh import Mesh
 from gso.result import Result
 from gso.seams.candidates import Candidate
 from gso.seams.facets import FACETS, mean_angle
-from gso.seams.options import NECK, Wishes
+from gso.seams.options import NECK, PieceSettings
 from gso.seams.segmentation import Segmentation
 from gso.seams.tree import Ground
 from gso.verdict import Code, Measurement, compare
@@ -21,7 +21,9 @@ from gso.wording import length as said
 from gso.wording import percent
 
 
-def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wishes) -> Segmentation:
+def packed(
+    found: Candidate, result: Result | None, ground: Ground, settings: PieceSettings
+) -> Segmentation:
     """Measure what was found, and judge it by what was asked for.
 
     Parameters
@@ -31,7 +33,7 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
         The solve that changed the shape.
     ground : Ground
         The design, to measure distances from.
-    wishes : Wishes
+    settings : PieceSettings
     """
     own, sheets, length = found.pieces, found.sheets, found.pieces.seam_length
     count, names = len(own), _names(own)
@@ -68,10 +70,10 @@ def packed(found: Candidate, result: Result | None, ground: Ground, wishes: Wish
                 f"{numbers['dihedral_mean_before']:.3g} to {numbers['dihedral_mean']:.3g} degrees: "
                 "the pieces have facets or wrinkles"
             )
-    reasons = compare(measured, wishes.limits)
+    reasons = compare(measured, settings.limits)
     codes = {reason.code for reason in reasons}
     if Code.STRAIN in codes:
-        notes += _bent(own.design, wishes.max_strain)
+        notes += _bent(own.design, settings.max_strain)
     if Code.NECK not in codes and numbers["neck_share"] < NECK:
         notes.append(
             f"piece {own.name(thin)} is {said(necks[thin])} wide at its narrowest place, "

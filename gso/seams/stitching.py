@@ -12,9 +12,9 @@ import numpy as np
 from gso import metrics
 from gso.cut_pieces import Pieces
 from gso.errors import MeshError
+from gso.geometry.polygon import arc_lengths
 from gso.mesh import Mesh
 from gso.mesh.cut import cut
-from gso.mesh.polyline import arc_lengths
 from gso.seams.chains import chains
 from gso.seams.sheets import Sheet, flattened
 from gso.seams.tree import Ground

@@ -9,22 +9,22 @@ from gso.errors import MeshError
 from gso.seams.candidates import Candidate
 from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
-from gso.seams.options import Wishes
+from gso.seams.options import PieceSettings
 from gso.seams.sheets import flattened
 from gso.seams.straightening import straight_seams
 from gso.seams.tree import Ground
 from gso.typing import Ints
 
 
-def straight(ground: Ground, found: Candidate, wishes: Wishes) -> Candidate:
+def straight(ground: Ground, found: Candidate, settings: PieceSettings) -> Candidate:
     """Straighten the seams of a triangle mesh, if patterns and strain allow it."""
-    wishes.say("straight seams")
+    settings.say("straight seams")
     own = straightened_pieces(ground, found.pieces)
     if own is None:
         return found
     sheets = tuple(flattened(piece.mesh) for piece in own)
     new = Candidate(own, sheets)
-    good = new.sound and new.strain <= max(found.strain, wishes.max_strain)
+    good = new.sound and new.strain <= max(found.strain, settings.max_strain)
     return new if good else found
 
 

@@ -174,12 +174,12 @@ def _split(
         smooth = along_u.vectors @ (keep * inner) @ along_v.vectors.T
         bent_u = smooth[:, :, 2:] - 2 * smooth[:, :, 1:-1] + smooth[:, :, :-2]
         bent_v = smooth[..., 2:] - 2 * smooth[..., 1:-1] + smooth[..., :-2]
-        wishes = [
+        targets = [
             aim_u + along_u.resist @ (bent_u - aim_u) + duals[0],
             aim_v + (bent_v - aim_v) @ along_v.resist + duals[1],
         ]
-        duals = [_clip(wish, STEP * c) for wish, c in zip(wishes, charges, strict=True)]
-        kinks = [wish - dual for wish, dual in zip(wishes, duals, strict=True)]
+        duals = [_clip(target, STEP * c) for target, c in zip(targets, charges, strict=True)]
+        kinks = [target - dual for target, dual in zip(targets, duals, strict=True)]
     return smooth, (kinks, duals)
 
 

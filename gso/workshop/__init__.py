@@ -1,26 +1,27 @@
 """From a design to the cutter: parts, their drawings, sheets, and a certificate.
 
 :func:`gso.fabricate` does all of it. The steps are here for scripts: a :class:`Design` is made
-(:func:`made`) as it is asked for (:class:`Ask`), its panels become parts (:func:`parts_of`), and
-parts are laid on sheets (:func:`nest`).
+(:func:`made`) as it is asked for (:class:`FabricationSettings`), its panels are scaled to
+millimetres (:func:`fitted`) and become parts (:func:`parts_from`), and parts are laid on sheets
+(:func:`nest`).
 """
 
 from gso.pattern import Bend
-from gso.workshop.asking import Ask
+from gso.workshop.design_panels import made
 from gso.workshop.designs import Design, designs_of
+from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
-from gso.workshop.making import made
 from gso.workshop.nesting import nest
 from gso.workshop.panels import Panel
 from gso.workshop.part import Drawing, Label, Notch, Part
-from gso.workshop.parts import parts_of
+from gso.workshop.parts import fitted, parts_from
 from gso.workshop.thickness import Thickness, thickened
 
 __all__ = [
-    "Ask",
     "Bend",
     "Design",
     "Drawing",
+    "FabricationSettings",
     "Finish",
     "Label",
     "Notch",
@@ -28,8 +29,9 @@ __all__ = [
     "Part",
     "Thickness",
     "designs_of",
+    "fitted",
     "made",
     "nest",
-    "parts_of",
+    "parts_from",
     "thickened",
 ]

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
 
 import numpy as np
 
+from gso.io.json_file import plain
 from gso.mesh import Mesh
 from gso.typing import Array, Json
 from gso.workshop.panels import Panel
@@ -117,17 +116,3 @@ def chord(outline: Array) -> float:
     smooth = np.where(turn < np.radians(30.0), turn, 0.0)
     at_ends = np.maximum(smooth, np.roll(smooth, -1))
     return float((size * at_ends / 8.0).max(initial=0.0))
-
-
-def plain(value: Any) -> Any:
-    """Replace what JSON lacks: NumPy numbers, and numbers that are not finite by None."""
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(v) for v in value]
-    if isinstance(value, bool | str) or value is None:
-        return value
-    if isinstance(value, int | np.integer):
-        return int(value)
-    number = float(value)
-    return number if math.isfinite(number) else None

@@ -9,7 +9,7 @@ import numpy as np
 from gso import metrics
 from gso.typing import Array
 from gso.verdict import Code, Measurement, Reason, compare, ordered
-from gso.workshop.asking import Ask
+from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
 from gso.workshop.measurements import bend_radius
 from gso.workshop.panels import Panel
@@ -23,7 +23,7 @@ _SEAM = 0.1
 Row = tuple[Code, float, float]
 
 
-def judge_sheet(own: Fitted, ask: Ask, finish: Finish) -> tuple[Reason, ...]:
+def judge_sheet(own: Fitted, settings: FabricationSettings, finish: Finish) -> tuple[Reason, ...]:
     """Return why fitted panels cannot be made, in millimetres; nothing if they can."""
     sheet = finish.thickness
     if sheet is None:
@@ -31,9 +31,13 @@ def judge_sheet(own: Fitted, ask: Ask, finish: Finish) -> tuple[Reason, ...]:
     parts: list[tuple[str, Row]] = []
     for panel, before in zip(own.panels, own.made.panels, strict=True):
         radius = own.scale * bend_radius(before)
-        rows = _bends(panel, sheet) if len(panel.bends) else _rolled(radius, ask, sheet)
+        rows = _bends(panel, sheet) if len(panel.bends) else _rolled(radius, settings, sheet)
         parts += [(panel.name, row) for row in rows]
-    reasons = [*own.reasons, *_compared("part", parts), *_compared("seam", _seams(own, ask, sheet))]
+    reasons = [
+        *own.reasons,
+        *_compared("part", parts),
+        *_compared("seam", _seams(own, settings, sheet)),
+    ]
     # Overlaps are what follows from the other faults.
     named = {name for reason in reasons for name in reason.places.ids}
     bad = [p.name for p in own.panels if p.name not in named and _overlaps(p)]
@@ -50,10 +54,10 @@ def _compared(kind: str, rows: list[tuple[str, Row]]) -> tuple[Reason, ...]:
     return compare(measured, bounds)
 
 
-def _rolled(radius: float, ask: Ask, sheet: Thickness) -> Iterator[Row]:
+def _rolled(radius: float, settings: FabricationSettings, sheet: Thickness) -> Iterator[Row]:
     """Measure a panel without bend lines, which is bent to some radius."""
     yield Code.TOO_THICK, radius, 0.5 * sheet.sheet
-    yield Code.NEUTRAL_STRAIN, sheet.strain(1.0 / radius), ask.strain
+    yield Code.NEUTRAL_STRAIN, sheet.strain(1.0 / radius), settings.strain
 
 
 def _bends(panel: Panel, sheet: Thickness) -> Iterator[Row]:
@@ -99,11 +103,11 @@ def _overlaps(panel: Panel) -> bool:
     return bool(metrics.flips(panel.surface, panel.flat)) or not outline.is_valid
 
 
-def _seams(own: Fitted, ask: Ask, sheet: Thickness) -> list[tuple[str, Row]]:
+def _seams(own: Fitted, settings: FabricationSettings, sheet: Thickness) -> list[tuple[str, Row]]:
     """Measure how much the sides of seams differ in length, by the thickness or the strain."""
     rows = []
     for seam in own.made.matings:
-        strained = seam.mismatch(own.made.panels) + ask.strain * seam.length
+        strained = seam.mismatch(own.made.panels) + settings.strain * seam.length
         bound = own.scale * strained + _SEAM * sheet.sheet
         both = dict.fromkeys(own.panels[k].name for k in (seam.one.panel, seam.two.panel))
         name = f"{seam.number} ({', '.join(both)})"

@@ -12,26 +12,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
+from gso.io.json_file import plain, write_json
 from gso.mesh import Mesh
 from gso.quantities import Length, Strain, as_length, as_strain, millimetres
 from gso.seams.options import as_sheet
 from gso.typing import AnyPath, Json
 from gso.verdict import Code, Reason, failure, ordered
-from gso.workshop.asking import Ask
-from gso.workshop.certificate import design_record, digest, plain, versions
+from gso.workshop.certificate import design_record, digest, versions
 from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
 from gso.workshop.designs import Designs, designs_of, several
+from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
-from gso.workshop.job_folder import WORK, close, opened
+from gso.workshop.job_folder import CERTIFICATE, WORK, opened
 from gso.workshop.marks import check_lines
 from gso.workshop.names import different
 from gso.workshop.nesting import Rotations, checked_options, nest
+from gso.workshop.output_files import Drawings, written
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.parts import fitted, parts_from
 from gso.workshop.work import made_all
-from gso.workshop.writing import Drawings, written
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +191,7 @@ def fabricate(
     place = Path(os.fsdecode(folder))
     every = designs_of(designs, keep_groups=keep_groups)
     meshes = [design.mesh for design in every]
-    ask = Ask(
+    settings = FabricationSettings(
         formulation,
         "1%" if max_deviation is None else max_deviation,
         None if max_strain is None else as_strain(max_strain, "max_strain"),
@@ -209,7 +210,7 @@ def fabricate(
     alone = len(marks) or len(holes) or any(len(design.kept) for design in every)
     first = list(range(len(meshes))) if alone else origins(meshes)
     chosen = sorted(set(first))
-    found, failed = made_all(every, chosen, ask, place / WORK, workers, scheduler, say)
+    found, failed = made_all(every, chosen, settings, place / WORK, workers, scheduler, say)
     found = _named(found)
     say("parts")
     parts: list[Part] = []
@@ -227,7 +228,7 @@ def fabricate(
         fit = fitted(one, scale, finish, *lines)
         own = [replace(part, count=len(copies)) for part in parts_from(fit, finish)]
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
-        why = (*(r.scaled(scale) for r in one.reasons), *judge_sheet(fit, ask, finish))
+        why = (*(r.scaled(scale) for r in one.reasons), *judge_sheet(fit, settings, finish))
         record["reasons"] = _words(why)
         records.append(record)
         reasons += [reason.within(one.name) for reason in why]
@@ -238,11 +239,11 @@ def fabricate(
             entry["same_as"] = same.get(entry["name"])
     certificate = {
         "unit": "mm",
-        "asked": plain({"unit": unit, **ask.record(), "finish": finish.record()}),
+        "asked": plain({"unit": unit, **settings.record(), "finish": finish.record()}),
         "versions": versions(),
         "designs": records,
         "sheets": [],
-        "notes": _notes(records, ask),
+        "notes": _notes(records, settings),
     }
     sheets: list[Drawing] = []
     if size is not None and parts:
@@ -276,7 +277,7 @@ def fabricate(
     files = written(place, parts, sheets, found.values(), certificate, drawings, earlier)
     certificate["files"] = files
     certificate["seconds"] = time.perf_counter() - clock
-    close(place, certificate)
+    write_json(place / CERTIFICATE, certificate)
     return Fabrication(place, tuple(parts), tuple(sheets), certificate, tuple(files))
 
 
@@ -299,11 +300,11 @@ def _named(found: dict[int, Made]) -> dict[int, Made]:
     return {k: one.named([next(names) for _ in one.panels]) for k, one in in_order.items()}
 
 
-def _notes(records: Sequence[Json], ask: Ask) -> list[str]:
+def _notes(records: Sequence[Json], settings: FabricationSettings) -> list[str]:
     """Say what is not as a reader might expect, although it is within what was asked."""
     every = [part for record in records for part in record.get("parts", ())]
     bare = sum(part["bends"] == 0 for part in every)
-    if ask.formulation != "ruled" or not bare:
+    if settings.formulation != "ruled" or not bare:
         return []
     return [
         f"{bare} of {len(every)} parts have no bend lines: they are flat, or no strip follows them "

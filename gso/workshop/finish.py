@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from gso.errors import OptionError
+from gso.quantities import as_positive
 from gso.spelling import choices
 from gso.typing import Json
 from gso.workshop.thickness import Thickness
@@ -53,10 +54,8 @@ class Finish:
     def __post_init__(self) -> None:
         for name in ("kerf", "allowance", "notches", "tabs", "labels"):
             value = getattr(self, name)
-            least = 0.0 if name in ("kerf", "allowance") else 1e-300
-            real = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-            if value is not None and not (real and least <= value < np.inf):
-                raise OptionError(f"{name} is {value!r}; it must be a positive length")
+            if value is not None:
+                as_positive(value, name, zero=name in ("kerf", "allowance"))
         if self.registration is not None:
             pair = np.asarray(self.registration, float)
             if pair.shape != (2,) or not ((pair > 0) & np.isfinite(pair)).all():

@@ -7,9 +7,9 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from gso import io
 from gso.errors import MeshError, OptionError
-from gso.typing import Json, Unwelded
+from gso.io.json_file import write_json
+from gso.typing import Unwelded
 from gso.verdict import Code, failure
 
 #: Folders of drawings and surfaces, the folder of what was made, and files.
@@ -70,14 +70,8 @@ def opened(place: Path, inputs: Iterable[object]) -> set[str]:
         raise MeshError(f"{place}: {error.strerror}; -o names a folder") from None
     files = _certificate(place) or []
     why = [failure(Code.UNFINISHED).record("mm")]
-    close(place, {"usable": False, "reasons": why, "files": files})
+    write_json(place / CERTIFICATE, {"usable": False, "reasons": why, "files": files})
     return {n for n in files if n.count("/") == 1 and n.split("/")[0] in FOLDERS and ".." not in n}
-
-
-def close(place: Path, certificate: Json) -> None:
-    """Write the certificate."""
-    with io.replacing(place / CERTIFICATE) as file:
-        file.write(json.dumps(certificate, indent=2).encode() + b"\n")
 
 
 def path_of(given: object) -> Path | None:

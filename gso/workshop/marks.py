@@ -1,4 +1,4 @@
-"""Points, marks and holes carried between a surface and its patterns, both ways."""
+"""Points, marks and holes of a surface, carried to its patterns."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
+from gso.geometry.polygon import anticlockwise
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.metrics import point_to_surface
 from gso.typing import Array, Ints
 from gso.verdict import Code, Measurement, Reason, compare
 from gso.workshop.panels import Panel
-from gso.workshop.part import signed_area
 
 #: Number of points of a mark along the diagonal of a panel, at least, before those are left out
 #: from which the line is less than a share of its size away.
@@ -52,18 +52,6 @@ def to_pattern(panels: Sequence[Panel], points: ArrayLike) -> tuple[Ints, Array]
         own = np.einsum("kc,kcd->kd", shares, panel.flat[triangles[place]])
         best[closer], number[closer], flat[closer] = away[closer], k, own[closer]
     return number, flat
-
-
-def to_surface(panel: Panel, points: ArrayLike) -> Array:
-    """Carry points (k, 2) of a panel's pattern to its surface, (k, 3).
-
-    Points outside the pattern are moved to its outline.
-    """
-    given = np.pad(_checked(points, 2), ((0, 0), (0, 1)))
-    triangles = panel.surface.triangles
-    flat = np.pad(panel.flat, ((0, 0), (0, 1)))
-    place, shares, _ = Nearest.of(flat, triangles).locate(given)
-    return np.asarray(np.einsum("kc,kcd->kd", shares, panel.surface.vertices[triangles[place]]))
 
 
 def marked(
@@ -144,7 +132,7 @@ def cut(
         elif not shapes[number[0]].contains_properly(ring):
             bad[Code.HOLE_OUTSIDE].append(where)
         else:
-            out[number[0]].append(flat if signed_area(flat) < 0 else flat[::-1])
+            out[number[0]].append(anticlockwise(flat)[::-1])
     return out, compare({code: Measurement.count("hole", ids) for code, ids in bad.items()}, {})
 
 

@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from gso.cut_pieces import Pieces
-from gso.mesh.polyline import Polylines, arc_lengths
+from gso.geometry.polygon import arc_lengths
+from gso.mesh.polyline import Polylines
 from gso.pattern import Pattern
 from gso.seams.chains import chains
 from gso.typing import Array, Ints

@@ -11,7 +11,7 @@ from gso.pattern import Pattern
 from gso.seams.sheets import rectangle
 from gso.typing import Json
 from gso.verdict import Code, Measurement, Reason, compare, merge
-from gso.workshop.asking import Ask
+from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made, Panel
 
 
@@ -26,7 +26,7 @@ def of_pattern(
     design: Mesh,
     surface: Mesh,
     pattern: Pattern,
-    ask: Ask,
+    settings: FabricationSettings,
     allowed: float | None,
 ) -> Json:
     """Measure a surface and its pattern; `allowed` is the largest distance from the design."""
@@ -37,7 +37,7 @@ def of_pattern(
     overlaps = len(faults.overlaps(sheet, pattern.flat))
     flips = int(metrics.flips(sheet, pattern.flat))
     return {
-        "formulation": ask.formulation,
+        "formulation": settings.formulation,
         "area": metrics.area(surface),
         "diagonal": design.diagonal,
         "allowed": allowed,
@@ -55,19 +55,19 @@ def of_pattern(
     }
 
 
-def judge(made: Made, ask: Ask) -> tuple[Reason, ...]:
+def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
     """Return why panels are not what was asked for, beside the reasons of their solve."""
     record, names = made.record, [panel.name for panel in made.panels]
     sizes = np.array([rectangle(panel.flat)[1] for panel in made.panels])
     # Strips keep the smallest radius themselves, or say why not.
-    plain = [panel for panel in made.panels if ask.min_radius and not len(panel.bends)]
-    wide, long = (None, None) if ask.max_size is None else sorted(ask.max_size)
+    plain = [panel for panel in made.panels if settings.min_radius and not len(panel.bends)]
+    wide, long = (None, None) if settings.max_size is None else sorted(settings.max_size)
     limits = {
         Code.DEVIATION: record["allowed"],
-        Code.STRAIN: ask.strain,
+        Code.STRAIN: settings.strain,
         Code.TOO_LONG: long,
         Code.TOO_WIDE: wide,
-        Code.BEND_RADIUS: ask.min_radius,
+        Code.BEND_RADIUS: settings.min_radius,
     }
     measured = {
         Code.DEVIATION: Measurement(record["deviation_max"]),

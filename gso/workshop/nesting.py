@@ -9,9 +9,11 @@ from typing import TypeAlias
 import numpy as np
 
 from gso.errors import OptionError
+from gso.geometry.polygon import anticlockwise, signed_area
+from gso.quantities import as_positive
 from gso.typing import Array
 from gso.workshop import sparrow
-from gso.workshop.part import Drawing, Part, signed_area
+from gso.workshop.part import Drawing, Part
 from gso.workshop.rectangles import ORDERS, packed
 
 #: Largest number of corners of the polygons that are nested.
@@ -30,6 +32,8 @@ _MOST = 500
 Say = Callable[[str], None]
 #: Allowed angles in degrees, how many of them, or "any".
 Rotations: TypeAlias = "Sequence[float] | int | str"
+#: Parts in their places in the room of each sheet.
+Sheets = list[list[Part]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +139,8 @@ def nest(
     best = _rectangles(items, room, spacing)
     notes: tuple[str, ...] = ()
     if method != "rectangles":
-        each = seconds / _count(best)
-        placed, why = None, f"{seconds:g} seconds are too few for {_count(best)} sheets"
+        each = seconds / len(best)
+        placed, why = None, f"{seconds:g} seconds are too few for {len(best)} sheets"
         if each >= _LEAST or method == "spyrrow":
             placed, why = _sparrow(items, room, spacing, each, seed, say)
         if placed is None:
@@ -179,11 +183,9 @@ def checked_options(
     """
     size = _checked_sheet(sheet)
     _angles(rotations)
-    for name, value in (("spacing", spacing), ("margin", margin)):
-        if not 0 <= value < np.inf:
-            raise OptionError(f"{name} is {value!r}; it must be a length of 0 or more")
-    if not 0 < seconds < np.inf:
-        raise OptionError(f"seconds is {seconds!r}; it must be a positive number")
+    as_positive(spacing, "spacing", zero=True)
+    as_positive(margin, "margin", zero=True)
+    as_positive(seconds, "seconds")
     long, wide = (size - 2.0 * margin).tolist()
     if min(long, wide) <= 0:
         raise OptionError(f"margin is {margin!r}, which leaves nothing of the sheet; lower it")
@@ -222,8 +224,7 @@ def _item(part: Part, rotations: Rotations, spacing: float) -> _Item:
         if len(outline) <= _CORNERS:
             break
         grow *= 2.0
-    shape = outline if signed_area(outline) > 0 else outline[::-1]
-    return _Item(own, shape, by, angles)
+    return _Item(own, anticlockwise(outline), by, angles)
 
 
 def _angles(rotations: Rotations) -> tuple[float, ...] | None:
@@ -242,15 +243,7 @@ def _angles(rotations: Rotations) -> tuple[float, ...] | None:
     raise OptionError(f"rotations is {rotations!r}; it must be angles, their number, or 'any'")
 
 
-@dataclass(frozen=True, eq=False)
-class _Place:
-    """A part in its place in the room of a sheet."""
-
-    part: Part
-    sheet: int
-
-
-def _rectangles(items: Sequence[_Item], room: tuple[float, float], spacing: float) -> list[_Place]:
+def _rectangles(items: Sequence[_Item], room: tuple[float, float], spacing: float) -> Sheets:
     """Pack bounding rectangles in several orders, and return the best."""
     from gso.seams.sheets import rectangle
 
@@ -276,17 +269,17 @@ def _rectangles(items: Sequence[_Item], room: tuple[float, float], spacing: floa
         copies += [(number, own)] * item.part.count
         grown = [(turned[k][0] + spacing, turned[k][1] + spacing) for k in fits]
         sizes += [grown] * item.part.count
-    best: list[_Place] | None = None
+    tried = []
     for order in ORDERS:
-        found = []
-        for place in packed(sizes, (room[0] + spacing, room[1] + spacing), order):
+        placed = packed(sizes, (room[0] + spacing, room[1] + spacing), order)
+        found: Sheets = [[] for _ in range(1 + max(place.sheet for place in placed))]
+        for place in placed:
             number, angles = copies[place.item]
             part = items[number].part.turned(np.radians(angles[place.choice]))
             part = replace(part.shifted(np.array([place.x, place.y]) - part.low), count=1)
-            found.append(_Place(part, place.sheet))
-        if best is None or _value(found) < _value(best):
-            best = found
-    return best or []
+            found[place.sheet].append(part)
+        tried.append(found)
+    return min(tried, key=_value)
 
 
 def _sparrow(
@@ -296,10 +289,10 @@ def _sparrow(
     seconds: float,
     seed: int,
     say: Say,
-) -> tuple[list[_Place] | None, str]:
+) -> tuple[Sheets | None, str]:
     """Fill sheet after sheet: what goes beyond a sheet is nested again on the next."""
     left = {k: item.part.count for k, item in enumerate(items)}
-    out: list[_Place] = []
+    out: Sheets = []
     # With the smallest border no part is beyond the sheet; the largest part may need its own.
     border = min(item.border for item in items)
     for item in items:
@@ -328,8 +321,8 @@ def _sparrow(
                 break
         if not best:
             return None, "spyrrow placed no part inside the sheet"
-        for k, part in best:
-            out.append(_Place(part, sheet))
+        out.append([part for _, part in best])
+        for k, _ in best:
             left[k] -= 1
     return None, f"more than {_MOST} sheets"
 
@@ -372,12 +365,12 @@ def _some(
     return asked, chosen
 
 
-def _apart(places: Sequence[_Place], spacing: float) -> bool:
+def _apart(sheets: Sheets, spacing: float) -> bool:
     """Check that the parts on each sheet are at least a distance apart."""
     import shapely
 
-    for sheet in range(_count(places)):
-        shapes = np.array([shapely.Polygon(p.part.outline) for p in places if p.sheet == sheet])
+    for parts in sheets:
+        shapes = np.array([shapely.Polygon(part.outline) for part in parts])
         tree = shapely.STRtree(shapes)
         one, two = tree.query(shapes, predicate="dwithin", distance=max(spacing - _TIGHT, 0.0))
         one, two = one[one < two], two[one < two]
@@ -389,36 +382,28 @@ def _apart(places: Sequence[_Place], spacing: float) -> bool:
     return True
 
 
-def _count(places: Sequence[_Place]) -> int:
-    return 1 + max((p.sheet for p in places), default=-1)
+def _used(parts: Sequence[Part]) -> float:
+    """Return the area of the rectangle about the parts on a sheet."""
+    return float(np.max([part.low + part.size for part in parts], axis=0).prod())
 
 
-def _used(places: Sequence[_Place]) -> float:
-    """Return the area of the rectangle about the parts on the last sheet."""
-    last = _count(places) - 1
-    corners = [p.part.low + p.part.size for p in places if p.sheet == last]
-    return float(np.max(corners, axis=0).prod()) if corners else 0.0
-
-
-def _value(places: Sequence[_Place]) -> tuple[int, float]:
+def _value(sheets: Sheets) -> tuple[int, float]:
     """Rank nestings, lower is better."""
-    return _count(places), _used(places)
+    return len(sheets), _used(sheets[-1])
 
 
 def _result(
-    places: Sequence[_Place],
+    placed: Sheets,
     sheet: tuple[float, float],
     margin: float,
     method: str,
     notes: tuple[str, ...],
 ) -> Nested:
     long, wide = (float(x) for x in sheet)
-    shift = np.array([margin, margin])
     sheets, shares = [], []
-    for number in range(_count(places)):
-        own = tuple(p.part.shifted(shift) for p in places if p.sheet == number)
-        sheets.append(Drawing(own, (long, wide), f"sheet {number + 1}"))
+    for number, parts in enumerate(placed, start=1):
+        own = tuple(part.shifted(np.array([margin, margin])) for part in parts)
+        sheets.append(Drawing(own, (long, wide), f"sheet {number}"))
         shares.append(sum(part.area for part in own) / (long * wide))
-    area = sum(p.part.area for p in places)
-    whole = (len(sheets) - 1) * long * wide + _used(places)
-    return Nested(tuple(sheets), tuple(shares), area / whole, method, notes)
+    whole = len(placed) - 1 + _used(placed[-1]) / (long * wide)
+    return Nested(tuple(sheets), tuple(shares), sum(shares) / whole, method, notes)

@@ -8,7 +8,7 @@ import numpy as np
 
 from gso.errors import MeshError
 from gso.typing import Array
-from gso.workshop.part import Part, signed_area
+from gso.workshop.part import Part
 
 #: Largest length of a mitred corner, in widths of the offset.
 _MITRE = 3.0
@@ -66,5 +66,4 @@ def _moved(part: Part, polygon: Array, by: float, *, gone: bool = False) -> Arra
         raise MeshError(
             f"part {part.name}: its outline cannot be moved by {by:g} mm, as {what}; take less"
         )
-    points = np.asarray(shape.exterior.coords)[:-1]
-    return points if signed_area(points) > 0 else points[::-1]
+    return np.asarray(shapely.orient_polygons(shape).exterior.coords)[:-1]

@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from gso.errors import MeshError
+from gso.geometry.polygon import arc_lengths
 from gso.mesh import Mesh
-from gso.mesh.polyline import arc_lengths
 from gso.pattern import Bend, Folded
 from gso.typing import Array, Ints, Json
 from gso.verdict import Places, Reason
@@ -113,11 +113,8 @@ class Mating:
 
     def mismatch(self, panels: tuple[Panel, ...]) -> float:
         """Return how much the lengths of both sides in the patterns differ at most."""
-        both = []
-        for side in (self.one, self.two):
-            line = side.on(panels[side.panel].flat)
-            both.append(arc_lengths(line))
-        return float(np.ptp(both[0] - both[1]))
+        one, two = (arc_lengths(s.on(panels[s.panel].flat)) for s in (self.one, self.two))
+        return float(np.ptp(one - two))
 
 
 @dataclass(frozen=True, eq=False)

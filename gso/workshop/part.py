@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from gso.geometry.polygon import signed_area
 from gso.pattern import Bend
 from gso.typing import Array
 
@@ -31,6 +32,12 @@ class Label:
     at: Array
     height: float
     angle: float = 0.0
+
+    @property
+    def start(self) -> Array:
+        """The middle of its base line, (2,)."""
+        up = np.array([-np.sin(self.angle), np.cos(self.angle)])
+        return np.asarray(self.at - 0.5 * self.height * up)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,34 +123,46 @@ class Part:
         [1.0, 2.0]
         """
         c, s = np.cos(angle), np.sin(angle)
-        turn = np.array([[c, s], [-s, c]])
-        return self._mapped(lambda points: points @ turn, lambda way: way @ turn, angle)
+        return self._mapped(np.array([[c, s], [-s, c]]), np.zeros(2), lambda old: old + angle)
 
     def shifted(self, by: Array) -> Part:
         """Return the part moved by a vector (2,)."""
-        step = np.asarray(by, float)
-        return self._mapped(lambda points: points + step, lambda way: way, 0.0)
+        return self._mapped(np.eye(2), by, lambda old: old)
 
-    def _mapped(
-        self, move: Callable[[Array], Array], turn: Callable[[Array], Array], angle: float
-    ) -> Part:
+    def mirrored(self) -> Part:
+        """Return the part turned over: what was up is down, and mountains are valley folds."""
+        over = self._mapped(np.diag([-1.0, 1.0]), np.zeros(2), lambda old: -old)
+        return replace(
+            over,
+            outline=over.outline[::-1],
+            holes=tuple(hole[::-1] for hole in over.holes),
+            seams=tuple(line[::-1] for line in over.seams),
+            bends=tuple(bend._replace(angle=-bend.angle) for bend in over.bends),
+        )
+
+    def _mapped(self, turn: Array, shift: Array, spin: Callable[[float], float]) -> Part:
+        """Return the part with points ``p @ turn + shift``; `spin` maps the angles of labels."""
+
         def each(lines: Sequence[Array]) -> tuple[Array, ...]:
-            return tuple(move(line) for line in lines)
+            return tuple(line @ turn + shift for line in lines)
 
+        (outline,) = each([self.outline])
         return replace(
             self,
-            outline=move(self.outline),
+            outline=outline,
             holes=each(self.holes),
-            bends=tuple(b._replace(line=move(b.line)) for b in self.bends),
+            bends=tuple(b._replace(line=b.line @ turn + shift) for b in self.bends),
             creases=each(self.creases),
             marks=each(self.marks),
             seams=each(self.seams),
-            notches=tuple(replace(n, at=move(n.at), inward=turn(n.inward)) for n in self.notches),
+            notches=tuple(
+                replace(n, at=n.at @ turn + shift, inward=n.inward @ turn) for n in self.notches
+            ),
             labels=tuple(
-                replace(label, at=move(label.at), angle=label.angle + angle)
+                replace(label, at=label.at @ turn + shift, angle=spin(label.angle))
                 for label in self.labels
             ),
-            grain=None if self.grain is None else turn(self.grain),
+            grain=None if self.grain is None else self.grain @ turn,
         )
 
 
@@ -173,13 +192,3 @@ class Drawing:
             points.append(np.array([[0.0, 0.0], self.sheet]))
         every = np.concatenate(points)
         return every.min(axis=0), every.max(axis=0)
-
-
-def signed_area(polygon: Array) -> float:
-    """Return the area of a closed polygon (k, 2), positive if it is anticlockwise.
-
-    >>> signed_area(np.array([[0.0, 0], [2, 0], [2, 1], [0, 1]]))
-    2.0
-    """
-    x, y = (polygon - polygon[0]).T
-    return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))

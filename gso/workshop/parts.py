@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.errors import OptionError
-from gso.mesh.polyline import arc_lengths
+from gso.geometry.polygon import anticlockwise, arc_lengths
 from gso.pattern import Bend
 from gso.seams.sheets import rectangle
 from gso.typing import Array
@@ -18,7 +17,7 @@ from gso.workshop.finish import Finish
 from gso.workshop.marks import cut, marked
 from gso.workshop.offsets import offset, with_allowance
 from gso.workshop.panels import Made, Mating, Panel, Side
-from gso.workshop.part import Label, Notch, Part, signed_area
+from gso.workshop.part import Label, Notch, Part
 from gso.workshop.tabs import with_tabs
 from gso.workshop.thickness import thickened
 
@@ -104,26 +103,6 @@ def fitted(
     return Fitted(made, scale, panels, drawn, *cut(made.panels, holes, flats))
 
 
-def parts_of(
-    made: Made,
-    scale: float,
-    finish: Finish,
-    marks: Sequence[ArrayLike] = (),
-    holes: Sequence[ArrayLike] = (),
-) -> list[Part]:
-    """Make the parts of a design; the parameters are those of :func:`fitted`.
-
-    Raises
-    ------
-    OptionError
-        A hole cannot be cut.
-    """
-    own = fitted(made, scale, finish, marks, holes)
-    if own.reasons:
-        raise OptionError("; ".join(map(str, own.reasons)))
-    return parts_from(own, finish)
-
-
 def parts_from(fitted: Fitted, finish: Finish) -> list[Part]:
     """Make the parts of fitted panels."""
     panels = fitted.panels
@@ -154,9 +133,9 @@ def scaled(panels: Sequence[Panel], scale: float, finish: Finish) -> list[Panel]
 def _bare(panel: Panel, marks: Sequence[Array], cut: Sequence[Array]) -> Part:
     """Make the part of one panel, whose pattern is in millimetres, as it lies there."""
     loops = [panel.flat[loop] for loop in panel.loops]
-    outline = loops[0] if signed_area(loops[0]) > 0 else loops[0][::-1]
-    holes = [hole if signed_area(hole) < 0 else hole[::-1] for hole in loops[1:]]
-    return Part(panel.name, outline, (*holes, *cut), drawn(panel.lines), marks=tuple(marks))
+    outline, *holes = map(anticlockwise, loops)
+    holes = [hole[::-1] for hole in holes] + list(cut)
+    return Part(panel.name, outline, tuple(holes), drawn(panel.lines), marks=tuple(marks))
 
 
 def drawn(bends: Sequence[Bend]) -> tuple[Bend, ...]:
@@ -186,28 +165,11 @@ def _finished(part: Part, joints: Sequence[Joint], finish: Finish) -> Part:
     part = part.turned(-rectangle(part.outline)[0])
     part = offset(with_allowance(part, finish.allowance), 0.5 * finish.kerf)
     if finish.face == "inside":
-        part = mirrored(part)
+        part = part.mirrored()
     part = part.shifted(-part.low)
     if finish.labels is not None:
         part = replace(part, labels=(_name(part, finish.labels),))
     return replace(part, grain=np.array([1.0, 0.0])) if finish.grain else part
-
-
-def mirrored(part: Part) -> Part:
-    """Return a part turned over: what was up is down, and mountain folds are valley folds."""
-    flip = np.array([-1.0, 1.0])
-    return replace(
-        part,
-        outline=(part.outline * flip)[::-1],
-        holes=tuple((hole * flip)[::-1] for hole in part.holes),
-        bends=tuple(Bend(b.line * flip, -b.angle, b.radius) for b in part.bends),
-        creases=tuple(line * flip for line in part.creases),
-        marks=tuple(line * flip for line in part.marks),
-        seams=tuple((line * flip)[::-1] for line in part.seams),
-        notches=tuple(replace(n, at=n.at * flip, inward=n.inward * flip) for n in part.notches),
-        labels=tuple(replace(la, at=la.at * flip, angle=-la.angle) for la in part.labels),
-        grain=None if part.grain is None else part.grain * flip,
-    )
 
 
 def _joint(panel: Panel, seam: Mating, side: Side, scale: float, first: bool) -> Joint:

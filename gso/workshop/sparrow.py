@@ -5,10 +5,11 @@ Source: Gardeyn and Wauters 2025, An open-source heuristic to reboot 2D nesting 
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
+from concurrent.futures import BrokenExecutor, TimeoutError
 from importlib.util import find_spec
+
+from gso.executors.process_pool import ProcessExecutor
+from gso.typing import Json
 
 #: Seconds that starting takes at most, and that a solve may take beyond its time.
 _START = 30.0
@@ -37,54 +38,34 @@ def solved(
     if find_spec("spyrrow") is None:
         return None, 'spyrrow is not installed: pip install ".[workshop]"'
     whole = max(round(seconds), 1)
-    asked = {
-        "items": items,
-        "height": height,
-        "seconds": whole,
-        "seed": seed,
-    }
-    try:
-        done = subprocess.run(
-            [sys.executable, "-m", "gso.workshop.sparrow"],
-            input=json.dumps(asked),
-            capture_output=True,
-            text=True,
-            timeout=_START + 2.0 * whole,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return None, "spyrrow took too long"
-    if done.returncode != 0:
-        return None, f"spyrrow ended with code {done.returncode}"
-    try:
-        return json.loads(done.stdout.splitlines()[-1]), ""
-    except (ValueError, IndexError):
-        return None, "spyrrow gave no result"
+    with ProcessExecutor(1) as executor:
+        try:
+            placed = executor.submit(packed, items, height, whole, seed)
+            return placed.result(_START + 2.0 * whole), ""
+        except TimeoutError:
+            return None, "spyrrow took too long"
+        except BrokenExecutor:
+            return None, "spyrrow ended its process"
+        except Exception as error:  # of a package that we do not know
+            return None, f"spyrrow failed: {error}"
 
 
-def main() -> None:
-    """Solve what is read from the input, and print the result."""
+def packed(items: list[Json], height: float, seconds: int, seed: int) -> list[Json]:
+    """Pack polygons as :func:`solved` does, in this process."""
     import spyrrow
 
-    asked = json.load(sys.stdin)
-    items = [
-        spyrrow.Item(str(k), [tuple(p) for p in item["shape"]], item["count"], item["angles"])
-        for k, item in enumerate(asked["items"])
-    ]
-    instance = spyrrow.StripPackingInstance("parts", asked["height"], items)
-    config = spyrrow.StripPackingConfig(
-        early_termination=True,
-        total_computation_time=asked["seconds"],
-        num_workers=1,
-        seed=asked["seed"],
+    instance = spyrrow.StripPackingInstance(
+        "parts",
+        height,
+        [
+            spyrrow.Item(str(k), [tuple(p) for p in item["shape"]], item["count"], item["angles"])
+            for k, item in enumerate(items)
+        ],
     )
-    found = instance.solve(config)
-    placed = [
+    config = spyrrow.StripPackingConfig(
+        early_termination=True, total_computation_time=seconds, num_workers=1, seed=seed
+    )
+    return [
         {"item": int(p.id), "angle": p.rotation, "x": p.translation[0], "y": p.translation[1]}
-        for p in found.placed_items
+        for p in instance.solve(config).placed_items
     ]
-    sys.stdout.write(json.dumps(placed) + "\n")
-
-
-if __name__ == "__main__":
-    main()

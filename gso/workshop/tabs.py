@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from gso.typing import Array
-from gso.workshop.part import Part, signed_area
+from gso.workshop.part import Part
 
 #: Length of a tab in widths, and the largest turn along it, in radians.
 _LENGTH, _TURN = 6.0, 0.35
@@ -44,14 +44,10 @@ def with_tabs(part: Part, lines: Sequence[Array], width: float) -> Part:
                         whole = joined
                         creases.append(piece)
                         break
-    outline = np.asarray(whole.exterior.coords)[:-1]
-    holes = [np.asarray(ring.coords)[:-1] for ring in whole.interiors]
-    return replace(
-        part,
-        outline=outline if signed_area(outline) > 0 else outline[::-1],
-        holes=tuple(hole if signed_area(hole) < 0 else hole[::-1] for hole in holes),
-        creases=(*part.creases, *creases),
-    )
+    whole = shapely.orient_polygons(whole)
+    outline, *holes = (np.asarray(r.coords)[:-1] for r in (whole.exterior, *whole.interiors))
+    creases = [*part.creases, *creases]
+    return replace(part, outline=outline, holes=tuple(holes), creases=tuple(creases))
 
 
 def _divided(line: Array, width: float) -> list[Array]:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
 from gso.mesh.topology import label_components
+from gso.quantities import as_positive
 from gso.spelling import choices
 from gso.typing import Array, Ints
 from gso.workshop.panels import Panel
@@ -56,14 +57,13 @@ class Thickness:
     table: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        if not 0 < self.sheet < np.inf:
-            raise OptionError(f"the thickness is {self.sheet!r}; it must be a positive length")
+        as_positive(self.sheet, "the thickness")
         if not 0 <= self.k <= 1:
             raise OptionError(f"the K-factor is {self.k!r}; it must be 0 to 1")
         if self.face not in FACES:
             raise OptionError(f"no face {self.face!r}; {choices(self.face, FACES)}")
-        if self.radius is not None and not 0 <= self.radius < np.inf:
-            raise OptionError(f"the bend radius is {self.radius!r}; it must be 0 or more")
+        if self.radius is not None:
+            as_positive(self.radius, "the bend radius", zero=True)
         if self.table is not None:
             rows = np.asarray(self.table, float)
             good = bool(rows.ndim == 2 and rows.shape[1:] == (2,) and len(rows) >= 1)

@@ -13,24 +13,25 @@ from pathlib import Path
 import numpy as np
 
 from gso import io
-from gso.errors import GSOError, MeshError
+from gso.errors import MeshError
 from gso.executors import open_executor
+from gso.io.json_file import plain
 from gso.typing import Keywords
 from gso.verdict import Reason
-from gso.workshop.asking import Ask
-from gso.workshop.certificate import digest, plain
+from gso.workshop.certificate import digest
+from gso.workshop.design_panels import made
 from gso.workshop.designs import Design
-from gso.workshop.making import made
+from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made
 
 #: Version of the files; those of another one are made again.
 _FORMAT = 3
 
 
-def key(design: Design, ask: Ask) -> str:
+def key(design: Design, settings: FabricationSettings) -> str:
     """Return what identifies the work on a design: its digest and what was asked."""
     own = [digest(design.mesh), design.kept.tolist()]
-    said = json.dumps([_FORMAT, version("gso"), *own, plain(ask.record())], sort_keys=True)
+    said = json.dumps([_FORMAT, version("gso"), *own, plain(settings.record())], sort_keys=True)
     return hashlib.sha256(said.encode()).hexdigest()
 
 
@@ -43,10 +44,16 @@ def store(one: Made, own: str, path: Path) -> None:
         np.savez_compressed(file, **whole)
 
 
-def work_on(ask: Ask, folder: str, design: Design) -> str:
-    """Make one design and store it; for worker processes."""
-    store(made(design, ask), key(design, ask), Path(folder) / f"{design.name}.npz")
-    return design.name
+def work_on(
+    settings: FabricationSettings,
+    folder: Path,
+    design: Design,
+    say: Callable[[str], None] = lambda said: None,
+    workers: int | None = 0,
+) -> None:
+    """Make one design and store it; in worker processes too."""
+    one = made(design, settings, say, workers)
+    store(one, key(design, settings), folder / f"{design.name}.npz")
 
 
 def stored(name: str, own: str, path: Path) -> Made | None:
@@ -68,7 +75,7 @@ def stored(name: str, own: str, path: Path) -> Made | None:
 def made_all(
     designs: Sequence[Design],
     chosen: Iterable[int],
-    ask: Ask,
+    settings: FabricationSettings,
     folder: Path,
     workers: int | None,
     scheduler: str | None,
@@ -80,7 +87,7 @@ def made_all(
     todo = []
 
     def read(design: Design) -> Made | None:
-        return stored(design.name, key(design, ask), folder / f"{design.name}.npz")
+        return stored(design.name, key(design, settings), folder / f"{design.name}.npz")
 
     for k in chosen:
         one = read(designs[k])
@@ -90,31 +97,20 @@ def made_all(
             found[k] = one
     # The largest first, so that no large one runs alone at the end.
     todo.sort(key=lambda k: -len(designs[k].mesh.vertices))
-    if scheduler is None and (workers == 0 or len(todo) == 1):
-        for number, k in enumerate(todo, start=1):
-            own = designs[k]
-            say(f"{own.name}: design {number} of {len(todo)}")
-            try:
-                one = made(own, ask, say, workers)
-            except GSOError as error:
-                failed[k] = str(error)
-                continue
-            store(one, key(own, ask), folder / f"{own.name}.npz")
-            found[k] = one
-        return found, failed
-    work = partial(work_on, ask, str(folder.resolve()))
+    here = scheduler is None and (workers == 0 or len(todo) == 1)
+    work = partial(work_on, settings, folder.resolve())
+    if here:
+        work = partial(work, say=say, workers=workers)
     items = (designs[k] for k in todo)
     total = len(found) + len(todo)
     say(f"designs: {len(found)} of {total}")
-    with open_executor(workers, scheduler) as executor:
+    with open_executor(0 if here else workers, scheduler) as executor:
         for done in executor.as_completed(work, items):
             k = todo[done.index]
-            if done.error is not None:
-                failed[k] = done.error
-                continue
-            one = read(designs[k])
+            one = read(designs[k]) if done.ok else None
             if one is None:
-                failed[k] = "its file in the folder work is missing; is the folder shared?"
+                lost = "its file in the folder work is missing; is the folder shared?"
+                failed[k] = done.error or lost
             else:
                 found[k] = one
             say(f"designs: {len(found) + len(failed)} of {total}")

@@ -39,7 +39,6 @@ __all__ = [
     "boundary_loops",
     "by_size",
     "check_vertices",
-    "component_labels",
     "corner_triangles",
     "edge_graph",
     "edge_keys",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from numbers import Real
-
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
@@ -13,8 +11,9 @@ from gso.hierarchy import resample
 from gso.net import tasks
 from gso.net.catalogue import NetLike, chain
 from gso.net.inference import denoising
-from gso.net.models.base import SIZE, Net, exact
+from gso.net.models.base import SIZE, Net, device_of, exact
 from gso.net.weights import cached
+from gso.quantities import as_positive
 from gso.typing import Array
 
 #: Smallest side of a grid that is resampled to the size of the nets.
@@ -90,7 +89,7 @@ def predict(
     """
     points = _checked(surface)
     batch = points[None] if points.ndim == 3 else points
-    kind, where = tasks.get(task), _device(device)
+    kind, where = tasks.get(task), device_of(device)
     nets = _nets(model, task, where)
     if isinstance(repeat, bool) or not isinstance(repeat, int) or not 1 <= repeat <= 100:
         raise OptionError(f"repeat is {repeat!r}; take a whole number from 1 to 100")
@@ -100,8 +99,8 @@ def predict(
     if passes is not None and not (whole and passes >= 1):
         raise OptionError(f"passes is {passes!r}; take a whole number from 1 up, or None for all")
     nets += [nets[-1]] * (repeat - 1)
-    if sigma is not None and not (isinstance(sigma, Real) and np.isfinite(sigma) and sigma >= 0):
-        raise OptionError(f"sigma is {sigma!r}; it must be a number, zero or more")
+    if sigma is not None:
+        as_positive(sigma, "sigma", zero=True)
     work = _denoised if kind.noisy else _predicted
     blocks = [
         work(batch[k : k + _BATCH], nets, passes, sigma, where)
@@ -112,7 +111,7 @@ def predict(
 
 
 def _denoised(
-    batch: Array, nets: list[Net], passes: int | None, sigma: float | None, device: str
+    batch: Array, nets: list[Net], passes: int | None, sigma: float | None, device: torch.device
 ) -> Array:
     """Predict for noisy grids of any size, which :mod:`gso.net.inference.denoising` converts."""
     height, width = batch.shape[1:3]
@@ -135,7 +134,11 @@ def _denoised(
 
 
 def _predicted(
-    batch: Array, nets: list[Net], passes: int | None, sigma: float | Array | None, device: str
+    batch: Array,
+    nets: list[Net],
+    passes: int | None,
+    sigma: float | Array | None,
+    device: torch.device,
 ) -> Array:
     out: Array = batch
     for net in nets:
@@ -157,7 +160,7 @@ def _predicted(
     return out
 
 
-def _nets(model: NetLike | None, task: str, device: str) -> list[Net]:
+def _nets(model: NetLike | None, task: str, device: torch.device) -> list[Net]:
     if isinstance(model, Net):
         nets = [model.to(device)]
     else:
@@ -166,15 +169,6 @@ def _nets(model: NetLike | None, task: str, device: str) -> list[Net]:
         if net.task != task:
             raise OptionError(f"the net is for task {net.task!r}, not {task!r}")
     return nets
-
-
-def _device(device: str | None) -> str:
-    name = device or ("cuda" if torch.cuda.is_available() else "cpu")
-    try:
-        torch.empty(0, device=name)
-    except (RuntimeError, AssertionError):
-        raise OptionError(f"there is no device {name!r}; take 'cpu'") from None
-    return name
 
 
 def _checked(surface: ArrayLike) -> Array:
@@ -226,7 +220,7 @@ def _told(net: Net) -> bool:
 
 
 def _sigma(
-    net: Net, unit: Array, scale: Array, sigma: float | Array | None, device: str
+    net: Net, unit: Array, scale: Array, sigma: float | Array | None, device: torch.device
 ) -> torch.Tensor | None:
     """Return the noise (B,) of each surface in the unit ball, None if the net does not use it."""
     if not _told(net):

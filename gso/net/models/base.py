@@ -8,8 +8,10 @@ from contextlib import AbstractContextManager
 import torch
 from torch import Tensor, nn
 
+from gso.errors import OptionError
 from gso.net import tasks
 from gso.net.models.grid_geometry import planes, rectangle
+from gso.net.models.resampling import resampled
 
 #: Samples along each side at which nets are trained.
 SIZE = 64
@@ -65,7 +67,6 @@ class Net(nn.Module):
             Number of passes; all of the net's by default.
         """
 
-    @abstractmethod
     def displacements_at(
         self,
         surface: Tensor,
@@ -75,6 +76,8 @@ class Net(nn.Module):
         passes: int | None = None,
     ) -> Tensor:
         """Compute displacements (B, h, w, d) of `fine`, the same surfaces at another resolution."""
+        moved = self.displacements(surface, sigma, passes=passes)
+        return resampled(moved, fine.shape[1], fine.shape[2])
 
     def initial_geometry(self, surface: Tensor) -> Tensor:
         """Return what the net displaces: the surface, or for flat images a rectangle."""
@@ -102,3 +105,20 @@ def exact(*, tuned: bool = False) -> AbstractContextManager[None]:
         size.
     """
     return torch.backends.cudnn.flags(enabled=True, benchmark=tuned, allow_tf32=False)
+
+
+def device_of(name: str | None) -> torch.device:
+    """Return a device by its name, or the GPU when there is one and no name is given.
+
+    Raises
+    ------
+    OptionError
+        There is no such device.
+    """
+    name = name or ("cuda" if torch.cuda.is_available() else "cpu")
+    try:
+        device = torch.device(name)
+        torch.empty(0, device=device)
+    except (RuntimeError, AssertionError):
+        raise OptionError(f"there is no device {name!r}; take 'cpu'") from None
+    return device

@@ -11,7 +11,6 @@ from gso.errors import OptionError
 from gso.net.models.base import Net
 from gso.net.models.blocks import IMDB, Stencils
 from gso.net.models.grid_geometry import axes
-from gso.net.models.resampling import resampled
 
 _LEVELS = 3
 
@@ -140,13 +139,3 @@ class GSONet(Net):
         if turn is None or self.kind.flat:
             return moved
         return torch.einsum("bhwj,bij->bhwi", moved, turn)
-
-    def displacements_at(
-        self,
-        surface: Tensor,
-        fine: Tensor,
-        sigma: Tensor | None = None,
-        *,
-        passes: int | None = None,
-    ) -> Tensor:
-        return resampled(self.displacements(surface, sigma), fine.shape[1], fine.shape[2])

@@ -12,7 +12,7 @@ from safetensors.torch import save as packed
 from torch import Tensor
 
 from gso.errors import WeightsError
-from gso.io import replacing
+from gso.io.atomic import write_bytes
 from gso.net.models.base import Net
 from gso.typing import Json
 
@@ -30,8 +30,7 @@ def save(path: Path, net: Net, average: Net, optimisers: Optimisers, state: Json
             tensors |= {f"optimiser.{number}.{k}.{name}": value for name, value in moments.items()}
     tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
     data = packed(tensors, metadata={"state": json.dumps(state)})
-    with replacing(path) as file:
-        file.write(data)
+    write_bytes(path, data)
 
 
 def load(path: Path, net: Net, average: Net, optimisers: Optimisers) -> Json:

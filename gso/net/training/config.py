@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
@@ -12,6 +11,7 @@ from typing import TypeVar
 
 from gso.errors import OptionError
 from gso.net import tasks
+from gso.quantities import as_positive
 from gso.spelling import check_keywords, choices
 from gso.typing import AnyPath, Json
 
@@ -80,16 +80,13 @@ class Phase:
 
     def __post_init__(self) -> None:
         _choice("loss", self.loss, LOSSES)
-        _number("batch", self.batch, 1, whole=True)
-        _number("stride", self.stride, 1, whole=True)
+        _whole("batch", self.batch, 1)
+        _whole("stride", self.stride, 1)
         if self.stride > LARGEST_STRIDE:
             raise OptionError(f"stride is {self.stride}; take at most {LARGEST_STRIDE}")
-        for name in ("share", "rate", "final_rate", "clip", "decay"):
-            _number(name, getattr(self, name), 0.0)
+        for name in ("share", "rate", "clip", "final_rate", "decay"):
+            as_positive(getattr(self, name), name, zero=name in ("final_rate", "decay"))
         _pair("eps", self.eps)
-        for name in ("share", "rate", "clip"):
-            if not getattr(self, name) > 0:
-                raise OptionError(f"{name} of a phase must be positive")
         if not isinstance(self.weights, Mapping):
             raise OptionError(f"weights is {self.weights!r}; it must be a table")
         known: tuple[str, ...] = {
@@ -99,7 +96,7 @@ class Phase:
         }.get(self.loss, ())
         for name, value in self.weights.items():
             _choice(f"weights of a phase with loss {self.loss!r}:", name, known)
-            _number(name, value, 0.0)
+            as_positive(value, name, zero=True)
         if self.loss == "published" and not any(self.weights.values()):
             raise OptionError(f"a phase with loss 'published' needs weights: {', '.join(TERMS)}")
 
@@ -191,13 +188,10 @@ class Config:
         _choice("augment", self.augment, AUGMENTATIONS)
         _choice("against", self.against, ("seen", "designs"))
         _choice("optimiser", self.optimiser, OPTIMISERS)
-        _number("steps", self.steps, 1, whole=True)
-        _number("validate", self.validate, 1, whole=True)
-        _number("limit", self.limit, 0, whole=True)
-        _number("fresh", self.fresh, 0, whole=True)
-        _number("seed", self.seed, 0, whole=True)
+        for name in ("steps", "validate", "limit", "fresh", "seed"):
+            _whole(name, getattr(self, name), int(name in ("steps", "validate")))
         for name in ("ema", "weight_decay", "validate_every", "checkpoint_every"):
-            _number(name, getattr(self, name), 0.0)
+            as_positive(getattr(self, name), name, zero=True)
         _pair("sigma", self.sigma)
         if not self.ema < 1 or not self.sigma[0] <= self.sigma[1]:
             raise OptionError("ema must be below 1, and sigma two positive numbers that rise")
@@ -316,16 +310,13 @@ def _choice(what: str, value: object, known: tuple[str, ...]) -> None:
         raise OptionError(f"{what} is {value!r}; {choices(value, known)}")
 
 
-def _number(what: str, value: object, least: float, *, whole: bool = False) -> None:
-    kind = int if whole else int | float
-    if not isinstance(value, kind) or isinstance(value, bool) or not least <= value < math.inf:
-        raise OptionError(f"{what} is {value!r}; it must be a number, {least} or more")
+def _whole(what: str, value: object, least: int) -> None:
+    if not isinstance(value, int) or isinstance(value, bool) or value < least:
+        raise OptionError(f"{what} is {value!r}; it must be a whole number, {least} or more")
 
 
 def _pair(what: str, value: object) -> None:
     if not isinstance(value, tuple) or len(value) != 2:
         raise OptionError(f"{what} is {value!r}; it must be two numbers")
     for one in value:
-        _number(what, one, 0.0)
-        if not one > 0:
-            raise OptionError(f"{what} is {value!r}; it must be positive")
+        as_positive(one, what)

@@ -19,6 +19,7 @@ from gso.net.training.learning_rate import place
 from gso.net.training.phase_objective import Objective
 from gso.net.training.processes import interruption, processes
 from gso.net.training.training_run import MODEL, Run, begin
+from gso.quantities import as_positive
 from gso.typing import AnyPath, Json
 
 __all__ = ["MODEL", "Report", "train"]
@@ -100,8 +101,8 @@ def train(
     WeightsError
         The checkpoint, or a net named by the configuration, is missing or damaged.
     """
-    if minutes is not None and not minutes > 0:
-        raise OptionError(f"minutes is {minutes!r}; it must be positive")
+    if minutes is not None:
+        as_positive(minutes, "minutes")
     with processes(device) as here, exact(tuned=True):
         for phase in config.phases:
             if phase.batch % here.world:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import torch
 from torch import distributed
 
-from gso.errors import OptionError
+from gso.net.models.base import device_of
 
 
 @dataclass(frozen=True)
@@ -91,14 +91,9 @@ def processes(device: str | None = None) -> Iterator[Processes]:
         There is no such device.
     """
     world, rank = (int(os.environ.get(n, d)) for n, d in (("WORLD_SIZE", "1"), ("RANK", "0")))
-    name = device or ("cuda" if torch.cuda.is_available() else "cpu")
-    if name == "cuda" and world > 1:
-        name = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
-    try:
-        where = torch.device(name)
-        torch.empty(0, device=where)
-    except (RuntimeError, AssertionError):
-        raise OptionError(f"there is no device {name!r}; take 'cpu'") from None
+    where = device_of(device)
+    if where == torch.device("cuda") and world > 1:
+        where = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
     if world == 1:
         yield Processes(0, 1, where)
         return

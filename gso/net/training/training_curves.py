@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from gso.io import replacing
+from gso.io.atomic import write_bytes
 
 NAME = "curves.jsonl"
 
@@ -27,8 +27,7 @@ class Curves:
         self.path = folder / NAME
         kept = [row for row in read(folder) if row["step"] <= step]
         self._known = {_what(row) for row in kept if row["step"] == step}
-        with replacing(self.path) as file:
-            file.write("".join(json.dumps(row) + "\n" for row in kept).encode())
+        write_bytes(self.path, "".join(json.dumps(row) + "\n" for row in kept).encode())
         self._writer: Any = None
         if find_spec("tensorboard") is not None:
             from torch.utils.tensorboard import SummaryWriter

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gso.ruled.polygon import enclosed_area
+from gso.geometry.polygon import signed_area
 from gso.ruled.smooth.curves import Curves
 from gso.ruled.vectors import cross, lengths
 from gso.spline import BSplineSurface, TrimmedSpline
@@ -73,7 +73,7 @@ class Patch:
         """Return the area of a small polygon (k, 2), from the derivatives in its middle."""
         u, v = ring.mean(axis=0)
         by = [self.spline.evaluate(u, v, **d) for d in ({"du": 1}, {"dv": 1})]
-        return abs(enclosed_area(ring)) * float(lengths(cross(*by)))
+        return abs(signed_area(ring)) * float(lengths(cross(*by)))
 
     def nearest(self, points: Array, uv: Array) -> Array:
         """Return the parameters (k, 2) of the nearest points to points (k, 3), near a guess."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 from types import ModuleType
 
 from gso.errors import OptionError
-from gso.io.atomic import check_writable, replacing, suffix_of
+from gso.io.atomic import check_writable, suffix_of, write_bytes
 from gso.registry import Registry
 from gso.spelling import choices
 from gso.typing import AnyPath
@@ -109,5 +109,4 @@ def write(
     check_writable(path)
     check(drawing)
     content: bytes = writer.content(drawing, layer_set(layers), **options)
-    with replacing(path) as file:
-        file.write(content)
+    write_bytes(path, content)

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gso.pattern import Bend
-from gso.workshop.part import Drawing
+from gso.workshop.part import Drawing, Label
 from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import Layer
-from gso.workshop.writers.strokes import Line, Text
+from gso.workshop.writers.strokes import Line
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing as Document
@@ -124,7 +124,7 @@ def _data(bend: Bend) -> list[tuple[int, str | float]]:
     return [*data, (1041, float(bend.radius))] if np.isfinite(bend.radius) else data
 
 
-def _text(space: Modelspace, text: Text, layer: str) -> DXFGraphic:
+def _text(space: Modelspace, text: Label, layer: str) -> DXFGraphic:
     from ezdxf.enums import TextEntityAlignment
 
     made = space.add_text(

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gso.errors import OptionError
+from gso.quantities import as_positive
 from gso.spelling import choices
 from gso.typing import Array
 from gso.workshop.part import Drawing
 from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import Layer
 from gso.workshop.writers.tiles import FOOT, Tile, Tiling, tiled
-from gso.workshop.writers.writer_checks import length
 
 if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas
@@ -81,7 +81,7 @@ def content(
     b'%PDF-'
     """
     check_paper(paper)
-    gap, free = length("overlap", overlap, zero=True), length("margin", margin, zero=True)
+    gap, free = as_positive(overlap, "overlap", zero=True), as_positive(margin, "margin", zero=True)
     tiling = tiled(drawing, PAPERS[paper], gap, free)
     stream = io.BytesIO()
     book = _Book(stream, tiling, free, gap)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gso.pattern import Bend
 from gso.typing import Array
 from gso.workshop.names import different
-from gso.workshop.part import Drawing, Part
+from gso.workshop.part import Drawing, Label, Part
 
 # A bend by less is none, in radians.
 _FLAT = 1e-9
@@ -52,36 +51,6 @@ class Line:
     bend: Bend | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Text:
-    """A line of text of the kind ``text``.
-
-    Attributes
-    ----------
-    text : str
-        Printable characters only.
-    at : ndarray, (2,)
-        Its middle, in millimetres.
-    height : float
-        Height of capital letters.
-    angle : float
-        Direction in radians.
-    """
-
-    kind: ClassVar[str] = "text"
-
-    text: str
-    at: Array
-    height: float
-    angle: float = 0.0
-
-    @property
-    def start(self) -> Array:
-        """The middle of its base line, (2,)."""
-        up = np.array([-np.sin(self.angle), np.cos(self.angle)])
-        return np.asarray(self.at - 0.5 * self.height * up)
-
-
 def lines(part: Part) -> list[Line]:
     """Return the lines of a part, the outline last.
 
@@ -111,7 +80,7 @@ def lines(part: Part) -> list[Line]:
     return [*drawn, _line("outline", part.outline, closed=True)]
 
 
-def texts(part: Part, bend_text: bool = False) -> list[Text]:
+def texts(part: Part, bend_text: bool = False) -> list[Label]:
     """Return the texts of a part: its labels, those of its notches and, if asked for, its bends.
 
     Parameters
@@ -127,7 +96,7 @@ def texts(part: Part, bend_text: bool = False) -> list[Text]:
     >>> [text.text for text in texts(Part("a", square, bends=(bend,)), bend_text=True)]
     ['down 90 deg R 1.5']
     """
-    found = [Text(printable(x.text), x.at, x.height, x.angle) for x in part.labels]
+    found = [replace(label, text=printable(label.text)) for label in part.labels]
     depth = _depth(part)
     height = _BESIDE * depth
     found += _numbers(part, depth, height)
@@ -142,7 +111,7 @@ def texts(part: Part, bend_text: bool = False) -> list[Text]:
         words = f"{way} {abs(np.degrees(bend.angle)):.4g} deg"
         if np.isfinite(bend.radius):
             words += f" R {bend.radius:.4g}"
-        found.append(Text(words, np.mean(bend.line, axis=0) + high * up, high, angle))
+        found.append(Label(words, np.mean(bend.line, axis=0) + high * up, high, angle))
     return [text for text in found if text.text and text.height > 0]
 
 
@@ -191,7 +160,7 @@ def printable(text: str) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
-def _numbers(part: Part, depth: float, height: float) -> list[Text]:
+def _numbers(part: Part, depth: float, height: float) -> list[Label]:
     """Place the texts of notches inside the part, beside a notch where it is narrow or holed.
 
     A text without room is left out; others of its seam have room.
@@ -209,7 +178,7 @@ def _numbers(part: Part, depth: float, height: float) -> list[Text]:
         for side in (0.0, 1.5, -1.5):
             at = notch.at + (depth + height) * notch.inward + side * height * along
             if shapely.contains_xy(shape, *(at + ends).T).all():
-                found.append(Text(text, at, height))
+                found.append(Label(text, at, height))
                 break
     return found
 
@@ -231,20 +200,20 @@ def _depth(part: Part) -> float:
 
 def _grain(part: Part, grain: Array) -> list[Line]:
     """Return the grain line, inside the part and close to its middle, and the head of its arrow."""
+    import shapely
+
     along = grain / np.hypot(*grain)
     across = np.array([-along[1], along[0]])
-    low, high = part.outline.min(axis=0), part.outline.max(axis=0)
-    middle = 0.5 * (low + high)
-    crossed = []
-    for polygon in (part.outline, *part.holes):
-        x, y = (polygon - middle) @ along, (polygon - middle) @ across
-        x1, y1 = np.roll(x, -1), np.roll(y, -1)
-        cut = (y > 0) != (y1 > 0)
-        crossed.append(x[cut] + (x1 - x)[cut] * (y / np.where(cut, y - y1, 1.0))[cut])
-    ends = np.sort(np.concatenate(crossed))[: 2 * (sum(map(len, crossed)) // 2)].reshape(-1, 2)
-    if len(ends) == 0:
-        ends = 0.5 * min(part.size) * np.array([[-1.0, 1.0]])
-    start, end = ends[np.argmax(np.ptp(ends, axis=1))]
+    middle = part.low + 0.5 * np.array(part.size)
+    far = np.hypot(*part.size) * along
+    inside = shapely.intersection(
+        shapely.make_valid(shapely.Polygon(part.outline, part.holes)),
+        shapely.LineString([middle - far, middle + far]),
+    )
+    chord = max(shapely.get_parts(inside), key=shapely.length, default=inside)
+    least = 0.5 * min(part.size)
+    ends = (shapely.get_coordinates(chord) - middle) @ along
+    start, end = (ends.min(), ends.max()) if chord.length > 0 else (-least, least)
     half = 0.5 * _GRAIN * (end - start)
     centre = middle + 0.5 * (start + end) * along
     tail, tip = centre - half * along, centre + half * along

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from gso.io.svg_page import SVGPage
+from gso.quantities import as_positive
 from gso.workshop.part import Drawing
 from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import Layer
-from gso.workshop.writers.strokes import Line, Text
-from gso.workshop.writers.writer_checks import length
 
 SUFFIX = ".svg"
 
@@ -58,27 +57,23 @@ def content(
     """
     low, high = drawing.bounds
     size = float((high - low).max())
-    width = max(_FINEST, _SHARE * size) if stroke is None else length("stroke", stroke)
+    width = max(_FINEST, _SHARE * size) if stroke is None else as_positive(stroke, "stroke")
     margin = 0.0 if drawing.sheet is not None else _MARGIN * width
     page = SVGPage(low - margin, high + margin)
     names = strokes.identifiers(drawing.parts)
-    every: list[list[Line | Text]] = [
-        [*strokes.lines(part), *strokes.texts(part, bend_text)] for part in drawing.parts
-    ]
     for layer in dict.fromkeys(layers.values()):
         inside = page.layer(layer.name, layer.colour, None if layer == layers["text"] else width)
         for border in strokes.sheet(drawing) if layer == layers["sheet"] else ():
             page.path(inside, [border.points], closed=True)
-        for part, name, drawn in zip(drawing.parts, names, every, strict=True):
-            mine = [each for each in drawn if layers.get(each.kind) == layer]
-            if not mine:
+        for part, name in zip(drawing.parts, names, strict=True):
+            drawn = [line for line in strokes.lines(part) if layers.get(line.kind) == layer]
+            texts = strokes.texts(part, bend_text) if layer == layers["text"] else []
+            if not (drawn or texts):
                 continue
             group = page.group(inside, f"{layer.name}-{name}", strokes.title(part))
-            for each in mine:
-                if isinstance(each, Text):
-                    page.text(group, each.text, each.start, each.height, each.angle)
-                else:
-                    bend = each.bend
-                    title = bend.in_words() if bend is not None else ""
-                    page.path(group, [each.points], closed=each.closed, title=title)
+            for line in drawn:
+                title = "" if line.bend is None else line.bend.in_words()
+                page.path(group, [line.points], closed=line.closed, title=title)
+            for text in texts:
+                page.text(group, text.text, text.start, text.height, text.angle)
     return page.content()

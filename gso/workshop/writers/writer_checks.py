@@ -7,7 +7,7 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.errors import GSOError, MeshError, OptionError
+from gso.errors import GSOError, MeshError
 from gso.workshop.part import Drawing, Part
 
 
@@ -27,40 +27,6 @@ def require(package: str, files: str) -> None:
     """
     if find_spec(package) is None:
         raise GSOError(f'{files} need {package}: pip install "gso[workshop]"')
-
-
-def length(name: str, value: float | str, *, zero: bool = False) -> float:
-    """Return an option that is a length in millimetres as a number.
-
-    Parameters
-    ----------
-    name : str
-        Name of the option.
-    value : float
-    zero : bool
-        Whether it may be zero.
-
-    Raises
-    ------
-    OptionError
-        It is no number, not finite or negative.
-
-    Examples
-    --------
-    >>> length("margin", 0, zero=True)
-    0.0
-    >>> length("stroke", -1)
-    Traceback (most recent call last):
-    gso.errors.OptionError: stroke is -1, but it is a length in millimetres above 0
-    """
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = np.nan
-    if not (np.isfinite(number) and (number > 0 or (zero and number == 0))):
-        least = "of 0 or more" if zero else "above 0"
-        raise OptionError(f"{name} is {value!r}, but it is a length in millimetres {least}")
-    return number
 
 
 def check(drawing: Drawing) -> None:

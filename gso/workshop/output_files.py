@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gso import io
+from gso.io.atomic import write_bytes
 from gso.typing import Json, Keywords
 from gso.workshop import writers
 from gso.workshop.job_folder import CERTIFICATE, PAGE, PAPER
 from gso.workshop.page import page
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
+from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import layer_set
 from gso.workshop.writers.pdf import check_paper
 
@@ -77,8 +79,7 @@ def written(
 
     for suffix in drawings.formats:
         for part in parts:
-            times = f", {part.count} times" if part.count > 1 else ""
-            drawing = Drawing((part,), title=part.name + times)
+            drawing = Drawing((part,), title=strokes.title(part))
             write(drawing, f"parts/{part.name}.{suffix}", suffix)
         for number, drawing in enumerate(sheets, start=1):
             write(drawing, f"sheets/sheet-{number}.{suffix}", suffix)
@@ -90,8 +91,7 @@ def written(
             (place / name).parent.mkdir(exist_ok=True)
             io.write(panel.surface, place / name)
             files.append(name)
-    with io.replacing(place / PAGE) as file:
-        file.write(page(certificate, parts, sheets).encode())
+    write_bytes(place / PAGE, page(certificate, parts, sheets).encode())
     files += [PAGE, CERTIFICATE]
     for name in earlier - set(files):
         (place / name).unlink(missing_ok=True)

@@ -14,7 +14,7 @@ FORMULATIONS = ("ruled", "curvature", "isometry", "flatten")
 
 
 @dataclass(frozen=True)
-class Ask:
+class FabricationSettings:
     """How designs become parts.
 
     Attributes
@@ -59,7 +59,7 @@ class Ask:
     def distance(self, diagonal: float) -> float:
         """Return the largest distance from a design with some diagonal, in its unit.
 
-        >>> Ask(max_deviation="0.5%").distance(200.0)
+        >>> FabricationSettings(max_deviation="0.5%").distance(200.0)
         1.0
         """
         return as_length(self.max_deviation, "max_deviation", diagonal=diagonal, unit=self.unit)

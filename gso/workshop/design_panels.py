@@ -21,8 +21,8 @@ from gso.seams import pieces as search
 from gso.tasks.request import Limits
 from gso.tno import optimize
 from gso.workshop import measurements
-from gso.workshop.asking import Ask
 from gso.workshop.designs import Design
+from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made
 from gso.workshop.pattern_panels import of_result, of_surface
 
@@ -32,13 +32,18 @@ _SAME = 1e-9
 Say = Callable[[str], None]
 
 
-def made(given: Design, ask: Ask, say: Say = lambda said: None, workers: int | None = 0) -> Made:
+def made(
+    given: Design,
+    settings: FabricationSettings,
+    say: Say = lambda said: None,
+    workers: int | None = 0,
+) -> Made:
     """Make a design of flat panels within what is asked, or as near to it as possible.
 
     Parameters
     ----------
     given : Design
-    ask : Ask
+    settings : FabricationSettings
     say : callable
         Called with what is being done.
     workers : int, optional
@@ -51,11 +56,11 @@ def made(given: Design, ask: Ask, say: Say = lambda said: None, workers: int | N
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
-        if ask.formulation == RULED:
-            return _strips(given, ask, named, workers)
-        if ask.formulation == "flatten":
-            return _as_it_is(given, ask, named)
-        return _nearly(given, ask, named, workers)
+        if settings.formulation == RULED:
+            return _strips(given, settings, named, workers)
+        if settings.formulation == "flatten":
+            return _as_it_is(given, settings, named)
+        return _nearly(given, settings, named, workers)
 
 
 def _welded(given: Design) -> Design:
@@ -68,16 +73,18 @@ def _welded(given: Design) -> Design:
     return replace(given, mesh=joined, kept=ids[ids[:, 0] != ids[:, 1]])
 
 
-def _strips(given: Design, ask: Ask, say: Say, workers: int | None) -> Made:
+def _strips(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
     """Make strips, of the whole design or of its pieces."""
-    options = Options(max_strips=ask.max_strips, min_radius=ask.min_radius)
-    allowed = ask.distance(given.mesh.diagonal)
-    limits = Limits(allowed, ask.strain)
-    request = StripsRequest(options, limits, ask.max_size, given.kept, workers=workers, say=say)
+    options = Options(max_strips=settings.max_strips, min_radius=settings.min_radius)
+    allowed = settings.distance(given.mesh.diagonal)
+    limits = Limits(allowed, settings.strain)
+    request = StripsRequest(
+        options, limits, settings.max_size, given.kept, workers=workers, say=say
+    )
     result = lay_strips(given.mesh, request)
     if result.pattern is None:
         raise MeshError("the solve was ended before there were strips")
-    record = measurements.of_pattern(given.mesh, result.mesh, result.pattern, ask, allowed)
+    record = measurements.of_pattern(given.mesh, result.mesh, result.pattern, settings, allowed)
     numbers = np.atleast_1d(result.details["strips"]).tolist()
     record |= {"pieces": len(numbers), "strips": numbers}
     if "seam_gap" in result.details:
@@ -86,36 +93,40 @@ def _strips(given: Design, ask: Ask, say: Say, workers: int | None) -> Made:
     record["deviation_mean"] = max(far.there_mean, far.back_mean)
     record["deviation_max"] = max(far.there_max, far.back_max)
     one = replace(of_result(given.name, result, record), reasons=result.reasons)
-    return _checked(_bent(one), ask)
+    return _checked(_bent(one), settings)
 
 
-def _as_it_is(given: Design, ask: Ask, say: Say) -> Made:
+def _as_it_is(given: Design, settings: FabricationSettings, say: Say) -> Made:
     """Cut a design whose shape stays into pieces, as far as the strain requires."""
-    return _checked(_of_search(given, given.mesh, ask, None, say, 0), ask)
+    return _checked(_of_search(given, given.mesh, settings, None, say, 0), settings)
 
 
-def _nearly(given: Design, ask: Ask, say: Say, workers: int | None) -> Made:
+def _nearly(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
     """Make nearly developable panels: one if that is possible, otherwise several."""
-    light = LightDesign.of(given.mesh, ask.distance(given.mesh.diagonal), named=len(given.kept) > 0)
+    light = LightDesign.of(
+        given.mesh, settings.distance(given.mesh.diagonal), named=len(given.kept) > 0
+    )
     tried = []
     if not len(given.kept) and parametrization.flattens(light.mesh):
         say("as a whole")
         result = optimize(
             light.mesh,
-            formulation=ask.formulation,
+            formulation=settings.formulation,
             max_deviation=light.allowed,
-            max_strain=ask.strain,
+            max_strain=settings.strain,
         )
         if result.pattern is not None:
-            allowed = ask.distance(given.mesh.diagonal)
-            record = measurements.of_pattern(given.mesh, result.mesh, result.pattern, ask, allowed)
+            allowed = settings.distance(given.mesh.diagonal)
+            record = measurements.of_pattern(
+                given.mesh, result.mesh, result.pattern, settings, allowed
+            )
             one = replace(of_result(given.name, result, record), reasons=result.reasons)
-            tried.append(_checked(_bent(one), ask))
+            tried.append(_checked(_bent(one), settings))
             if not tried[0].reasons:
                 return tried[0]
     try:
-        one = _of_search(given, light.mesh, ask, light.allowed, say, workers)
-        tried.append(_checked(one, ask))
+        one = _of_search(given, light.mesh, settings, light.allowed, say, workers)
+        tried.append(_checked(one, settings))
     except GSOError:
         if not tried:
             raise
@@ -123,17 +134,22 @@ def _nearly(given: Design, ask: Ask, say: Say, workers: int | None) -> Made:
 
 
 def _of_search(
-    given: Design, mesh: Mesh, ask: Ask, allowed: float | None, say: Say, workers: int | None
+    given: Design,
+    mesh: Mesh,
+    settings: FabricationSettings,
+    allowed: float | None,
+    say: Say,
+    workers: int | None,
 ) -> Made:
     """Search for seams within a distance, and make a panel of each piece."""
     found = search(
         # On triangles seams need not follow edge rows.
         Mesh(mesh.vertices, mesh.triangles),
-        max_strain=ask.strain,
+        max_strain=settings.strain,
         max_deviation=allowed,
-        darts=ask.darts,
-        sheet=ask.sheet,
-        unit=ask.unit,
+        darts=settings.darts,
+        sheet=settings.sheet,
+        unit=settings.unit,
         keep=given.kept if len(given.kept) else None,
         workers=workers,
         callback=say,
@@ -142,15 +158,15 @@ def _of_search(
     if pattern is None:
         said = "; ".join(map(str, found.reasons))
         raise MeshError(f"{given.name}: a piece cannot be laid flat; {said}")
-    bound = None if allowed is None else ask.distance(given.mesh.diagonal)
-    record = measurements.of_pattern(given.mesh, found.design, pattern, ask, bound)
+    bound = None if allowed is None else settings.distance(given.mesh.diagonal)
+    record = measurements.of_pattern(given.mesh, found.design, pattern, settings, bound)
     one = of_surface(given.name, found.design, pattern, record | {"pieces": len(found)})
     return _bent(replace(one, reasons=found.reasons))
 
 
-def _checked(made: Made, ask: Ask) -> Made:
+def _checked(made: Made, settings: FabricationSettings) -> Made:
     """Add the reasons against the panels."""
-    return replace(made, reasons=measurements.judge(made, ask))
+    return replace(made, reasons=measurements.judge(made, settings))
 
 
 def _bent(made: Made) -> Made:

@@ -1,0 +1,36 @@
+"""Lines and closed polygons in arrays of points; the first point of a polygon is not repeated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gso.typing import Array
+
+
+def signed_area(polygon: Array) -> float:
+    """Return the area of a closed polygon (k, 2), positive if it is anticlockwise.
+
+    >>> signed_area(np.array([[0.0, 0], [2, 0], [2, 1], [0, 1]]))
+    2.0
+    """
+    x, y = polygon.T
+    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+
+
+def anticlockwise(polygon: Array) -> Array:
+    """Return a closed polygon (k, 2), reversed if it is clockwise.
+
+    >>> anticlockwise(np.array([[0.0, 0], [0, 1], [2, 1]])).tolist()
+    [[2.0, 1.0], [0.0, 1.0], [0.0, 0.0]]
+    """
+    return polygon if signed_area(polygon) > 0 else polygon[::-1]
+
+
+def arc_lengths(line: Array) -> Array:
+    """Return the length of an open line (k, d) from its start to each of its points, (k,).
+
+    >>> arc_lengths(np.array([[0.0, 0], [3, 4], [3, 5]])).tolist()
+    [0.0, 5.0, 6.0]
+    """
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    return np.asarray(np.r_[0.0, np.cumsum(steps)])

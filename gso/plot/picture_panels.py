@@ -1,0 +1,100 @@
+"""Panels of pictures: surfaces in pieces, with ruling lines, or of strips; and their patterns."""
+
+from __future__ import annotations
+
+import colorsys
+
+import numpy as np
+
+from gso.mesh import Mesh
+from gso.plot.draw import GRAZING, Panel, facing, turned
+from gso.plot.view import View
+from gso.ruled.ruled_surface import RuledSurface
+from gso.rulings import gauss_image, shape_operator, trace
+from gso.seams.segmentation import Segmentation, whole_pattern
+from gso.typing import Array
+
+#: Colours of neighbouring strips, and of flat regions.
+_STRIPS = np.array([(0.60, 0.71, 0.82), (0.78, 0.83, 0.72)])
+_FLAT = np.array((0.93, 0.78, 0.55))
+
+
+def ruled(mesh: Mesh, view: View, count: int) -> Panel:
+    """Make a panel of the surface with up to `count` ruling lines."""
+    rulings = trace(mesh, count=count)
+    panel = Panel(view.project(mesh.vertices), mesh.faces)
+    panel.lines = [view.project(line) for line in rulings.lines]
+    panel.title = "no rulings: the surface is flat"
+    if len(rulings):
+        panel.title = f"rulings, off straight by {100 * rulings.straightness.mean():.2g} %"
+    return panel
+
+
+def gauss(mesh: Mesh, view: View, name: str = "Gauss image") -> Panel:
+    """Make a panel of the surface's Gauss image, seen from the same side as the surface."""
+    panel = Panel(gauss_image(mesh) @ view.axes, mesh.faces, shaded=False, circle=1.0)
+    panel.title = f"{name}, thickness {shape_operator(mesh).thickness:.2g}"
+    return panel
+
+
+def strips(design: Mesh, surface: RuledSurface) -> list[Panel]:
+    """Make panels of the design, of the strips near it, and of their pattern.
+
+    Strips have two colours in turn, and flat regions a third. Lines are rulings and creases, and
+    bend lines in the pattern.
+    """
+    view, mesh = View.of(design), surface.mesh
+    before = Panel(view.project(design.vertices), design.faces, "design", light=GRAZING)
+    tint = np.where(surface.flat[:, None], _FLAT, _STRIPS[surface.strip % len(_STRIPS)])
+    far = surface.distances(design)
+    share = 100.0 * max(far.there_max, far.back_max) / design.diagonal
+    after = Panel(view.project(mesh.vertices), mesh.faces, tint=tint)
+    parts = surface.strips
+    after.title = f"{parts} strip{'s' if parts > 1 else ''}, largest distance {share:.2g} %"
+    edges = np.concatenate([surface.rulings.edges, surface.creases.edges])
+    after.lines = list(after.points[edges])
+    flat = surface.pattern.flat
+    seen = after.points[surface.pattern.vertex]
+    turn = facing(flat, seen) if parts == 1 else 1.0
+    middle, size = flat.mean(axis=0), design.frame.scale
+    points = turned(flat - middle, turn) / size
+    sheet = Panel(points, surface.pattern.faces, shaded=False, tint=tint)
+    sheet.title = "exact pattern with its bend lines"
+    sheet.lines = [turned(bend.line - middle, turn) / size for bend in surface.bends]
+    return [before, after, sheet]
+
+
+def pieces(found: Segmentation) -> list[Panel]:
+    """Make panels of the surface with its seams, of its other side, and of the patterns."""
+    view = View.of(found.design)
+    behind = View(view.frame, view.axes * np.array([-1.0, 1.0, -1.0]))
+    colours = _colours(len(found))
+    surface = found.design
+    panels = []
+    for side, title in ((view, _title(found)), (behind, "from behind")):
+        panel = Panel(side.project(surface.vertices), surface.faces, title, light=GRAZING)
+        panel.tint = colours[found.of_face]
+        panel.lines = list(panel.points[found.edges])
+        panels.append(panel)
+    own = [k for k, sheet in enumerate(found.sheets) if sheet is not None]
+    if own:
+        mesh, flat = whole_pattern(found)
+        points = (flat - 0.5 * (flat.min(axis=0) + flat.max(axis=0))) / np.ptp(flat, axis=0).max()
+        wide = float(np.ptp(panels[0].points[:, :2], axis=0).max())
+        sheet = Panel(np.pad(wide * points, ((0, 0), (0, 1))), mesh.faces, shaded=False)
+        count = [len(found.sheets[k].mesh.faces) for k in own]  # type: ignore[union-attr]
+        sheet.tint = np.repeat(colours[own], count, axis=0)
+        sheet.title = "patterns (not at the same scale)"
+        panels.append(sheet)
+    return panels
+
+
+def _title(found: Segmentation) -> str:
+    count = len(found)
+    return f"{count} piece{'s' if count > 1 else ''}, seam {found.seam_length:.3g}"
+
+
+def _colours(count: int) -> Array:
+    """Return pale colours of even brightness, far apart for neighbouring numbers."""
+    hue = (0.58 + 0.618034 * np.arange(count)) % 1.0
+    return np.array([colorsys.hls_to_rgb(h, 0.74, 0.45) for h in hue]).reshape(-1, 3)
