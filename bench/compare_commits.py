@@ -62,9 +62,13 @@ def terms() -> Entries:
     x, y = np.meshgrid(np.linspace(-1, 1, 6), np.linspace(-1, 1, 7), indexing="ij")
     mesh = gso.Mesh.from_grid(np.stack([x, y, 0.3 * x * y + 0.1 * x**3], axis=-1))
     random = np.random.default_rng(0)
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    examples = importlib.import_module("tests.conformance.term_examples").examples
     sizes = {"surface": 3, "flat": 2, "scale": 1}
     for name, module in registry.items():
-        for k, term in enumerate(module.examples(mesh)):
+        # They were moved to the tests.
+        own = getattr(module, "examples", None)
+        for k, term in enumerate(examples(name, mesh) if own is None else own(mesh)):
             dims = [sizes[block] for block, ids in term.stencil for _ in range(ids.shape[1])]
             at = 0.5 + 0.1 * random.normal(size=(sum(dims), term.count))
             constants = term.constants if term.constants.size else np.empty((0, term.count))
@@ -153,8 +157,30 @@ def nets() -> Entries:
         yield from of_result(f"hybrid {k}", gso.hybrid.solve(points))
 
 
+def strips() -> Entries:
+    """Strips of surfaces, by number and within a distance."""
+    for k, points in enumerate(surfaces(4)):
+        for name, keywords in {"4": {"strips": 4}, "near": {"max_deviation": "2%"}}.items():
+            found = gso.strips(points, **keywords)
+            yield f"{name} {k}/vertices", found.mesh.vertices
+            yield f"{name} {k}/pattern", found.pattern.flat
+            yield f"{name} {k}/farthest", found.ruled.farthest
+
+
+def pieces() -> Entries:
+    """Pieces of a dome and of a closed surface, as they are and within a distance."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+    whole = importlib.import_module("whole")
+    for name in ("dome", "canopy"):
+        for limits in ({"max_strain": 0.01}, {"max_deviation": "2%"}):
+            found = gso.pieces(whole.DESIGNS[name](), workers=0, **limits)
+            for key, value in found.metrics.items():
+                yield f"{name} {next(iter(limits))}/{key}", value
+            yield f"{name} {next(iter(limits))}/edges", np.asarray(found.edges)
+
+
 GROUPS: dict[str, Callable[[], Entries]] = {
-    f.__name__: f for f in (terms, developable, flatten, denoise, constraints, nets)
+    f.__name__: f for f in (terms, developable, flatten, denoise, constraints, nets, strips, pieces)
 }
 
 
