@@ -22,8 +22,8 @@ def at_first_use(
     Examples
     --------
     >>> load, names = at_first_use("gso.linalg", {"banded": "Solver cost"})
-    >>> names()
-    ['Solver', 'cost']
+    >>> "cost" in names()
+    True
     >>> load("cost").__module__
     'gso.linalg.banded'
     """

@@ -142,7 +142,9 @@ def test_max_strain_is_kept_with_no_more_displacement_than_it_takes(surfaces, st
     mesh = Mesh.from_grid(surfaces[0][::2, ::2])
     result = gso.tno.optimize(mesh, max_strain=strain)
     flat = gso.tno.optimize(result.mesh, task="flatten", options="fast")
-    assert 0.8 * strain <= flat.metrics["strain_max"] <= strain * (1 + 1e-3)
+    assert metrics.face_strains(result.mesh, result.pattern.flat).max() <= strain * (1 + 1e-3)
+    # Another image of the same surface needs about as much.
+    assert 0.8 * strain <= flat.metrics["strain_max"] <= 1.05 * strain
 
 
 def test_both_bounds_hold_where_they_can(surfaces):
