@@ -288,7 +288,8 @@ class Code(str, enum.Enum):
     STRAIN = _limit(
         "strain",
         Kind.SHARE,
-        "Largest strain of the pattern; its bound is 0.5 % where only max_deviation is given.",
+        "Largest strain of the pattern; its bound is 0.5 % where only max_deviation is given, and "
+        "for gso pieces 1 % where the shape stays, 0.1 % where it may change.",
         "the largest strain of the pattern is {value}, more than {bound}",
         "allow more strain (max_strain), distance (max_deviation) or narrow necks (min_neck), or "
         "gso pieces",
