@@ -178,6 +178,11 @@ class Mesh:
         return topology.half_edges(self.triangles, len(self.vertices))
 
     @cached_property
+    def face_stars(self) -> topology.Stars:
+        """Interior vertices and the corners of the faces around them, by the number of faces."""
+        return topology.face_stars(self.half_edges)
+
+    @cached_property
     def stars_by_triangulation(self) -> tuple[topology.Stars, ...]:
         """Vertex stars of both triangulations of the quads, grouped by ring length.
 
