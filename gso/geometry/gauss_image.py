@@ -49,16 +49,20 @@ def image_curvature(centre: Vec[S], corners: Sequence[Vec[S]]) -> S:
     >>> round(float(image_curvature((0., 0., 1.), both)), 6)
     0.320401
     """
-    normals, area = [], 0.0
+    normals: list[Vec[S]] = []
+    areas: list[S] = []
     for k in range(0, len(corners), 2):
         following = corners[(k + 2) % len(corners)]
         normal = cross(sub(corners[k + 1], centre), sub(following, corners[k]))
         size = norm(normal)
         normals.append(tuple(x / size for x in normal))
-        area = size + area
-    first = normals[0]
-    pairs = itertools.pairwise(normals[1:])
-    angle, *others = (solid_angle(first, a, b) for a, b in pairs)
-    for other in others:
-        angle = angle + other
-    return angle / (0.5 * STAR * area)
+        areas.append(size)
+    angles = [solid_angle(normals[0], a, b) for a, b in itertools.pairwise(normals[1:])]
+    return _sum(angles) / (0.5 * STAR * _sum(areas))
+
+
+def _sum(values: Sequence[S]) -> S:
+    total, *others = values
+    for value in others:
+        total = total + value
+    return total

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any, TypeVar
+
 import numpy as np
+from numpy.typing import NDArray
 
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.typing import Array, Ints
+
+_N = TypeVar("_N", bound=NDArray[Any])
 
 #: Largest relative error of the distance.
 ERROR = 5e-4
@@ -82,17 +87,18 @@ def farthest(surface: Mesh, other: Mesh, known: float = 0.0) -> float:
         at, place = at.reshape(-1, 3), place.reshape(-1, 3, 3)
         away = np.linalg.norm(place - middle, axis=2)
         largest = max(largest, float(away.max()))
-        pairs = (points, middle), (far, away), (which, at)
-        points, far, which = (_quarters(*pair) for pair in pairs)
+        points, far = _quarters(points, middle), _quarters(far, away)
+        which = _quarters(which, at)
     return max(largest, float(upper.max()))
 
 
-def _quarters(corners: Array, middles: Array) -> Array:
+def _quarters(corners: _N, middles: _N) -> _N:
     """Return the values at the corners of the four parts of triangles, (4 k, 3, ...)."""
     a, b, c = (corners[:, k] for k in range(3))
     p, q, r = (middles[:, k] for k in range(3))
     parts = [(a, p, r), (p, b, q), (r, q, c), (p, q, r)]
-    return np.concatenate([np.stack(part, axis=1) for part in parts])
+    out: _N = np.concatenate([np.stack(part, axis=1) for part in parts])  # type: ignore[assignment]
+    return out
 
 
 def _upper(points: Array, corner: Array, which: Ints) -> Array:

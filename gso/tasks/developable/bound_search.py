@@ -6,6 +6,7 @@ that meets the bound gives the smallest displacement.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TypeVar
 
@@ -16,7 +17,7 @@ from gso.status import Status
 from gso.tasks.base import Analysis, Runner, Solution
 from gso.tasks.base import Options as BaseOptions
 from gso.tasks.developable import joint_isometry
-from gso.tasks.developable.options import DEVELOPABLE, Options
+from gso.tasks.developable.options import DEVELOPABLE, NEAR, Options
 from gso.tasks.developable.target import (
     PROGRESS,
     SearchRequest,
@@ -95,6 +96,23 @@ def _strain_left(run: Runner, solution: Solution) -> float:
     if not parametrization.flattens(run.analysis.mesh):
         return np.inf
     return strain_of(run, solution.points)
+
+
+def near_design(analysis: Analysis, request: SearchRequest) -> Iterator[SearchRequest]:
+    """Yield requests whose results stay near the design, for where one without limits does not.
+
+    First by the same formulation, and then by "isometry", if the user did not name one and did not
+    ask for a fast solve. There are none with constraints, B-splines or the settings of a reference.
+    """
+    options = request.options
+    reference = isinstance(options, joint_isometry.Options) and options.begin == "design"
+    if reference or options.variables == "surface" or not analysis.constraints.empty:
+        return
+    bound = NEAR * analysis.mesh.diagonal
+    yield replace(request, x0=None, max_displacement=bound)
+    other = _other(analysis, request)
+    if other is not None and options.iterations >= Options().iterations:
+        yield replace(other, max_displacement=bound)
 
 
 def stay_within(
