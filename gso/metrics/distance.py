@@ -10,6 +10,7 @@ from gso import geometry
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.mesh.polyline import Polylines
+from gso.metrics.farthest_point import farthest
 from gso.metrics.surfaces import SurfaceLike, mesh_of, used_points
 from gso.typing import Array
 
@@ -42,11 +43,21 @@ def point_to_surface(points: Array, mesh: Mesh) -> Array:
 
 
 def surface_distance(before: SurfaceLike, after: SurfaceLike) -> Distances:
-    """Measure true point-to-surface distances: output to input ("there"), and back."""
+    """Measure true distances between surfaces: output to input ("there"), and back.
+
+    The means are those of the vertices. The largest are of all points, see :func:`farthest`.
+    """
     a, b = mesh_of(before), mesh_of(after)
-    there = point_to_surface(used_points(b), a)
-    back = point_to_surface(used_points(a), b)
-    return Distances(float(there.mean()), float(there.max()), float(back.mean()), float(back.max()))
+    return Distances(*_from_vertices(b, a), *_from_vertices(a, b))
+
+
+def _from_vertices(surface: Mesh, other: Mesh) -> tuple[float, float]:
+    """Return the mean distance of the vertices from another surface, and that of all points."""
+    used = surface.used
+    foot, distance = np.zeros(len(used), np.int64), np.zeros(len(used))
+    foot[used], _, place = Nearest(other).locate(surface.vertices[used])
+    distance[used] = np.linalg.norm(place - surface.vertices[used], axis=1)
+    return float(distance[used].mean()), farthest(surface, other, 0.0, (foot, distance))
 
 
 def boundary_distance(before: SurfaceLike, after: SurfaceLike) -> tuple[float, float]:

@@ -13,8 +13,8 @@ from gso.typing import Array, Ints
 
 _N = TypeVar("_N", bound=NDArray[Any])
 
-#: Largest relative error of the distance.
-ERROR = 5e-4
+#: Largest errors of the distance: relative to it, and to the diagonal.
+ERROR, _SLACK = 5e-4, 1e-6
 #: Times that triangles are halved, and triangles in one round at most; beyond it the upper bound is
 #: returned.
 _ROUNDS, _MOST = 16, 400_000
@@ -22,7 +22,12 @@ _ROUNDS, _MOST = 16, 400_000
 _FIRST = 50
 
 
-def farthest(surface: Mesh, other: Mesh, known: float = 0.0) -> float:
+def farthest(
+    surface: Mesh,
+    other: Mesh,
+    known: float = 0.0,
+    vertices: tuple[Ints, Array] | None = None,
+) -> float:
     """Return the largest distance of the points of a surface from another, in its unit.
 
     All points of the triangles count, not only the vertices. The distance from one triangle of
@@ -34,11 +39,15 @@ def farthest(surface: Mesh, other: Mesh, known: float = 0.0) -> float:
     surface, other : Mesh
     known : float
         A distance that is reached elsewhere; the result is at least that.
+    vertices : (ndarray of int (n,), ndarray (n,)), optional
+        Of each vertex of the surface, the triangle of `other` nearest to it and the distance, where
+        they are known.
 
     Returns
     -------
     float
-        At most 0.05 % below the largest distance, and never above it by more.
+        At most 0.05 % and 1e-6 of the diagonal below the largest distance, and never above it by
+        more.
 
     Examples
     --------
@@ -53,12 +62,15 @@ def farthest(surface: Mesh, other: Mesh, known: float = 0.0) -> float:
     corner, tri = other.vertices[other.triangles], surface.triangles
     distance, foot = np.zeros(len(surface.vertices)), np.zeros(len(surface.vertices), np.int64)
     largest, asked = known, surface.used.copy()
+    if vertices is not None:
+        foot, distance = vertices
+        asked[:] = False
 
     def ask(vertices: Ints) -> None:
         foot[vertices], _, place = near.locate(surface.vertices[vertices])
         distance[vertices] = np.linalg.norm(place - surface.vertices[vertices], axis=1)
 
-    if np.array_equal(tri, other.triangles):
+    if vertices is None and np.array_equal(tri, other.triangles):
         # A point is at most as far as that with the same shares of the same triangle.
         moved = np.linalg.norm(surface.vertices - other.vertices, axis=1)
         order = np.flatnonzero(asked)[np.argsort(-moved[asked])]
@@ -70,9 +82,10 @@ def farthest(surface: Mesh, other: Mesh, known: float = 0.0) -> float:
     ask(np.flatnonzero(asked))
     largest = max(largest, float(distance.max()))
     points, far, which = surface.vertices[tri], distance[tri], foot[tri]
+    slack = _SLACK * surface.diagonal
     for _ in range(_ROUNDS):
         side = np.linalg.norm(points - np.roll(points, -1, axis=1), axis=2)
-        enough = (1.0 + ERROR) * largest
+        enough = (1.0 + ERROR) * largest + slack
         keep = far.max(axis=1) + side.max(axis=1) / np.sqrt(3.0) > enough
         points, far, which = points[keep], far[keep], which[keep]
         upper = _upper(points, corner, which)
