@@ -191,10 +191,10 @@ class RuledSurface:
     def distances(self, design: Mesh, *, parts: bool = False) -> metrics.Distances:
         """Measure the distances from a design, in its unit, all over both surfaces.
 
-        "There" is from the surface to the design, "back" from the design to it; the mean of that is of
-        the vertices. The largest distances, of all points, include those between the boundary curves, so that a slit counts with
-        its depth; with `parts`, for surfaces that meet inside the design, only those from the
-        design's boundary.
+        "There" is from the surface to the design, "back" from the design to it, the mean of which
+        is that of the vertices. The largest distances, of all points, include those between the
+        boundary curves, so that a slit counts with its depth; with `parts`, for surfaces that meet
+        inside the design, only those from the design's boundary.
         """
         points, weight = self.samples()
         there = metrics.point_to_surface(points, design)
