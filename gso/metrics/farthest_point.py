@@ -45,9 +45,9 @@ def farthest(
     Returns
     -------
     float
-        At most 0.05 % and 1e-6 of the diagonal below the largest distance, and never above it. Where
-        triangles were halved eight times, or are too many, it is the largest distance at their
-        corners and middles.
+        At most 0.05 % and 1e-6 of the diagonal below the largest distance, and never above it.
+        Where triangles were halved eight times, or are too many, it is the largest distance at
+        their corners and middles.
 
     Examples
     --------
