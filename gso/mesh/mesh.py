@@ -303,6 +303,15 @@ class Mesh:
         """Length of the bounding box's diagonal; unused vertices are not counted."""
         return geometry.box_diagonal(self.vertices[self.used])
 
+    @property
+    def size(self) -> float:
+        """Twice the distance of the farthest vertex from the centroid.
+
+        For a rectangle it is the diagonal. Unlike the bounding box it does not change when the
+        surface is turned.
+        """
+        return 2.0 * self.frame.scale
+
     @cached_property
     def frame(self) -> Frame:
         """Transform from the unit ball: the centroid, and the largest distance from it.

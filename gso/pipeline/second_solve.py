@@ -84,7 +84,8 @@ def _or_start(run: Run, result: Result) -> Result:
     other = conclude(run, start)
     if not _strain(other) * _GAIN < _strain(result) or excess(result) < excess(other):
         return result
-    other.notes += (
+    other.notes = (
+        *dict.fromkeys([*result.notes, *other.notes]),
         f"the solve by {result.formulation!r} has more curvature than its start, and no less than "
         "half of its strain: this is the start",
     )

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 Bounds = dict[Code, float | None]
 
-#: Distance from the design, relative to the diagonal of its bounding box, beyond which a result is
-#: refused whatever limit was given.
+#: Distance from the design, relative to its size, beyond which a result is refused whatever limit
+#: was given.
 _FAR = 0.5
 
 
@@ -83,19 +83,19 @@ def denoise(result: Result, limits: Limits, violation: float) -> tuple[Measured,
 def _away(
     result: Result, far: metrics.Distances, limits: Limits, violation: float
 ) -> tuple[Measured, Bounds]:
-    """Measure the distance to the design, also as a share of its diagonal."""
+    """Measure the distance to the design, also as a share of its size."""
     from gso.tasks.developable.options import NEAR
 
-    deviation, diagonal = max(far.there_max, far.back_max), result.design.diagonal
+    deviation, size = max(far.there_max, far.back_max), result.design.size
     free = limits.max_deviation is None and limits.target_curvature is None
     share = NEAR if free else _FAR
     # Far from the origin, distances are only known up to the rounding of the coordinates.
     return {
-        Code.DEVIATION: Measurement(deviation, slack=1e-12 * diagonal),
-        Code.FAR: Measurement(deviation / diagonal),
+        Code.DEVIATION: Measurement(deviation, slack=1e-12 * size),
+        Code.FAR: Measurement(deviation / size),
     }, {
         Code.DEVIATION: limits.max_deviation,
-        Code.FAR: share + violation / diagonal,
+        Code.FAR: share + violation / size,
     }
 
 

@@ -101,15 +101,21 @@ def _strain_left(run: Runner, solution: Solution) -> float:
 def near_design(analysis: Analysis, request: SearchRequest) -> Iterator[SearchRequest]:
     """Yield requests whose results stay near the design, for where one without limits does not.
 
-    First by the same formulation, and then by "isometry", if the user did not name one and did not
-    ask for a fast solve. There are none with constraints, B-splines or the settings of a reference.
+    First by the same formulation. Then, for "isometry", by that of the surface it starts from, and
+    else by "isometry", if the user did not name one and did not ask for a fast solve. There are
+    none with constraints, B-splines or the settings of a reference.
     """
     options = request.options
     reference = isinstance(options, joint_isometry.Options) and options.begin == "design"
     if reference or options.variables == "surface" or not analysis.constraints.empty:
         return
-    bound = NEAR * analysis.mesh.diagonal
+    # The design is in the unit ball, and its size is twice the radius.
+    bound = 2.0 * NEAR
     yield replace(request, x0=None, max_displacement=bound)
+    if isinstance(options, joint_isometry.Options):
+        begun = replace(request, x0=None, max_displacement=bound, formulation="curvature")
+        yield begun.with_options(Options())
+        return
     other = _other(analysis, request)
     if other is not None and options.iterations >= Options().iterations:
         yield replace(other, max_displacement=bound)

@@ -43,9 +43,10 @@ COARSE_CURVATURE, COARSE_FAIRNESS = 1.5, 3.0
 #: The mean of squared second differences along both polylines of quads is twice that across the
 #: edges of triangles, in the mean over all directions.
 _QUADS = 2.0
-#: Number of faces up to which curvature is also measured by the normals of quads, and its share of
-#: the weight. Quads of finer meshes hide little: at 64 x 64 the three measures agree.
-_COARSE, _IMAGE = 3_000, 0.5
+#: Numbers of faces between which curvature is also measured by the normals of quads, and its share
+#: of the weight. Quads of finer meshes hide little: at 64 x 64 the three measures agree. Those of
+#: coarser ones are no surface yet.
+_COARSE, _IMAGE = (100, 3_000), 1.0 / 3.0
 
 
 def adapted_weights(options: Options, curved: Any, bending: Any) -> tuple[Any, Any]:
@@ -117,7 +118,8 @@ def _terms(request: Request[Options], shape: Shape, curved: float, mesh: Mesh) -
 
 def _is_coarse(mesh: Mesh) -> bool:
     """Tell whether quads can hide curvature by bending along their diagonals."""
-    return not mesh.is_triangles and len(mesh.faces) <= _COARSE
+    quads = mesh.faces.shape[1] == 4 and bool((mesh.faces[:, -1] >= 0).all())
+    return quads and _COARSE[0] <= len(mesh.faces) <= _COARSE[1]
 
 
 def _resampled(source: Mesh, target: Mesh) -> Array:
