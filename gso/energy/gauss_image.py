@@ -32,6 +32,8 @@ def build(mesh: Mesh) -> list[Term]:
     quads around them. Vertices of triangles have none.
     """
     quad = are_quads(mesh.faces)
+    if not quad.any():
+        return []
     area = np.zeros(len(mesh.faces))
     area[quad] = np.linalg.norm(quad_area_vectors(mesh.vertices, mesh.faces[quad]), axis=1)
     he = mesh.half_edges
