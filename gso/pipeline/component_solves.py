@@ -175,15 +175,24 @@ def _translate(result: Result, here: Mesh, there: Mesh) -> Result:
 
 
 class _Watch:
-    """Callback that passes on the progress of one component after the other."""
+    """Callback that passes on the progress of one component after the other.
+
+    The stages of a component's other solves, which count from zero again, are given the number of
+    the last stage reached.
+    """
 
     def __init__(self, callback: Callback, count: int):
         self.callback, self.count = callback, count
-        self.place, self.stopped = 0, False
+        self.place, self.stopped, self.reached = 0, False, (0, 1)
 
     def __call__(self, progress: Progress) -> bool:
         if not self.stopped:
-            self.stopped = self.callback(renumber(progress, self.place, self.count)) is False
+            progress = renumber(progress, self.place, self.count)
+            if progress.stage / progress.stages < self.reached[0] / self.reached[1]:
+                stage, stages = self.reached
+                progress = replace(progress, stage=stage, stages=stages)
+            self.reached = (progress.stage, progress.stages)
+            self.stopped = self.callback(progress) is False
         return not self.stopped
 
 

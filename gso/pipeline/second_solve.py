@@ -42,15 +42,17 @@ def solve_and_judge(run: Run) -> Result:
     usable result is returned, or else the one that misses its limits by the smallest factor.
     """
     case = run.case
-    first = best = _or_start(run, conclude(run, run.solve()))
+    first = conclude(run, run.solve())
+    judged = [first, *_start_of(run, first)]
+    best = first = judged[-1]
     for request in _others(case, first):
         solution = run(request)
         if solution.status is Status.CANCELLED:
             best.status = Status.CANCELLED
             break
         result = conclude(run, solution)
-        for name in ("pattern", "verdict"):
-            result.seconds[name] += first.seconds[name]
+        result.warm_start = "cold"
+        judged.append(result)
         if excess(result) < excess(best):
             why = str(first.reasons[0]).partition(";")[0]
             result.notes += (
@@ -61,35 +63,47 @@ def solve_and_judge(run: Run) -> Result:
         if best.usable:
             break
     best.iterations, best.history = run.iterations, run.history
+    best.seconds |= run.timings.as_dict()
+    for name in ("pattern", "verdict"):
+        if name in best.seconds:
+            best.seconds[name] = sum(r.seconds.get(name, 0.0) for r in judged)
     return best
 
 
-def _or_start(run: Run, result: Result) -> Result:
-    """Return a result, or that which its solve started from, if that is better.
+def _start_of(run: Run, result: Result) -> list[Result]:
+    """Return the result that a solve started from, if it is better; else none.
 
     More than one and a half times the curvature has to buy at least half of the strain.
     """
-    request = run.case.solver_request
-    before = run.case.task.formulations[request.formulation].before
-    begun = None if before is None or request.limits.given else before(request)
-    if begun is None or not request.verdict or not run.case.constraints.empty:
-        return result
+    case = run.case
+    request, scale = case.solver_request, case.frame.scale
+    before = case.task.formulations[request.formulation].before
+    begun = None if before is None or not _may_go_on(case, result) else before(request)
+    if begun is None or not request.verdict or not case.constraints.empty:
+        return []
     start = run(begun)
-    curved = loss_gc_worst(result.mesh, scale=1.0)
-    there = run.case.frame.mesh.replaced(start.points)
-    if start.status.is_failure or curved * run.case.frame.scale**2 <= _RISE * loss_gc_worst(
-        there, scale=1.0
-    ):
-        return result
+    if start.status is Status.CANCELLED:
+        result.status = Status.CANCELLED
+        return []
+    curved = loss_gc_worst(result.mesh, scale=1.0) * scale**2
+    there = loss_gc_worst(case.frame.mesh.replaced(start.points), scale=1.0)
+    if start.status.is_failure or curved <= _RISE * there:
+        return []
     other = conclude(run, start)
     if not _strain(other) * _GAIN < _strain(result) or excess(result) < excess(other):
-        return result
+        return []
     other.notes = (
         *dict.fromkeys([*result.notes, *other.notes]),
         f"the solve by {result.formulation!r} has more curvature than its start, and no less than "
         "half of its strain: this is the start",
     )
-    return other
+    return [other]
+
+
+def _may_go_on(case: Case, result: Result) -> bool:
+    """Return whether limits, a budget of iterations and the callback allow other solves."""
+    free = not case.request.limits.given and case.request.start.iterations is None
+    return free and result.status is not Status.CANCELLED
 
 
 def _strain(result: Result) -> float:
@@ -99,12 +113,14 @@ def _strain(result: Result) -> float:
 def excess(result: Result) -> float:
     """Return the largest factor by which a result misses its limits; 0 if it is usable.
 
-    Faults, which have no limit, count as far beyond.
+    Faults, which have no limit, and more curvature than the design's count as far beyond.
     """
     if result.usable:
         return 0.0
     factors = [
-        reason.value / reason.bound if reason.bound else float("inf")
+        reason.value / reason.bound
+        if reason.bound and reason.code is not Code.CURVATURE_ROSE
+        else float("inf")
         for reason in result.reasons
         if reason.value is not None
     ]
@@ -113,9 +129,8 @@ def excess(result: Result) -> float:
 
 def _others(case: Case, first: Result) -> Iterator[Request[Options]]:
     """Return other requests, if they may remove the reasons against a result."""
-    request, others = case.solver_request, case.task.others
+    others, missed = case.task.others, first.status is Status.CONSTRAINTS_MISSED
     codes = {reason.code for reason in first.reasons}
-    stopped = first.status in (Status.CANCELLED, Status.CONSTRAINTS_MISSED)
-    if others is None or request.limits.given or stopped or not codes or not codes <= _MENDED:
+    if others is None or missed or not _may_go_on(case, first) or not codes or codes - _MENDED:
         return
-    yield from others(case.analysis, request)
+    yield from others(case.analysis, case.solver_request)
