@@ -45,7 +45,7 @@ def refused(done, *words):
     return True
 
 
-def bump(size=9, height=0.3):
+def bump(size=9, height=0.1):
     y, x = np.mgrid[:size, :size] / (size - 1)
     return np.stack([x, y, height * np.sin(np.pi * x) * np.sin(np.pi * y)], axis=-1)
 

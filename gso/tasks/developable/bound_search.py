@@ -32,6 +32,9 @@ R = TypeVar("R", bound=Request[BaseOptions])
 
 #: Weights tried in turn within a bound, until the strain is small enough.
 _HARDER = (1.0, 6.0, 36.0)
+#: Factor on the elongation in a solve by isometry near the design: its iterations end before a
+#: boundary that has grown is short again.
+_BORDERS = 3.0
 
 
 def search(run: Runner, request: SearchRequest) -> Solution:
@@ -110,15 +113,22 @@ def near_design(analysis: Analysis, request: SearchRequest) -> Iterator[SearchRe
     if reference or options.variables == "surface" or not analysis.constraints.empty:
         return
     # The design is in the unit ball, and its size is twice the radius.
-    bound = 2.0 * NEAR
-    yield replace(request, x0=None, max_displacement=bound)
+    near = replace(request, x0=None, max_displacement=2.0 * NEAR)
+    yield _with_borders(near)
     if isinstance(options, joint_isometry.Options):
-        begun = replace(request, x0=None, max_displacement=bound, formulation="curvature")
-        yield begun.with_options(Options())
+        yield replace(near.with_options(Options()), formulation="curvature")
         return
-    other = _other(analysis, request)
+    other = _other(analysis, near)
     if other is not None and options.iterations >= Options().iterations:
-        yield replace(other, max_displacement=bound)
+        yield _with_borders(other)
+
+
+def _with_borders(request: SearchRequest) -> SearchRequest:
+    """Return a request that keeps the lengths of boundaries more, if it is one by isometry."""
+    options = request.options
+    if not isinstance(options, joint_isometry.Options):
+        return request
+    return request.with_options(replace(options, w_elongation=_BORDERS * options.w_elongation))
 
 
 def stay_within(
