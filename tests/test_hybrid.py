@@ -173,13 +173,14 @@ def test_a_flat_start_that_turns_over_is_dropped():
         {"task": "flatten"},
         {"task": "flatten", "formulation": "lengths"},
         {"task": "flatten", "formulation": "isometry"},
-        {"max_deviation": 0.1, "formulation": "curvature"},
+        {"max_deviation": 0.05, "formulation": "curvature"},
         {"constraints": [gso.Handle([0, 16, 272], saddle(17).reshape(-1, 3)[[0, 16, 272]] * 1.1)]},
     ],
     ids=lambda k: "-".join(map(str, k.values()))[:20] or "curvature",
 )
 def test_a_good_start_stays_good(keywords):
-    design = saddle(17, strength=0.1)
+    # Without limits, a start is used only where its result is usable.
+    design = saddle(17, strength=0.4 if {"max_deviation", "constraints"} & {*keywords} else 0.1)
     cold = optimize(design, **keywords)
     points = cold.flat if keywords.get("task") == "flatten" else cold.mesh
     result = optimize(design, x0=Start(points, source="guess", guarded=True), **keywords)
