@@ -14,6 +14,7 @@ from gso import metrics
 from gso.mesh import Mesh
 from gso.tasks.developable import Options
 from gso.tasks.developable.options import NEAR, SHEET
+from gso.tasks.start import Start
 from tests.conftest import cylinder, saddle, shuffled, sphere_cap
 
 PRESETS = tuple(Options.PRESETS)
@@ -50,6 +51,29 @@ def test_what_strains_or_is_far_is_solved_again_nearby(surfaces):
             # The history and the count of iterations are those of all solves.
             assert result.iterations > plain.iterations
     assert 0 < again < len(surfaces)
+
+
+def test_other_solves_are_cold_and_end_with_budget_and_callback(surfaces):
+    for points in surfaces:
+        plain, result = (gso.tno.optimize(points, verdict=v) for v in (False, True))
+        if result.iterations > plain.iterations:
+            break
+    budget = Start(points, iterations=plain.iterations)
+    assert gso.tno.optimize(points, x0=budget).iterations <= plain.iterations
+    assert gso.tno.optimize(points, x0=points).warm_start == "cold"
+    alone = gso.tno.optimize(points, x0=Start(plain.mesh, source="guess", iterations=0))
+    assert (alone.warm_start, alone.iterations, alone.usable) == ("guess", 0, False)
+    np.testing.assert_allclose(alone.grid, plain.grid, atol=1e-12)
+    seen = []
+
+    def stop(progress):
+        seen.append(progress)
+        return len(seen) <= len(plain.history)
+
+    stopped = gso.tno.optimize(points, callback=stop)
+    assert stopped.status is gso.Status.CANCELLED
+    assert len(stopped.history) == len(seen) == len(plain.history) + 1
+    np.testing.assert_array_equal(stopped.grid, plain.grid)
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -39,7 +39,9 @@ def solve_and_judge(run: Run) -> Result:
     Where the user gave limits, the task searches for a result that holds them. Where there are
     none, a result that strains too much, is too far away or folds is solved again with a bound on
     the distance, by the same formulation and, where the user did not name it, by others. The first
-    usable result is returned, or else the one that misses its limits by the smallest factor.
+    usable result is returned, or else the one that misses its limits by the smallest factor
+    (:func:`excess`). A callback ends all solves, and a start with a budget of iterations has none
+    but the first.
     """
     case = run.case
     first = conclude(run, run.solve())
