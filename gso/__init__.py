@@ -1,4 +1,4 @@
-"""Optimise quad and grid surfaces: make them developable, flatten them, denoise them.
+"""Surfaces that can be built from flat sheets: developable, in pieces or strips, laid flat, cut.
 
 >>> import gso
 >>> mesh = gso.load("examples/panel.obj")                     # doctest: +SKIP

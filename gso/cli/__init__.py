@@ -58,7 +58,11 @@ def _version(ctx: click.Context, option: click.Parameter, asked: bool) -> None:
     help="Print the version.",
 )
 def main() -> None:
-    """Make quad and grid surfaces developable, flatten them, denoise them."""
+    """Make surfaces that can be built from flat sheets.
+
+    Make them developable, lay them flat or denoise them (optimize), cut whole designs into pieces
+    (pieces), make exactly developable strips (strips), write what a cutter needs (fabricate).
+    """
 
 
 for _command in (optimize, strips, pieces, metrics, info, plot, dataset, fabricate, train):

@@ -191,8 +191,8 @@ def plot(
 ) -> None:
     """Draw the surface FILE as a picture (.png, .pdf, .svg).
 
-    A full result (.npz of gso optimize) is drawn beside its design, unless --before or
-    --color is given.
+    A full result (.npz of gso optimize or gso strips) is drawn beside its design, unless --before
+    or --color is given.
     """
     from gso import io
     from gso import plot as pictures

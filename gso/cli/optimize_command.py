@@ -78,8 +78,9 @@ from gso.errors import OptionError
 def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
     """Optimise the surface IN and write it to OUT.
 
-    Several inputs are processed in parallel; OUT is then a folder. The exit code is 0 only
-    if all results are usable; otherwise the reasons are printed, with their places.
+    Several inputs are processed in parallel; OUT, and the PNG of --plot, are then folders. With
+    --max-deviation alone, the largest strain must be 0.5 % or less. The exit code is 0 only if all
+    results are usable; otherwise the reasons are printed, with their places.
     """
     if given["net"] is not None and given["method"] in ("auto", "tno"):
         raise OptionError("--net goes with --method net or hybrid")

@@ -58,6 +58,8 @@ def pieces(
 ) -> None:
     """Find seams of the design IN, and write its pieces and their patterns to DIR.
 
+    Without --max-deviation the shape stays as it is; --max-strain is then 1 % when it is not given.
+    With it the shape changes within that distance; --max-strain is then 0.1 % when it is not given.
     The exit code is 0 only if the pieces are what was asked for; otherwise the reasons are
     printed.
     """

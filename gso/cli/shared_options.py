@@ -116,13 +116,13 @@ constraints = click.option(
     "--constraints",
     metavar="JSON",
     type=click.Path(),
-    help='File with what must hold: a list such as [{"type": "Glue", "pairs": [[0, 9]]}].',
+    help='File with what must hold: a list such as [{"type": "Fixed", "ids": [0, 9]}].',
 )
 plot = click.option(
     "--plot",
     metavar="PNG",
     type=click.Path(),
-    help="Picture to draw (.png, .pdf, .svg); a folder when there are several inputs.",
+    help="Picture to draw (.png, .pdf, .svg).",
 )
 table = click.option(
     "--metrics", "table", metavar="JSON", type=click.Path(), help="File for status and metrics."

@@ -84,7 +84,9 @@ def strips(
     """Make strips of planar faces near the design IN, and write them to OUT.
 
     The design is tried as one surface. Where that does not hold --max-deviation, it is cut into
-    pieces, and each piece becomes strips. The exit code is 0 only if the result is usable;
+    pieces, and each piece becomes strips; it is not cut where --strips is a number, or with --flats
+    or --constraints. Pieces that no strips follow keep a pattern with a strain of at most
+    --max-strain, 0.1 % when it is not given. The exit code is 0 only if the result is usable;
     otherwise the reasons are printed.
     """
     own = {option: given.pop(option) for option in ("unit", "quiet", "weld", "force")}

@@ -46,7 +46,7 @@ def train(
     """Train the net that CONFIG describes, a .toml or .json file or a name.
 
     To resume an interrupted run, give the same command again. To train with several
-    processes, use torchrun: torchrun --nproc-per-node 2 -m gso.cli train CONFIG ...
+    processes, use torchrun: torchrun --nproc-per-node 2 -m gso train CONFIG ...
     """
     # Set before torch is imported: busily waiting threads slow each other on shared cores.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

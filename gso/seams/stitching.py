@@ -49,7 +49,7 @@ def stitched(
     sheets : list of Sheet
         Their flat patterns.
     strain : float
-        Bound on the 99th percentile of the strain.
+        Bound on the largest strain.
     neck : float
         Smallest length of the part along which two pieces are joined.
     accept : callable

@@ -289,8 +289,9 @@ class Code(str, enum.Enum):
     STRAIN = _limit(
         "strain",
         Kind.SHARE,
-        "Largest strain of the pattern; its bound is 2 % where no limit is given, and 0.5 % where "
-        "only max_deviation is given.",
+        "Largest strain of the pattern; its bound is 2 % where no limit is given, 0.5 % where only "
+        "max_deviation is given, and for gso pieces 1 % where the shape stays, 0.1 % where it may "
+        "change.",
         "the largest strain of the pattern is {value}, more than {bound}",
         "make strips (gso strips) or pieces of it (gso pieces), or allow more strain (max_strain) "
         "or distance (max_deviation)",

@@ -39,11 +39,11 @@ from gso.wording import length
 
 #: Shares of the allowed distance: what the joint solve of the pieces may use, and the least and the
 #: most within which strips follow its result, so that the two sides of a seam stay together.
-JOINT, _LEAST, _MOST = 0.5, 0.1, 0.5
+JOINT, _LEAST, _MOST = 0.9, 0.1, 0.5
 #: Distance within which strips follow the joint result where none is given, relative to the
 #: diagonal.
 _NEAR = 0.01
-#: Largest number of strips of a piece that "auto" tries: it is developable, so that one should do.
+#: Largest number of strips of a piece that "auto" tries.
 _STRIPS = 8
 #: Number of pieces from which on processes make their strips.
 _MANY = 8
@@ -121,16 +121,26 @@ def of_pieces(
     if joint.result is not None and joint.result.status is Status.CANCELLED:
         return _cancelled(joint), ()
     seconds = time.perf_counter() - clock
-    follow = _distance_left(joint, request, light)
-    strips = _of_each(joint.shape, request, follow)
-    if any(isinstance(made, Result) and made.status is Status.CANCELLED for made in strips):
-        return _cancelled(joint), ()
-    # What counts is the distance of the whole from the design, and between both sides of a seam.
-    tried = []
-    for strict in (False, True) if request.may_leave_pieces else (False,):
-        parts = [_part(joint, request, k, made, strict) for k, made in enumerate(strips)]
-        result = _merged(joint, parts)
-        tried.append((result, _reasons(result, request, parts)))
+    left = _distance_left(joint, request, light)
+    free, most = request.may_leave_pieces, min(request.options.max_strips, _STRIPS)
+    tried: list[tuple[StripsResult, tuple[Reason, ...]]] = []
+    ways = [(most, left)]
+    if free and light.allowed is not None:
+        # A piece is developable, so that one strip should do; more of them are more parts. Strips
+        # that follow their piece closely have seams whose sides fit.
+        ways = [(1, _LEAST * light.allowed), (1, left), *(ways if most > 1 else ())]
+    for number, follow in ways:
+        strips = _of_each(joint.shape, request, number, follow)
+        if any(isinstance(made, Result) and made.status is Status.CANCELLED for made in strips):
+            return _cancelled(joint), ()
+        # What counts is the distance of the whole from the design, and the gaps at seams.
+        strictly = (True,) if follow != left else (False, True)
+        for strict in strictly if free else (False,):
+            parts = [_part(joint, request, k, made, strict) for k, made in enumerate(strips)]
+            result = _merged(joint, parts)
+            tried.append((result, _reasons(result, request, parts)))
+            if not tried[-1][1]:
+                break
         if not tried[-1][1]:
             break
     result, reasons = min(tried, key=lambda one: (len(one[1]) > 0, one[0].ruled.farthest))
@@ -183,12 +193,11 @@ def _distance_left(joint: _Joint, request: StripsRequest, light: LightDesign) ->
 
 
 def _of_each(
-    shape: Pieces, request: StripsRequest, follow: float | None
+    shape: Pieces, request: StripsRequest, most: int, follow: float | None
 ) -> list[Result | GSOError]:
-    """Make strips of each piece."""
-    asked = request.options
+    """Make strips of each piece, at most so many."""
     # Their own normals give the rulings of developable pieces.
-    options = replace(asked, starts=("design",), max_strips=min(asked.max_strips, _STRIPS))
+    options = replace(request.options, starts=("design",), max_strips=most)
     own = replace(request, options=options, constraints=(), start=Start(None))
     meshes = [piece.mesh for piece in shape]
     if request.callback is not None or len(meshes) < _MANY:
