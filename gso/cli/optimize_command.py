@@ -86,10 +86,6 @@ def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
         raise OptionError("--net goes with --method net or hybrid")
     keywords = _keywords(given, given["suffix"] or out)
     job = Job.of(keywords, given, given["constraints"], given["net"])
-    if given["table"] is not None:
-        from gso.io import check_writable
-
-        check_writable(given["table"])
     if len(names) > 1 or os.path.isdir(out) or out.endswith(("/", os.sep)):
         from gso.cli.many_files import many
 

@@ -124,8 +124,24 @@ plot = click.option(
     type=click.Path(),
     help="Picture to draw (.png, .pdf, .svg).",
 )
+
+
+def _writable(ctx: click.Context, option: click.Parameter, value: str | None) -> str | None:
+    """Refuse a file that cannot be written, before anything is computed."""
+    if value is not None:
+        from gso.io import check_writable
+
+        check_writable(value)
+    return value
+
+
 table = click.option(
-    "--metrics", "table", metavar="JSON", type=click.Path(), help="File for status and metrics."
+    "--metrics",
+    "table",
+    metavar="JSON",
+    type=click.Path(),
+    callback=_writable,
+    help="File for status and metrics.",
 )
 
 

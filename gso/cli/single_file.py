@@ -24,10 +24,6 @@ def single(job: Job, file: str, out: str, plot: str | None, table: str | None) -
     from gso.solver import loops
 
     job.check(out, plot)
-    if table is not None:
-        from gso.io import check_writable
-
-        check_writable(table)
     job.spare([file], out, plot, table)
     mesh = file_options.load(file, job.weld)
     if out.lower().endswith(".npy") and mesh.grid_shape is None:

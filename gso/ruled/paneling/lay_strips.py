@@ -265,7 +265,7 @@ class _Task:
         if asked.verdict or self.divisible:
             violation = violation_of(case_of(self.design, asked)) if asked.constraints else 0.0
             own = judge(result, asked.limits, violation)
-            reasons = ordered([*own, *against_sheet(result, asked)])
+            reasons = ordered([*own, *_against_sheet(result, asked)])
         result.seconds["verdict"] = time.perf_counter() - clock
         return _Tried(result, reasons)
 
@@ -274,7 +274,7 @@ class _Task:
         if division is self.division:
             light = LightDesign(self.design, self.design, asked.max_deviation)
         result, reasons = of_pieces(light, asked, division)
-        return _Tried(result, ordered([*reasons, *against_sheet(result, asked)]))
+        return _Tried(result, ordered([*reasons, *_against_sheet(result, asked)]))
 
 
 @dataclass(frozen=True)
@@ -329,7 +329,7 @@ def _without_darts(found: Segmentation) -> Pieces:
     return pieces if whole else cut(design, Edges(found.edges))
 
 
-def against_sheet(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
+def _against_sheet(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
     """Return the reasons if parts of the pattern are larger than the sheet."""
     pattern, sheet = result.pattern, request.sheet
     if pattern is None or sheet is None:

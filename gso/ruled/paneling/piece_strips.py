@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -121,31 +121,39 @@ def of_pieces(
     if joint.result is not None and joint.result.status is Status.CANCELLED:
         return _cancelled(joint), ()
     seconds = time.perf_counter() - clock
-    left = _distance_left(joint, request, light)
-    free, most = request.may_leave_pieces, min(request.options.max_strips, _STRIPS)
     tried: list[tuple[StripsResult, tuple[Reason, ...]]] = []
-    ways = [(most, left)]
-    if free and light.allowed is not None:
-        # A piece is developable, so that one strip should do; more of them are more parts. Strips
-        # that follow their piece closely have seams whose sides fit.
-        ways = [(1, _LEAST * light.allowed), (1, left), *(ways if most > 1 else ())]
-    for number, follow in ways:
-        strips = _of_each(joint.shape, request, number, follow)
+    for strips, strict in _candidates(joint, request, light):
         if any(isinstance(made, Result) and made.status is Status.CANCELLED for made in strips):
             return _cancelled(joint), ()
         # What counts is the distance of the whole from the design, and the gaps at seams.
-        strictly = (True,) if follow != left else (False, True)
-        for strict in strictly if free else (False,):
-            parts = [_part(joint, request, k, made, strict) for k, made in enumerate(strips)]
-            result = _merged(joint, parts)
-            tried.append((result, _reasons(result, request, parts)))
-            if not tried[-1][1]:
-                break
+        parts = [_part(joint, request, k, made, strict) for k, made in enumerate(strips)]
+        result = _merged(joint, parts)
+        tried.append((result, _reasons(result, request, parts)))
         if not tried[-1][1]:
             break
     result, reasons = min(tried, key=lambda one: (len(one[1]) > 0, one[0].ruled.farthest))
     result.seconds |= {"pieces": seconds, "strips": time.perf_counter() - clock - seconds}
     return result, reasons
+
+
+def _candidates(
+    joint: _Joint, request: StripsRequest, light: LightDesign
+) -> Iterator[tuple[list[Result | GSOError], bool]]:
+    """Yield strips of each piece, and whether only those that follow it closely are to be taken.
+
+    A piece is developable, so that one strip should do; more of them are more parts. Strips that
+    follow their piece closely come first, as the sides of their seams fit.
+    """
+    left, most = _distance_left(joint, request, light), min(request.options.max_strips, _STRIPS)
+    if light.allowed is None or not request.may_leave_pieces:
+        yield _of_each(joint.shape, request, most, left), False
+        return
+    # Numbers and distances may be the same.
+    for number, follow in dict.fromkeys([(1, _LEAST * light.allowed), (1, left), (most, left)]):
+        strips = _of_each(joint.shape, request, number, follow)
+        if follow == left:
+            yield strips, False
+        yield strips, True
 
 
 def found_pieces(light: LightDesign, request: StripsRequest, share: float) -> Segmentation:
