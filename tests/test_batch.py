@@ -20,6 +20,7 @@ from gso.pipeline import Case
 from gso.solver import Problem, kernels
 from gso.tasks import check
 from gso.unknowns import DIMENSIONS
+from gso.verdict import Code
 from tests.conformance.term_examples import examples
 from tests.conftest import codes, cylinder, meshes, saddle
 
@@ -331,10 +332,14 @@ def test_other_norms(formulation, changed, designs):
 
 
 def test_verdict(designs):
-    found = gso.tno.optimize_batch(designs[:1], workers=0, verdict=True)[0]
-    one = gso.tno.optimize(designs[0])
-    assert (found.usable, codes(found.reasons)) == (one.usable, codes(one.reasons))
+    far, found = gso.tno.optimize_batch(designs[:2], workers=0, verdict=True)
+    one = gso.tno.optimize(designs[1])
+    assert (found.usable, codes(found.reasons)) == (one.usable, codes(one.reasons)) == (True, [])
+    # Batches do not solve again within a distance, as a single solve does.
+    assert (far.usable, codes(far.reasons)) == (False, [Code.FAR])
+    assert gso.tno.optimize(designs[0]).usable
     assert found.pattern is not None
+    assert far.pattern is not None
 
 
 @pytest.mark.slow

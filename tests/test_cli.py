@@ -45,7 +45,7 @@ def refused(done, *words):
     return True
 
 
-def bump(size=9, height=0.3):
+def bump(size=9, height=0.1):
     y, x = np.mgrid[:size, :size] / (size - 1)
     return np.stack([x, y, height * np.sin(np.pi * x) * np.sin(np.pi * y)], axis=-1)
 
@@ -460,7 +460,7 @@ def test_info(run, small):
     assert facts["vertices"] == "81"
     assert facts["faces"] == "64"
     assert facts["boundary loops"] == "1 (32 vertices)"
-    assert facts["bounding box"] == "1 x 1 x 0.3"
+    assert facts["bounding box"] == "1 x 1 x 0.1"
     assert facts["loss_gc"].startswith(f"{gso.metrics.loss_gc(bump()):.4g}")
     assert "no interior vertex" in second
     assert "bounding box          1 x 2 x 0" in second

@@ -223,6 +223,7 @@ def test_a_misbehaving_component_is_named():
     ball = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [-1, -1, -1]])
     closed = Mesh(ball, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     quads = panel()
+    quads = quads.replaced(quads.vertices * [1.0, 1.0, 0.5])
     triangles = Mesh(quads.vertices, quads.triangles)
     with pytest.raises(gso.MeshError, match=r"component 1 of 2 .* vertex 81\).*closed"):
         gso.tno.optimize(together(triangles, closed), task="flatten")

@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 import designs
 from designs import KINDS
 
+import gso
 from gso import metrics
 from tests.conftest import renumbered
 
@@ -112,3 +113,14 @@ def test_a_seed_gives_the_same_designs_again(kind):
         or not np.allclose(a.mesh.vertices, b.mesh.vertices)
         for a, b in zip(first, other)
     )
+
+
+def test_isometry_is_no_worse_than_its_start():
+    design = designs.holes(0)[6].mesh
+    start = gso.tno.optimize(design)
+    result = gso.tno.optimize(design, formulation="isometry")
+    (strain, less), (curved, flatter) = (
+        [r.details["verdict"]["strain_max"] for r in (start, result)],
+        [metrics.loss_gc_worst(r.mesh, scale=1.0) for r in (start, result)],
+    )
+    assert flatter <= 1.5 * curved or less < 0.5 * strain

@@ -13,6 +13,8 @@ import gso
 from gso import metrics
 from gso.mesh import Mesh
 from gso.tasks.developable import Options
+from gso.tasks.developable.options import NEAR, SHEET
+from gso.tasks.start import Start
 from tests.conftest import cylinder, saddle, shuffled, sphere_cap
 
 PRESETS = tuple(Options.PRESETS)
@@ -25,13 +27,53 @@ def moved(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("preset", PRESETS)
 def test_curvature_falls_and_the_surface_stays_close(surfaces, preset):
     for points in surfaces:
-        result = gso.tno.optimize(points, options=preset)
+        result = gso.tno.optimize(points, options=preset, verdict=False)
         m = result.metrics
         assert m["K_A_r"] > 0.7
         assert m["d_H"] < 1.0
         assert m["fairness_ratio"] < 2.0
         assert sum(result.energy.values()) > 0
         assert result.grid.shape == points.shape
+
+
+def test_what_strains_or_is_far_is_solved_again_nearby(surfaces):
+    again = 0
+    for points in surfaces:
+        plain = gso.tno.optimize(points, verdict=False)
+        result = gso.tno.optimize(points)
+        far = metrics.surface_distance(result.design, result.mesh)
+        assert result.usable
+        assert result.details["verdict"]["strain_max"] <= SHEET
+        assert max(far.there_max, far.back_max) <= NEAR * result.design.size
+        if not np.array_equal(plain.mesh.vertices, result.mesh.vertices):
+            again += 1
+            assert "another solve" in result.notes[-1]
+            # The history and the count of iterations are those of all solves.
+            assert result.iterations > plain.iterations
+    assert 0 < again < len(surfaces)
+
+
+def test_other_solves_are_cold_and_end_with_budget_and_callback(surfaces):
+    for points in surfaces:
+        plain, result = (gso.tno.optimize(points, verdict=v) for v in (False, True))
+        if result.iterations > plain.iterations:
+            break
+    budget = Start(points, iterations=plain.iterations)
+    assert gso.tno.optimize(points, x0=budget).iterations <= plain.iterations
+    assert gso.tno.optimize(points, x0=points).warm_start == "cold"
+    alone = gso.tno.optimize(points, x0=Start(plain.mesh, source="guess", iterations=0))
+    assert (alone.warm_start, alone.iterations, alone.usable) == ("guess", 0, False)
+    np.testing.assert_allclose(alone.grid, plain.grid, atol=1e-12)
+    seen = []
+
+    def stop(progress):
+        seen.append(progress)
+        return len(seen) <= len(plain.history)
+
+    stopped = gso.tno.optimize(points, callback=stop)
+    assert stopped.status is gso.Status.CANCELLED
+    assert len(stopped.history) == len(seen) == len(plain.history) + 1
+    np.testing.assert_array_equal(stopped.grid, plain.grid)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -194,25 +236,29 @@ def test_contradicting_constraints_are_named(surfaces):
 
 def test_a_warm_start_from_the_result_stays_at_least_as_good(surfaces):
     points = surfaces[0]
-    cold = gso.tno.optimize(points, options="accurate")
-    warm = gso.tno.optimize(points, options="accurate", x0=cold.mesh)
+    cold = gso.tno.optimize(points, options="accurate", verdict=False)
+    warm = gso.tno.optimize(points, options="accurate", x0=cold.mesh, verdict=False)
     assert warm.warm_start == "x0"
     assert sum(warm.energy.values()) <= sum(cold.energy.values()) * (1 + 1e-9)
 
 
 def test_a_start_that_is_wrong_at_large_costs_no_quality(surfaces):
+    ratios = []
     for points in surfaces:
-        cold = gso.tno.optimize(points)
+        cold = gso.tno.optimize(points, verdict=False)
         u = np.linspace(0.0, np.pi, len(points))
         lift = 0.02 * np.sin(u)[:, None] * np.sin(u)
-        warm = gso.tno.optimize(points, x0=cold.grid + lift[..., None] * [0.0, 0.0, 1.0])
+        start = cold.grid + lift[..., None] * [0.0, 0.0, 1.0]
+        warm = gso.tno.optimize(points, x0=start, verdict=False)
         assert warm.warm_start == "x0" and warm.history[0].name == "20x20"
-        assert sum(warm.energy.values()) <= 1.05 * sum(cold.energy.values())
+        ratios.append(sum(warm.energy.values()) / sum(cold.energy.values()))
+    # Each solve ends in one of several local minima.
+    assert np.mean(ratios) <= 1.03 and max(ratios) <= 1.1
 
 
 def test_free_vertices_come_after_offsets_where_a_start_is_given(surfaces):
     def stages(**keywords):
-        result = gso.tno.optimize(surfaces[0], options="accurate", **keywords)
+        result = gso.tno.optimize(surfaces[0], options="accurate", verdict=False, **keywords)
         return list(dict.fromkeys(p.name for p in result.history))
 
     assert stages() == ["20x20", "free"]
@@ -291,7 +337,7 @@ def test_one_set_of_weights_serves_three_resolutions():
         rows = []
         for surface in generate(12, seed=77):
             points = surface.sample(size)
-            m = gso.tno.optimize(points).metrics
+            m = gso.tno.optimize(points, verdict=False).metrics
             rows.append((m["loss_gc"], m["d_H"]))
         figures.append(np.mean(rows, axis=0))
     spread = np.max(figures, axis=0) / np.min(figures, axis=0)
@@ -353,7 +399,7 @@ def test_mixed_meshes_are_fair_across_their_triangles():
     other = ~np.isin(triangles[:, :3], keep).all(axis=1)
     mixed = Mesh(grid.vertices, np.r_[[keep], triangles[other]])
     ratios = [
-        gso.tno.optimize(m).metrics["fairness_ratio"]
+        gso.tno.optimize(m, verdict=False).metrics["fairness_ratio"]
         for m in (mixed, Mesh(grid.vertices, grid.triangles))
     ]
     assert ratios[0] == pytest.approx(ratios[1], rel=0.3)

@@ -228,8 +228,8 @@ def test_unreachable_bounds_are_said():
     found = codes(result.reasons)
     assert found[0] is Code.TARGET_MISSED
     # A single strip so far from its design may be folded, too.
-    assert found[-2:] == [Code.DEVIATION, Code.FAR]
-    assert result.reasons[1].value == result.details["verdict"]["deviation"] > 1e-4
+    assert found[-1] is Code.DEVIATION
+    assert result.reasons[-1].value == result.details["verdict"]["deviation"] > 1e-4
 
 
 def test_triangles_holes_and_numbering():
@@ -366,7 +366,9 @@ def test_strips_pass_through_fixed_vertices_and_handles(strips):
     lifted = mesh.vertices[middle] + [0.0, 0.0, 0.02 * mesh.diagonal]
     for constraint in (gso.Fixed([0, middle]), gso.Handle(middle, lifted)):
         options = gso.RuledOptions(strips=strips)
-        result = gso.tno.optimize(mesh, options=options, constraints=[constraint])
+        result = gso.tno.optimize(
+            mesh, options=options, constraints=[constraint], max_deviation=0.1 * mesh.size
+        )
         assert result.usable, result.reasons
         (missed,) = result.details["constraints"].values()
         assert missed < 1e-7 * mesh.diagonal

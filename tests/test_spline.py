@@ -465,7 +465,7 @@ def test_importing_gso_io_loads_no_cad_package():
 def test_a_cad_output_asks_for_a_spline(surfaces, tmp_path):
     need(".step")
     source, out = tmp_path / "a.npy", tmp_path / "a.stp"
-    np.save(source, surfaces[0])
+    np.save(source, surfaces[1])
     done = CliRunner().invoke(main, ["optimize", str(source), "-o", str(out), "--unit", "cm"])
     assert done.exit_code == 0, done.output
     assert "16 x 16 control points" in done.output
@@ -489,7 +489,7 @@ def test_a_spline_is_fitted_where_it_cannot_be_solved_for(surfaces, tmp_path):
 def test_many_outputs_may_be_cad_files(surfaces, tmp_path):
     need(".3dm")
     for k in range(2):
-        np.save(tmp_path / f"{k}.npy", surfaces[k])
+        np.save(tmp_path / f"{k}.npy", surfaces[2 * k + 1])
     words = [str(tmp_path / f"{k}.npy") for k in range(2)]
     words += ["-o", str(tmp_path / "out"), "--suffix", "3dm", "--workers", "0"]
     done = CliRunner().invoke(main, ["optimize", *words])

@@ -23,6 +23,7 @@ from gso.geometry.cells import (
     isometry_defect,
 )
 from gso.geometry.differences import second_difference
+from gso.geometry.gauss_image import image_curvature, solid_angle
 from gso.geometry.parametric import smooth_gaussian_curvature
 from gso.geometry.rigid import closest_motion
 from gso.geometry.shape_operator import (
@@ -71,6 +72,7 @@ __all__ = [
     "grid_curvature",
     "grid_star",
     "half_trace",
+    "image_curvature",
     "isometry_defect",
     "norm",
     "norm2",
@@ -84,6 +86,7 @@ __all__ = [
     "signed_areas",
     "singular_values",
     "smooth_gaussian_curvature",
+    "solid_angle",
     "star_area",
     "sub",
     "tangent_frame",

@@ -178,6 +178,11 @@ class Mesh:
         return topology.half_edges(self.triangles, len(self.vertices))
 
     @cached_property
+    def face_stars(self) -> topology.Stars:
+        """Interior vertices and the corners of the faces around them, by the number of faces."""
+        return topology.face_stars(self.half_edges)
+
+    @cached_property
     def stars_by_triangulation(self) -> tuple[topology.Stars, ...]:
         """Vertex stars of both triangulations of the quads, grouped by ring length.
 
@@ -299,6 +304,15 @@ class Mesh:
     def diagonal(self) -> float:
         """Length of the bounding box's diagonal; unused vertices are not counted."""
         return geometry.box_diagonal(self.vertices[self.used])
+
+    @property
+    def size(self) -> float:
+        """Twice the distance of the farthest vertex from the centroid.
+
+        For a rectangle it is the diagonal. Unlike the bounding box it does not change when the
+        surface is turned.
+        """
+        return 2.0 * self.frame.scale
 
     @cached_property
     def frame(self) -> Frame:

@@ -20,6 +20,7 @@ from gso.metrics.distance import (
     point_to_surface,
     surface_distance,
 )
+from gso.metrics.farthest_point import farthest
 from gso.metrics.gaussian_curvature import (
     K_A_r,
     K_A_r_worst,
@@ -28,6 +29,7 @@ from gso.metrics.gaussian_curvature import (
     curvature_grid,
     loss_gc,
     loss_gc_half,
+    loss_gc_image,
     loss_gc_mean,
     loss_gc_worst,
     mean_abs_K,
@@ -75,6 +77,7 @@ __all__ = [
     "face_strains",
     "fairness",
     "fairness_ratio",
+    "farthest",
     "flipped_cells",
     "flipped_faces",
     "flips",
@@ -84,6 +87,7 @@ __all__ = [
     "loop_ratios",
     "loss_gc",
     "loss_gc_half",
+    "loss_gc_image",
     "loss_gc_mean",
     "loss_gc_worst",
     "loss_iso_cell",

@@ -10,12 +10,9 @@ from gso import geometry
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.mesh.polyline import Polylines
-from gso.metrics.farthest import farthest
+from gso.metrics.farthest_point import farthest
 from gso.metrics.surfaces import SurfaceLike, mesh_of, used_points
 from gso.typing import Array
-
-#: Share of the points that are asked for first: one in so many.
-_FIRST = 64
 
 
 class Distances(NamedTuple):
@@ -46,39 +43,34 @@ def point_to_surface(points: Array, mesh: Mesh) -> Array:
 
 
 def surface_distance(before: SurfaceLike, after: SurfaceLike) -> Distances:
-    """Measure true point-to-surface distances: output to input ("there"), and back."""
+    """Measure true distances between surfaces: output to input ("there"), and back.
+
+    The means are those of the vertices. The largest are of all points, see :func:`farthest`.
+    """
     a, b = mesh_of(before), mesh_of(after)
-    there = point_to_surface(used_points(b), a)
-    back = point_to_surface(used_points(a), b)
-    return Distances(float(there.mean()), float(there.max()), float(back.mean()), float(back.max()))
+    return Distances(*_from_vertices(b, a), *_from_vertices(a, b))
+
+
+def _from_vertices(surface: Mesh, other: Mesh) -> tuple[float, float]:
+    """Return the mean distance of the vertices from another surface, and that of all points."""
+    used = surface.used
+    foot, distance = np.zeros(len(used), np.int64), np.zeros(len(used))
+    foot[used], _, place = Nearest(other).locate(surface.vertices[used])
+    distance[used] = np.linalg.norm(place - surface.vertices[used], axis=1)
+    return float(distance[used].mean()), farthest(surface, other, 0.0, (foot, distance))
 
 
 def largest_distance(before: SurfaceLike, after: SurfaceLike) -> float:
     """Return the largest distance of :func:`surface_distance`, in either direction.
 
-    It is found sooner where both surfaces are the same grid, or have the same faces.
+    It is found sooner than by that function where both surfaces have the same triangles.
 
     >>> grid = np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])
     >>> largest_distance(grid, grid + [0.0, 0.0, 0.5])
     0.5
     """
     a, b = mesh_of(before), mesh_of(after)
-    here, there, one, two = a.grid, b.grid, a.grid_index, b.grid_index
-    grids = one is not None and two is not None and np.array_equal(one, two)
-    if grids and here is not None and there is not None:
-        return farthest(there, here, farthest(here, there))
-    if not np.array_equal(a.faces, b.faces):
-        found = surface_distance(a, b)
-        return max(found.there_max, found.back_max)
-    bound = np.linalg.norm(a.vertices - b.vertices, axis=1)
-    order = np.flatnonzero(a.used)[np.argsort(-bound[a.used])]
-    known = 0.0
-    for points, surface in ((b, a), (a, b)):
-        tree = Nearest(surface)
-        for ids in np.split(order, [len(order) // _FIRST]):
-            ids = ids[bound[ids] > known]
-            known = max(known, float(tree.distances(points.vertices[ids]).max(initial=0.0)))
-    return known
+    return farthest(a, b, farthest(b, a))
 
 
 def boundary_distance(before: SurfaceLike, after: SurfaceLike) -> tuple[float, float]:

@@ -23,6 +23,7 @@ INFO: dict[str, Info] = {
     "loss_gc_before": Info("1/size^2", True, "loss_gc of the input"),
     "loss_gc_worst": Info("1/size^2", True, "loss_gc in the worse of both triangulations of quads"),
     "loss_gc_worst_before": Info("1/size^2", True, "loss_gc_worst of the input"),
+    "loss_gc_image": Info("1/size^2", True, "loss_gc by the normals of the quads"),
     "loss_gc_half": Info("1/size^2", True, "loss_gc of every second vertex, both triangulations"),
     "mean_abs_K": Info("1/size^2", True, "mean |K|, Meyer's area, worse triangulation"),
     "mean_abs_K_before": Info("1/size^2", True, "mean_abs_K of the input"),

@@ -17,10 +17,10 @@ from gso.executors.base import useful_workers
 from gso.mesh import Mesh
 from gso.pipeline.case import Case
 from gso.pipeline.component_results import merge, renumber
-from gso.pipeline.judgement import conclude
 from gso.pipeline.lay_flat import lay_out
 from gso.pipeline.normalise import given_points
 from gso.pipeline.run import Run
+from gso.pipeline.second_solve import solve_and_judge
 from gso.result import Result
 from gso.solver import Callback
 from gso.status import Progress
@@ -53,11 +53,10 @@ def solve_mesh(
 
 def solve_case(case: Case, callback: Callback | None = None) -> Result:
     """Solve a single component, or several that constraints join."""
-    run = Run(case, callback, lay_out=lay_out)
-    solution = run.solve()
+    result = solve_and_judge(Run(case, callback, lay_out=lay_out))
     if several(case.design):
-        solution.notes += ("its components are joined by constraints and solved together",)
-    return conclude(run, solution)
+        result.notes += ("its components are joined by constraints and solved together",)
+    return result
 
 
 def parts(design: Mesh, constraints: Compiled) -> list[Component]:
@@ -176,15 +175,24 @@ def _translate(result: Result, here: Mesh, there: Mesh) -> Result:
 
 
 class _Watch:
-    """Callback that passes on the progress of one component after the other."""
+    """Callback that passes on the progress of one component after the other.
+
+    The stages of a component's other solves, which count from zero again, are given the number of
+    the last stage reached.
+    """
 
     def __init__(self, callback: Callback, count: int):
         self.callback, self.count = callback, count
-        self.place, self.stopped = 0, False
+        self.place, self.stopped, self.reached = 0, False, (0, 1)
 
     def __call__(self, progress: Progress) -> bool:
         if not self.stopped:
-            self.stopped = self.callback(renumber(progress, self.place, self.count)) is False
+            progress = renumber(progress, self.place, self.count)
+            if progress.stage / progress.stages < self.reached[0] / self.reached[1]:
+                stage, stages = self.reached
+                progress = replace(progress, stage=stage, stages=stages)
+            self.reached = (progress.stage, progress.stages)
+            self.stopped = self.callback(progress) is False
         return not self.stopped
 
 

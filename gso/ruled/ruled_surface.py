@@ -192,22 +192,23 @@ class RuledSurface:
     def distances(self, design: Mesh, *, parts: bool = False) -> metrics.Distances:
         """Measure the distances from a design, in its unit, all over both surfaces.
 
-        "There" is from the surface to the design, "back" from the design's vertices to it. The
-        largest distances include those between the boundary curves, so that a slit counts with
-        its depth; with `parts`, for surfaces that meet inside the design, only those from the
-        design's boundary.
+        "There" is from the surface to the design, "back" from the design to it, the mean of which
+        is that of the vertices. The largest distances, of all points, include those between the
+        boundary curves, so that a slit counts with its depth; with `parts`, for surfaces that meet
+        inside the design, only those from the design's boundary.
         """
         points, weight = self.samples()
         there = metrics.point_to_surface(points, design)
+        most = metrics.farthest(self.mesh, design, float(there.max()))
         back = metrics.point_to_surface(design.vertices[design.used], self.mesh)
         rim_there, rim_back = 0.0, 0.0
         if not parts or design.boundary_loops:
             rim_there, rim_back = metrics.boundary_distance(design, self.mesh)
         return metrics.Distances(
             float(weight @ there),
-            float(there.max()) if parts else max(float(there.max()), rim_there),
+            most if parts else max(most, rim_there),
             float(back.mean()),
-            max(float(back.max()), rim_back),
+            max(metrics.farthest(design, self.mesh, float(back.max())), rim_back),
         )
 
     def on_ruling(self, line: Array, points: Array) -> Array:

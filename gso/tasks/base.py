@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
@@ -276,6 +276,9 @@ class Formulation(Generic[O]):
         Names of the :class:`gso.tasks.request.Limits` that it takes.
     search : callable, optional
         Finds the solution for a request with limits.
+    before : callable, optional
+        Returns the request, by another formulation, whose result a solve starts from; None where
+        it starts from something else.
     """
 
     options: type[O]
@@ -283,6 +286,7 @@ class Formulation(Generic[O]):
     presets: tuple[str, ...] = ()
     limits: tuple[str, ...] = ()
     search: Callable[[Runner, Request[O]], Solution] | None = None
+    before: Callable[[Request[O]], Request[Any] | None] | None = None
 
 
 @dataclass(frozen=True)
@@ -306,6 +310,8 @@ class Task:
     pattern_metrics : callable, optional
         Metrics of the pattern (n, 2) of a surface, if its result is a surface that can be laid
         flat.
+    others : callable, optional
+        Returns other requests to solve, in turn, where the result of one is not usable.
     """
 
     formulations: Mapping[str, Formulation[Any]]
@@ -314,6 +320,7 @@ class Task:
     lengths: tuple[str, ...] = ()
     analysis: type[Analysis] = Analysis
     pattern_metrics: Callable[[Mesh, Array], dict[str, float]] | None = None
+    others: Callable[[Any, Request[Any]], Iterator[Request[Any]]] | None = None
 
     @property
     def options(self) -> type[Options]:

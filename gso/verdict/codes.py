@@ -272,10 +272,11 @@ class Code(str, enum.Enum):
     FAR = _limit(
         "far",
         Kind.SHARE,
-        "The same over the design's diagonal, whatever limit was given; for strips the bound is "
-        "10 %. What constraints ask for is added.",
-        "the result has left the design by {value} of its diagonal, more than {bound}",
-        "cut the design into pieces (gso pieces), allow more strips, or hold more vertices",
+        "The same over the design's size, twice the distance of its farthest vertex from the "
+        "centroid. The bound is 5 % where no limit was given. What constraints ask for is added.",
+        "the result has left the design by {value} of its size, more than {bound}",
+        "make strips (gso strips) or pieces of it (gso pieces), or allow the distance "
+        "(max_deviation)",
         limit=0.5,
     )
     SEAM_GAP = _limit(
@@ -288,11 +289,12 @@ class Code(str, enum.Enum):
     STRAIN = _limit(
         "strain",
         Kind.SHARE,
-        "Largest strain of the pattern; its bound is 0.5 % where only max_deviation is given, and "
-        "for gso pieces 1 % where the shape stays, 0.1 % where it may change.",
+        "Largest strain of the pattern; its bound is 2 % where no limit is given, 0.5 % where only "
+        "max_deviation is given, and for gso pieces 1 % where the shape stays, 0.1 % where it may "
+        "change.",
         "the largest strain of the pattern is {value}, more than {bound}",
-        "allow more strain (max_strain), distance (max_deviation) or narrow necks (min_neck), or "
-        "gso pieces",
+        "make strips (gso strips) or pieces of it (gso pieces), or allow more strain (max_strain) "
+        "or distance (max_deviation)",
     )
     TARGET_CURVATURE = _limit(
         "target_curvature",

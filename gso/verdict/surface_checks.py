@@ -13,6 +13,9 @@ from gso.verdict.compare import Measurement
 
 Measured = dict[Code, Measurement]
 
+#: Cosines of the angles at an edge that is sharp in the design, and at one that is folded over.
+_EDGE, _OVER = 0.0, -0.87
+
 
 def of_surface(design: Mesh, surface: Mesh) -> Measured:
     """Find folds, self-intersections and collapsed edges of a surface.
@@ -23,7 +26,7 @@ def of_surface(design: Mesh, surface: Mesh) -> Measured:
     same = np.array_equal(design.faces, surface.faces)
     bad = faults.folded(surface)
     if same and bad.size:
-        bad = np.setdiff1d(bad, faults.folded(design))
+        bad = _new_folds(design, surface, bad)
     pairs = faults.crossings(surface)
     if same and pairs.size:
         pairs = pairs[~_known(design, pairs)]
@@ -52,6 +55,18 @@ def of_pattern(surface: Mesh, pattern: Pattern, *, lengths: bool = True) -> Meas
     if lengths:
         found[Code.PATTERN_COLLAPSED] = _shortest(surface, flat, pattern.vertex)
     return found
+
+
+def _new_folds(design: Mesh, surface: Mesh, bad: Ints) -> Ints:
+    """Return the faces at folds of a surface that are no sharp edges of the design already.
+
+    An edge of more than 90 degrees in the design may turn by more than 120, but not by 150.
+    """
+    new = np.setdiff1d(bad, faults.folded(design, below=_EDGE))
+    if len(new) == len(bad):
+        return new
+    over = np.setdiff1d(faults.folded(surface, below=_OVER), faults.folded(design))
+    return np.union1d(new, over)
 
 
 def _shortest(before: Mesh, after: Array, names: Ints | None = None) -> Measurement:

@@ -21,23 +21,21 @@ if TYPE_CHECKING:
 
 Bounds = dict[Code, float | None]
 
-#: Distance from the design, relative to the diagonal of its bounding box, beyond which a result is
-#: refused whatever limit was given, and the same for strips, where more of them are the remedy.
-_FAR, _STRIPS = 0.5, 0.1
+#: Distance from the design, relative to its size, beyond which a result is refused whatever limit
+#: was given.
+_FAR = 0.5
 
 
 def developable(result: Result, limits: Limits, violation: float) -> tuple[Measured, Bounds]:
     """Measure deviation, strain of the pattern, and curvature."""
     # Imported here, as it imports scipy.
-    from gso.tasks.developable.options import DEVELOPABLE, Options
+    from gso.tasks.developable.options import DEVELOPABLE, SHEET, Options
 
     design, mesh = result.design, result.mesh
-    measured, bounds = _away(
-        result, metrics.largest_distance(design, mesh), limits, violation, _FAR
-    )
+    measured, bounds = _away(result, metrics.largest_distance(design, mesh), limits, violation)
     strain, allowed = np.inf, limits.max_strain
-    if allowed is None and limits.max_deviation is not None:
-        allowed = DEVELOPABLE
+    if allowed is None and limits.target_curvature is None:
+        allowed = SHEET if limits.max_deviation is None else DEVELOPABLE
     if result.pattern is not None:
         strains = _strains(mesh, result.pattern)
         strain = float(strains.max())
@@ -70,7 +68,7 @@ def strips(result: Result, limits: Limits, violation: float) -> tuple[Measured, 
         return {}, {}
     far = result.distances
     deviation = max(far.there_max, far.back_max)
-    measured, bounds = _away(result, deviation, limits, violation, _STRIPS)
+    measured, bounds = _away(result, deviation, limits, violation)
     measured[Code.RULINGS_CROSS] = Measurement(float(surface.crossed))
     measured[Code.STRAIN] = Measurement(_strains(result.mesh, surface.pattern).max())
     bounds[Code.STRAIN] = limits.max_strain
@@ -86,17 +84,21 @@ def denoise(result: Result, limits: Limits, violation: float) -> tuple[Measured,
 
 
 def _away(
-    result: Result, deviation: float, limits: Limits, violation: float, share: float
+    result: Result, deviation: float, limits: Limits, violation: float
 ) -> tuple[Measured, Bounds]:
-    """Measure the distance to the design, also as a share of its diagonal."""
-    diagonal = result.design.diagonal
+    """Measure the distance to the design, also as a share of its size."""
+    from gso.tasks.developable.options import NEAR
+
+    size = result.design.size
+    free = limits.max_deviation is None and limits.target_curvature is None
+    share = NEAR if free else _FAR
     # Far from the origin, distances are only known up to the rounding of the coordinates.
     return {
-        Code.DEVIATION: Measurement(deviation, slack=1e-12 * diagonal),
-        Code.FAR: Measurement(deviation / diagonal),
+        Code.DEVIATION: Measurement(deviation, slack=1e-12 * size),
+        Code.FAR: Measurement(deviation / size),
     }, {
         Code.DEVIATION: limits.max_deviation,
-        Code.FAR: share + violation / diagonal,
+        Code.FAR: share + violation / size,
     }
 
 

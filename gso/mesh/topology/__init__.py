@@ -20,7 +20,7 @@ from gso.mesh.topology.half_edges import (
     reverse,
 )
 from gso.mesh.topology.polylines import boundary_loops, hinges, polyline_crosses, polyline_triples
-from gso.mesh.topology.stars import RING_SIZES, Stars, grid_stars, vertex_stars
+from gso.mesh.topology.stars import RING_SIZES, Stars, face_stars, grid_stars, vertex_stars
 from gso.mesh.topology.triangulation import (
     are_quads,
     by_size,
@@ -43,6 +43,7 @@ __all__ = [
     "edge_graph",
     "edge_keys",
     "edges",
+    "face_stars",
     "four_corners",
     "grid_faces",
     "grid_stars",

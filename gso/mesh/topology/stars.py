@@ -48,12 +48,51 @@ def vertex_stars(faces: Ints, he: HalfEdges, turned: Flags) -> tuple[Stars, Star
     MeshError
         A vertex is non-manifold (two fans of faces meet there), or has too many faces.
     """
-    interior = np.flatnonzero(~he.boundary_vertex & (he.face_count > 0))
     quad = are_quads(faces)
     through = (_place_in_face(he, quad) % 2 == 0) != turned[he.face]
+    found: tuple[Stars, Stars] = ([], [])
+    for centre, spokes in _spokes(he):
+        four = quad[he.face[spokes]]
+        count = four.sum(axis=1, keepdims=True)
+        odd = count % 2 == 1
+        even_turn = np.cumsum(four, axis=1) % 2 == 1
+        agrees = ((through[spokes] == even_turn) & four).sum(axis=1, keepdims=True)
+        own = even_turn == (2 * agrees >= count)
+        for stars, split in zip(found, (own, ~own), strict=True):
+            stars += _rings(he, centre, spokes, four & (split | odd))
+    return _merged(found[0]), _merged(found[1])
+
+
+def face_stars(he: HalfEdges) -> Stars:
+    """List the interior vertices with the corners of the faces around them.
+
+    Returns
+    -------
+    list of (centres (n,), corners (n, 2 k))
+        One entry per number k of faces around a vertex, anticlockwise: of each face the next
+        corner and the one opposite to the centre, which of a triangle is the last one.
+    """
+    found = []
+    for centre, spokes in _spokes(he):
+        after = he.next[spokes]
+        found.append(
+            (centre, np.stack([he.dest[spokes], he.dest[after]], 2).reshape(len(centre), -1))
+        )
+    return found
+
+
+def _spokes(he: HalfEdges) -> Stars:
+    """List the interior vertices and the half-edges from them, anticlockwise, by their number.
+
+    Raises
+    ------
+    MeshError
+        Two fans of faces meet at a vertex.
+    """
+    interior = np.flatnonzero(~he.boundary_vertex & (he.face_count > 0))
     start = np.zeros(he.vertex_count, np.int64)
     start[he.origin] = np.arange(he.origin.size)
-    found: tuple[Stars, Stars] = ([], [])
+    found = []
     for valence in np.unique(he.face_count[interior]):
         centre = interior[he.face_count[interior] == valence]
         spokes = np.empty((centre.size, valence), np.int64)
@@ -66,15 +105,8 @@ def vertex_stars(faces: Ints, he: HalfEdges, turned: Flags) -> tuple[Stars, Star
                 f"vertex {centre[h != spokes[:, 0]][0]} joins two parts of the surface that "
                 "touch nowhere else: give each part its own copy of the vertex"
             )
-        four = quad[he.face[spokes]]
-        count = four.sum(axis=1, keepdims=True)
-        odd = count % 2 == 1
-        even_turn = np.cumsum(four, axis=1) % 2 == 1
-        agrees = ((through[spokes] == even_turn) & four).sum(axis=1, keepdims=True)
-        own = even_turn == (2 * agrees >= count)
-        for stars, split in zip(found, (own, ~own), strict=True):
-            stars += _rings(he, centre, spokes, four & (split | odd))
-    return _merged(found[0]), _merged(found[1])
+        found.append((centre, spokes))
+    return found
 
 
 def _rings(he: HalfEdges, centre: Ints, spokes: Ints, through: Flags) -> Stars:

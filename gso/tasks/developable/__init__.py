@@ -8,7 +8,7 @@ from functools import partial
 from gso.tasks.base import Formulation, Plan, Task
 from gso.tasks.developable import joint_isometry, schedule
 from gso.tasks.developable.analysis import Analysis
-from gso.tasks.developable.bound_search import search
+from gso.tasks.developable.bound_search import near_design, search
 from gso.tasks.developable.developable_metrics import flat_metrics, metrics
 from gso.tasks.developable.options import Options
 from gso.tasks.request import Request
@@ -22,7 +22,15 @@ def _before_isometry(analysis: Analysis, request: Request[joint_isometry.Options
     bound = request.max_displacement
     # The box bounds of the solve by isometry cover only part of the ball around a vertex.
     bound = None if bound is None else 0.99 * ALONG * bound
-    return schedule.plan(analysis, replace(request.with_options(Options()), max_displacement=bound))
+    begun = replace(request.with_options(Options()), max_displacement=bound)
+    return schedule.plan(analysis, begun)
+
+
+def _curvature(request: Request[joint_isometry.Options]) -> Request[Options] | None:
+    """Return the request for the surface that a solve by isometry starts from."""
+    if request.x0 is not None or request.options.begin != "curvature":
+        return None
+    return replace(request.with_options(Options()), formulation="curvature")
 
 
 TASK = Task(
@@ -39,9 +47,11 @@ TASK = Task(
             presets=("jiang2020",),
             limits=("max_deviation", "max_strain"),
             search=search,
+            before=_curvature,
         ),
     },
     metrics,
     analysis=Analysis,
     pattern_metrics=flat_metrics,
+    others=near_design,
 )

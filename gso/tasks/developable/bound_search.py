@@ -6,6 +6,7 @@ that meets the bound gives the smallest displacement.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TypeVar
 
@@ -16,7 +17,7 @@ from gso.status import Status
 from gso.tasks.base import Analysis, Runner, Solution
 from gso.tasks.base import Options as BaseOptions
 from gso.tasks.developable import joint_isometry
-from gso.tasks.developable.options import DEVELOPABLE, Options
+from gso.tasks.developable.options import DEVELOPABLE, NEAR, Options
 from gso.tasks.developable.target import (
     PROGRESS,
     SearchRequest,
@@ -31,6 +32,9 @@ R = TypeVar("R", bound=Request[BaseOptions])
 
 #: Weights tried in turn within a bound, until the strain is small enough.
 _HARDER = (1.0, 6.0, 36.0)
+#: Factor on the elongation in a solve by isometry near the design: its iterations end before a
+#: boundary that has grown is short again.
+_BORDERS = 3.0
 
 
 def search(run: Runner, request: SearchRequest) -> Solution:
@@ -95,6 +99,36 @@ def _strain_left(run: Runner, solution: Solution) -> float:
     if not parametrization.flattens(run.analysis.mesh):
         return np.inf
     return strain_of(run, solution.points)
+
+
+def near_design(analysis: Analysis, request: SearchRequest) -> Iterator[SearchRequest]:
+    """Yield requests whose results stay near the design, for where one without limits does not.
+
+    First by the same formulation. Then, for "isometry", by that of the surface it starts from, and
+    else by "isometry", if the user did not name one and did not ask for a fast solve. There are
+    none with constraints, B-splines or the settings of a reference.
+    """
+    options = request.options
+    reference = isinstance(options, joint_isometry.Options) and options.begin == "design"
+    if reference or options.variables == "surface" or not analysis.constraints.empty:
+        return
+    # The design is in the unit ball, and its size is twice the radius.
+    near = replace(request, x0=None, max_displacement=2.0 * NEAR)
+    yield _with_borders(near)
+    if isinstance(options, joint_isometry.Options):
+        yield replace(near.with_options(Options()), formulation="curvature")
+        return
+    other = _by_isometry(analysis, near)
+    if other is not None and options.iterations >= Options().iterations:
+        yield _with_borders(other)
+
+
+def _with_borders(request: SearchRequest) -> SearchRequest:
+    """Return a request that keeps the lengths of boundaries more, if it is one by isometry."""
+    options = request.options
+    if not isinstance(options, joint_isometry.Options):
+        return request
+    return request.with_options(replace(options, w_elongation=_BORDERS * options.w_elongation))
 
 
 def stay_within(

@@ -31,6 +31,7 @@ def curvature_metrics(before: Mesh, after: Mesh, scale: float) -> dict[str, floa
         "loss_gc": measure.loss_gc(after, scale=scale),
         "loss_gc_worst_before": measure.loss_gc_worst(before, scale=scale),
         "loss_gc_worst": measure.loss_gc_worst(after, scale=scale),
+        "loss_gc_image": measure.loss_gc_image(after, scale=scale),
         "loss_gc_half": measure.loss_gc_half(after, scale=scale),
         "mean_abs_K_before": measure.mean_abs_K(before, scale=scale),
         "mean_abs_K": measure.mean_abs_K(after, scale=scale),

@@ -345,4 +345,4 @@ def _terms(
 def _unknowns(bound: float | None, mesh: Mesh, layout: Layout, coordinates: Array) -> Variables:
     if bound is None:
         return free(layout)
-    return framed_displacements(layout, mesh.vertices, vertex_normals(mesh))
+    return framed_displacements(layout, mesh.vertices, vertex_normals(mesh), mesh.edges)
