@@ -12,9 +12,8 @@ from scipy.spatial.transform import Rotation
 import gso
 from gso import metrics
 from gso.mesh import Mesh
-from gso.tasks.developable import Options
-from gso.tasks.developable.options import NEAR, SHEET
-from gso.tasks.start import Start
+from gso.tasks import Start
+from gso.tasks.developable import NEAR, SHEET, Options
 from tests.conftest import cylinder, saddle, shuffled, sphere_cap
 
 PRESETS = tuple(Options.PRESETS)

@@ -184,16 +184,16 @@ class Run:
         """Solve the stages of a plan with at least one, the last one until hard terms hold."""
         coordinates, entered = plan.start, None
         least = 0.0 if plan.cold_start is None else self.case.request.start.tolerance
-        stages = plan.stages
+        stages = list(plan.stages)
         # Coarser grids use the kernels of the finest, which are compiled if that one is large.
         counts = largest_counts((stage.items, stage.layout) for stage in stages)
         for number, stage in enumerate(stages):
             clock = time.perf_counter()
             entered, coordinates = coordinates, stage.enter(coordinates)
             self.timings.setup += time.perf_counter() - clock
-            last = number == len(stages) - 1
+            last = number >= len(plan.stages) - 1
             # A warm start is close to the solution: reserve iterations for the last stage.
-            reserved = 0 if last or plan.cold_start is None else stages[-1].iterations
+            reserved = 0 if last or plan.cold_start is None else plan.stages[-1].iterations
             solve = partial(
                 self.minimise,
                 options,
@@ -207,10 +207,13 @@ class Run:
                 break
             if stage.finished is not None and stage.finished(coordinates):
                 break
+            if last and plan.further is not None:
+                further = plan.further(number + 1 - len(plan.stages), coordinates)
+                stages += [] if further is None else [further]
             # Stages of another mesh have another pattern.
-            if not last and stages[number + 1].layout != stage.layout:
+            if number + 1 < len(stages) and stages[number + 1].layout != stage.layout:
                 self._problem = None
-        after = stages[number + 1 :]
+        after = plan.stages[number + 1 :]
         if minimum.status is Status.CANCELLED:
             # Transfer the coordinates to the last stage without solving.
             for stage in after:

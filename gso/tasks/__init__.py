@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from gso.tasks.evaluation import compute_metrics, largest_strain
     from gso.tasks.options import Options
     from gso.tasks.request import Limits, check
+    from gso.tasks.start import Start
 
 __all__ = [
     "Formulation",
@@ -21,6 +22,7 @@ __all__ = [
     "Options",
     "Plan",
     "Stage",
+    "Start",
     "Task",
     "add",
     "check",
@@ -39,6 +41,7 @@ __getattr__, __dir__ = at_first_use(
         "evaluation": "compute_metrics largest_strain",
         "options": "Options",
         "request": "Limits check",
+        "start": "Start",
     },
 )
 

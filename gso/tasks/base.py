@@ -173,6 +173,9 @@ class Plan:
         numbering.
     edited : Stage, optional
         What a session iterates while handles move; the last stage where not given.
+    further : callable, optional
+        Builds another stage on the coordinates of the last one, or returns None if they need none.
+        Its first argument is the number of such stages before. Batches leave them out.
     """
 
     layout: Layout
@@ -189,6 +192,7 @@ class Plan:
     start_refused: str = ""
     cut: Cut | None = None
     edited: Stage | None = None
+    further: Callable[[int, Array], Stage | None] | None = None
 
 
 @dataclass

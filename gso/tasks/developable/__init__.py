@@ -10,11 +10,11 @@ from gso.tasks.developable import joint_isometry, schedule
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.developable.bound_search import near_design, search
 from gso.tasks.developable.developable_metrics import flat_metrics, metrics
-from gso.tasks.developable.options import Options
+from gso.tasks.developable.options import NEAR, SHEET, Options
 from gso.tasks.request import Request
 from gso.unknowns import ALONG
 
-__all__ = ["TASK", "Options"]
+__all__ = ["NEAR", "SHEET", "TASK", "Options"]
 
 
 def _before_isometry(analysis: Analysis, request: Request[joint_isometry.Options]) -> Plan:

@@ -32,6 +32,8 @@ R = TypeVar("R", bound=Request[BaseOptions])
 
 #: Weights tried in turn within a bound, until the strain is small enough.
 _HARDER = (1.0, 6.0, 36.0)
+#: Largest distance of a usable result. The design is in the unit ball, and its size is the diameter.
+_USABLE = 2.0 * NEAR
 #: Factor on the elongation in a solve by isometry near the design: its iterations end before a
 #: boundary that has grown is short again.
 _BORDERS = 3.0
@@ -41,7 +43,8 @@ def search(run: Runner, request: SearchRequest) -> Solution:
     """Search for a result within given limits.
 
     If a bound on distance or strain is missed, "isometry" is tried too where the user did not
-    name the formulation.
+    name the formulation. A surface that strains little enough but is too far away to be usable is
+    solved again within the usable distance.
 
     Parameters
     ----------
@@ -67,6 +70,10 @@ def search(run: Runner, request: SearchRequest) -> Solution:
         solution, met = attempt(other)
         if met or _strain_left(run, solution) < _strain_left(run, best):
             best = solution
+    if bound is None and met and _distance(analysis, best) > _USABLE:
+        solution, met = stay_within(run, request, _USABLE, strain)
+        if met:
+            best = _with_end_of(solution, best)
     return best
 
 
@@ -112,8 +119,7 @@ def near_design(analysis: Analysis, request: SearchRequest) -> Iterator[SearchRe
     reference = isinstance(options, joint_isometry.Options) and options.begin == "design"
     if reference or options.variables == "surface" or not analysis.constraints.empty:
         return
-    # The design is in the unit ball, and its size is twice the radius.
-    near = replace(request, x0=None, max_displacement=2.0 * NEAR)
+    near = replace(request, x0=None, max_displacement=_USABLE)
     yield _with_borders(near)
     if isinstance(options, joint_isometry.Options):
         yield replace(near.with_options(Options()), formulation="curvature")

@@ -42,10 +42,6 @@ COARSE_CURVATURE, COARSE_FAIRNESS = 1.5, 3.0
 #: The mean of squared second differences along both polylines of quads is twice that across the
 #: edges of triangles, in the mean over all directions.
 _QUADS = 2.0
-#: Numbers of faces between which curvature is also measured by the normals of quads, and its share
-#: of the weight. Quads of finer meshes hide little: at 64 x 64 the three measures agree. Those of
-#: coarser ones are no surface yet.
-_COARSE, _IMAGE = (100, 3_000), 1.0 / 3.0
 
 
 def adapted_weights(options: Options, curved: N, bending: N) -> tuple[N, N]:
@@ -54,20 +50,23 @@ def adapted_weights(options: Options, curved: N, bending: N) -> tuple[N, N]:
     return curvature, options.w_fairness * (TYPICAL_BENDING / (bending + 1.0)) ** 0.5
 
 
-def objective(analysis: Analysis, request: Request[Options], mesh: Mesh) -> list[Weighted]:
+def objective(
+    analysis: Analysis, request: Request[Options], mesh: Mesh, image: float = 0.0
+) -> list[Weighted]:
     """Build the terms on the design or on a coarser copy of it, without constraints.
 
-    Several components are weighted each for its own size and curvature.
+    Several components are weighted each for its own size and curvature. `image` is the share of
+    the weight of curvature for curvature by the normals of quads.
     """
     if not request.options.by_component or not several(analysis.mesh):
         shape = analysis.shape
         if mesh is not shape.mesh and mesh.grid_index is None:
             request = _on_triangles(request, analysis)
-        return _terms(request, shape, shape.curvature, mesh)
+        return _terms(request, shape, shape.curvature, mesh, image)
 
     def make(own: Mesh) -> list[Weighted]:
         shape = Shape(own)
-        return _terms(request, shape, measure.loss_gc_worst(own, scale=1.0), own)
+        return _terms(request, shape, measure.loss_gc_worst(own, scale=1.0), own, image)
 
     return per_component.objective(mesh, make)
 
@@ -83,7 +82,9 @@ def _on_triangles(request: Request[Options], analysis: Analysis) -> Request[Opti
     return replace(request, options=options)
 
 
-def _terms(request: Request[Options], shape: Shape, curved: float, mesh: Mesh) -> list[Weighted]:
+def _terms(
+    request: Request[Options], shape: Shape, curved: float, mesh: Mesh, image: float
+) -> list[Weighted]:
     """Build the terms of one component, on its own mesh or on a coarser copy of it."""
     o = request.options
     w_curvature, w_fairness = adapted_weights(o, max(curved, 1e-3), shape.bending)
@@ -97,10 +98,10 @@ def _terms(request: Request[Options], shape: Shape, curved: float, mesh: Mesh) -
         w_proximity = 0.3 * w_proximity
     normals = vertex_normals(mesh)
     near = proximity.build(mesh, normals, tangential=o.tangential)
-    bent = [(t, w_curvature) for t in curvature.build(mesh)]
-    if mesh is shape.mesh and _is_coarse(mesh):
-        part = _IMAGE * w_curvature
-        bent = [(t, w - part) for t, w in bent] + [(t, part) for t in gauss_image.build(mesh)]
+    by_image = image * w_curvature
+    bent = [(t, w_curvature - by_image) for t in curvature.build(mesh)]
+    if image > 0:
+        bent += [(t, by_image) for t in gauss_image.build(mesh)]
     items = [Weighted(t, w, Absolute(o.eps)) for t, w in bent]
     smooth = shape.smooth
     if mesh is shape.mesh:
@@ -113,12 +114,6 @@ def _terms(request: Request[Options], shape: Shape, curved: float, mesh: Mesh) -
     items.append(Weighted(near, w_proximity, Distance(o.quadratic_below)))
     items.append(Weighted(elongation.build(mesh), o.w_elongation))
     return items
-
-
-def _is_coarse(mesh: Mesh) -> bool:
-    """Tell whether quads can hide curvature by bending along their diagonals."""
-    quads = mesh.faces.shape[1] == 4 and bool((mesh.faces[:, -1] >= 0).all())
-    return quads and _COARSE[0] <= len(mesh.faces) <= _COARSE[1]
 
 
 def _resample(source: Mesh, target: Mesh) -> Array:
