@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from gso.typing import Array
@@ -24,6 +26,32 @@ def anticlockwise(polygon: Array) -> Array:
     [[2.0, 1.0], [0.0, 1.0], [0.0, 0.0]]
     """
     return polygon if signed_area(polygon) > 0 else polygon[::-1]
+
+
+def mean_width(loops: Sequence[Array]) -> float:
+    """Return twice the area of a region over its perimeter: the width, for a long strip.
+
+    Parameters
+    ----------
+    loops : sequence of ndarray, (k, 2)
+        Its boundary loops, the outer one first.
+
+    Examples
+    --------
+    >>> round(mean_width([np.array([[0.0, 0], [98, 0], [98, 2], [0, 2]])]), 2)
+    1.96
+    """
+    outer, *holes = (abs(signed_area(loop)) for loop in loops)
+    return 2.0 * (outer - sum(holes)) / sum(perimeter(loop) for loop in loops)
+
+
+def perimeter(polygon: Array) -> float:
+    """Return the length of a closed polygon (k, d).
+
+    >>> perimeter(np.array([[0.0, 0], [3, 0], [3, 4]]))
+    12.0
+    """
+    return float(np.linalg.norm(polygon - np.roll(polygon, 1, axis=0), axis=1).sum())
 
 
 def arc_lengths(line: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso import geometry
+from gso.geometry.polygon import perimeter
 from gso.mesh import topology
 from gso.metrics.surfaces import (
     SurfaceLike,
@@ -95,10 +96,5 @@ def loop_ratios(before: SurfaceLike, after: SurfaceLike) -> Array:
     """
     here, there = mesh_of(before), points_of(after)
     loops = here.boundary_loops
-    was, now = (np.array([_around(p[loop]) for loop in loops]) for p in (here.vertices, there))
+    was, now = (np.array([perimeter(p[loop]) for loop in loops]) for p in (here.vertices, there))
     return np.asarray(now / was)
-
-
-def _around(points: Array) -> float:
-    """Return the length of a closed polygon (n, 3)."""
-    return float(np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1).sum())

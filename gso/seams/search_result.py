@@ -8,6 +8,7 @@ import numpy as np
 
 from gso import faults, metrics
 from gso.cut_pieces import Pieces
+from gso.geometry.polygon import mean_width
 from gso.mesh import Mesh
 from gso.result import Result
 from gso.seams.candidates import Candidate
@@ -52,6 +53,14 @@ def packed(
         Code.NECK: Measurement(necks, "piece", names),
         **_of_sheets(found),
     }
+    joined = sorted(set(own.sides[np.ptp(own.sides, axis=1) > 0].ravel().tolist()))
+    if joined and len(whole) == count:
+        areas = np.array([metrics.area(own[k].mesh) for k in joined])
+        outlines = [[whole[k].flat[x] for x in whole[k].mesh.boundary_loops] for k in joined]
+        widths = np.array([mean_width(loops) for loops in outlines])
+        some = [names[k] for k in joined]
+        measured[Code.SMALL] = Measurement(areas / size**2, "piece", some)
+        measured[Code.NARROW] = Measurement(widths / ground.mesh.size, "piece", some)
     notes = []
     if result is not None:
         measured |= of_surface(result.design, result.mesh)

@@ -299,8 +299,8 @@ class Code(str, enum.Enum):
     TARGET_CURVATURE = _limit(
         "target_curvature",
         Kind.FACTOR,
-        "Mean absolute curvature, more than 5 % above the target.",
-        "mean |K| is {value}, above the target of {bound}",
+        "The metric ``loss_gc_worst``, more than 5 % above the target.",
+        "loss_gc_worst is {value}, above the target of {bound}",
         "raise target_curvature, or cut the design into pieces (gso pieces)",
         tolerance=0.05,
     )
@@ -349,6 +349,24 @@ class Code(str, enum.Enum):
         "Width of a piece at its narrowest place.",
         "necks are {value} wide, less than {bound}",
         "allow narrower necks (min_neck) or more strain (max_strain)",
+        least=True,
+    )
+    SMALL = _limit(
+        "small",
+        Kind.SHARE,
+        "Area of a part, over that of all parts. Parts without seams do not count.",
+        "parts have only {value} of the area, less than {bound}",
+        "cut along other lines, or allow more distance (max_deviation) or strain (max_strain)",
+        limit=0.001,
+        least=True,
+    )
+    NARROW = _limit(
+        "narrow",
+        Kind.SHARE,
+        "Mean width of a part, over the design's size. Parts without seams do not count.",
+        "parts are only {value} of the design's size wide, less than {bound}",
+        "allow more distance (max_deviation) or strain (max_strain), for fewer parts",
+        limit=0.003,
         least=True,
     )
     TOO_SHORT = _limit(

@@ -17,7 +17,15 @@ from gso.workshop.part import Part
 from gso.workshop.parts import Fitted
 
 #: Entries of a record that are lengths, in the mesh's unit.
-_LENGTHS = ("diagonal", "allowed", "deviation_mean", "deviation_max", "bend_radius_min", "seam_gap")
+_LENGTHS = (
+    "diagonal",
+    "size",
+    "allowed",
+    "deviation_mean",
+    "deviation_max",
+    "bend_radius_min",
+    "seam_gap",
+)
 _PACKAGES = ("gso", "numpy", "scipy", "shapely", "ezdxf", "spyrrow")
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from gso import faults, metrics, rulings
 from gso.errors import MeshError
+from gso.geometry.polygon import mean_width
 from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.seams.sheets import rectangle
@@ -40,13 +41,14 @@ def of_pattern(
         "formulation": settings.formulation,
         "area": metrics.area(surface),
         "diagonal": design.diagonal,
+        "size": design.size,
         "allowed": allowed,
         "deviation_mean": max(away.there_mean, away.back_mean),
         "deviation_max": far,
         "deviation_at": _worst(design, surface),
         "strain_max": strains["strain_max"],
         "strain_p99": strains["strain_p99"],
-        "curvature": _curvatures(surface),
+        "curvature": _curvatures(pattern.surface(surface)),
         "planarity_max": _planarity(surface),
         "overlaps": overlaps,
         "inverted": flips,
@@ -80,6 +82,14 @@ def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
             np.array([bend_radius(panel) for panel in plain]), "part", [p.name for p in plain]
         ),
     }
+    pairs = [{seam.one.panel, seam.two.panel} for seam in made.matings]
+    joined = [made.panels[k] for k in sorted(set().union(*(p for p in pairs if len(p) > 1)))]
+    if joined:
+        own = [panel.name for panel in joined]
+        areas = np.array([metrics.area(panel.surface) for panel in joined])
+        widths = [mean_width([p.flat[loop] for loop in p.loops]) for p in joined]
+        measured[Code.SMALL] = Measurement(areas / record["area"], "part", own)
+        measured[Code.NARROW] = Measurement(np.array(widths) / record["size"], "part", own)
     later = compare(measured, limits)
     # The solve may have had another design in its place, or less room; and a strain that is too
     # large is said as the record has it.

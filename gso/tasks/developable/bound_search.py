@@ -32,7 +32,7 @@ R = TypeVar("R", bound=Request[BaseOptions])
 
 #: Weights tried in turn within a bound, until the strain is small enough.
 _HARDER = (1.0, 6.0, 36.0)
-#: Largest distance of a usable result. The design is in the unit ball, and its size is the diameter.
+#: Largest distance of a usable result, from a design in the unit ball, whose size is 2.
 _USABLE = 2.0 * NEAR
 #: Factor on the elongation in a solve by isometry near the design: its iterations end before a
 #: boundary that has grown is short again.

@@ -10,6 +10,9 @@ lines, which lets a surface become developable. Second derivatives are relative 
 the design's own, which is large where the design is developable. d penalises the displacement
 from the design, its tangential part less: quadratically below `quadratic_below`, linearly
 beyond. The elongation of an edge is zero within a range of length ratios.
+
+|K| is the mean over the angle defects of both triangulations of quads. Where coarse quads hide
+curvature from both, a share of its weight goes to |K| by the normals of quads.
 """
 
 from __future__ import annotations

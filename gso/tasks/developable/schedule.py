@@ -47,10 +47,10 @@ TANGENTS = ("first tangent", "second tangent")
 _SWEEPS = 3
 #: Tolerance of all stages but the last.
 _LOOSE = 1e-3
-#: Number of quads up to which they may hide curvature: at 64 x 64 all measures agree. Curvature by
-#: the normals of quads over that of the worse triangulation, above which the former gets shares of
-#: the weight of curvature, and these shares.
-_COARSE = 3_000
+#: Numbers of quads that may hide curvature: fewer are no surface yet, and at 64 x 64 all measures
+#: agree. Curvature by the normals of quads over that of the worse triangulation, above which the
+#: former gets shares of the weight of curvature, and these shares.
+_COARSE = (100, 3_000)
 _HIDDEN, _IMAGE = 1.4, (0.5, 0.75, 0.9)
 
 
@@ -97,7 +97,8 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
             moving=stages[-1].variables,
         )
     further = None
-    if spline is None and len(mesh.faces) <= _COARSE and are_quads(mesh.faces).all():
+    coarse_quads = _COARSE[0] <= len(mesh.faces) <= _COARSE[1] and are_quads(mesh.faces).all()
+    if spline is None and coarse_quads:
         further = partial(_against_hidden_curvature, analysis, request, stages[-1])
     begin = coarse[0].begin.vertices if coarse else inside(start, mesh, radius(request))
     free_to_return = constraints.empty
