@@ -44,11 +44,12 @@ def test_what_strains_or_is_far_is_solved_again_nearby(surfaces):
         assert result.usable
         assert result.details["verdict"]["strain_max"] <= SHEET
         assert max(far.there_max, far.back_max) <= NEAR * result.design.size
-        if not np.array_equal(plain.mesh.vertices, result.mesh.vertices):
+        if any("another solve" in note for note in result.notes):
             again += 1
-            assert "another solve" in result.notes[-1]
             # The history and the count of iterations are those of all solves.
             assert result.iterations > plain.iterations
+        elif result.history[-1].name != "normals of quads":
+            np.testing.assert_array_equal(plain.mesh.vertices, result.mesh.vertices)
     assert 0 < again < len(surfaces)
 
 

@@ -175,7 +175,7 @@ def _summary(rows: dict[str, dict[str, Any]]) -> None:
         f"isometry with |K| above 1.5 times that of balanced: {len(curved)} of {len(pairs)}, "
         f"of these with more than half of its strain {worse}"
     )
-    more = [row["sampled"] / row["distance"] - 1 for row in rows.values() if row["distance"]]
+    more = [row["sampled"] / row["distance"] - 1 for row in rows.values() if row["distance"] > 1e-9]
     print(f"sampled above the distance by at most {max(more, default=0.0):.2g}")
 
 

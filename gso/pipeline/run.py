@@ -207,7 +207,7 @@ class Run:
                 break
             if stage.finished is not None and stage.finished(coordinates):
                 break
-            if last and plan.further is not None:
+            if last and plan.further is not None and self.case.request.verdict:
                 further = plan.further(number + 1 - len(plan.stages), coordinates)
                 stages += [] if further is None else [further]
             # Stages of another mesh have another pattern.

@@ -175,7 +175,8 @@ class Plan:
         What a session iterates while handles move; the last stage where not given.
     further : callable, optional
         Builds another stage on the coordinates of the last one, or returns None if they need none.
-        Its first argument is the number of such stages before. Batches leave them out.
+        Its first argument is the number of such stages before. Solves without a verdict, and
+        batches, leave them out.
     """
 
     layout: Layout

@@ -71,7 +71,8 @@ def search(run: Runner, request: SearchRequest) -> Solution:
         if met or _strain_left(run, solution) < _strain_left(run, best):
             best = solution
     if bound is None and met and _distance(analysis, best) > _USABLE:
-        solution, met = stay_within(run, request, _USABLE, strain)
+        limit = of_strain(run, strain or DEVELOPABLE)
+        solution, met = reach(run, replace(request, max_displacement=_USABLE), limit)
         if met:
             best = _with_end_of(solution, best)
     return best
