@@ -21,8 +21,10 @@ _LARGE = 3.0
 _SMALL = 4.0
 #: Multiple of the median area of free facets, and triangles, from which on a facet is a plane.
 _PLATE, _MANY = 8.0, 4
-#: Facets below which a strip is short, and share of a component's area that makes it mostly free.
-_SHORT, _MOSTLY = 12, 0.5
+#: Facets below which a strip is short, and share of a component's area below which it is small.
+_SHORT, _LITTLE = 12, 0.01
+#: Share of a component's area that makes it mostly free.
+_MOSTLY = 0.5
 #: Least eigenvalue of the mean of products of normals that are not across one direction.
 _TURNED = 1e-8
 
@@ -214,13 +216,16 @@ def _absorbed(graph: FacetGraph, patches: list[Patch]) -> list[Patch]:
     if not free.any():
         return patches
     whole = graph.connected(np.ones_like(free))
-    share = np.bincount(whole, graph.areas * free) / np.bincount(whole, graph.areas)
+    total = np.bincount(whole, graph.areas)
+    share = np.bincount(whole, graph.areas * free) / total
     typical = float(np.median(graph.areas[free]))
     kept = []
     for patch in patches:
         facets = np.unique(graph.facet[patch.triangles])
-        small = len(facets) < _SHORT and np.median(graph.facet_areas[facets]) <= _SMALL * typical
-        if small and patch.kind != "free" and share[whole[patch.triangles[0]]] > _MOSTLY:
+        of = whole[patch.triangles[0]]
+        few = len(facets) < _SHORT or graph.areas[patch.triangles].sum() < _LITTLE * total[of]
+        small = few and np.median(graph.facet_areas[facets]) <= _SMALL * typical
+        if small and patch.kind != "free" and share[of] > _MOSTLY:
             free[patch.triangles] = True
         elif patch.kind != "free":
             kept.append(patch)

@@ -23,8 +23,9 @@ _WIDEST, _WIDER = np.radians(62.0), 3.0
 _SEVERAL = 2.5
 #: Angle between the normals of a triangle and of the surface, in radians.
 _TILTED = np.radians(35.0)
-#: Points of a seed region, and its least number; seeds that are fitted together.
-_POINTS, _FEWEST, _TOGETHER = 48, 7, 2000
+#: Points of a seed region, their least number for a cylinder (a cone needs one more), and seeds
+#: that are fitted together.
+_POINTS, _FEWEST, _TOGETHER = 48, 8, 2000
 #: Largest smooth parts that are tried as a whole.
 _PARTS = 100
 #: Seeds that are tried at most.
@@ -140,13 +141,17 @@ def _promising(
     spread, axes = np.linalg.eigh(products)
     _, cone_axes = np.linalg.eigh(products - mean[:, :, None] * mean[:, None, :])
     enough = (given.sum(axis=1) >= _FEWEST) & (one >= 3) & (spread[:, 1] > 1e-7)
+    more = given.sum(axis=1) > _FEWEST
     worst = np.full(len(chunk), np.inf)
     ready = np.flatnonzero(enough)
     ready = ready[on_quadrics(points[ready], given[ready], graph.tolerance)]
     if not len(ready):
         return ready, around
     for conical, axis in ((False, axes), (True, cone_axes)):
-        fits = fit_round(points[ready], given[ready], axis[ready, :, 0], conical=conical)
+        ready = ready[more[ready] & (worst[ready] > graph.tolerance)] if conical else ready
+        fits = fit_round(
+            points[ready], given[ready], axis[ready, :, 0], conical=conical, goal=graph.tolerance
+        )
         worst[ready] = np.minimum(worst[ready], fits.worst)
     order = np.argsort(worst, kind="stable")
     return order[worst[order] <= graph.tolerance], around
@@ -203,7 +208,7 @@ def _fitted(
 ) -> RoundSurface | None:
     """Fit a surface to the vertices of a region; None where they lie far from any."""
     ids = np.unique(graph.triangles[member])
-    if len(ids) < _FEWEST:
+    if len(ids) < _FEWEST + conical:
         return None
     ids = ids[np.linspace(0, len(ids) - 1, min(len(ids), _ENOUGH)).round().astype(int)]
     points = graph.points[ids]
@@ -218,11 +223,11 @@ def _fitted(
             starts.append(np.linalg.eigh(products - np.outer(mean, mean))[1][:, 0])
     count = len(starts)
     sets = np.broadcast_to(points, (count, *points.shape))
-    fits = fit_round(sets, np.ones(sets.shape[:2], bool), np.stack(starts), conical=conical)
+    goal, given = _LOOSE * graph.tolerance, np.ones(sets.shape[:2], bool)
+    fits = fit_round(sets, given, np.stack(starts), conical=conical, goal=goal)
     best = int(np.argmin(fits.worst))
     extent = np.linalg.norm(np.ptp(points, axis=0))
-    small = not np.isfinite(fits.worst[best]) or fits.radius[best] > 1e4 * extent
-    if small or fits.worst[best] > _LOOSE * max(graph.tolerance, 1e-12 * extent):
+    if not fits.worst[best] <= goal or fits.radius[best] > _HUGE * extent:
         return None
     return fits.surface(best)
 
@@ -313,5 +318,7 @@ def _open_edges(graph: FacetGraph) -> Flags:
 
 #: Distance from the axis, relative to the largest, below which a point is the apex.
 _APEX = 1e-4
+#: Radius relative to a region's size above which it is flat.
+_HUGE = 1e4
 #: Multiple of the tolerance up to which a seed region may lie off its surface.
 _LOOSE = 4.0

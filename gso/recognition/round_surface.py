@@ -13,6 +13,8 @@ from gso.typing import Array, Flags
 _STEPS, _DAMPING = 25, 1e-3
 #: Decrease of the sum of squares, relative to it, that ends the steps.
 _ENOUGH = 1e-9
+#: Decrease of the sum of squares in a step that is slow, and number of slow steps.
+_SLOW, _PATIENCE = 0.5, 3
 #: Damping that no step overcomes, and a mean square that is rounding error.
 _STUCK, _NOTHING = 1e3, 1e-28
 #: Largest gradient of a quadric with coefficients of norm one, and rounding errors of its values.
@@ -111,7 +113,7 @@ class Fits:
         )
 
 
-def fit_round(points: Array, given: Flags, axis: Array, *, conical: bool) -> Fits:
+def fit_round(points: Array, given: Flags, axis: Array, *, conical: bool, goal: float = 0.0) -> Fits:
     """Fit cylinders or cones to sets of points by least squares of distances.
 
     A linear fit with the given axes is the start of damped Gauss-Newton steps, of all sets at
@@ -127,6 +129,8 @@ def fit_round(points: Array, given: Flags, axis: Array, *, conical: bool) -> Fit
         Unit directions of the axes at the start.
     conical : bool
         Fit cones, otherwise cylinders.
+    goal : float
+        Root mean square distance above which sets that converge slowly are given up.
 
     Examples
     --------
@@ -146,42 +150,52 @@ def fit_round(points: Array, given: Flags, axis: Array, *, conical: bool) -> Fit
     centre, radius, slope = _linear_start(local, weight, axis, conical)
     free = 6 if conical else 5
     damping = np.full(len(points), _DAMPING)
-    residual, jacobian = _residuals(local, weight, centre, axis, radius, slope)
-    best = (residual**2).sum(axis=1)
-    unit, done = np.eye(free), np.zeros(len(points), bool)
+    state = np.concatenate([centre, axis, radius[:, None], slope[:, None]], axis=1)
+    best = np.full(len(points), np.inf)
+    live, tried, slow = np.arange(len(points)), state, np.zeros(len(points), np.int64)
     for _ in range(_STEPS):
-        j = jacobian[..., :free]
-        normal = np.einsum("bki,bkj->bij", j, j)
-        bulk = np.einsum("bii->bi", normal)
-        scaled = damping[:, None] * bulk + 1e-15 * (1.0 + bulk.max(axis=1, keepdims=True))
-        step = np.linalg.solve(
-            normal + scaled[:, :, None] * unit, -np.einsum("bki,bk->bi", j, residual)[..., None]
-        )[..., 0]
-        step = np.clip(step, -0.5, 0.5) if not conical else np.clip(step, -1.0, 1.0)
-        e1, e2 = _frames(axis)
-        new_centre = centre + step[:, :1] * e1 + step[:, 1:2] * e2
-        new_axis = axis + step[:, 2:3] * e1 + step[:, 3:4] * e2
-        new_axis /= np.linalg.norm(new_axis, axis=1, keepdims=True)
-        new_radius = radius + step[:, 4]
-        new_slope = slope + step[:, 5] if conical else slope
-        new = _residuals(local, weight, new_centre, new_axis, new_radius, new_slope)
-        cost = (new[0] ** 2).sum(axis=1)
-        better = cost < best
-        pick = better[:, None]
-        centre, axis = np.where(pick, new_centre, centre), np.where(pick, new_axis, axis)
-        radius = np.where(better, new_radius, radius)
-        slope = np.where(better, new_slope, slope)
-        residual = np.where(pick, new[0], residual)
-        jacobian = np.where(pick[..., None], new[1], jacobian)
-        done |= (better & (best - cost <= _ENOUGH * best)) | (damping > _STUCK)
-        damping = np.where(better, damping * 0.1, damping * 10.0)
-        best = np.where(better, cost, best)
-        done |= best < _NOTHING * count
-        if done.all():
+        residual, jacobian = _residuals(local[live], weight[live], tried)
+        cost = (residual**2).sum(axis=1)
+        before = best[live]
+        better = cost < before
+        won = live[better]
+        state[won], best[won] = tried[better], cost[better]
+        settled = np.isfinite(before) & (cost >= (1.0 - _ENOUGH) * before)
+        done = better & (settled | (cost < _NOTHING * count[live]))
+        damping[live] *= np.where(better, 0.1, 10.0)
+        far = np.minimum(cost, before) > count[live] * (goal / size[live]) ** 2
+        slow[live] += far & ~(cost < _SLOW * before)
+        going = ~done & (damping[live] < _STUCK) & (slow[live] < _PATIENCE)
+        if not going.any():
             break
-    worst = np.abs(residual).max(axis=1) * size
-    # Moved along the axis to the middle of the points.
+        # A step that failed is tried again from the old state, with more damping.
+        live, better = live[going], better[going]
+        residual, jacobian = residual[going], jacobian[going]
+        if not better.all():
+            residual[~better], jacobian[~better] = _residuals(
+                local[live[~better]], weight[live[~better]], state[live[~better]]
+            )
+        tried = _stepped(state[live], residual, jacobian[..., :free], damping[live])
+    worst = np.abs(_residuals(local, weight, state)[0]).max(axis=1) * size
+    centre, axis, radius, slope = state[:, :3], state[:, 3:6], state[:, 6], state[:, 7]
     return Fits(middle + centre * size[:, None], axis, radius * size, slope, worst)
+
+
+def _stepped(state: Array, residual: Array, jacobian: Array, damping: Array) -> Array:
+    """Take a damped Gauss-Newton step; states are rows of centre, axis, radius and slope."""
+    transposed = jacobian.transpose(0, 2, 1)
+    normal = transposed @ jacobian
+    bulk = np.einsum("bii->bi", normal)
+    scaled = damping[:, None] * bulk + 1e-15 * (1.0 + bulk.max(axis=1, keepdims=True))
+    np.einsum("bii->bi", normal)[:] += scaled
+    step = np.linalg.solve(normal, -(transposed @ residual[..., None]))[..., 0].clip(-1.0, 1.0)
+    e1, e2 = _frames(state[:, 3:6])
+    new = state.copy()
+    new[:, :3] += step[:, :1] * e1 + step[:, 1:2] * e2
+    new[:, 3:6] += step[:, 2:3] * e1 + step[:, 3:4] * e2
+    new[:, 3:6] /= np.linalg.norm(new[:, 3:6], axis=1, keepdims=True)
+    new[:, 6 : 2 + step.shape[1]] += step[:, 4:]
+    return new
 
 
 def on_quadrics(points: Array, given: Flags, tolerance: float) -> Flags:
@@ -235,10 +249,9 @@ def _linear_start(
     return cx[:, None] * e1 + cy[:, None] * e2, radius, np.clip(slope, -10.0, 10.0)
 
 
-def _residuals(
-    local: Array, weight: Array, centre: Array, axis: Array, radius: Array, slope: Array
-) -> tuple[Array, Array]:
+def _residuals(local: Array, weight: Array, state: Array) -> tuple[Array, Array]:
     """Return distances (b, k) and their derivatives (b, k, 6) by centre, axis, radius, slope."""
+    centre, axis, radius, slope = state[:, :3], state[:, 3:6], state[:, 6], state[:, 7]
     e1, e2 = _frames(axis)
     d = local - centre[:, None]
     z = np.einsum("bkd,bd->bk", d, axis)
