@@ -170,8 +170,9 @@ def lines_of_strip(
     start, end_ = origin + begin[:, None] * along, origin + stop[:, None] * along
     angle = np.zeros(len(first))
     np.maximum.at(angle, group, np.abs(fold[which]))
-    width = np.stack([_widths(low, high, group, p, start, end_, count) for p in (start, end_)])
-    radius = width / np.maximum(angle, 1e-12)
+    outer = [flat[facet == f].reshape(-1, 2) for f in range(count)]
+    width = np.stack([_widths(low, high, group, p, start, end_, outer) for p in (start, end_)])
+    radius = width / (2 * np.sin(np.maximum(angle, 1e-12) / 2))
     up = np.zeros(len(first))
     np.add.at(up, group, fold[which])
     return tuple(
@@ -184,28 +185,35 @@ def lines_of_strip(
 
 
 def _widths(
-    low: Ints, high: Ints, group: Ints, at: Array, start: Array, end: Array, count: int
+    low: Ints, high: Ints, group: Ints, at: Array, start: Array, end: Array, outer: list[Array]
 ) -> Array:
-    """Mean distance of points on rulings to the lines of the rulings beside them."""
+    """Mean width of the two facets beside each ruling, at a point of it.
+
+    To the other ruling of the facet, or to its vertices where it has no other.
+    """
     first = np.unique(group, return_index=True)[1]
-    lines = np.arange(len(first))
     facets = np.stack([low[first], high[first]], axis=1)
-    a = np.concatenate([facets[:, 0], facets[:, 1]])
-    b = np.concatenate([lines, lines])
-    order = np.argsort(a, kind="stable")
-    a, b = a[order], b[order]
-    begin = np.searchsorted(a, facets)
-    size = np.searchsorted(a, facets, side="right") - begin
-    total, number = np.zeros(len(lines)), np.zeros(len(lines))
-    for side in (0, 1):
-        for offset in (0, 1):
-            known = size[:, side] > offset
-            other = b[np.minimum(begin[:, side] + offset, len(b) - 1)]
-            known &= other != lines
-            along = end[other] - start[other]
-            d = at - start[other]
-            far = np.abs(along[:, 0] * d[:, 1] - along[:, 1] * d[:, 0])
-            far /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)
-            total += np.where(known, far, 0.0)
-            number += known
-    return np.asarray(total / np.maximum(number, 1))
+    rulings: list[list[int]] = [[] for _ in outer]
+    for k, pair in enumerate(facets.tolist()):
+        for f in pair:
+            rulings[f].append(k)
+    width = np.zeros(len(first))
+    for k, pair in enumerate(facets.tolist()):
+        for f in pair:
+            others = [line for line in rulings[f] if line != k]
+            if others:
+                width[k] += min(_distance(at[k], start[j], end[j]) for j in others) / 2
+                continue
+            along = (end[k] - start[k]) / np.linalg.norm(end[k] - start[k])
+            d = outer[f] - at[k]
+            off = np.abs(d[:, 0] * along[1] - d[:, 1] * along[0])
+            far = off > _JOINED * max(float(off.max()), 1e-300)
+            nearest = np.abs(d[far] @ along).argmin()
+            width[k] += off[far][nearest] / 2
+    return width
+
+
+def _distance(point: Array, start: Array, end: Array) -> float:
+    """Distance of a point from the line through two others."""
+    along, d = end - start, point - start
+    return float(abs(along[0] * d[1] - along[1] * d[0]) / np.hypot(*along))

@@ -30,6 +30,8 @@ _POINTS, _FEWEST, _TOGETHER = 48, 8, 2000
 _PARTS = 100
 #: Seeds that are tried at most.
 _SEEDS = 40_000
+#: Length of a shared edge, relative to the longest of both facets.
+_LONG = 0.7
 #: Points that a fit to a whole region uses at most.
 _ENOUGH = 3000
 #: Rounds of fitting and growing.
@@ -74,15 +76,23 @@ def round_regions(graph: FacetGraph) -> list[Region]:
             free &= ~region.member
     for rings in (4, 8) if graph.allowed > graph.step else (2, 1):
         found += _from_seeds(graph, free, rings)
+    for rings in (2, 1):
+        found += _from_seeds(graph, free, rings, along=True)
     return found
 
 
-def _from_seeds(graph: FacetGraph, free: Flags, rings: int) -> list[Region]:
-    """Grow regions from facets and the rings around them; `free` is updated."""
+def _from_seeds(
+    graph: FacetGraph, free: Flags, rings: int, *, along: bool = False
+) -> list[Region]:
+    """Grow regions from facets and the rings around them; `free` is updated.
+
+    Neighbours in a ring share a vertex, or, with `along`, one of the longest edges.
+    """
     found = []
     table = graph.facet_vertices
     sizes = np.diff(table.indptr)
-    near = _neighbours(graph, free, sizes <= _POINTS // 2)
+    neighbours = _neighbours_along if along else _neighbours
+    near = neighbours(graph, free, sizes <= _POINTS // 2)
     order = np.random.default_rng(0).permutation(table.shape[0])
     open_facets = np.zeros(table.shape[0], bool)
     open_facets[graph.facet[free]] = True
@@ -119,6 +129,31 @@ def _neighbours(graph: FacetGraph, free: Flags, small: Flags) -> csr_matrix:
     n = graph.facet_normals
     alike = np.einsum("ed,ed->e", n[near.row], n[near.col]) > np.cos(2 * SMOOTH)
     return topology.edge_graph(table.shape[0], near.row[alike], near.col[alike])
+
+
+def _neighbours_along(graph: FacetGraph, free: Flags, small: Flags) -> csr_matrix:
+    """Which small facets that are free share an edge about as long as their longest.
+
+    Facets of a strip are joined across their rulings, and not with what is at their ends.
+    """
+    count = graph.facet_vertices.shape[0]
+    f = graph.facet[graph.pairs]
+    use = free[graph.pairs].all(axis=1) & small[f].all(axis=1) & (f[:, 0] != f[:, 1])
+    use &= np.abs(graph.folds) <= SMOOTH
+    a, b = f[use].T
+    ends = graph.points[graph.ends[use]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    shared = topology.edge_graph(
+        count,
+        np.concatenate([a, b, np.arange(count)]),
+        np.concatenate([b, a, np.arange(count)]),
+        np.concatenate([length, length, np.zeros(count)]),
+    )
+    longest = np.maximum(np.asarray(shared.max(axis=1).todense()).ravel(), 1e-300)
+    table = shared.tocoo()
+    strong = table.data >= _LONG * np.maximum(longest[table.row], longest[table.col])
+    strong |= table.row == table.col
+    return topology.edge_graph(count, table.row[strong], table.col[strong])
 
 
 def _promising(
@@ -243,13 +278,25 @@ def _members(graph: FacetGraph, surface: RoundSurface, inside: Flags, free: Flag
     toward = np.einsum("td,td->t", surface.normals(graph.middles), graph.normals)
     sign = np.sign((toward * graph.areas)[inside].sum())
     typical = np.quantile(spans[inside], 0.75)
-    fits = free & on[graph.triangles].all(axis=1) & (sign * toward >= np.cos(_TILTED))
-    fits &= spans <= min(_WIDER * typical, _WIDEST)
+    fits = free & on[graph.triangles].all(axis=1) & (spans <= min(_WIDER * typical, _WIDEST))
+    # A thin triangle of vertices on a curved surface may be tilted much, if it is no part of a
+    # plane that cuts the surface.
+    tilted = sign * toward < np.cos(_TILTED)
+    alone = np.bincount(graph.facet)[graph.facet] == 1
+    fits &= ~tilted | (alone & (sign * _turning_areas(surface, angle, height, graph) > 0))
     label = graph.connected(fits)
     seen = label[inside & fits]
     if not len(seen):
         return np.zeros_like(free)
     return np.asarray(label == np.bincount(seen).argmax())
+
+
+def _turning_areas(surface: RoundSurface, angle: Array, height: Array, graph: FacetGraph) -> Array:
+    """Return areas of triangles by angle and height, positive seen from outside, (t,)."""
+    a, h = angle[graph.triangles], height[graph.triangles]
+    turn = a - a[:, :1]
+    turn -= 2 * np.pi * np.round(turn / (2 * np.pi))
+    return np.asarray(turn[:, 1] * (h[:, 2] - h[:, 0]) - turn[:, 2] * (h[:, 1] - h[:, 0]))
 
 
 def triangle_spans(surface: RoundSurface, angle: Array, rho: Array, triangles: Ints) -> Array:
