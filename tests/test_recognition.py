@@ -484,11 +484,8 @@ def test_cylinder_that_ends_in_a_sphere():
     level = np.linspace(-1.0, 0.0, 5)
     lift = np.linspace(0, 1.2, 11)[1:]
     rows = [np.stack([np.cos(turn), np.sin(turn), np.full_like(turn, z)], axis=1) for z in level]
-    rows += [
-        np.stack([np.cos(v) * np.cos(turn), np.cos(v) * np.sin(turn), np.full_like(turn, np.sin(v))],
-                 axis=1)
-        for v in lift
-    ]  # fmt: skip
+    ring = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
+    rows += [np.cos(v) * ring + np.array([0, 0, np.sin(v)]) for v in lift]
     shape = recognition.recognise(np.stack(rows) * 40)
     assert sorted(face.kind for face in shape.faces) == ["cylinder", "free"]
     cylinder = next(face for face in shape.faces if face.kind == "cylinder")

@@ -14,6 +14,7 @@ from gso.recognition.flat_and_torsal import Patch, other_patches
 from gso.recognition.flat_images import Part, developed, plane_image, round_image
 from gso.recognition.region_growing import Region, round_regions
 from gso.recognition.shape_face import Recognised, ShapeFace
+from gso.recognition.smooth_torsal import smooth_image
 from gso.typing import Array, Flags, Ints, MeshLike
 
 
@@ -115,7 +116,12 @@ def _round_face(graph: FacetGraph, region: Region, step: float | None) -> ShapeF
 def _other_face(graph: FacetGraph, patch: Patch, limit: float) -> ShapeFace:
     ids = patch.triangles
     if patch.kind == "free":
-        return ShapeFace("free", ids)
+        smooth = smooth_image(graph.points, graph.triangles[ids], limit)
+        if smooth is None:
+            return ShapeFace("free", ids)
+        return ShapeFace(
+            "torsal", ids, smooth.flat, strain=smooth.strain, bend_lines=smooth.bend_lines
+        )
     part = Part.of(graph.points, graph.triangles[ids])
     if patch.kind == "plane":
         return _plane(graph, part, ids)

@@ -81,9 +81,7 @@ def round_regions(graph: FacetGraph) -> list[Region]:
     return found
 
 
-def _from_seeds(
-    graph: FacetGraph, free: Flags, rings: int, *, along: bool = False
-) -> list[Region]:
+def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = False) -> list[Region]:
     """Grow regions from facets and the rings around them; `free` is updated.
 
     Neighbours in a ring share a vertex, or, with `along`, one of the longest edges.

@@ -113,7 +113,9 @@ class Fits:
         )
 
 
-def fit_round(points: Array, given: Flags, axis: Array, *, conical: bool, goal: float = 0.0) -> Fits:
+def fit_round(
+    points: Array, given: Flags, axis: Array, *, conical: bool, goal: float = 0.0
+) -> Fits:
     """Fit cylinders or cones to sets of points by least squares of distances.
 
     A linear fit with the given axes is the start of damped Gauss-Newton steps, of all sets at
