@@ -29,7 +29,9 @@ _POINTS, _FEWEST, _TOGETHER = 48, 8, 2000
 #: Largest smooth parts that are tried as a whole.
 _PARTS = 100
 #: Seeds that are tried at most.
-_SEEDS = 40_000
+_SEEDS = 20_000
+#: Share of a seed region that its surface must hold.
+_KEPT = 0.3
 #: Length of a shared edge, relative to the longest of both facets.
 _LONG = 0.7
 #: Points that a fit to a whole region uses at most.
@@ -94,6 +96,9 @@ def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = Fal
     order = np.random.default_rng(0).permutation(table.shape[0])
     open_facets = np.zeros(table.shape[0], bool)
     open_facets[graph.facet[free]] = True
+    if along:
+        # A single triangle has no direction.
+        open_facets &= np.bincount(graph.facet) > 1
     order = order[open_facets[order] & (sizes[order] <= _POINTS // 2)][:_SEEDS]
     tried = np.zeros(table.shape[0], bool)
     first = np.zeros(table.shape[0], np.int64)
@@ -232,6 +237,8 @@ def _grown(graph: FacetGraph, seed: Flags, free: Flags, *, conical: bool) -> Reg
         new = _members(graph, surface, member, free)
         if (new == member).all():
             break
+        if (new & seed).sum() < _KEPT * seed.sum():
+            return None
         member = new
     return None if surface is None or not member.any() else Region(surface, member)
 
@@ -280,8 +287,10 @@ def _members(graph: FacetGraph, surface: RoundSurface, inside: Flags, free: Flag
     # A thin triangle of vertices on a curved surface may be tilted much, if it is no part of a
     # plane that cuts the surface.
     tilted = sign * toward < np.cos(_TILTED)
-    alone = np.bincount(graph.facet)[graph.facet] == 1
-    fits &= ~tilted | (alone & (sign * _turning_areas(surface, angle, height, graph) > 0))
+    area = sign * _turning_areas(surface, angle, height, graph)
+    thin = tilted & fits & (area > 1e-9 * np.abs(area).max())
+    cut = np.bincount(graph.facet, tilted & ~thin) > 0
+    fits &= ~tilted | (thin & ~cut[graph.facet])
     label = graph.connected(fits)
     seen = label[inside & fits]
     if not len(seen):
