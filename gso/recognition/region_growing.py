@@ -1,0 +1,378 @@
+"""Growth of cylinders and cones over a mesh, from fits to small regions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gso.mesh import topology
+from gso.recognition.facet_graph import FacetGraph
+from gso.recognition.round_surface import RoundSurface, fit_round, on_quadrics
+from gso.typing import Array, Flags, Ints
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+#: Fold, in radians, up to which a mesh can be a smooth surface: a tube of 12 sides has 30 degrees.
+SMOOTH = np.radians(30.5)
+#: Angle around the axis that one triangle can span, and its multiple of the upper quartile.
+_WIDEST, _WIDER = np.radians(62.0), 3.0
+#: Facets around the axis from which on they are a smooth surface.
+_SEVERAL = 2.5
+#: Angle between the normals of a triangle and of the surface, in radians.
+_TILTED = np.radians(35.0)
+#: Points of a seed region, their least number for a cylinder (a cone needs one more), and seeds
+#: that are fitted together.
+_POINTS, _FEWEST, _TOGETHER = 48, 8, 2000
+#: Largest smooth parts that are tried as a whole.
+_PARTS = 100
+#: Seeds that are tried at most.
+_SEEDS = 20_000
+#: Share of a seed region that its surface must hold.
+_KEPT = 0.3
+#: Length of a shared edge, relative to the longest of both facets.
+_LONG = 0.7
+#: Points that a fit to a whole region uses at most.
+_ENOUGH = 3000
+#: Rounds of fitting and growing.
+_ROUNDS = 8
+#: Share of triangles by which a cone must exceed a cylinder to be one.
+_MORE = 1.02
+#: Share of a region's vertices that are inside of it where several rows of facets are.
+_INSIDE = 0.1
+
+
+@dataclass(frozen=True)
+class Region:
+    """Triangles on one round surface.
+
+    Attributes
+    ----------
+    surface : RoundSurface
+    member : ndarray of bool, (t,)
+    """
+
+    surface: RoundSurface
+    member: Flags
+
+
+def round_regions(graph: FacetGraph) -> list[Region]:
+    """Find all cylinders and cones of a mesh; regions do not overlap.
+
+    Whole smooth parts of the mesh are tried first, then the surroundings of every facet.
+    """
+    free = np.ones(len(graph.triangles), bool)
+    found: list[Region] = []
+    smooth = np.abs(graph.folds) <= SMOOTH
+    label = graph.connected(free, smooth)
+    count = np.bincount(label)
+    for part in np.argsort(-count, kind="stable")[:_PARTS]:
+        if count[part] < 3:
+            break
+        whole = label == part
+        region = _best(graph, whole, free, np.zeros(0, bool))
+        if region is not None:
+            found.append(region)
+            free &= ~region.member
+    for rings in (4, 8) if graph.allowed > graph.step else (2, 1):
+        found += _from_seeds(graph, free, rings)
+    for rings in (2, 1):
+        found += _from_seeds(graph, free, rings, along=True)
+    return found
+
+
+def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = False) -> list[Region]:
+    """Grow regions from facets and the rings around them; `free` is updated.
+
+    Neighbours in a ring share a vertex, or, with `along`, one of the longest edges.
+    """
+    found = []
+    table = graph.facet_vertices
+    sizes = np.diff(table.indptr)
+    neighbours = _neighbours_along if along else _neighbours
+    near = neighbours(graph, free, sizes <= _POINTS // 2)
+    order = np.random.default_rng(0).permutation(table.shape[0])
+    open_facets = np.zeros(table.shape[0], bool)
+    open_facets[graph.facet[free]] = True
+    if along:
+        # A single triangle has no direction.
+        open_facets &= np.bincount(graph.facet) > 1
+    order = order[open_facets[order] & (sizes[order] <= _POINTS // 2)][:_SEEDS]
+    tried = np.zeros(table.shape[0], bool)
+    first = np.zeros(table.shape[0], np.int64)
+    first[graph.facet[::-1]] = np.arange(len(graph.facet))[::-1]
+    for start in range(0, len(order), _TOGETHER):
+        chunk = order[start : start + _TOGETHER]
+        chunk = chunk[free[first[chunk]]]
+        if not len(chunk):
+            continue
+        good, around = _promising(graph, near, chunk, rings)
+        for k in good:
+            if not free[first[chunk[k]]] or tried[chunk[k]]:
+                continue
+            facets = around.indices[around.indptr[k] : around.indptr[k + 1]]
+            seed = free & np.isin(graph.facet, facets)
+            region = _best(graph, seed, free, tried)
+            if region is not None:
+                found.append(region)
+                free &= ~region.member
+    return found
+
+
+def _neighbours(graph: FacetGraph, free: Flags, small: Flags) -> csr_matrix:
+    """Which small facets that are free share a vertex and are not folded sharply."""
+    table = graph.facet_vertices
+    is_open = np.zeros(table.shape[0], bool)
+    is_open[graph.facet[free]] = True
+    keep = (small & is_open).astype(float)
+    part = table.multiply(keep[:, None]).tocsr()
+    near = (part @ part.T).tocoo()
+    n = graph.facet_normals
+    alike = np.einsum("ed,ed->e", n[near.row], n[near.col]) > np.cos(2 * SMOOTH)
+    return topology.edge_graph(table.shape[0], near.row[alike], near.col[alike])
+
+
+def _neighbours_along(graph: FacetGraph, free: Flags, small: Flags) -> csr_matrix:
+    """Which small facets that are free share an edge about as long as their longest.
+
+    Facets of a strip are joined across their rulings, and not with what is at their ends.
+    """
+    count = graph.facet_vertices.shape[0]
+    f = graph.facet[graph.pairs]
+    use = free[graph.pairs].all(axis=1) & small[f].all(axis=1) & (f[:, 0] != f[:, 1])
+    use &= np.abs(graph.folds) <= SMOOTH
+    a, b = f[use].T
+    ends = graph.points[graph.ends[use]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    shared = topology.edge_graph(
+        count,
+        np.concatenate([a, b, np.arange(count)]),
+        np.concatenate([b, a, np.arange(count)]),
+        np.concatenate([length, length, np.zeros(count)]),
+    )
+    longest = np.maximum(np.asarray(shared.max(axis=1).todense()).ravel(), 1e-300)
+    table = shared.tocoo()
+    strong = table.data >= _LONG * np.maximum(longest[table.row], longest[table.col])
+    strong |= table.row == table.col
+    return topology.edge_graph(count, table.row[strong], table.col[strong])
+
+
+def _promising(
+    graph: FacetGraph, near: csr_matrix, chunk: Ints, rings: int
+) -> tuple[Ints, csr_matrix]:
+    """Return seeds whose surroundings fit a cylinder or cone, best first, and their facets."""
+    around = near[chunk]
+    for _ in range(rings - 1):
+        around = around @ near
+        around.data[:] = 1.0
+    around.sort_indices()
+    vertices = (around @ graph.facet_vertices).tocsr()
+    ids, given = _padded(vertices)
+    points = graph.points[ids]
+    n = graph.facet_normals
+    one = np.asarray(around.sum(axis=1)).ravel()
+    mean = around @ n / np.maximum(one, 1)[:, None]
+    products = (around @ (n[:, :, None] * n[:, None, :]).reshape(-1, 9)).reshape(-1, 3, 3)
+    products /= np.maximum(one, 1)[:, None, None]
+    spread, axes = np.linalg.eigh(products)
+    _, cone_axes = np.linalg.eigh(products - mean[:, :, None] * mean[:, None, :])
+    enough = (given.sum(axis=1) >= _FEWEST) & (one >= 3) & (spread[:, 1] > 1e-7)
+    more = given.sum(axis=1) > _FEWEST
+    worst = np.full(len(chunk), np.inf)
+    ready = np.flatnonzero(enough)
+    ready = ready[on_quadrics(points[ready], given[ready], graph.tolerance)]
+    if not len(ready):
+        return ready, around
+    for conical, axis in ((False, axes), (True, cone_axes)):
+        ready = ready[more[ready] & (worst[ready] > graph.tolerance)] if conical else ready
+        fits = fit_round(
+            points[ready], given[ready], axis[ready, :, 0], conical=conical, goal=graph.tolerance
+        )
+        worst[ready] = np.minimum(worst[ready], fits.worst)
+    order = np.argsort(worst, kind="stable")
+    return order[worst[order] <= graph.tolerance], around
+
+
+def _padded(table: csr_matrix) -> tuple[Ints, Flags]:
+    """Return up to _POINTS evenly chosen columns of each row of a matrix, and which are given."""
+    length = np.diff(table.indptr)
+    kept = np.minimum(length, _POINTS)
+    step = np.arange(_POINTS)
+    given = step < kept[:, None]
+    place = np.where(given, step * length[:, None] // np.maximum(kept, 1)[:, None], 0)
+    ids = table.indices[np.minimum(table.indptr[:-1, None] + place, len(table.indices) - 1)]
+    return ids, given
+
+
+def _best(graph: FacetGraph, seed: Flags, free: Flags, tried: Flags) -> Region | None:
+    """Grow a cylinder and a cone from a seed region, and return the better one, if any is good.
+
+    Otherwise the facets that were reached are marked as tried.
+    """
+    best, most = None, 0.0
+    reached = []
+    for conical in (False, True):
+        region = _grown(graph, seed, free, conical=conical)
+        if region is None:
+            continue
+        reached.append(region.member)
+        area = float(graph.areas[region.member].sum())
+        if area > _MORE * most and _is_smooth(graph, region.surface, region.member, free):
+            best, most = region, area
+    if best is None and len(tried):
+        for member in reached:
+            tried[graph.facet[member]] = True
+    return best
+
+
+def _grown(graph: FacetGraph, seed: Flags, free: Flags, *, conical: bool) -> Region | None:
+    """Fit a surface and add the triangles on it, until none is added."""
+    member, surface = seed, None
+    for _ in range(_ROUNDS):
+        surface = _fitted(graph, member, surface, conical)
+        if surface is None:
+            return None
+        new = _members(graph, surface, member, free)
+        if (new == member).all():
+            break
+        if (new & seed).sum() < _KEPT * seed.sum():
+            return None
+        member = new
+    return None if surface is None or not member.any() else Region(surface, member)
+
+
+def _fitted(
+    graph: FacetGraph, member: Flags, before: RoundSurface | None, conical: bool
+) -> RoundSurface | None:
+    """Fit a surface to the vertices of a region; None where they lie far from any."""
+    ids = np.unique(graph.triangles[member])
+    if len(ids) < _FEWEST + conical:
+        return None
+    ids = ids[np.linspace(0, len(ids) - 1, min(len(ids), _ENOUGH)).round().astype(int)]
+    points = graph.points[ids]
+    starts = [] if before is None else [before.axis]
+    if before is None:
+        n, w = graph.normals[member], graph.areas[member]
+        w = w / w.sum()
+        mean = w @ n
+        products = np.einsum("t,ti,tj->ij", w, n, n)
+        starts.append(np.linalg.eigh(products)[1][:, 0])
+        if conical:
+            starts.append(np.linalg.eigh(products - np.outer(mean, mean))[1][:, 0])
+    count = len(starts)
+    sets = np.broadcast_to(points, (count, *points.shape))
+    goal, given = _LOOSE * graph.tolerance, np.ones(sets.shape[:2], bool)
+    fits = fit_round(sets, given, np.stack(starts), conical=conical, goal=goal)
+    best = int(np.argmin(fits.worst))
+    extent = np.linalg.norm(np.ptp(points, axis=0))
+    if not fits.worst[best] <= goal or fits.radius[best] > _HUGE * extent:
+        return None
+    return fits.surface(best)
+
+
+def _members(graph: FacetGraph, surface: RoundSurface, inside: Flags, free: Flags) -> Flags:
+    """Free triangles on a surface that are connected to a region, or to most of it."""
+    angle, rho, height = surface.coordinates(graph.points)
+    radius = surface.radius + surface.slope * height
+    on = np.abs(rho - radius) * np.cos(surface.half_angle) <= graph.tolerance
+    if surface.slope:
+        on &= radius >= -2 * graph.tolerance
+    spans = triangle_spans(surface, angle, rho, graph.triangles)
+    toward = np.einsum("td,td->t", surface.normals(graph.middles), graph.normals)
+    sign = np.sign((toward * graph.areas)[inside].sum())
+    typical = np.quantile(spans[inside], 0.75)
+    fits = free & on[graph.triangles].all(axis=1) & (spans <= min(_WIDER * typical, _WIDEST))
+    # A thin triangle of vertices on a curved surface may be tilted much, if it is no part of a
+    # plane that cuts the surface.
+    tilted = sign * toward < np.cos(_TILTED)
+    area = sign * _turning_areas(surface, angle, height, graph)
+    thin = tilted & fits & (area > 1e-9 * np.abs(area).max())
+    cut = np.bincount(graph.facet, tilted & ~thin) > 0
+    fits &= ~tilted | (thin & ~cut[graph.facet])
+    label = graph.connected(fits)
+    seen = label[inside & fits]
+    if not len(seen):
+        return np.zeros_like(free)
+    return np.asarray(label == np.bincount(seen).argmax())
+
+
+def _turning_areas(surface: RoundSurface, angle: Array, height: Array, graph: FacetGraph) -> Array:
+    """Return areas of triangles by angle and height, positive seen from outside, (t,)."""
+    a, h = angle[graph.triangles], height[graph.triangles]
+    turn = a - a[:, :1]
+    turn -= 2 * np.pi * np.round(turn / (2 * np.pi))
+    return np.asarray(turn[:, 1] * (h[:, 2] - h[:, 0]) - turn[:, 2] * (h[:, 1] - h[:, 0]))
+
+
+def triangle_spans(surface: RoundSurface, angle: Array, rho: Array, triangles: Ints) -> Array:
+    """Return the angles around the axis that triangles span; a corner at the apex has none."""
+    turn = np.diff(angle[triangles], axis=1, append=angle[triangles[:, :1]])
+    turn = np.abs(turn - 2 * np.pi * np.round(turn / (2 * np.pi)))
+    far = rho > _APEX * max(float(rho.max()), 1e-300)
+    known = far[triangles] & far[np.roll(triangles, -1, axis=1)]
+    return np.asarray(np.where(known, turn, 0.0).max(axis=1))
+
+
+def _is_smooth(graph: FacetGraph, surface: RoundSurface, member: Flags, free: Flags) -> bool:
+    """Whether a region is a smooth surface and no polyhedron, nor a row of a free surface."""
+    triangles = graph.triangles[member]
+    if len(np.unique(graph.facet[member])) < 3:
+        return False
+    ids = np.unique(triangles)
+    angle, rho, _ = surface.coordinates(graph.points)
+    spans = triangle_spans(surface, angle, rho, triangles)
+    typical = float(np.quantile(spans, 0.75))
+    far = ids[rho[ids] > _APEX * rho[ids].max()]
+    around = np.sort(angle[far])
+    gaps = np.diff(around, append=around[:1] + 2 * np.pi)
+    covered = 2 * np.pi - gaps.max() if gaps.max() > 2 * typical else 2 * np.pi
+    if typical > SMOOTH or covered < _SEVERAL * typical:
+        return False
+    if float(np.abs(surface.distances(graph.points[ids])).max()) > graph.tolerance:
+        return False
+    # A plane within the tolerance is a plane.
+    around_mean = graph.points[ids] - graph.points[ids].mean(axis=0)
+    direction = np.linalg.eigh(around_mean.T @ around_mean)[1][:, 0]
+    if np.ptp(around_mean @ direction) <= 4 * graph.tolerance:
+        return False
+    return _has_straight_rulings(graph, surface, member, free, ids)
+
+
+def _has_straight_rulings(
+    graph: FacetGraph, surface: RoundSurface, member: Flags, free: Flags, ids: Ints
+) -> bool:
+    """Whether the rulings are proved straight, by points inside, or end at edges or sharp folds.
+
+    One row of facets of a sphere lies on a cone, too.
+    """
+    one, two = member[graph.pairs].T
+    inside = np.zeros(len(graph.points), bool)
+    inside[ids] = True
+    border = one != two
+    inside[graph.ends[border]] = False
+    inside[graph.half_edges.origin[_open_edges(graph)]] = False
+    inside[graph.half_edges.dest[_open_edges(graph)]] = False
+    if inside.sum() > _INSIDE * len(ids):
+        return True
+    a, b = graph.points[graph.ends[border]].transpose(1, 0, 2)
+    along = b - a
+    length = np.linalg.norm(along, axis=1)
+    cosine = np.abs(np.einsum("ed,ed->e", along, surface.rulings((a + b) / 2)))
+    across = cosine < np.cos(_TILTED) * length
+    fold = np.abs(graph.folds[border])
+    smooth = across & (fold <= SMOOTH) & free[graph.pairs[border]].all(axis=1)
+    return bool(length[smooth].sum() <= _INSIDE * max(length[across].sum(), 1e-300))
+
+
+def _open_edges(graph: FacetGraph) -> Flags:
+    return np.asarray(graph.half_edges.twin < 0)
+
+
+#: Distance from the axis, relative to the largest, below which a point is the apex.
+_APEX = 1e-4
+#: Radius relative to a region's size above which it is flat.
+_HUGE = 1e4
+#: Multiple of the tolerance up to which a seed region may lie off its surface.
+_LOOSE = 4.0
