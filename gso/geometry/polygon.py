@@ -62,3 +62,25 @@ def arc_lengths(line: Array) -> Array:
     """
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     return np.asarray(np.r_[0.0, np.cumsum(steps)])
+
+
+def rectangle(flat: Array) -> tuple[float, tuple[float, float]]:
+    """Return the smallest rectangle about points (n, 2): its angle, its length and its width.
+
+    One side of it lies on the convex hull.
+
+    >>> angle, size = rectangle(np.array([[0.0, 0], [3, 3], [2, 4], [-1, 1]]))
+    >>> round(float(np.degrees(angle))), [round(x, 6) for x in size]
+    (45, [4.242641, 1.414214])
+    """
+    from scipy.spatial import ConvexHull
+
+    hull = flat[ConvexHull(flat).vertices]
+    side = np.roll(hull, -1, axis=0) - hull
+    angle = np.arctan2(side[:, 1], side[:, 0])
+    turn = np.exp(-1j * angle)[:, None] * (hull @ np.array([1.0, 1j]))[None]
+    wide, high = np.ptp(turn.real, axis=1), np.ptp(turn.imag, axis=1)
+    k = int((wide * high).argmin())
+    if wide[k] >= high[k]:
+        return float(angle[k]), (float(wide[k]), float(high[k]))
+    return float(angle[k] + 0.5 * np.pi), (float(high[k]), float(wide[k]))

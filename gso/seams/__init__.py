@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from gso.seams.disks import opening
     from gso.seams.search import pieces
     from gso.seams.segmentation import Segmentation
-    from gso.seams.sheets import Sheet, rectangle
+    from gso.seams.sheets import Sheet
 
 __all__ = [
     "Creases",
@@ -36,7 +36,6 @@ __all__ = [
     "cut",
     "opening",
     "pieces",
-    "rectangle",
 ]
 
 # These import SciPy.
@@ -46,6 +45,6 @@ __getattr__, __dir__ = at_first_use(
         "disks": "opening",
         "search": "pieces",
         "segmentation": "Segmentation",
-        "sheets": "Sheet rectangle",
+        "sheets": "Sheet",
     },
 )

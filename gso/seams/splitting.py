@@ -8,7 +8,8 @@ from scipy.sparse.csgraph import dijkstra
 from gso.mesh import between
 from gso.mesh.separation import spans
 from gso.mesh.topology import edge_graph
-from gso.seams.sheets import Sheet, rectangle
+from gso.geometry.polygon import rectangle
+from gso.seams.sheets import Sheet
 from gso.typing import Array, Ints
 
 #: Radius of the two parts that an overlap is cut between, relative to their distance.

@@ -9,7 +9,7 @@ from gso.errors import MeshError
 from gso.geometry.polygon import mean_width
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.seams.sheets import rectangle
+from gso.geometry.polygon import rectangle
 from gso.typing import Json
 from gso.verdict import Code, Measurement, Reason, compare, merge
 from gso.workshop.fabrication_settings import FabricationSettings

@@ -245,7 +245,7 @@ def _angles(rotations: Rotations) -> tuple[float, ...] | None:
 
 def _rectangles(items: Sequence[_Item], room: tuple[float, float], spacing: float) -> Sheets:
     """Pack bounding rectangles in several orders, and return the best."""
-    from gso.seams.sheets import rectangle
+    from gso.geometry.polygon import rectangle
 
     copies: list[tuple[int, list[float]]] = []
     sizes = []

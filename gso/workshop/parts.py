@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from gso.geometry.polygon import anticlockwise, arc_lengths
 from gso.pattern import Bend
-from gso.seams.sheets import rectangle
+from gso.geometry.polygon import rectangle
 from gso.typing import Array
 from gso.verdict import Reason
 from gso.workshop.finish import Finish

@@ -23,7 +23,8 @@ from gso.ruled.paneling.options import MOST, Options
 from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import case_of, check_whole, of_surface
-from gso.seams import Edges, Segmentation, cut, rectangle
+from gso.geometry.polygon import rectangle
+from gso.seams import Edges, Segmentation, cut
 from gso.seams.options import as_sheet
 from gso.solver import Callback
 from gso.status import Status
