@@ -10,8 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from gso.mesh import Mesh
+from gso.mesh.topology import label_components
 from gso.typing import Array, Ints
 
+#: Angle in radians up to which edges are in line, and bends equal.
+_STRAIGHT = 1e-6
 #: Names of the arrays in files.
 _ARRAYS = ("flat", "faces", "vertex", "seams")
 
@@ -64,9 +67,42 @@ class Folded(NamedTuple):
     radii: Array = np.empty(0)
 
     def lines(self, flat: Array) -> list[Bend]:
-        """Return them as lines, for positions (p, 2) of the pattern's vertices."""
-        every = zip(flat[self.edges], self.angles.tolist(), self.radii.tolist(), strict=True)
-        return [Bend(line, angle, radius) for line, angle, radius in every]
+        """Return them as lines, for positions (p, 2) of the pattern's vertices.
+
+        Edges that continue each other with the same angle are one line, with the smallest radius.
+        """
+        if not len(self.edges):
+            return []
+        chain = self._chains(flat)
+        out = []
+        for own in np.split(order := np.argsort(chain, kind="stable"), _starts(chain[order])):
+            ends = flat[self.edges[own]].reshape(-1, 2)
+            along = (ends - ends[0]) @ (ends[1] - ends[0])
+            line = ends[[int(along.argmin()), int(along.argmax())]]
+            out.append(Bend(line, float(self.angles[own[0]]), float(self.radii[own].min())))
+        return out
+
+    def _chains(self, flat: Array) -> Ints:
+        """Name edges by the line that they are on, in the order of their first edges."""
+        count = len(self.edges)
+        ends = self.edges.ravel()
+        order = np.argsort(ends, kind="stable")
+        often = np.bincount(ends)
+        two = np.flatnonzero(often[ends[order]] == 2)[::2]
+        one, other = order[two] // 2, order[two + 1] // 2
+        a, b = (flat[self.edges[k]] for k in (one, other))
+        way, to = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0]
+        long = np.linalg.norm(way, axis=1) * np.linalg.norm(to, axis=1)
+        straight = np.abs(way[:, 0] * to[:, 1] - way[:, 1] * to[:, 0]) <= _STRAIGHT * long
+        same = np.abs(self.angles[one] - self.angles[other]) <= _STRAIGHT
+        linked = straight & same & (one != other)
+        names = label_components(count, one[linked], other[linked])
+        _, first, label = np.unique(names, return_index=True, return_inverse=True)
+        return np.argsort(np.argsort(first))[label.ravel()]
+
+
+def _starts(sorted_names: Ints) -> Ints:
+    return np.flatnonzero(np.diff(sorted_names)) + 1
 
 
 @dataclass(frozen=True)

@@ -62,14 +62,30 @@ def divided(mesh: Mesh, edges: Ints, shares: Array) -> tuple[Mesh, Ints]:
     """
     if not len(edges):
         return mesh, np.empty((0, 2), np.int64)
-    v, f = mesh.vertices, mesh.faces[:, :3]
-    n = len(v)
+    v = mesh.vertices
+    points = v[edges[:, 0]] + shares[:, None] * (v[edges[:, 1]] - v[edges[:, 0]])
+    faces, owner = subdivided(mesh.faces[:, :3], len(v), edges)
+    said = mesh.attributes
+    if said is not None:
+        said = replace(said, texture=None, texture_corners=None).taken(owner)
+    return Mesh(np.concatenate([v, points]), faces, attributes=said), edges
+
+
+def subdivided(f: Ints, n: int, edges: Ints) -> tuple[Ints, Ints]:
+    """Divide triangles (t, 3) of n vertices by a new vertex on each of some edges (k, 2).
+
+    Returns
+    -------
+    faces : ndarray of int, (u, 3)
+        Vertex n + i is that of edge i. The parts of a triangle are in its place.
+    owner : ndarray of int, (u,)
+        The triangle that each is a part of.
+    """
     key = edge_keys(edges[:, 0], edges[:, 1], n)
     order = np.argsort(key)
     sides = edge_keys(f, np.roll(f, -1, axis=1), n)
     place = np.minimum(np.searchsorted(key[order], sides), len(key) - 1)
     crossed = key[order][place] == sides
-    points = v[edges[:, 0]] + shares[:, None] * (v[edges[:, 1]] - v[edges[:, 0]])
     middle = np.where(crossed, n + order[place], -1)
     count = crossed.sum(axis=1)
     new, parent = [f[count == 0]], [np.flatnonzero(count == 0)]
@@ -98,10 +114,7 @@ def divided(mesh: Mesh, edges: Ints, shares: Array) -> tuple[Mesh, Ints]:
         parent += [rows] * 4
     faces, owner = np.concatenate(new), np.concatenate(parent)
     rank = np.argsort(owner, kind="stable")
-    said = mesh.attributes
-    if said is not None:
-        said = replace(said, texture=None, texture_corners=None).taken(owner[rank])
-    return Mesh(np.concatenate([v, points]), faces[rank], attributes=said), edges
+    return faces[rank], owner[rank]
 
 
 def followed(seam: Ints, inserted: Ints, count: int) -> Ints:

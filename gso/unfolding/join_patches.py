@@ -144,9 +144,7 @@ def _marked(edges: DualEdges, given: ArrayLike, count: int, name: str, triangles
     return np.isin(edge_keys(edges.ends[:, 0], edges.ends[:, 1], count), keys)
 
 
-def _planes(
-    points: Array, triangles: Ints, edges: DualEdges, smooth: Flags
-) -> tuple[Ints, Array]:
+def _planes(points: Array, triangles: Ints, edges: DualEdges, smooth: Flags) -> tuple[Ints, Array]:
     """Return the patches of triangles in common planes, and their flat corners.
 
     Triangles that are not exactly in one plane are patches of their own: they are turned into a
@@ -217,7 +215,9 @@ def _first(
         return patch, corners
     one, other = edges.corners()
     area = np.bincount(patch, _areas(corners))
-    links = Links(patch, pair[every], one[every], other[every], size[every], area / area.sum(), sheet)
+    links = Links(
+        patch, pair[every], one[every], other[every], size[every], area / area.sum(), sheet
+    )
     layout = Layout.apart(links, corners)
     for number in range(len(every)):
         a, b = layout.part[links.patches[number]]
@@ -281,9 +281,7 @@ def _linked(
     pair = patch[edges.triangles]
     one, other = edges.corners()
     pair = np.where(turned[:, None], pair[:, ::-1], pair)
-    one, other = (
-        np.where(turned[:, None], x, y) for x, y in ((other, one), (one, other))
-    )
+    one, other = (np.where(turned[:, None], x, y) for x, y in ((other, one), (one, other)))
     reached = np.r_[pair.ravel(), np.arange(int(patch.max()) + 1)]
     names, first = np.unique(reached, return_index=True)
     rank = np.empty(len(names), np.int64)
@@ -310,8 +308,10 @@ def _hinges(
         while len(left) > 1:
             k, left = left[0], left[1:]
             same = pair[left, 0] == pair[k, 0]
-            a, b = (np.where(same[:, None], x, y) for x, y in ((one[left], other[left]),
-                                                               (other[left], one[left])))
+            a, b = (
+                np.where(same[:, None], x, y)
+                for x, y in ((one[left], other[left]), (other[left], one[left]))
+            )
             turn = np.diff(one[k])[0] / np.diff(other[k])[0]
             turn /= abs(turn)
             shift = one[k].mean() - turn * other[k].mean()

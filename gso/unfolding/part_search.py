@@ -60,9 +60,7 @@ def searched(start: Layout, seed: int, effort: float) -> Layout:
         other = merged(start.copy(), edges[np.argsort(-links.weights[edges] * noise)])
         best = min(best, other, key=_value)
     if best.number > least:
-        best = _Search(best, random).run(
-            least, int(effort * (800 + 2 * links.count))
-        )
+        best = _Search(best, random).run(least, int(effort * (800 + 2 * links.count)))
     return _shortened(best)
 
 

@@ -10,7 +10,8 @@ import numpy as np
 from scipy.spatial import cKDTree as Points
 
 from gso import parametrization
-from gso.errors import ConvergenceWarning, GSOError, MeshError
+from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
+from gso.folded_pattern import folded_pattern
 from gso.io.raw_surface import welded
 from gso.mesh import Mesh
 from gso.ruled.paneling.lay_strips import lay_strips
@@ -54,6 +55,9 @@ def made(
     def named(said: str) -> None:
         say(f"{given.name}: {said}")
 
+    exact = _exact(given, settings)
+    if exact is not None and not exact.reasons:
+        return exact
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         if settings.formulation == RULED:
@@ -71,6 +75,36 @@ def _welded(given: Design) -> Design:
         return given
     ids = Points(joined.vertices).query(mesh.vertices[given.kept])[1]
     return replace(given, mesh=joined, kept=ids[ids[:, 0] != ids[:, 1]])
+
+
+def _exact(given: Design, settings: FabricationSettings) -> Made | None:
+    """Unfold a design that is flat or developable as it is; None if it is not."""
+    try:
+        found = folded_pattern(
+            given.mesh, max_strain=settings.strain, cut=given.kept, sheet=settings.max_size
+        )
+    except OptionError:
+        # A face is larger than the sheet.
+        return None
+    if found is None:
+        return None
+    record = measurements.of_pattern(
+        given.mesh,
+        found.surface,
+        found.pattern,
+        settings,
+        settings.distance(given.mesh.diagonal),
+    )
+    # By the equations of the faces: chords of the mesh are shorter than the arcs of the pattern.
+    record |= {
+        "pieces": found.parts,
+        "deviation_mean": 0.0,
+        "deviation_max": 0.0,
+        "strain_max": found.strain,
+        "strain_p99": found.strain,
+    }
+    one = of_surface(given.name, found.surface, found.pattern, record, found.folded)
+    return _checked(_bent(one), settings)
 
 
 def _strips(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
