@@ -13,7 +13,7 @@ from gso.pattern import Folded, Pattern
 from gso.quantities import Length, Strain
 from gso.recognition import BendLine, Recognised, ShapeFace, recognise
 from gso.seams.slicing import subdivided
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 from gso.unfolding.dual_edges import dual_edges
 from gso.unfolding.join_patches import Joined, join_patches
 
@@ -25,6 +25,8 @@ _FOLD, _TANGENT = np.radians(0.05), np.radians(1.0)
 #: Number of triangles up to which a design may be a polyhedron, and the angle from which on its
 #: edges are sharp; a quarter of their length has to be.
 _FEW, _SHARP = 1_000, np.radians(20.0)
+#: Angle between neighbouring rows of edges up to which they are bend lines of a round face.
+_COARSEST = np.radians(15.5)
 #: Space between parts, relative to the size.
 _APART = 0.02
 
@@ -299,30 +301,83 @@ def _bent(
     if rows is not None:
         return rows
     turn, shift = _motion(sliced, face, flat)
-    lines = [np.stack([line.start, line.end]) @ turn + shift for line in face.bend_lines]
     near = _SAME * _size(sliced.points)
+    bends = _rulings(face)
+    lines = [_Line.of(np.stack([b.start, b.end]) @ turn + shift, face, shift, near) for b in bends]
     for line in lines:
         edges = sliced.edges_of(number)
-        away = _away(line, sliced.flat[edges])
+        away = line.away(sliced.flat[edges])
         away[np.abs(away) < near] = 0.0
         hit = away[:, 0] * away[:, 1] < 0
         share = away[hit, 0] / (away[hit, 0] - away[hit, 1])
         p, q = sliced.flat[edges[hit]].transpose(1, 0, 2)
-        at = _along(line, p + share[:, None] * (q - p))
-        inside = (at > -near) & (at < np.linalg.norm(line[1] - line[0]) + near)
+        inside = line.reaches(p + share[:, None] * (q - p))
         if inside.any():
             sliced.insert(edges[hit][inside], share[inside])
     edges, out = sliced.edges_of(number), []
     inner = np.isin(edge_keys(edges[:, 0], edges[:, 1], len(sliced.flat)), sliced.inner())
-    for line, bend in zip(lines, _weighted(face.bend_lines, lines, sliced, edges, inner, near)):
-        on = inner & _on(line, sliced.flat[edges], near)
+    on = [inner & line.carries(sliced.flat[edges], near) for line in lines]
+    for line, bend, own in zip(lines, _weighted(bends, lines, on), on, strict=True):
         angle = -bend.angle if bend.up else bend.angle
-        for edge in edges[on]:
-            middle = _along(line, sliced.flat[edge].mean(axis=0)[None])[0]
-            share = float(np.clip(middle / np.linalg.norm(line[1] - line[0]), 0.0, 1.0))
+        long = float(np.linalg.norm(bend.end - bend.start))
+        for edge in edges[own]:
+            share = float(line.along(sliced.flat[edge]).mean()) / long
             radius = bend.radius_start + share * (bend.radius_end - bend.radius_start)
-            out.append((edge, angle, float(radius)))
+            out.append((edge, angle, radius))
     return out
+
+
+def _rulings(face: ShapeFace) -> list[BendLine]:
+    """Return the bend lines of a face; of those on one ruling of a round face the first."""
+    bends = list(face.bend_lines)
+    if face.surface is None:
+        return bends
+    level = _levels(face, face.surface.slope > 0)
+    order = np.argsort(level, kind="stable")
+    new = np.diff(level[order], prepend=-np.inf) > _SAME * max(float(np.ptp(level)), 1e-300)
+    first = np.minimum.reduceat(order, np.flatnonzero(new))
+    return [bends[k] for k in sorted(first.tolist())]
+
+
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """A ruling in the pattern: its ends (2, 2), and how far it reaches from the first one."""
+
+    ends: Array
+    reach: tuple[float, float]
+
+    @classmethod
+    def of(cls, ends: Array, face: ShapeFace, apex: Array, near: float) -> _Line:
+        """Make a line that ends at `ends`, but on round faces only at the outline or the apex."""
+        if face.surface is None:
+            return cls(ends, (-near, float(np.linalg.norm(ends[1] - ends[0])) + near))
+        line = cls(ends, (-np.inf, np.inf))
+        return line if face.surface.slope == 0 else cls(ends, (float(line.along(apex)), np.inf))
+
+    @property
+    def way(self) -> Array:
+        """Its unit direction."""
+        d = self.ends[1] - self.ends[0]
+        return np.asarray(d / np.linalg.norm(d))
+
+    def away(self, points: Array) -> Array:
+        """Return the signed distances of points (..., 2)."""
+        x, y = self.way
+        return np.asarray((points - self.ends[0]) @ np.array([-y, x]))
+
+    def along(self, points: Array) -> Array:
+        """Return the places of points (..., 2) along the line."""
+        return np.asarray((points - self.ends[0]) @ self.way)
+
+    def reaches(self, points: Array) -> Flags:
+        """Tell which points are within its reach."""
+        at = self.along(points)
+        return np.asarray((at > self.reach[0]) & (at < self.reach[1]))
+
+    def carries(self, ends: Array, near: float) -> Flags:
+        """Tell which edges (e, 2, 2) lie on it."""
+        on = (np.abs(self.away(ends)) < 2 * near) & self.reaches(ends)
+        return np.asarray(on.all(axis=1))
 
 
 def _rows(
@@ -369,14 +424,14 @@ def _rows(
     nearest = np.unique(np.abs(found[:, None] - wanted[1:-1]).argmin(axis=0))
     chosen = found[nearest]
     gaps = np.diff([ends[0], *chosen, ends[1]])
-    if gaps.max() > 2.0 * step + near:
+    factor = 1.0 / np.tan(surface.half_angle) if cone else 1.0 / surface.radius
+    if gaps.max() > max(2.0 * step, _COARSEST / factor) + near:
         return None
     # Edges of the pattern, by the triangles that were not divided yet.
     here = np.full(len(sliced.source), -1)
     here[face.triangles] = np.arange(len(face.triangles))
     if len(sliced.faces) != len(here):
         return None
-    factor = 1.0 / np.tan(surface.half_angle) if cone else 1.0 / surface.radius
     name = np.empty(len(at), np.int64)
     name[order] = group
     own = sliced.faces[face.triangles]
@@ -432,47 +487,15 @@ def _motion(sliced: _Sliced, face: ShapeFace, flat: Array) -> tuple[Array, Array
     return turn, ends[0] - here[0] @ turn
 
 
-def _away(line: Array, points: Array) -> Array:
-    """Return signed distances of points (..., 2) from the line through two points."""
-    way = line[1] - line[0]
-    way = way / np.linalg.norm(way)
-    return np.asarray((points - line[0]) @ np.array([-way[1], way[0]]))
-
-
-def _along(line: Array, points: Array) -> Array:
-    way = line[1] - line[0]
-    return np.asarray((points - line[0]) @ (way / np.linalg.norm(way)))
-
-
-def _on(line: Array, ends: Array, near: float) -> Array:
-    """Tell which edges, by their ends (e, 2, 2), lie on a piece of a line."""
-    long = float(np.linalg.norm(line[1] - line[0]))
-    along = _along(line, ends)
-    inside = (along > -near) & (along < long + near)
-    return np.asarray(((np.abs(_away(line, ends)) < 2 * near) & inside).all(axis=1))
-
-
-def _weighted(
-    bends: tuple[BendLine, ...],
-    lines: list[Array],
-    sliced: _Sliced,
-    edges: Ints,
-    inner: Array,
-    near: float,
-) -> list[BendLine]:
+def _weighted(bends: list[BendLine], lines: list[_Line], on: list[Flags]) -> list[BendLine]:
     """Give the angle of limiting lines on the outline to their neighbours."""
     out = list(bends)
-    limits = [k for k, bend in enumerate(bends) if bend.limit]
-    for k in limits:
-        if (inner & _on(lines[k], sliced.flat[edges], near)).any():
-            continue
-        rest = [j for j in range(len(bends)) if not bends[j].limit]
-        if rest:
-            gap = [abs(_away(lines[j], lines[k].mean(axis=0)[None])[0]) for j in rest]
-            close = min(gap)
-            for j, g in zip(rest, gap, strict=True):
-                if g <= close + near:
-                    out[j] = replace(out[j], angle=out[j].angle + bends[k].angle)
+    rest = [k for k, bend in enumerate(bends) if not bend.limit]
+    for k, bend in enumerate(bends):
+        if bend.limit and rest and not on[k].any():
+            middle = lines[k].ends.mean(axis=0)
+            near = min(rest, key=lambda j: abs(float(lines[j].away(middle))))
+            out[near] = replace(out[near], angle=out[near].angle + bend.angle)
     return out
 
 

@@ -201,6 +201,15 @@ class Code(str, enum.Enum):
         "take a thinner sheet, or fold it along its bend lines (--bend-radius)",
         least=True,
     )
+    TOOL_RADIUS = _limit(
+        "tool_radius",
+        Kind.LENGTH,
+        "Inner radius of the folding tool; its bound is 0.4 of the sheet's thickness.",
+        "a sheet of this thickness tears where it is folded to an inner radius of {value}, less "
+        "than {bound}",
+        "take a larger --bend-radius or a thinner sheet",
+        least=True,
+    )
     NEUTRAL_STRAIN = _limit(
         "neutral_strain",
         Kind.SHARE,

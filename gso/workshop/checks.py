@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gso import metrics
-from gso.typing import Array
+from gso.typing import Array, Flags
 from gso.verdict import Code, Measurement, Reason, compare, ordered
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
@@ -18,6 +18,8 @@ from gso.workshop.thickness import Thickness
 
 #: Largest difference of the two sides of a seam that the thickness may add, in sheet thicknesses.
 _SEAM = 0.1
+#: Smallest inner radius of a fold, in sheet thicknesses: beyond it the outside of the sheet tears.
+_SHARPEST = 0.4
 
 #: A code with a value and its bound.
 Row = tuple[Code, float, float]
@@ -62,24 +64,35 @@ def _rolled(radius: float, settings: FabricationSettings, sheet: Thickness) -> I
 
 def _bends(panel: Panel, sheet: Thickness) -> Iterator[Row]:
     """Measure the bends of a panel."""
-    turn = np.degrees(np.abs(panel.angles))
+    if panel.rolled.any():
+        yield from _sharpest(panel, panel.rolled, sheet)
+    folded = ~panel.rolled
+    if not folded.any():
+        return
     if sheet.table is not None:
+        turn = np.degrees(np.abs(panel.angles[folded]))
         last = float(np.degrees(np.asarray(sheet.table, float)[-1, 0]))
         yield Code.BEND_ANGLE, float(turn.max()), last
     elif sheet.radius is None:
-        k = int(panel.radii.argmin())
-        depth = float(sheet.depth(panel.angles[k]))
-        yield Code.TOO_THICK, float(panel.radii[k]) + depth, depth
+        yield from _sharpest(panel, folded, sheet)
     else:
-        yield from _nearest(panel, sheet)
+        yield Code.TOOL_RADIUS, sheet.radius, _SHARPEST * sheet.sheet
+        yield from _nearest(panel, folded, sheet)
 
 
-def _nearest(panel: Panel, sheet: Thickness) -> Iterator[Row]:
+def _sharpest(panel: Panel, bends: Flags, sheet: Thickness) -> Iterator[Row]:
+    """Measure the smallest radius of some bends, which are rolled to that of the surface."""
+    k = int(np.where(bends, panel.radii, np.inf).argmin())
+    depth = float(sheet.depth(panel.angles[k]))
+    yield Code.TOO_THICK, float(panel.radii[k]) + depth, max(depth, _SHARPEST * sheet.sheet)
+
+
+def _nearest(panel: Panel, bends: Flags, sheet: Thickness) -> Iterator[Row]:
     """Measure the two neighbouring bends that lack most room."""
     import shapely
 
-    lines = panel.flat[panel.bends]
-    wide = np.abs(panel.angles) * (float(sheet.radius or 0.0) + sheet.k * sheet.sheet)
+    lines = panel.flat[panel.bends[bends]]
+    wide = np.abs(panel.angles[bends]) * (float(sheet.radius or 0.0) + sheet.k * sheet.sheet)
     segments = shapely.linestrings(lines)
     middle = shapely.points(lines.mean(axis=1))
     tree = shapely.STRtree(segments)

@@ -13,10 +13,10 @@ from gso.errors import MeshError
 from gso.geometry.polygon import arc_lengths
 from gso.mesh import Mesh
 from gso.pattern import Bend, Folded
-from gso.typing import Array, Ints, Json
+from gso.typing import Array, Flags, Ints, Json
 from gso.verdict import Places, Reason
 
-_ARRAYS = ("points", "faces", "flat", "bends", "angles", "radii")
+_ARRAYS = ("points", "faces", "flat", "bends", "angles", "radii", "rolled")
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +34,8 @@ class Panel:
         Edges to bend along.
     angles, radii : ndarray, (b,)
         Their angles in radians, positive for mountain folds, and the radii of the bends.
+    rolled : ndarray of bool, (b,)
+        Bends that are rulings of a round face, to be rolled to their radius; others are folded.
     """
 
     name: str
@@ -42,6 +44,11 @@ class Panel:
     bends: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
     angles: Array = field(default_factory=lambda: np.empty(0))
     radii: Array = field(default_factory=lambda: np.empty(0))
+    rolled: Flags = field(default_factory=lambda: np.empty(0, bool))
+
+    def __post_init__(self) -> None:
+        if not len(self.rolled):
+            object.__setattr__(self, "rolled", np.zeros(len(self.bends), bool))
 
     @property
     def lines(self) -> list[Bend]:
@@ -154,7 +161,7 @@ class Made:
         out: dict[str, np.ndarray] = {"names": np.frombuffer(said, np.uint8)}
         for k, panel in enumerate(self.panels):
             parts = (panel.surface.vertices, panel.surface.faces, panel.flat)
-            every = (*parts, panel.bends, panel.angles, panel.radii)
+            every = (*parts, panel.bends, panel.angles, panel.radii, panel.rolled.astype(np.int64))
             out |= {f"panel{k}_{name}": x for name, x in zip(_ARRAYS, every, strict=True)}
         for k, seam in enumerate(self.matings):
             out[f"seam{k}_along"] = seam.along
@@ -178,8 +185,8 @@ class Made:
         try:
             panels = []
             for k, own in enumerate(json.loads(data["names"].tobytes())):
-                points, faces, *rest = (data[f"panel{k}_{part}"] for part in _ARRAYS)
-                panels.append(Panel(str(own), Mesh(points, faces), *rest))
+                points, faces, *rest, rolled = (data[f"panel{k}_{part}"] for part in _ARRAYS)
+                panels.append(Panel(str(own), Mesh(points, faces), *rest, rolled > 0))
             matings: list[Mating] = []
             while f"seam{len(matings)}_along" in data:
                 k = len(matings)

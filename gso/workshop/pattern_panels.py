@@ -31,9 +31,10 @@ def of_surface(
     record : dict
         What was measured.
     folded : Folded, optional
-        Bend lines.
+        Bend lines: rulings of round faces, which are rolled to their radius, and folds.
     """
     panels, label, local = _divided(surface.vertices, pattern, folded or Folded())
+    panels = [replace(panel, rolled=panel.radii > 0) for panel in panels]
     matings = of_pattern(surface.vertices, pattern, label, local)
     return Made(name, _named(panels, [name] * len(panels)), numbered(matings), record)
 

@@ -128,15 +128,26 @@ class Thickness:
         away = np.abs(self.k * self.sheet - self.depth([1.0, -1.0])).max()
         return float(away * curvature)
 
+    @property
+    def rolled(self) -> Thickness:
+        """The same sheet, rolled to the radii of the surface."""
+        return replace(self, radius=None, table=None)
+
 
 def thickened(panel: Panel, thickness: Thickness) -> Panel:
     """Return a panel with the pattern of a sheet of some thickness, and inner radii of bends.
 
-    Plates between bends are moved apart or together along the normals of the bends.
+    Plates between bends are moved apart or together along the normals of the bends. Bends that are
+    rolled have the radius of the surface, and others that of the tool.
     """
     if not len(panel.bends):
         return panel
-    radii = thickness.inner(panel.angles, panel.radii)
+    rolled, angles = panel.rolled, panel.angles
+    radii = np.where(
+        rolled,
+        thickness.rolled.inner(angles, panel.radii),
+        thickness.inner(angles, panel.radii),
+    )
     plate, pairs, ends = _plates(panel)
     p, q = panel.flat[ends].transpose(1, 0, 2)
     way = q - p
@@ -144,7 +155,8 @@ def thickened(panel: Panel, thickness: Thickness) -> Panel:
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     count = int(plate.max()) + 1
     # The normal points from the first plate of each pair to the second.
-    step = thickness.change(panel.angles)[:, None] * normal
+    change = np.where(rolled, thickness.rolled.change(angles), thickness.change(angles))
+    step = change[:, None] * normal
     shift = _solved(count, pairs, step)
     total, often = np.zeros((len(panel.flat), 2)), np.zeros(len(panel.flat))
     faces = panel.surface.faces

@@ -1,0 +1,231 @@
+"""Designs that are flat or developable as they are: nothing moves, every fold has its line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+import gso
+from gso import metrics
+from gso.folded_pattern import folded_pattern
+from gso.mesh import Mesh
+from gso.workshop.finish import Finish
+from gso.workshop.thickness import Thickness
+
+
+def box(x=1.0, y=1.0, z=1.0) -> Mesh:
+    points = [[a, b, c] for c in (0, z) for a, b in ((0, 0), (x, 0), (x, y), (0, y))]
+    sides = [[k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4)]
+    return Mesh(points, [[3, 2, 1, 0], [4, 5, 6, 7], *sides])
+
+
+def prism(n=8, radius=40.0, height=120.0) -> Mesh:
+    """Sides and both caps, in triangles."""
+    turn = 2 * np.pi * np.arange(n) / n
+    ring = radius * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    points = np.concatenate([ring, ring + [0, 0, height]])
+    k = np.arange(n)
+    j = (k + 1) % n
+    sides = [np.stack([k, j, j + n], axis=1), np.stack([k, j + n, k + n], axis=1)]
+    caps = [np.stack([0 * k, j, k], axis=1)[1:-1], np.stack([0 * k, k, j], axis=1)[1:-1] + n]
+    return Mesh(points, np.concatenate([*sides, *caps]))
+
+
+def half_cylinder(radius=1500.0, length=5000.0, shape=(9, 41), turned=0.0) -> Mesh:
+    u, v = np.meshgrid(np.linspace(0, 1, shape[0]), np.linspace(0, 1, shape[1]), indexing="ij")
+    along, angle = length * u, np.pi * v
+    if turned:
+        # A rotated grid on the unrolled sheet.
+        plane = np.stack([length * (u - 0.5), radius * np.pi * (v - 0.5)], axis=-1)
+        c, s = np.cos(turned), np.sin(turned)
+        along, arc = np.moveaxis(0.5 * plane @ np.array([[c, s], [-s, c]]), -1, 0)
+        angle = arc / radius
+    grid = np.stack([radius * np.cos(angle), radius * np.sin(angle), along], axis=-1)
+    return Mesh.from_grid(grid)
+
+
+def frustum(low=120.0, high=65.0, height=110.0, count=48, rows=7) -> Mesh:
+    turn = 2 * np.pi * np.arange(count) / count
+    share = np.linspace(0, 1, rows)[:, None]
+    radius = low + share * (high - low)
+    points = np.stack(
+        np.broadcast_arrays(radius * np.cos(turn), radius * np.sin(turn), height * share), axis=-1
+    )
+    r, c = np.meshgrid(np.arange(rows - 1), np.arange(count), indexing="ij")
+    near, far = r * count + c, r * count + (c + 1) % count
+    faces = np.stack([near, far, far + count, near + count], axis=-1).reshape(-1, 4)
+    return Mesh(points.reshape(-1, 3), faces)
+
+
+def bracket(long=60.0, radius=5.0, wide=40.0, facets=8) -> Mesh:
+    """Two plates at a right angle with a rolled corner between them."""
+    turn = np.linspace(0, np.pi / 2, facets + 1)
+    corner = radius * np.stack([np.sin(turn), 1 - np.cos(turn)], axis=1)
+    line = np.concatenate([[[-long, 0.0]], corner, [[radius, radius + long]]])
+    points = np.array([[x, y, z] for z in (0.0, wide) for x, y in line])
+    n = len(line)
+    return Mesh(points, [[k, k + 1, n + k + 1, n + k] for k in range(n - 1)])
+
+
+def channel(flange=20.0, web=100.0, lip=60.0, long=200.0) -> Mesh:
+    line = np.array([[0, flange], [0, 0], [web, 0], [web, lip]])
+    points = np.array([[x, y, z] for z in (0.0, long) for x, y in line])
+    return Mesh(points, [[k, k + 1, 5 + k, 4 + k] for k in range(3)])
+
+
+def transition(side=150.0, radius=50.0, height=120.0, arcs=16) -> Mesh:
+    """A sheet-metal duct from a square to a circle: four triangles and four quarter cones."""
+    corners = 0.5 * side * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+    turn = np.pi / 4 + np.linspace(0, 2 * np.pi, 4 * arcs, endpoint=False) - np.pi / 4
+    ring = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    points = np.concatenate([np.pad(corners, ((0, 0), (0, 1))), np.c_[ring, height + 0 * turn]])
+    faces = []
+    for q in range(4):
+        top = [4 + (q * arcs + k) % (4 * arcs) for k in range(arcs + 1)]
+        faces += [[q, b, a] for a, b in zip(top, top[1:])]
+        faces.append([q, (q + 1) % 4, top[-1]])
+    return Mesh(points, np.array(faces)[:, ::-1])
+
+
+def edge_lengths(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(points[faces] - points[np.roll(faces, -1, axis=1)], axis=-1)
+
+
+def check(found, design: Mesh) -> None:
+    """Nothing moved, nothing overlaps, planes keep their lengths, every triangle is upright."""
+    n = len(design.vertices)
+    np.testing.assert_array_equal(found.surface.vertices[:n], design.vertices)
+    far = metrics.surface_distance(design, found.surface)
+    assert max(far.there_max, far.back_max) < 1e-9 * design.diagonal
+    flat, faces = found.pattern.flat, found.pattern.faces
+    triangles = [shapely.Polygon(flat[f]) for f in faces]
+    a, b, c = flat[faces].transpose(1, 0, 2)
+    signed = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    assert signed.min() > 0
+    union = shapely.union_all([t.buffer(1e-9 * design.diagonal, join_style="mitre") for t in triangles])
+    assert union.area == pytest.approx(signed.sum(), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("design", "folds", "total"),
+    [
+        (box(100, 100, 100), 5, 450.0),
+        (prism(), 9, 7 * 45.0 + 180.0),
+        (channel(), 2, 180.0),
+        (bracket(), 0, 90.0),
+        (half_cylinder(), 0, 180.0),
+    ],
+    ids=["box", "prism", "channel", "bracket", "half cylinder"],
+)
+def test_total_fold_angle(design, folds, total):
+    found = folded_pattern(design)
+    check(found, design)
+    assert found.parts == 1
+    bends = found.folded.lines(found.pattern.flat)
+    assert sum(bend.radius == 0 for bend in bends) == folds
+    assert sum(abs(np.degrees(bend.angle)) for bend in bends) == pytest.approx(total, abs=1e-6)
+
+
+def test_a_half_cylinder_is_a_rectangle_with_parallel_lines():
+    found = folded_pattern(half_cylinder())
+    size = np.sort(np.ptp(found.pattern.flat, axis=0))
+    np.testing.assert_allclose(size, [1500 * np.pi, 5000.0], rtol=1e-9)
+    bends = found.folded.lines(found.pattern.flat)
+    way = np.array([bend.line[1] - bend.line[0] for bend in bends])
+    assert np.abs(np.ptp(way, axis=1)).min() == pytest.approx(5000.0)
+    np.testing.assert_allclose([bend.radius for bend in bends], 1500.0, rtol=1e-6)
+
+
+def test_lines_of_a_turned_grid_are_the_rulings():
+    design = half_cylinder(shape=(30, 50), turned=np.radians(30))
+    found = folded_pattern(design)
+    check(found, design)
+    bends = found.folded.lines(found.pattern.flat)
+    assert len(bends) > 5
+    way = np.array([bend.line[1] - bend.line[0] for bend in bends])
+    angle = np.degrees(np.arctan2(way[:, 1], way[:, 0])) % 180
+    assert np.ptp(angle) < 0.01
+    np.testing.assert_allclose([bend.radius for bend in bends], 1500.0, rtol=1e-6)
+    arc = np.ptp(np.arctan2(design.vertices[:, 1], design.vertices[:, 0]))
+    total = np.degrees(sum(abs(bend.angle) for bend in bends))
+    assert 0.5 * np.degrees(arc) < total
+
+
+def test_a_frustum_is_a_sector():
+    low, high, height = 120.0, 65.0, 110.0
+    design = frustum(low, high, height)
+    found = folded_pattern(design)
+    check(found, design)
+    slant = np.hypot(low - high, height)
+    tip = np.arcsin((low - high) / slant)
+    outer = low / np.sin(tip)
+    sector = 2 * np.pi * np.sin(tip)
+    a, b, c = found.pattern.flat[found.pattern.faces].transpose(1, 0, 2)
+    area = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum()
+    ring = 0.5 * sector * (outer**2 - (outer - slant) ** 2)
+    # The outline follows chords of the arcs.
+    assert area == pytest.approx(ring, rel=2e-3)
+    bends = found.folded.lines(found.pattern.flat)
+    reach = np.array([np.linalg.norm(bend.line[1] - bend.line[0]) for bend in bends])
+    np.testing.assert_allclose(reach, slant, rtol=1e-9)
+
+
+def test_a_duct_from_square_to_round_is_one_part():
+    design = transition()
+    found = folded_pattern(design)
+    check(found, design)
+    assert found.parts == 1
+    before = np.sort(edge_lengths(design.vertices, design.faces).ravel())
+    after = np.sort(edge_lengths(found.pattern.flat, found.pattern.faces).ravel())
+    np.testing.assert_allclose(after, before, rtol=1e-9)
+
+
+def test_what_is_not_developable_has_no_such_pattern():
+    u = np.linspace(-1, 1, 21)
+    x, y = np.meshgrid(u, u)
+    assert folded_pattern(Mesh.from_grid(np.dstack([x, y, np.sqrt(4 - x**2 - y**2)]))) is None
+
+
+@pytest.mark.parametrize("design", [box(90, 60, 40), half_cylinder(), frustum(), channel()])
+def test_fabricated_as_it_is(design, tmp_path):
+    job = gso.fabricate(design, tmp_path, formats=("svg",), workers=0)
+    assert job.usable and len(job.parts) == 1
+    (record,) = job.certificate["designs"]
+    assert record["deviation_max"] == 0.0
+    assert record["strain_max"] < 1e-12
+    assert len(job.parts[0].bends) >= 2
+
+
+@pytest.mark.parametrize(("thick", "radius", "k"), [(1.0, 1.0, 0.5), (1.5, 1.5, 0.44), (3.0, 4.0, 0.33)])
+def test_flat_lengths_of_folded_sections_are_the_shops(tmp_path, thick, radius, k):
+    sheet = Thickness(thick, k=k, radius=radius)
+    job = gso.fabricate(
+        channel(), tmp_path, formats=("svg",), workers=0, finish=Finish(thickness=sheet)
+    )
+    (part,) = job.parts
+    # The design is the middle of the sheet: outer and inner flanges differ from it by T / 2.
+    setback = radius + thick / 2
+    allowance = np.pi / 2 * (radius + k * thick)
+    flat = 180.0 + 2 * (allowance - 2 * setback)
+    assert min(part.size) == pytest.approx(flat, abs=1e-9)
+    assert job.usable
+
+
+def test_too_thick_for_its_folds(tmp_path):
+    def reasons(thickness):
+        finish = Finish(thickness=thickness)
+        job = gso.fabricate(channel(), tmp_path, formats=("svg",), workers=0, finish=finish)
+        return [reason["code"] for reason in job.certificate["reasons"]]
+
+    assert reasons(Thickness(10.0, radius=1.0)) == ["tool_radius"]
+    assert reasons(Thickness(1.5)) == ["too_thick"]
+    assert reasons(Thickness(1.5, face="inside")) == ["too_thick"]
+
+
+def test_rolled_bends_keep_their_radius_beside_folds(tmp_path):
+    sheet = Thickness(1.5, k=0.5, radius=2.0)
+    job = gso.fabricate(bracket(), tmp_path, formats=("svg",), workers=0, finish=Finish(thickness=sheet))
+    (part,) = job.parts
+    assert max(part.size) == pytest.approx(120.0 + 5.0 * np.pi / 2, abs=1e-6)
+    np.testing.assert_allclose([bend.radius for bend in part.bends], 5.0 - 0.75, rtol=1e-6)
