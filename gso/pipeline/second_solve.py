@@ -135,4 +135,4 @@ def _others(case: Case, first: Result) -> Iterator[Request[Options]]:
     codes = {reason.code for reason in first.reasons}
     if others is None or missed or not _may_go_on(case, first) or not codes or codes - _MENDED:
         return
-    yield from others(case.analysis, case.solver_request)
+    yield from others(case.analysis, case.solver_request, bool(codes - {Code.FAR}))

@@ -42,6 +42,8 @@ GENERAL = 1.8
 #: folds that finer meshes do not have; these weights lead to less energy on the design's own mesh.
 #: Under constraints they would not.
 COARSE_CURVATURE, COARSE_FAIRNESS = 1.5, 3.0
+#: Factors on the weights of curvature, fairness and proximity where displacements are bounded.
+BOUNDED = (4.5, 3.0, 0.3)
 #: The mean of squared second differences along both polylines of quads is twice that across the
 #: edges of triangles, in the mean over all directions.
 _QUADS = 2.0
@@ -97,8 +99,8 @@ def _terms(
     w_proximity = o.w_proximity
     if request.max_displacement is not None:
         # The bound keeps the result close, so the other terms can be stronger.
-        w_curvature, w_fairness = 4.5 * w_curvature, 3.0 * w_fairness
-        w_proximity = 0.3 * w_proximity
+        w_curvature, w_fairness = BOUNDED[0] * w_curvature, BOUNDED[1] * w_fairness
+        w_proximity = BOUNDED[2] * w_proximity
     normals = vertex_normals(mesh)
     near = proximity.build(mesh, normals, tangential=o.tangential)
     by_image = image * w_curvature
