@@ -10,6 +10,7 @@ arrays of points.
 
 from gso.geometry.angle_defect import (
     GRID_RINGS,
+    fan_angle,
     gaussian_curvature,
     grid_curvature,
     grid_star,
@@ -67,6 +68,7 @@ __all__ = [
     "doubled_areas",
     "eigen",
     "face_products",
+    "fan_angle",
     "first_form",
     "gaussian_curvature",
     "grid_curvature",
