@@ -35,7 +35,12 @@ from gso.metrics.gaussian_curvature import (
     mean_abs_K,
     worst_curvature,
 )
-from gso.metrics.hole_defects import hole_defects, turning
+from gso.metrics.hole_defects import (
+    hole_defects,
+    hole_gaps,
+    inner_outlines,
+    turning,
+)
 from gso.metrics.info import INFO, Info
 from gso.metrics.lengths import edge_length_error, isometry_defect, isometry_energy, loss_iso_cell
 from gso.metrics.normal_angles import dihedral_angles, face_normals, normal_angle
@@ -83,6 +88,8 @@ __all__ = [
     "flipped_faces",
     "flips",
     "hole_defects",
+    "hole_gaps",
+    "inner_outlines",
     "isometry_defect",
     "isometry_energy",
     "largest_distance",
