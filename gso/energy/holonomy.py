@@ -14,7 +14,8 @@ gradient, where the targets were renewed (majorisation and minimisation).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
 
 
 def build(mesh: Mesh, loops: Sequence[Ints]) -> list[Term]:
-    """Build the term of some inner outlines of a mesh; none without.
+    """Build the terms of some inner outlines of a mesh, one per number of vertices of the fans.
 
     Weights are such that with the same weight in the objective a defect costs as much as the same
     defect of an interior vertex in the term of curvature.
@@ -60,19 +61,37 @@ def build(mesh: Mesh, loops: Sequence[Ints]) -> list[Term]:
     stars = 1.5 * float(geometry.doubled_areas(mesh.vertices, mesh.triangles).sum())
     factor = (size / (_SHARE * stars))[number]
 
-    def refresh(blocks: Mapping[str, Array]) -> Array:
+    def wanted(blocks: Mapping[str, Array]) -> Array:
         centre, *ring = geometry.corners(blocks["surface"], fans)
         turn = np.pi - np.asarray(geometry.fan_angle(centre, ring))
         length = np.asarray(geometry.norm(geometry.sub(ring[0], centre)))
-        return np.stack([np.pi - geometry.closing(turn, length, number).turn, factor])
+        return np.pi - geometry.closing(turn, length, number).turn
 
-    return [
-        Term(
-            "curvature",
-            residual,
-            (("surface", fans),),
-            weights=(_SHARE / size)[number],
-            constants=refresh({"surface": mesh.vertices}),
-            refresh=refresh,
+    weights = (_SHARE / size)[number]
+    terms = []
+    # Shorter fans repeat their last vertex.
+    count = 1 + (fans[:, 1:-1] != fans[:, 2:]).sum(axis=1)
+    for k in np.unique(count).tolist():
+        own = np.flatnonzero(count == k)
+        refresh = partial(_constants, wanted, own, factor[own])
+        terms.append(
+            Term(
+                "curvature",
+                residual,
+                (("surface", fans[own, : k + 1]),),
+                weights=weights[own],
+                constants=refresh({"surface": mesh.vertices}),
+                refresh=refresh,
+            )
         )
-    ]
+    return terms
+
+
+def _constants(
+    wanted: Callable[[Mapping[str, Array]], Array],
+    own: Ints,
+    factor: Array,
+    blocks: Mapping[str, Array],
+) -> Array:
+    """Return the constants of the elements `own` among all vertices of the loops."""
+    return np.stack([wanted(blocks)[own], factor])

@@ -57,7 +57,7 @@ def closing(turn: Array, length: Array, number: Ints) -> Closing:
     array([0.5])
     """
     size = np.bincount(number)
-    defect = 2.0 * np.pi + np.bincount(number, turn)
+    defect = 2.0 * np.pi + np.bincount(number, turn).astype(float)
     turn = turn - (defect / size)[number]
     # Every loop turns by a full turn, so the headings of one need not begin anew after another.
     heading = np.cumsum(turn)
@@ -71,8 +71,7 @@ def closing(turn: Array, length: Array, number: Ints) -> Closing:
     det = np.maximum(xx * yy - xy * xy, np.finfo(float).tiny)
     a = (yy * wanted[0] - xy * wanted[1]) / det
     b = (xx * wanted[1] - xy * wanted[0]) / det
-    gap = np.asarray(np.hypot(*ends))
-    return Closing(defect, gap, turn + a[number] * x + b[number] * y)
+    return Closing(defect, np.hypot(*ends), turn + a[number] * x + b[number] * y)
 
 
 def _about_centre(values: Array, number: Ints, size: Ints) -> Array:
