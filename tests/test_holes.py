@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gso
-from gso import metrics
+from gso import geometry, metrics
 from gso.mesh import Mesh
 from tests.conftest import shuffled
 
@@ -96,3 +96,82 @@ def test_defects_and_curvature_add_up_to_the_turning_of_the_outline():
     outline = (np.pi - angles[dented.boundary_loops[0]]).sum()
     total = inside + outline + np.radians(metrics.hole_defects(dented)).sum()
     assert total == pytest.approx(2.0 * np.pi, abs=1e-9)
+
+
+def wavy_ring() -> Mesh:
+    """A ring whose outline goes up and down three times."""
+    ring = band(lambda s: 0.35 + 0.65 * s, lambda s: 0.0 * s, around=64, along=15)
+    x, y, _ = ring.vertices.T
+    height = 0.18 * (x**2 + y**2) * np.cos(3.0 * np.arctan2(y, x))
+    return ring.replaced(np.c_[x, y, height])
+
+
+def largest_strain(surface: Mesh, flat) -> float:
+    """The largest |l'/l - 1| in any direction of any triangle, by Gram matrices."""
+    gram = []
+    for points in (surface.vertices, flat):
+        a, b, c = (points[surface.triangles[:, k]] for k in range(3))
+        edges = np.stack([b - a, c - a], axis=1)
+        gram.append(edges @ edges.transpose(0, 2, 1))
+    squared = np.linalg.eigvals(np.linalg.solve(*gram)).real
+    return float(np.abs(np.sqrt(squared) - 1.0).max())
+
+
+def test_a_ring_closes_in_the_plane():
+    design = wavy_ring()
+    far = {"max_strain": 1.0, "max_deviation": 1.0}
+    strains, defects, curved = [], [], []
+    for weight in (0.0, gso.DevelopableOptions().w_holes):
+        options = gso.DevelopableOptions(w_holes=weight)
+        result = gso.tno.optimize(design, options=options, **far)
+        assert not result.pattern.is_cut
+        strains.append(largest_strain(result.mesh, result.pattern.flat))
+        defects.append(np.abs(metrics.hole_defects(result.mesh)).max())
+        assert result.metrics["hole_defect_max"] == pytest.approx(defects[-1])
+        assert metrics.surface_distance(design, result.mesh).there_max < 0.04 * design.diagonal
+        curved.append(metrics.loss_gc(result.mesh) / metrics.loss_gc(design))
+    assert strains[1] < 0.2 * strains[0]
+    assert defects[1] < 0.2 * defects[0]
+    assert max(curved) < 0.02
+
+
+def test_holes_that_lack_an_angle_are_left_to_cuts():
+    cap = sheet(lambda x, y: np.sqrt(4.0 - x**2 - y**2), [(4, 9, 5, 8), (14, 20, 12, 17)])
+    assert (metrics.hole_defects(cap) > 0.0).all()
+    one, two = (
+        gso.tno.optimize(cap, options=gso.DevelopableOptions(w_holes=w)) for w in (0.0, 1.0)
+    )
+    assert np.array_equal(one.mesh.vertices, two.mesh.vertices)
+    assert one.usable
+    assert one.pattern.is_cut
+    assert "hole_defect_max" not in one.metrics
+
+
+def test_designs_with_one_outline_do_not_depend_on_the_weight():
+    mesh = shuffled(sheet(lambda x, y: 0.2 * (x**2 - y**2), []))
+    one, two = (
+        gso.tno.optimize(mesh, options=gso.DevelopableOptions(w_holes=w)) for w in (0.0, 1.0)
+    )
+    assert np.array_equal(one.mesh.vertices, two.mesh.vertices)
+
+
+def test_targets_close_a_loop_in_the_plane():
+    """Turning angles of :func:`gso.geometry.closing`, once more and again, close a polygon."""
+    rng = np.random.default_rng(2)
+    n = 30
+    turn, length = -2.0 * np.pi / n + rng.normal(0.0, 0.1, n), rng.uniform(0.5, 1.5, n)
+    number = np.zeros(n, int)
+    for _ in range(20):
+        turn = geometry.closing(turn, length, number).turn
+    heading = np.cumsum(turn)
+    assert turn.sum() == pytest.approx(-2.0 * np.pi)
+    ends = [(length * f(heading)).sum() for f in (np.cos, np.sin)]
+    assert ends == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
+def test_an_unrolled_hole_has_the_gap_of_a_shifted_sheet():
+    """Two cones of opposite defects at a distance shift what goes around both by a gap."""
+    sides = np.array([3.0, 2.0, 3.5, 2.0])
+    found = geometry.closing(np.full(4, -0.5 * np.pi), sides, np.zeros(4, int))
+    assert found.defect == pytest.approx([0.0])
+    assert found.gap == pytest.approx([0.5])

@@ -38,6 +38,7 @@ from gso.metrics.gaussian_curvature import (
 from gso.metrics.hole_defects import (
     hole_defects,
     hole_gaps,
+    holes,
     inner_outlines,
     turning,
 )
@@ -89,6 +90,7 @@ __all__ = [
     "flips",
     "hole_defects",
     "hole_gaps",
+    "holes",
     "inner_outlines",
     "isometry_defect",
     "isometry_energy",

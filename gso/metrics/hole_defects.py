@@ -85,6 +85,19 @@ def hole_gaps(surface: SurfaceLike) -> Array:
     return np.asarray(100.0 * _unrolled(mesh).gap[inner] / np.array(around))
 
 
+def holes(surface: SurfaceLike) -> dict[str, float]:
+    """Return the largest defect and the largest gap, by metric name; none with one outline.
+
+    >>> holes(np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))]))
+    {}
+    """
+    defects = np.abs(hole_defects(surface))
+    if not len(defects):
+        return {}
+    largest = {"hole_defect_max": defects.max(), "hole_gap_max": hole_gaps(surface).max()}
+    return {name: float(value) for name, value in largest.items()}
+
+
 def _unrolled(surface: SurfaceLike) -> geometry.Closing:
     """Unroll the boundary loops of a surface."""
     mesh = mesh_of(surface)

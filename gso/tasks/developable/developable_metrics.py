@@ -21,10 +21,6 @@ def flat_metrics(surface: Mesh, flat: Array) -> dict[str, float]:
         "strain_p99": strain.p99,
         "flipped_cells": float(measure.flips(surface, flat)),
     }
-    holes = measure.hole_defects(surface)
-    if len(holes):
-        out["hole_defect_max"] = float(np.abs(holes).max())
-        out["hole_gap_max"] = float(measure.hole_gaps(surface).max())
     return {name: value for name, value in out.items() if not np.isnan(value)}
 
 

@@ -29,8 +29,8 @@ class Options(BaseOptions):
         Weight of mean |K| for a design with typical mean |K|; the weight used decreases slowly
         with the design's mean |K|.
     w_holes : float
-        Factor on that weight for holes, whose defects would strain the pattern; with 1 a defect
-        of a hole costs as much as that of a vertex, and the result is farther from the design.
+        Factor on that weight for holes, whose defects would strain the pattern; with 1 a defect of
+        a hole costs as much as that of a vertex, and the result is farther from the design.
     w_fairness : float
         Weight of the mean squared second derivative for a design with typical bending; the
         weight used decreases with the design's bending.
