@@ -175,3 +175,12 @@ def test_an_unrolled_hole_has_the_gap_of_a_shifted_sheet():
     found = geometry.closing(np.full(4, -0.5 * np.pi), sides, np.zeros(4, int))
     assert found.defect == pytest.approx([0.0])
     assert found.gap == pytest.approx([0.5])
+
+
+@pytest.mark.parametrize("rise", [0.4, 0.6])
+def test_rings_on_a_cone_are_cut_open(rise):
+    cone = band(lambda s: 0.35 + 0.65 * s, lambda s: 0.65 * rise * s, around=72, along=17)
+    result = gso.tno.optimize(cone, task="flatten")
+    assert result.pattern.is_cut
+    assert largest_strain(result.pattern.surface(cone), result.pattern.flat) < 1e-9
+    assert gso.tno.optimize(cone).usable

@@ -21,6 +21,9 @@ _SMALL = 1e-3
 _BAD, _BETTER, _MUCH_BETTER = 0.1, 0.8, 0.2
 #: Fewer cuts are preferred if their strain is at most this multiple of the smallest.
 _ALIKE = 1.1
+#: Angle that a hole lacks from which on the image of a surface that is cut there may need this many
+#: times as many iterations: the faces beside the cut turn by that angle.
+_LACKING, _LONGER = np.radians(1.0), 4
 #: A full turn, and the tolerance on the turning of a loop around a hole, -2 pi in the plane.
 _ROUND, _TURN = 2.0 * np.pi, 0.5 * np.pi
 
@@ -134,11 +137,18 @@ def _best(
     tube = [loop for loop, angle in zip(loops, turns, strict=True) if abs(angle + _ROUND) > _TURN]
     choices = [tube, loops] if 2 <= len(tube) < len(loops) else [loops]
     trees = [joining(mesh, some) for some in choices]
-    tried = [_tried(mesh, ids, tree, iterations) for tree in trees]
-    levels = [level if lies_on_itself or not bad else np.inf for level, bad in tried]
-    enough = max(_ALIKE * min(levels), _SMALL)
-    which = next(k for k, level in enumerate(levels) if level <= enough)
-    if levels[which] > (_BETTER if uncut > _BAD else _MUCH_BETTER) * uncut:
+    # Only the outer outline turns more than the others. The rest lack these angles to lie flat.
+    lacking = float(np.sort(turns)[-2] + _ROUND)
+    for longer in (1, _LONGER):
+        tried = [_tried(mesh, ids, tree, longer * iterations) for tree in trees]
+        levels = [level if lies_on_itself or not bad else np.inf for level, bad in tried]
+        enough = max(_ALIKE * min(levels), _SMALL)
+        which = next(k for k, level in enumerate(levels) if level <= enough)
+        if levels[which] <= (_BETTER if uncut > _BAD else _MUCH_BETTER) * uncut:
+            break
+        if lacking < _LACKING or not min(levels) < uncut:
+            return None
+    else:
         return None
     between = len(choices[which])
     lines = "a shortest line" if between == 2 else f"{between - 1} shortest lines"
