@@ -146,7 +146,7 @@ def _best(
         which = next(k for k, level in enumerate(levels) if level <= enough)
         if levels[which] <= (_BETTER if uncut > _BAD else _MUCH_BETTER) * uncut:
             break
-        if lacking < _LACKING or not min(levels) < uncut:
+        if lacking < _LACKING or np.isinf(levels).all():
             return None
     else:
         return None
