@@ -6,8 +6,9 @@ On the design scaled to the unit ball it is
     + w_elongation / 2 mean (elongation)^2
 
 with |K| smoothed by a decreasing epsilon. The absolute value concentrates bending along few
-lines, which lets a surface become developable. Second derivatives are relative to a share of
-the design's own, which is large where the design is developable. d penalises the displacement
+lines, which lets a surface become developable. The angle defects of holes that have to close in
+the plane count as curvature, too. Second derivatives are relative to a share of the design's
+own, which is large where the design is developable. d penalises the displacement
 from the design, its tangential part less: quadratically below `quadratic_below`, linearly
 beyond. The elongation of an edge is zero within a range of length ratios.
 
@@ -19,9 +20,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from gso import metrics as measure
 from gso.components import several
-from gso.energy import Weighted, curvature, elongation, fairness, gauss_image, proximity
+from gso.energy import Weighted, curvature, elongation, fairness, gauss_image, holonomy, proximity
 from gso.energy.losses import Absolute, Distance
 from gso.hierarchy import resample
 from gso.mesh import Mesh
@@ -30,7 +33,7 @@ from gso.tasks import per_component
 from gso.tasks.developable.analysis import Analysis, Shape, own_bending
 from gso.tasks.developable.options import Options
 from gso.tasks.request import Request
-from gso.typing import Array, N
+from gso.typing import Array, Ints, N
 
 #: Mean |K| and mean squared bending of a typical design, for which weights are quoted.
 TYPICAL_CURVATURE = 0.3
@@ -47,6 +50,9 @@ BOUNDED = (4.5, 3.0, 0.3)
 #: The mean of squared second differences along both polylines of quads is twice that across the
 #: edges of triangles, in the mean over all directions.
 _QUADS = 2.0
+#: Defect in degrees up to which an inner outline counts as a hole, as where patterns are cut open;
+#: others are the ends of tubes. And the defect up to which a hole lacks no angle.
+_HOLE, _LACKS = 90.0, 0.1
 
 
 def adapted_weights(options: Options, curved: N, bending: N) -> tuple[N, N]:
@@ -107,6 +113,7 @@ def _terms(
     bent = [(t, w_curvature - by_image) for t in curvature.build(mesh)]
     if image > 0:
         bent += [(t, by_image) for t in gauss_image.build(mesh)]
+    bent += [(t, o.w_holes * w_curvature) for t in holonomy.build(mesh, _holes(mesh))]
     items = [Weighted(t, w, Absolute(o.eps)) for t, w in bent]
     smooth = shape.smooth
     if mesh is shape.mesh:
@@ -119,6 +126,21 @@ def _terms(
     items.append(Weighted(near, w_proximity, Distance(o.quadratic_below)))
     items.append(Weighted(elongation.build(mesh), o.w_elongation))
     return items
+
+
+def _holes(mesh: Mesh) -> list[Ints]:
+    """Return the inner outlines that have to close in the plane.
+
+    They are those that nearly do in the design, unless all of them lack an angle: then the pattern
+    can be cut open at them. Cut open at a hole with too much angle it would lie on itself.
+    """
+    if len(mesh.boundary_loops) < 2:
+        return []
+    defects = measure.hole_defects(mesh)
+    near = np.abs(defects) < _HOLE
+    if (defects[near] > _LACKS).all():
+        return []
+    return [mesh.boundary_loops[k] for k in measure.inner_outlines(mesh)[near]]
 
 
 def _resample(source: Mesh, target: Mesh) -> Array:
