@@ -404,3 +404,39 @@ def test_replacing_writes_any_bytes(tmp_path):
         assert isinstance(file, io.BufferedWriter)
         file.write(b"x" * 9)
     assert (tmp_path / "a.bin").read_bytes() == b"x" * 9
+
+
+@pytest.mark.parametrize("first", range(8))
+@pytest.mark.parametrize("suffix", ["obj", "off", "ply"])
+def test_concave_polygons_are_cut_inside_whatever_the_first_corner(tmp_path, first, suffix):
+    # A C of width 60 and height 80, cut out by 40 x 40, on a plane that rises by 3 in 10.
+    outline = [(20, 20), (20, 60), (60, 60), (60, 80), (0, 80), (0, 0), (60, 0), (60, 20)]
+    ring = np.roll(np.array([(x, y, 0.3 * x) for x, y in outline]), first, axis=0)
+    rows = "\n".join(" ".join(map(str, row)) for row in ring)
+    numbers = " ".join(map(str, range(8)))
+    path = tmp_path / f"c.{suffix}"
+    path.write_text(
+        {
+            "obj": "v " + rows.replace("\n", "\nv ") + "\nf 1 2 3 4 5 6 7 8\n",
+            "off": f"OFF\n8 1 0\n{rows}\n8 {numbers}\n",
+            "ply": "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\n"
+            "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+            f"{rows}\n8 {numbers}\n",
+        }[suffix]
+    )
+    mesh = gso.load(path)
+    corners = mesh.vertices[mesh.faces]
+    area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert len(mesh.faces) == 6
+    assert np.linalg.norm(area, axis=1).sum() == pytest.approx(3200 * np.hypot(1, 0.3), rel=1e-9)
+    assert "cut into triangles" in mesh.notes[0]
+
+
+def test_repeated_vertices_of_faces_are_left_out_with_a_note(tmp_path):
+    path = tmp_path / "twice.obj"
+    square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+    path.write_text(square + "f 1 1 2 3\nf 1 3 3\nf 3 4 4 4 1\n")
+    mesh = gso.load(path)
+    assert mesh.faces.tolist() == [[0, 1, 2], [2, 3, 0]]
+    assert any("3 faces repeat a vertex" in note for note in mesh.notes)
+    assert any("1 faces have fewer than three" in note and "face 1" in note for note in mesh.notes)

@@ -28,12 +28,15 @@ class Surface:
         What was changed or left out.
     attributes : Attributes, optional
         Names and texture coordinates of the faces.
+    polygon : ndarray of int, (m,), optional
+        Number of each face in the file, where some were cut into triangles or left out.
     """
 
     vertices: ArrayLike
     faces: ArrayLike | None
     notes: tuple[str, ...] = ()
     attributes: Attributes | None = None
+    polygon: Ints | None = None
 
     def mesh(self, weld: float | None = None) -> Mesh:
         """Make a mesh, after merging vertices within the distance `weld` if it is given."""
