@@ -6,6 +6,9 @@ import numpy as np
 
 from gso.typing import Array, Ints
 
+#: Area of a corner of a quad, relative to the quad's, below which it is in a line.
+_STRAIGHT = 1e-7
+
 
 def signed_area(polygon: Array) -> float:
     """Return the area of a closed polygon (k, 2), positive if it is anticlockwise.
@@ -68,6 +71,25 @@ def triangulated(polygon: Array) -> Ints:
         out.append(ring[[at - 1, at, (at + 1) % len(ring)]])
         ring = np.delete(ring, at)
     return np.array([*out, ring])
+
+
+def reflex_corners(quads: Array) -> Ints:
+    """Return the corner at which each quad (m, 4, 3) is not convex, (m,); -1 for convex ones.
+
+    Such a corner turns inwards, or not at all, seen along the normal of the quad. The diagonal
+    that divides the quad inside it starts there. A quad that crosses itself has no such corner.
+
+    >>> arrow = np.array([[4.0, 0, 0], [1, 1, 0], [0, 4, 0], [0, 0, 0]])
+    >>> reflex_corners(np.array([arrow, np.roll(arrow, 1, axis=0)]))
+    array([1, 2])
+    """
+    with np.errstate(all="ignore"):
+        p = quads - quads.mean(axis=1, keepdims=True)
+        before = p - np.roll(p, 1, axis=1)
+        normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+        turn = np.einsum("mkd,md->mk", np.cross(before, np.roll(before, -1, axis=1)), normal)
+        inwards = turn <= _STRAIGHT * (normal**2).sum(axis=1, keepdims=True)
+    return np.where(inwards.sum(axis=1) == 1, inwards.argmax(axis=1), -1)
 
 
 def _best_ear(p: Array) -> int:

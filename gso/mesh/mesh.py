@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from gso import geometry
 from gso.errors import MeshError
+from gso.geometry.polygon import reflex_corners
 from gso.mesh import topology
 from gso.mesh.attributes import Attributes
 from gso.mesh.validation import (
@@ -170,7 +171,11 @@ class Mesh:
 
     @cached_property
     def _quad_splits(self) -> Flags:
-        return topology.quad_splits(self.faces, self.half_edges)
+        inwards = np.full(len(self.faces), -1)
+        quad = topology.are_quads(self.faces)
+        if quad.any():
+            inwards[quad] = reflex_corners(self.vertices[self.faces[quad]])
+        return topology.quad_splits(self.faces, self.half_edges, inwards)
 
     @cached_property
     def triangle_edges(self) -> topology.HalfEdges:

@@ -17,6 +17,26 @@ from gso.typing import Array, Flags, Ints
 if TYPE_CHECKING:
     from gso.mesh.mesh import Mesh
 
+
+class FaceError(MeshError):
+    """A face cannot be used.
+
+    Attributes
+    ----------
+    face : int
+        Its row in the table of faces.
+    what : str
+        Its corners, what is wrong, and what to do.
+    """
+
+    def __init__(self, face: int, what: str):
+        super().__init__(f"face {face} = {what}")
+        self.face, self.what = face, what
+
+    def __reduce__(self) -> tuple[type[FaceError], tuple[int, str]]:
+        return FaceError, (self.face, self.what)
+
+
 #: Tolerance for coincident vertices, relative to the longest side of the bounding box.
 JOINED = 1e-7
 
@@ -100,12 +120,13 @@ def checked_table(faces: ArrayLike, count: int) -> Ints:
 
 
 def _refuse(table: Ints, bad: Flags, what: str, instead: str = "") -> None:
-    """Raise a MeshError that names the first of some faces, if there are any."""
+    """Raise a FaceError that names the first of some faces, if there are any."""
     if bad.any():
         k = int(bad.argmax())
-        raise MeshError(
-            f"face {k} = {table[k].tolist()} {what} ({int(bad.sum())} such faces)"
-            + (f"; {instead}" if instead else "")
+        raise FaceError(
+            k,
+            f"{table[k].tolist()} {what} ({int(bad.sum())} such faces)"
+            + (f"; {instead}" if instead else ""),
         )
 
 
@@ -137,9 +158,10 @@ def check_corners(table: Ints) -> None:
     _refuse(table, twice, "repeats a vertex", "write it with one corner less or delete it")
     _, first, count = np.unique(ordered, axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
-        raise MeshError(
-            f"face {first[count > 1][0]} = {table[first[count > 1][0]].tolist()} is there "
-            f"{count[count > 1][0]} times; delete the duplicates"
+        face = int(first[count > 1][0])
+        raise FaceError(
+            face,
+            f"{table[face].tolist()} is there {count[count > 1][0]} times; delete the duplicates",
         )
 
 
