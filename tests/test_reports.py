@@ -14,7 +14,7 @@ def written(path, points, faces, lines=None):
     """Write an OBJ file; `lines` are put before the faces of these numbers."""
     rows = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in points]
     for k, face in enumerate(faces):
-        rows += [(lines or {}).get(k, "")] + ["f " + " ".join(str(v + 1) for v in face)]
+        rows += [(lines or {}).get(k, ""), "f " + " ".join(str(v + 1) for v in face)]
     path.write_text("\n".join(rows) + "\n")
     return path
 
