@@ -16,6 +16,7 @@ from gso.mesh.attributes import Attributes
 from gso.mesh.validation import (
     JOINED,
     check_area,
+    check_vertices,
     checked_faces,
     checked_grid,
     checked_vertices,
@@ -101,7 +102,7 @@ class Mesh:
         table, flipped, said = checked_faces(faces, points)
         self.vertices: Array = points
         self.faces: Ints = table
-        topology.check_vertices(self.half_edges)
+        check_vertices(self.half_edges, points)
         self.given_notes: tuple[str, ...] = tuple(notes)
         self.notes: tuple[str, ...] = self.given_notes + unjoined(self) + said
         self.attributes = None if attributes is None else reordered(attributes, table, flipped)

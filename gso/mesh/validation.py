@@ -201,6 +201,49 @@ def have_area(table: Ints, points: Array, size: float | None = None) -> Flags:
     return np.asarray(np.sqrt(x * x + y * y + z * z) > 1e-14)
 
 
+def check_vertices(he: topology.HalfEdges, points: Array) -> None:
+    """Refuse non-manifold vertices; where an edge has a vertex on it, say that first.
+
+    Raises
+    ------
+    MeshError
+        Parts of the surface share no edge at a vertex.
+    """
+    try:
+        topology.check_vertices(he)
+    except MeshError:
+        _check_t_junctions(he, points)
+        raise
+
+
+def _check_t_junctions(he: topology.HalfEdges, points: Array) -> None:
+    """Refuse vertices of the outline that lie on its edges without being their ends."""
+    from scipy.spatial import cKDTree
+
+    rim = np.flatnonzero(he.twin < 0)
+    a, b = he.origin[rim], he.dest[rim]
+    ids = np.unique(a)
+    way = points[b] - points[a]
+    size = np.linalg.norm(way, axis=1)
+    tree = cKDTree(points[ids])
+    step = JOINED * np.ptp(points[ids], axis=0).max()
+    near = tree.query_ball_point(0.5 * (points[a] + points[b]), 0.5 * size)
+    edge = np.repeat(np.arange(len(rim)), [len(found) for found in near])
+    vertex = ids[np.concatenate([np.asarray(found, np.int64) for found in near])]
+    share = ((points[vertex] - points[a[edge]]) * way[edge]).sum(axis=1) / size[edge] ** 2
+    foot = points[a[edge]] + share[:, None] * way[edge]
+    on = np.linalg.norm(points[vertex] - foot, axis=1) <= step
+    on &= (share * size[edge] > step) & ((1.0 - share) * size[edge] > step)
+    if on.any():
+        k = int(on.argmax())
+        at = edge[k]
+        raise MeshError(
+            f"vertex {vertex[k]} lies on the edge from vertex {a[at]} to vertex {b[at]}, but the "
+            f"face {he.face[rim[at]]} of that edge does not have it ({int(on.sum())} such "
+            "vertices): add it to that face as a corner, so that the faces share edges"
+        )
+
+
 def weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]] | None:
     """Weld the sides of a grid that are one point; None if there are none."""
     points = grid.reshape(-1, 3)

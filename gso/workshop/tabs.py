@@ -147,14 +147,14 @@ def _angles(glued: Part, there: Array) -> tuple[float, float]:
     edges = np.concatenate(lines)
     size = float(np.ptp(glued.outline, axis=0).max())
     found = []
-    for at, ahead in ((there[0], there[-1]), (there[-1], there[0])):
+    # The face is to the right of the seam, seen from this part.
+    for at, ahead, side in ((there[0], there[-1], -1.0), (there[-1], there[0], 1.0)):
         base = ahead - at
         ends = np.concatenate([edges[:, ::-1], edges])
         ends = ends[np.linalg.norm(ends[:, 0] - at, axis=1) < 1e-6 * size]
         rays = ends[:, 1] - ends[:, 0]
-        # The face is to the right of the seam seen from this part.
         turn = np.arctan2(base[0] * rays[:, 1] - base[1] * rays[:, 0], rays @ base)
-        turn = (turn if at is there[-1] else -turn) % (2.0 * np.pi)
+        turn = side * turn % (2.0 * np.pi)
         # An edge along the seam itself is no side of the face.
         inner = turn[(turn > 1e-3) & (turn < 2.0 * np.pi - 1e-3)]
         found.append(min(0.25 * np.pi, 0.5 * float(inner.min(initial=np.pi))))
