@@ -8,6 +8,7 @@ import pytest
 import gso
 from gso.mesh import Mesh
 from gso.verdict import Code
+from gso.workshop import Bend, Finish, Part, TabSeam, with_tabs
 
 
 def written(path, points, faces, lines=None):
@@ -158,3 +159,116 @@ def test_a_tall_duct_of_few_faces_is_made(tmp_path):
     assert not any("no area" in str(reason) for reason in job.reasons)
     area = 12 * 2 * 60 * np.sin(np.pi / 12) * 200
     assert part_area(job) == pytest.approx(area, rel=0.02)
+
+
+def triangle(base, angle, other):
+    """Return a triangle on a base along x, by the angles in radians at its ends."""
+    high = base / (1 / np.tan(angle) + 1 / np.tan(other))
+    return np.array([(0.0, 0), (base, 0), (high / np.tan(angle), high)])
+
+
+def turned(points, angle, by):
+    c, s = np.cos(angle), np.sin(angle)
+    return points @ np.array([[c, s], [-s, c]]) + by
+
+
+@pytest.mark.parametrize("angles", [(9.5, 85.0), (30.0, 40.0), (120.0, 20.0), (89.0, 89.0)])
+def test_tabs_lie_within_the_face_that_they_are_glued_to(angles):
+    # A square of 60, along whose upper side a triangle stands upside down in its own place.
+    square = np.array([(0.0, 0), (60, 0), (60, 60), (0, 60)])
+    a, b = np.radians(angles)
+    face = triangle(60.0, a, b)
+    glued = Part("b", turned(face, 1.1, [300.0, 40.0]))
+    # From right to left along the square, which is to the left.
+    line, there = square[[2, 3]], glued.outline[[1, 0]]
+    seam = TabSeam(7, line, there, glued, True)
+    part = with_tabs(Part("a", square), [seam], 5.0, numbers=3.0)
+    tab = np.array([p for p in part.outline if p[1] > 60 + 1e-9]) - [0, 60]
+    assert 1 <= len(tab) <= 2 and [label.text for label in part.labels] == ["7"]
+    # At both ends the tab takes half of the angle of the face, and 45 degrees at most.
+    for end, angle, way in ((0.0, a, 1.0), (60.0, b, -1.0)):
+        first = tab[np.argmin(way * tab[:, 0])]
+        own = np.arctan2(first[1], way * (first[0] - end))
+        assert own == pytest.approx(min(angle / 2, np.pi / 4), rel=1e-6)
+    # Nothing of it is beyond the other sides of the face.
+    for p, q in ((face[1], face[2]), (face[2], face[0])):
+        left = (q - p)[0] * (tab - p)[:, 1] - (q - p)[1] * (tab - p)[:, 0]
+        assert (left > 0).all()
+    assert not part.holes and part.area > 3600
+
+
+def test_a_tab_ends_at_a_sharp_bend_of_the_other_part():
+    # The other part is a flange of 3 and a wall behind a bend of 90 degrees.
+    square = np.array([(0.0, 0), (60, 0), (60, 60), (0, 60)])
+    wall = np.array([(0.0, 0), (60, 0), (60, 3), (60, 40), (0, 40), (0, 3)])
+    high = {}
+    for angle in (np.pi / 2, 0.05):
+        glued = Part("b", wall, bends=(Bend(np.array([(0.0, 3), (60, 3)]), angle, 1.0),))
+        seam = TabSeam(1, square[[2, 3]], wall[[1, 0]], glued, True)
+        part = with_tabs(Part("a", square), [seam], 5.0)
+        high[angle] = part.outline[:, 1].max() - 60
+    assert high[np.pi / 2] == pytest.approx(2.5) and high[0.05] == pytest.approx(5.0)
+
+
+def pyramid(sides, radius, height):
+    """Return a pyramid without its base."""
+    turn = 2 * np.pi * np.arange(sides) / sides
+    ring = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn], axis=1)
+    faces = [[k, (k + 1) % sides, sides] for k in range(sides)]
+    return Mesh(np.r_[ring, [[0, 0, height]]], faces)
+
+
+@pytest.mark.parametrize(("sides", "height"), [(4, 120.0), (6, 60.0), (3, 200.0)])
+def test_tabs_of_pyramids_leave_no_slits_and_carry_numbers(tmp_path, sides, height):
+    design = pyramid(sides, 14.0, height)
+    finish = Finish(tabs=5.0, notches=None)
+    job = flat(design, tmp_path / "out", finish=finish, max_strain="0.1%")
+    side = np.hypot(14.0, height)
+    apex = 2 * np.arcsin(14.0 * np.sin(np.pi / sides) / side)
+    plain = sides * 0.5 * side**2 * np.sin(apex)
+    assert part_area(job) > plain
+    numbers = [label.text for part in job.parts for label in part.labels if label.text.isdigit()]
+    assert numbers.count("1") == 2
+    for part in job.parts:
+        assert not part.holes
+        steps = np.linalg.norm(part.outline - np.roll(part.outline, 1, axis=0), axis=1)
+        assert steps.min() > 1e-3
+
+
+@pytest.mark.parametrize("cut", [[(1, 1)], [(1, 1), (3, 2)], [(1, 1), (2, 2)]])
+def test_plates_with_holes_never_end_in_an_error_of_the_library(tmp_path, cut):
+    # Squares of 10 without some of them.
+    rows, columns = 4, 6
+    x, y = np.meshgrid(10.0 * np.arange(columns + 1), 10.0 * np.arange(rows + 1))
+    points = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)
+    k = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
+    gone = [i + j * columns for i, j in cut]
+    k = np.delete(k, gone)
+    faces = np.stack([k, k + 1, k + columns + 2, k + columns + 1], axis=1)
+    try:
+        job = flat((points, faces), tmp_path / "out", darts=True)
+    except gso.GSOError as error:
+        # Two holes that share a corner are no surface there.
+        assert cut[1:] == [(2, 2)] and "vertex" in str(error)
+    else:
+        assert part_area(job) == pytest.approx(100.0 * (rows * columns - len(cut)), rel=1e-6)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.4])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_t_junction_is_named(slope, mirrored):
+    # Two faces beside the long edge of a third.
+    points = np.array([(0, 0), (20, 0), (20, 60), (0, 60), (20, 25), (50, 0), (50, 25), (50, 60)])
+    points = np.c_[points, slope * points[:, 0]].astype(float)
+    # Another row, so that faces on both sides of the edge meet at its ends only.
+    faces = np.array([[0, 1, 2, 3], [1, 5, 6, 4], [4, 6, 7, 2]])
+    if mirrored:
+        points, faces = points * [-1, 1, 1], faces[:, ::-1]
+    with pytest.raises(gso.MeshError, match=r"vertex 4 lies on the edge .*add it to that face"):
+        Mesh(points, faces)
+
+
+def test_holes_in_no_edge_are_no_t_junctions():
+    points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 1, 0), (2, 2, 0), (1, 2, 0), (0, 1, 0)]
+    with pytest.raises(gso.MeshError, match="give each part its own copy"):
+        Mesh(points, [[0, 1, 2, 6], [2, 3, 4, 5]])

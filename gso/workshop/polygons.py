@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 _GRIDS = (1e-12, 1e-10, 1e-8)
 #: Grids, in millimetres, on which polygons are united that touch but for rounding errors.
 _JOINTS = (1e-9, 1e-7, 1e-5)
+#: Distance of successive points that are one, in millimetres.
+_REPEATED = 1e-6
 #: Largest width of a hole that is a rounding error of a union, in millimetres, and the largest
 #: share of the area by which a union may miss what it unites.
 _SLIVER, _LOST = 1e-3, 1e-6
@@ -80,7 +82,7 @@ def united(one: Geometry, two: Geometry) -> Geometry | None:
     if whole.geom_type != "Polygon" or abs(whole.area - area) > _LOST * area:
         return None
     holes = [ring for ring in whole.interiors if shapely.Polygon(ring).area > _SLIVER * ring.length]
-    return shapely.Polygon(whole.exterior, holes)
+    return shapely.remove_repeated_points(shapely.Polygon(whole.exterior, holes), _REPEATED)
 
 
 def largest(shape: Geometry) -> Geometry | None:
