@@ -388,7 +388,6 @@ def test_unjudged_results_are_usable_as_before(good):
 
 def _plates(*turns):
     """Return square plates of side 2 through one line, turned about it by angles in degrees."""
-    # No edge runs along the line, where plates would only touch.
     y, x = np.mgrid[-1:1:7j, -1:1:8j]
     points = [
         np.stack([x.ravel() * np.cos(a) + k / 50, y.ravel() + k / 30, x.ravel() * np.sin(a)], 1)
