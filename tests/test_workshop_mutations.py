@@ -10,7 +10,7 @@ from gso import GSOError
 from gso.workshop import Finish, Thickness
 
 #: Designs of the slow test, and of the fast one; every so many is made of strips.
-FULL, SAMPLE, STRIPS = 600, 40, 50
+FULL, SAMPLE, STRIPS = 300, 12, 100
 
 
 def sheet(kind, rng):
@@ -115,7 +115,7 @@ def counted(numbers, folder):
 @pytest.mark.filterwarnings("ignore")
 def test_a_sample_of_damaged_designs_ends_in_parts_or_own_errors(tmp_path):
     found = counted(range(1, 1 + SAMPLE), tmp_path)
-    assert min(found["usable"], found["not usable"] + found["refused"]) > SAMPLE // 10
+    assert min(found["usable"], found["not usable"] + found["refused"]) >= 1
 
 
 @pytest.mark.slow
