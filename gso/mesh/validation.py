@@ -221,6 +221,8 @@ def _check_t_junctions(he: topology.HalfEdges, points: Array) -> None:
     from scipy.spatial import cKDTree
 
     rim = np.flatnonzero(he.twin < 0)
+    if not rim.size:
+        return
     a, b = he.origin[rim], he.dest[rim]
     ids = np.unique(a)
     way = points[b] - points[a]
