@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gso
-from gso import Pattern, metrics, parametrization
+from gso import Pattern, metrics
 from gso import mesh as meshes
 from gso.cli import main
 from gso.mesh import Mesh, joining
@@ -275,10 +275,9 @@ class TestFiles:
 
 def test_turning_tells_ends_from_holes():
     mesh = tube(CYLINDER)
-    assert np.allclose([parametrization.turning(mesh, loop) for loop in mesh.boundary_loops], 0.0)
+    assert np.allclose(metrics.turning(mesh), 0.0)
     flat = tube(ring(1.0, 0.0))
-    turns = sorted(parametrization.turning(flat, loop) for loop in flat.boundary_loops)
-    assert np.allclose(turns, [-2 * np.pi, 2 * np.pi])
+    assert np.allclose(sorted(metrics.turning(flat)), [-2 * np.pi, 2 * np.pi])
 
 
 def test_pattern_of_a_whole_surface():

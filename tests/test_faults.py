@@ -363,3 +363,47 @@ def test_it_is_fast():
         return time.process_time() - start
 
     assert min(once() for _ in range(5)) < 0.1
+
+
+def _sheet_about_a_line(angles, shift=0.0):
+    """Return half-planes about the y axis, as one sheet from the first to the last angle."""
+    y = np.linspace(0, 4, 5) + shift
+    rows = []
+    for k, angle in enumerate(np.radians(angles)):
+        for radius in (2.0, 1.0) if k == 0 else (1.0, 2.0):
+            rows.append([(radius * np.cos(angle), v, radius * np.sin(angle)) for v in y])
+        if k == 0 and len(angles) > 1:
+            rows.append([(0.0, v, 0.0) for v in y])
+    return Mesh.from_grid(np.array(rows))
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.3])
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+@pytest.mark.parametrize(
+    ("one", "two", "cross"),
+    [
+        ((0, 180), (90, 270), True),
+        ((0, 180), (30, 200), True),
+        ((0, 120), (60, 240), True),
+        ((0, 90), (180, 270), False),
+        ((0, 180), (30, 150), False),
+        ((-30, 210), (20, 160), False),
+    ],
+)
+def test_sheets_that_meet_along_edges(one, two, cross, shift, turn):
+    c, s = np.cos(turn), np.sin(turn)
+    both = beside(_sheet_about_a_line(one), _sheet_about_a_line(two, shift))
+    mesh = both.replaced(both.vertices @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]))
+    found = faults.crossings(mesh)
+    assert bool(found.size) == cross
+    if cross:
+        # The faces that are named have two corners on the line.
+        on = np.linalg.norm(both.vertices[:, [0, 2]], axis=1) < 1e-9
+        assert (on[mesh.faces[found]].sum(axis=-1) == 2).all()
+
+
+def test_a_wall_that_ends_on_a_floor_does_not_cross_it():
+    floor = _sheet_about_a_line((0, 180))
+    y, z = np.meshgrid(np.linspace(0, 4, 5), [0.0, 1.0, 2.0])
+    wall = Mesh.from_grid(np.stack([0 * y, y, z], axis=-1))
+    assert not faults.crossings(beside(floor, wall)).size

@@ -103,7 +103,9 @@ def check(found, design: Mesh) -> None:
     a, b, c = flat[faces].transpose(1, 0, 2)
     signed = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     assert signed.min() > 0
-    union = shapely.union_all([t.buffer(1e-9 * design.diagonal, join_style="mitre") for t in triangles])
+    union = shapely.union_all(
+        [t.buffer(1e-9 * design.diagonal, join_style="mitre") for t in triangles]
+    )
     assert union.area == pytest.approx(signed.sum(), rel=1e-6)
 
 
@@ -197,7 +199,9 @@ def test_fabricated_as_it_is(design, tmp_path):
     assert len(job.parts[0].bends) >= 2
 
 
-@pytest.mark.parametrize(("thick", "radius", "k"), [(1.0, 1.0, 0.5), (1.5, 1.5, 0.44), (3.0, 4.0, 0.33)])
+@pytest.mark.parametrize(
+    ("thick", "radius", "k"), [(1.0, 1.0, 0.5), (1.5, 1.5, 0.44), (3.0, 4.0, 0.33)]
+)
 def test_flat_lengths_of_folded_sections_are_the_shops(tmp_path, thick, radius, k):
     sheet = Thickness(thick, k=k, radius=radius)
     job = gso.fabricate(
@@ -225,7 +229,9 @@ def test_too_thick_for_its_folds(tmp_path):
 
 def test_rolled_bends_keep_their_radius_beside_folds(tmp_path):
     sheet = Thickness(1.5, k=0.5, radius=2.0)
-    job = gso.fabricate(bracket(), tmp_path, formats=("svg",), workers=0, finish=Finish(thickness=sheet))
+    job = gso.fabricate(
+        bracket(), tmp_path, formats=("svg",), workers=0, finish=Finish(thickness=sheet)
+    )
     (part,) = job.parts
     assert max(part.size) == pytest.approx(120.0 + 5.0 * np.pi / 2, abs=1e-6)
     np.testing.assert_allclose([bend.radius for bend in part.bends], 5.0 - 0.75, rtol=1e-6)

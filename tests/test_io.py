@@ -404,3 +404,86 @@ def test_replacing_writes_any_bytes(tmp_path):
         assert isinstance(file, io.BufferedWriter)
         file.write(b"x" * 9)
     assert (tmp_path / "a.bin").read_bytes() == b"x" * 9
+
+
+@pytest.mark.parametrize("first", range(8))
+@pytest.mark.parametrize("suffix", ["obj", "off", "ply"])
+def test_concave_polygons_are_cut_inside_whatever_the_first_corner(tmp_path, first, suffix):
+    # A C of width 60 and height 80, cut out by 40 x 40, on a plane that rises by 3 in 10.
+    outline = [(20, 20), (20, 60), (60, 60), (60, 80), (0, 80), (0, 0), (60, 0), (60, 20)]
+    ring = np.roll(np.array([(x, y, 0.3 * x) for x, y in outline]), first, axis=0)
+    rows = "\n".join(" ".join(map(str, row)) for row in ring)
+    numbers = " ".join(map(str, range(8)))
+    path = tmp_path / f"c.{suffix}"
+    path.write_text(
+        {
+            "obj": "v " + rows.replace("\n", "\nv ") + "\nf 1 2 3 4 5 6 7 8\n",
+            "off": f"OFF\n8 1 0\n{rows}\n8 {numbers}\n",
+            "ply": "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\n"
+            "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+            f"{rows}\n8 {numbers}\n",
+        }[suffix]
+    )
+    mesh = gso.load(path)
+    corners = mesh.vertices[mesh.faces]
+    area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert len(mesh.faces) == 6
+    assert np.linalg.norm(area, axis=1).sum() == pytest.approx(3200 * np.hypot(1, 0.3), rel=1e-9)
+    assert "cut into triangles" in mesh.notes[0]
+
+
+def test_repeated_vertices_of_faces_are_left_out_with_a_note(tmp_path):
+    path = tmp_path / "twice.obj"
+    square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+    path.write_text(square + "f 1 1 2 3\nf 1 3 3\nf 3 4 4 4 1\n")
+    mesh = gso.load(path)
+    assert mesh.faces.tolist() == [[0, 1, 2], [2, 3, 0]]
+    assert any("3 faces repeat a vertex" in note for note in mesh.notes)
+    assert any("1 faces have fewer than three" in note and "face 1" in note for note in mesh.notes)
+
+
+def _arrow(first, inner=(10.0, 10.0)):
+    """Return a quad with an inner corner, listed from a corner on: its area is 400 by default."""
+    return np.roll([(0.0, 0, 0), (40, 0, 0), (*inner, 0), (0, 40, 0)], -first, axis=0)
+
+
+@pytest.mark.parametrize("first", range(4))
+@pytest.mark.parametrize("inner", [(10.0, 10.0), (5.0, 12.0), (20.0, 20.0)])
+def test_concave_quads_are_cut_through_their_inner_corner(first, inner):
+    # The shoelace formula of the corners (0, 0), (40, 0), inner, (0, 40).
+    right = 20.0 * (inner[0] + inner[1])
+    points = _arrow(first, inner)
+    mesh = gso.io.as_mesh((points, [[0, 1, 2, 3]]))
+    assert mesh.faces.shape == (2, 3)
+    assert gso.metrics.area(mesh) == pytest.approx(right, rel=1e-12)
+    assert "1 quads are not convex" in mesh.notes[0] and "face 0" in mesh.notes[0]
+    # A mesh made without a reader keeps its face, and its triangles are the right ones.
+    corners = points[Mesh(points, [[0, 1, 2, 3]]).triangles]
+    areas = np.linalg.norm(np.cross(*(corners[:, k] - corners[:, 0] for k in (1, 2))), axis=1) / 2
+    assert areas.sum() == pytest.approx(right, rel=1e-12) and areas.min() > 1.0
+
+
+def test_a_concave_quad_among_others_keeps_the_names_of_its_faces(tmp_path):
+    path = tmp_path / "hat.obj"
+    points = [(0, 0, 0), (40, 0, 0), (10, 10, 0), (0, 40, 0), (40, 40, 0), (0, 0, 20), (40, 0, 20)]
+    path.write_text(
+        "".join(f"v {x} {y} {z}\n" for x, y, z in points)
+        + "g wall\nf 1 6 7 2\ng floor\nf 2 3 4 1\ng wedge\nf 4 3 2 5\n"
+    )
+    mesh = gso.load(path)
+    said = mesh.attributes.labels["g"]
+    by_name = dict.fromkeys(said.names, 0.0)
+    for face, k in zip(mesh.faces, said.of_face, strict=True):
+        x, y = mesh.vertices[face[face >= 0]][:, [0, 1 if said.names[k] != "wall" else 2]].T
+        by_name[said.names[k]] += abs((x * np.roll(y, -1) - y * np.roll(x, -1)).sum()) / 2
+    assert by_name == {"wall": 800.0, "floor": 400.0, "wedge": 1200.0}
+
+
+def test_errors_name_the_face_of_the_file(tmp_path):
+    path = tmp_path / "flat.obj"
+    ring = np.linspace(0, 2 * np.pi, 6, endpoint=False)
+    points = [*np.c_[np.cos(ring), np.sin(ring), 0 * ring], (2, 2, 0), (3, 3, 0), (4, 4, 0)]
+    rows = "".join(f"v {x} {y} {z}\n" for x, y, z in points)
+    path.write_text(rows + "f 1 2 3 4 5 6\nf 7 8 9\n")
+    with pytest.raises(MeshError, match=r"face 1 = \[6, 7, 8\] has no area"):
+        gso.load(path)

@@ -384,3 +384,48 @@ def test_unjudged_results_are_usable_as_before(good):
     plain = replace(good, reasons=(), status=Status.CONVERGED)
     assert plain.usable
     assert not replace(plain, status=Status.CANCELLED).usable
+
+
+def _plates(*turns):
+    """Return square plates of side 2 through one line, turned about it by angles in degrees."""
+    y, x = np.mgrid[-1:1:7j, -1:1:8j]
+    points = [
+        np.stack([x.ravel() * np.cos(a) + k / 50, y.ravel() + k / 30, x.ravel() * np.sin(a)], 1)
+        for k, a in enumerate(np.radians(turns))
+    ]
+    faces = Mesh.from_grid(np.stack([x, y, 0 * x], axis=-1)).faces
+    return Mesh(np.concatenate(points), np.concatenate([faces + 56 * k for k in range(len(turns))]))
+
+
+def _eight():
+    """Return a strip bent to a figure of eight: exactly developable, and through itself."""
+    angle = np.linspace(0, 1, 24)[:, None] + np.zeros((24, 9))
+    across = np.arange(9.0) / 4 + np.zeros((24, 9))
+    eight = [np.sin(6.28 * angle + 0.1), across, 0.5 * np.sin(12.57 * angle + 0.2)]
+    return Mesh.from_grid(np.stack(eight, axis=-1))
+
+
+@pytest.mark.parametrize(
+    "how", [{"task": "flatten"}, {"formulation": "curvature"}, {"formulation": "isometry"}, {}]
+)
+@pytest.mark.parametrize("make", [_eight, lambda: _plates(0, 90), lambda: _plates(10, 70, 130)])
+def test_what_passes_through_itself_cannot_be_built(make, how):
+    mesh = make()
+    result = gso.tno.optimize(mesh, **how)
+    assert not result.usable and result.status is Status.UNUSABLE
+    why = next(r for r in result.reasons if r.code is Code.CROSSES_ITSELF)
+    # A face that is named has vertices on both sides of the plane of another one that is named.
+    named = [mesh.vertices[f] for f in mesh.faces[list(why.places.ids)]]
+    for face in named:
+        sides = [
+            (face - other[0]) @ np.cross(other[1] - other[0], other[2] - other[0])
+            for other in named
+        ]
+        assert any(side.min() < 0 < side.max() for side in sides)
+
+
+def test_plates_that_only_stand_near_each_other_are_no_crossing():
+    mesh = _plates(0, 90)
+    apart = mesh.replaced(mesh.vertices + np.repeat([[0, 0, 0], [0, 0, 1.01]], 56, axis=0))
+    for how in ({"task": "flatten"}, {"formulation": "curvature"}):
+        assert gso.tno.optimize(apart, **how).usable

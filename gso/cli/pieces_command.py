@@ -65,7 +65,7 @@ def pieces(
     """
     from gso import plot
     from gso.cli.progress import words
-    from gso.seams import Labels
+    from gso.seams import Groups
     from gso.seams import pieces as search
     from gso.seams.piece_files import save
 
@@ -75,7 +75,7 @@ def pieces(
     file_options.spare([name], outputs, force)
     mesh = file_options.load(name, weld)
     with words() as say:
-        found = search(mesh, keep=Labels("g") if keep_groups else None, callback=say, **given)
+        found = search(mesh, keep=Groups() if keep_groups else None, callback=say, **given)
     save(found, folder, given["unit"])
     if plot.available():
         try:

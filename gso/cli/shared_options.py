@@ -97,7 +97,10 @@ sheet = click.option(
 )
 darts = click.option("--darts/--no-darts", default=False, help="Whether cuts may end in a piece.")
 keep_groups = click.option(
-    "--keep-groups", is_flag=True, help="Cut between the groups (g) of IN in any case."
+    "--keep-groups",
+    is_flag=True,
+    help="Cut between the groups (g) of IN in any case; without two of them, between its objects "
+    "(o) or materials (usemtl).",
 )
 unit = click.option(
     "--unit", type=click.Choice(tuple(MILLIMETRES)), default="mm", help="Unit of the coordinates."

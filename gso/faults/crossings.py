@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso import geometry
+from gso.faults.edge_crossings import cross_along_edges
 from gso.faults.face_pairs import DEPTH, by_triangles, candidates, every, split
 from gso.faults.one_to_one import simple_boundary, upright
 from gso.mesh import Mesh
@@ -16,7 +17,7 @@ def crossings(mesh: Mesh) -> Ints:
 
     Quads are split into triangles along their first diagonal. Faces that touch, are coplanar,
     or penetrate each other by less than a thousandth of their width do not intersect. An
-    intersection that runs along edges of both parts, to that precision, is not detected.
+    intersection may run along edges of one part or of both.
 
     Parameters
     ----------
@@ -43,10 +44,17 @@ def crossings(mesh: Mesh) -> Ints:
     triangles, count = split(mesh.faces)
     if _is_graph(mesh, points, every(triangles, count)):
         return np.empty((0, 2), np.int64)
-    pairs, width = candidates(points, mesh.faces)
-    which, first, second = by_triangles(pairs, triangles, count)
+    pairs, width = candidates(points, mesh.faces, touching=True)
+    which, first, second, place = by_triangles(pairs, triangles, count)
     crossed = np.zeros(len(pairs), bool)
-    crossed[which[_cross(points[first], points[second], DEPTH * width[which])]] = True
+    depth = DEPTH * width[which]
+    crossed[which[_cross(points[first], points[second], depth)]] = True
+    # Rows of all triangles: the first ones of the faces, then the second ones.
+    row = np.stack([np.arange(len(count)), len(count) + np.cumsum(count == 2) - 1], axis=1)
+    number = np.stack([row[pairs[which, k], place[k]] for k in range(2)], axis=1)
+    for own in (number, number[:, ::-1]):
+        along = cross_along_edges(points, every(triangles, count), own, depth)
+        crossed[which[along]] = True
     found = pairs[crossed]
     return found[np.lexsort(found.T[::-1])]
 

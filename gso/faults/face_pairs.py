@@ -13,7 +13,7 @@ from gso.typing import Array, Flags, Ints
 DEPTH = 1e-3
 
 
-def candidates(points: Array, faces: Ints) -> tuple[Ints, Array]:
+def candidates(points: Array, faces: Ints, *, touching: bool = False) -> tuple[Ints, Array]:
     """Find the pairs of faces without a common vertex that two simple tests do not separate.
 
     The tests compare their bounding boxes, and their extents along the line through their
@@ -25,6 +25,8 @@ def candidates(points: Array, faces: Ints) -> tuple[Ints, Array]:
         Vertices.
     faces : ndarray of int, (m, 3) or (m, 4)
         Faces; a triangle among quads ends in -1.
+    touching : bool
+        Whether to keep pairs that only touch.
 
     Returns
     -------
@@ -47,7 +49,8 @@ def candidates(points: Array, faces: Ints) -> tuple[Ints, Array]:
     axis = centre[:, second] - centre[:, first]
     length = np.sqrt((axis**2).sum(axis=0))
     here, there = (np.einsum("dkp,dp->kp", corners[:, :, k], axis) for k in (first, second))
-    met = np.maximum.reduce(here) - np.minimum.reduce(there) > DEPTH * width * length
+    least = -DEPTH if touching else DEPTH
+    met = np.maximum.reduce(here) - np.minimum.reduce(there) > least * width * length
     # Faces with the same centre cannot be separated along that line.
     met |= length <= DEPTH * width
     return np.stack([first, second], axis=1)[met], width[met]
@@ -75,7 +78,7 @@ def every(triangles: Ints, count: Ints) -> Ints:
     return np.concatenate([triangles[:, 0], triangles[count == 2, 1]])
 
 
-def by_triangles(pairs: Ints, triangles: Ints, count: Ints) -> tuple[Ints, Ints, Ints]:
+def by_triangles(pairs: Ints, triangles: Ints, count: Ints) -> tuple[Ints, Ints, Ints, Ints]:
     """Expand pairs of faces into pairs of their triangles.
 
     Returns
@@ -84,12 +87,16 @@ def by_triangles(pairs: Ints, triangles: Ints, count: Ints) -> tuple[Ints, Ints,
         Index of the pair of faces of each pair of triangles.
     first, second : ndarray of int, (t, 3)
         Corners of the triangles.
+    place : ndarray of int, (2, t)
+        Which triangle of its face each is, 0 or 1.
     """
-    which, first, second = [], [], []
+    which, first, second, place = [], [], [], []
     for i in range(2):
         for j in range(2):
             there = np.flatnonzero((count[pairs[:, 0]] > i) & (count[pairs[:, 1]] > j))
             which.append(there)
             first.append(triangles[pairs[there, 0], i])
             second.append(triangles[pairs[there, 1], j])
-    return np.concatenate(which), np.concatenate(first), np.concatenate(second)
+            place.append(np.repeat([[i], [j]], len(there), axis=1))
+    each, one, two = (np.concatenate(x) for x in (which, first, second))
+    return each, one, two, np.concatenate(place, axis=1)

@@ -70,7 +70,7 @@ def _covers_once(mesh: Mesh, points: Array, triangles: Ints) -> bool:
 def _overlapping(mesh: Mesh, points: Array, triangles: Ints, count: Ints) -> Ints:
     """Find the pairs of faces by testing all that are close, split into given triangles."""
     pairs, width = candidates(points, mesh.faces)
-    which, first, second = by_triangles(pairs, triangles, count)
+    which, first, second, _ = by_triangles(pairs, triangles, count)
     met = _meet(points[first], points[second], DEPTH * width[which])
     return np.unique(pairs[which[met]], axis=0)
 

@@ -4,12 +4,13 @@ The functions take *component tuples* ``(x, y, z)`` or ``(x, y)`` and use only
 ``+ - * /`` and the few functions of :mod:`gso.geometry.ops`. The same code runs on
 NumPy arrays (metrics), torch tensors (losses) and CasADi symbols (derivatives), so
 solver residuals, training losses and metrics always agree. Only :mod:`gso.geometry.size`,
-:mod:`gso.geometry.triangle`, :mod:`gso.geometry.rigid` and :mod:`gso.geometry.polygon` take NumPy
-arrays of points.
+:mod:`gso.geometry.triangle`, :mod:`gso.geometry.rigid`, :mod:`gso.geometry.polygon` and
+:mod:`gso.geometry.closing` take NumPy arrays.
 """
 
 from gso.geometry.angle_defect import (
     GRID_RINGS,
+    fan_angle,
     gaussian_curvature,
     grid_curvature,
     grid_star,
@@ -22,6 +23,7 @@ from gso.geometry.cells import (
     face_products,
     isometry_defect,
 )
+from gso.geometry.closing import Closing, closing
 from gso.geometry.differences import second_difference
 from gso.geometry.gauss_image import image_curvature, solid_angle
 from gso.geometry.parametric import smooth_gaussian_curvature
@@ -50,12 +52,14 @@ from gso.geometry.vector import angle, cross, dot, norm, norm2, sub
 
 __all__ = [
     "GRID_RINGS",
+    "Closing",
     "Matrix",
     "angle",
     "area_vectors",
     "ball",
     "box_diagonal",
     "closest_motion",
+    "closing",
     "corner_angles",
     "corner_area2",
     "corners",
@@ -67,6 +71,7 @@ __all__ = [
     "doubled_areas",
     "eigen",
     "face_products",
+    "fan_angle",
     "first_form",
     "gaussian_curvature",
     "grid_curvature",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -35,6 +36,28 @@ def _curvature(angles: S, area2: S) -> S:
 def star_area(centre: Vec[S], ring: Sequence[Vec[S]]) -> S:
     """Sum the full areas of the triangles of a star (three times the barycentric area)."""
     return 0.5 * _star(centre, ring)[1]
+
+
+def fan_angle(centre: Vec[S], ring: Sequence[Vec[S]]) -> S:
+    """Return the sum of the angles of an open fan of triangles at their common corner, radians.
+
+    Parameters
+    ----------
+    centre : tuple of 3 numbers
+        The corner.
+    ring : sequence of tuples of 3 numbers
+        The other corners in their order, two or more. One listed twice in a row adds nothing.
+
+    Examples
+    --------
+    >>> round(float(fan_angle((0., 0., 0.), [(1., 0., 0.), (0., 1., 0.), (0., 0., 1.)])), 6)
+    3.141593
+    """
+    edges = [sub(p, centre) for p in ring]
+    total, *others = (_wedge(a, b)[0] for a, b in itertools.pairwise(edges))
+    for angle in others:
+        total = total + angle
+    return total
 
 
 #: Index offsets (i, j) from a grid vertex to its ring of six neighbours, for both triangulations

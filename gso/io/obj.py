@@ -58,6 +58,7 @@ def read(data: bytes) -> Surface:
         faces,
         notes + said + _left_out(words, v),
         None if attributes.empty else attributes,
+        polygon,
     )
 
 

@@ -50,8 +50,8 @@ def read(data: bytes) -> Surface:
     if outside.any():
         at = int(outside.argmax())
         words.fail(corner[at], f"a face refers to vertex {index[at]}, the last one is {n - 1}")
-    faces, notes = face_table(index, size, points)
-    return Surface(points, faces, notes)
+    faces, polygon, notes = face_table(index, size, points)
+    return Surface(points, faces, notes, polygon=polygon)
 
 
 def _counts(words: Words, glued: bytes) -> tuple[int, int, int]:

@@ -81,8 +81,8 @@ def read(data: bytes) -> Surface:
             f"face {face} refers to vertex {corners[outside.argmax()]}, the last one is "
             f"{len(points) - 1}"
         )
-    faces, notes = face_table(corners, count, points)
-    return Surface(points, faces, notes)
+    faces, polygon, notes = face_table(corners, count, points)
+    return Surface(points, faces, notes, polygon=polygon)
 
 
 def _header(data: bytes) -> _Header:

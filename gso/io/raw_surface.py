@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import MeshError
+from gso.geometry.polygon import reflex_corners
 from gso.mesh import Mesh
 from gso.mesh.attributes import Attributes
-from gso.mesh.validation import checked_table, checked_vertices
+from gso.mesh.topology import are_quads
+from gso.mesh.validation import FaceError, checked_table, checked_vertices
 from gso.mesh.welding import collapse, equal, near
 from gso.quantities import as_positive
 from gso.typing import Array, Ints
@@ -28,12 +30,15 @@ class Surface:
         What was changed or left out.
     attributes : Attributes, optional
         Names and texture coordinates of the faces.
+    polygon : ndarray of int, (m,), optional
+        Number of each face in the file, where some were cut into triangles or left out.
     """
 
     vertices: ArrayLike
     faces: ArrayLike | None
     notes: tuple[str, ...] = ()
     attributes: Attributes | None = None
+    polygon: Ints | None = None
 
     def mesh(self, weld: float | None = None) -> Mesh:
         """Make a mesh, after merging vertices within the distance `weld` if it is given."""
@@ -42,7 +47,58 @@ class Surface:
             return grid if weld is None else welded(grid, weld)
         if weld is not None:
             return _welded(self, self.faces, checked(weld)).mesh()
-        return Mesh(self.vertices, self.faces, notes=self.notes, attributes=self.attributes)
+        mesh = self._made(self.faces)
+        if mesh.is_triangles or mesh.grid_index is not None:
+            return mesh
+        return self._convex(mesh, checked_table(self.faces, len(mesh.vertices)))
+
+    def _made(self, faces: ArrayLike) -> Mesh:
+        try:
+            return Mesh(self.vertices, faces, notes=self.notes, attributes=self.attributes)
+        except FaceError as error:
+            raise self._named(error) from None
+
+    def _convex(self, mesh: Mesh, table: Ints) -> Mesh:
+        """Cut the quads that are not convex into two triangles each, with a note.
+
+        `mesh` has the faces of the `table`.
+        """
+        quad = np.flatnonzero(are_quads(table))
+        corner = np.full(len(table), -1)
+        corner[quad] = reflex_corners(mesh.vertices[table[quad]])
+        concave = corner >= 0
+        if not concave.any():
+            return mesh
+        face = np.repeat(np.arange(len(table)), 1 + concave)
+        second = np.diff(face, prepend=-1) == 0
+        turns = np.broadcast_to(np.arange(4), (len(face), 4)).copy()
+        for half, corners in ((~second, [0, 1, 2]), (second, [0, 2, 3])):
+            some = np.flatnonzero(concave[face] & half)
+            turns[some, :3] = (corner[face[some], None] + corners) % 4
+        turns[concave[face] | (table[face, 3] < 0), 3] = -1
+        polygon = np.arange(len(table)) if self.polygon is None else self.polygon
+        note = (
+            f"{int(concave.sum())} quads are not convex and were cut into two triangles each "
+            f"(the first is face {polygon[concave.argmax()]})"
+        )
+        faces = np.where(turns < 0, -1, np.take_along_axis(table[face], turns, axis=1))
+        return Surface(
+            mesh.vertices,
+            faces,
+            (*self.notes, note),
+            None if self.attributes is None else self.attributes.taken(face, turns),
+            polygon[face],
+        )._made(faces)
+
+    def _named(self, error: FaceError) -> MeshError:
+        """Name the face of the file that an error is about."""
+        if self.polygon is None:
+            return error
+        face = int(self.polygon[error.face])
+        parts = int((self.polygon == face).sum())
+        if parts > 1:
+            return MeshError(f"face {face}: its triangle {error.what}")
+        return FaceError(face, error.what)
 
 
 def checked(weld: object) -> float:
@@ -102,7 +158,7 @@ def _welded(surface: Surface, faces: ArrayLike, weld: float) -> Surface:
     kept = target == np.arange(len(points))
     if kept.all():
         note = f"weld={weld:.3g} merged nothing: no two vertices are that close"
-        return Surface(points, table, (*surface.notes, note), surface.attributes)
+        return Surface(points, table, (*surface.notes, note), surface.attributes, surface.polygon)
     done = collapse(table, target)
     if not len(done.faces):
         raise MeshError(f"weld={weld:.3g} leaves no face; give a length below that of the edges")
@@ -122,6 +178,7 @@ def _welded(surface: Surface, faces: ArrayLike, weld: float) -> Surface:
         np.where(done.faces < 0, -1, new[done.faces]),
         (*surface.notes, *notes),
         None if said is None else said.taken(done.kept, done.turns),
+        None if surface.polygon is None else surface.polygon[done.kept],
     )
 
 

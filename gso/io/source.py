@@ -7,10 +7,13 @@ import os
 import numpy as np
 
 from gso.errors import MeshError
-from gso.typing import AnyPath, Array, Ints
+from gso.geometry.polygon import triangulated
+from gso.typing import AnyPath, Array, Flags, Ints
 
 # Largest number of fan apexes tried per polygon, because the work is quadratic.
 _MOST_APEXES = 64
+# Relative area of a triangle below which it is in a line.
+_THIN = 1e-12
 
 
 def read_bytes(path: AnyPath) -> bytes:
@@ -48,20 +51,29 @@ def ranges(first: Ints, count: Ints) -> Ints:
     return np.repeat(first - before, count) + np.arange(int(count.sum()))
 
 
-def face_table(corners: Ints, count: Ints, points: Array) -> tuple[Ints, tuple[str, ...]]:
-    """Convert polygons to faces (m, 3) or (m, 4); return them and notes on changes.
+def face_table(corners: Ints, count: Ints, points: Array) -> tuple[Ints, Ints, tuple[str, ...]]:
+    """Convert polygons to faces (m, 3) or (m, 4).
+
+    Corners that repeat the one before are left out, and with them polygons of fewer than three
+    corners. A polygon with five or more corners is cut into triangles inside it.
 
     Parameters
     ----------
     corners : ndarray of int, (sum of count,)
         Vertex indices, polygon after polygon.
     count : ndarray of int, (p,)
-        Corners of each polygon, at least three. A polygon with five or more corners is
-        replaced by a triangle fan at its place in the sequence.
+        Corners of each polygon, at least three.
     points : ndarray, (n, 3)
-        The vertices. The apex of a fan is the corner that maximises the smallest triangle
-        area (signed by the polygon normal), which avoids degenerate triangles at collinear
-        corners.
+        The vertices.
+
+    Returns
+    -------
+    faces : ndarray of int, (m, 3) or (m, 4)
+        In the sequence of the polygons.
+    polygon : ndarray of int, (m,)
+        The polygon of each face.
+    notes : tuple of str
+        What was changed.
 
     Examples
     --------
@@ -72,8 +84,8 @@ def face_table(corners: Ints, count: Ints, points: Array) -> tuple[Ints, tuple[s
            [1, 4, 0]])
     """
     corners = corners.astype(np.int64, copy=False)
-    place, _, notes = face_corners(corners, count, points)
-    return np.where(place < 0, -1, corners[place]), notes
+    place, polygon, notes = face_corners(corners, count, points)
+    return np.where(place < 0, -1, corners[place]), polygon, notes
 
 
 def face_corners(corners: Ints, count: Ints, points: Array) -> tuple[Ints, Ints, tuple[str, ...]]:
@@ -81,12 +93,58 @@ def face_corners(corners: Ints, count: Ints, points: Array) -> tuple[Ints, Ints,
 
     Returns the positions (m, k) with -1 as padding, the polygon of each face (m,), and notes.
     """
+    kept, left, notes = _distinct(corners, count)
+    ring, size = corners[kept], left[left > 0]
+    place, polygon = _faces(ring, size, points)
+    many = (left > 4).nonzero()[0]
+    if many.size:
+        notes += (
+            f"{many.size} polygons with more than four corners were cut into triangles "
+            f"(the first is face {many[0]})",
+        )
+    return np.where(place < 0, -1, kept[place]), np.flatnonzero(left)[polygon], notes
+
+
+def _distinct(corners: Ints, count: Ints) -> tuple[Ints, Ints, tuple[str, ...]]:
+    """Leave out the corners of polygons that repeat the one before.
+
+    Returns the positions of the others, their number in each polygon (0 for polygons with fewer
+    than three), and notes.
+    """
+    last = np.cumsum(count) - 1
+    before = np.arange(-1, corners.size - 1)
+    before[last - count + 1] = last
+    good = corners != corners[before]
+    if good.all():
+        return np.arange(corners.size), count, ()
+    polygon = np.repeat(np.arange(count.size), count)
+    left = np.bincount(polygon[good], minlength=count.size)
+    shorter = left < count
+    notes = [
+        f"{int(shorter.sum())} faces repeat a vertex; it was left out of them "
+        f"(the first is face {int(shorter.argmax())})"
+    ]
+    gone = left < 3
+    if gone.any():
+        notes.append(
+            f"{int(gone.sum())} faces have fewer than three different vertices and were left out "
+            f"(the first is face {int(gone.argmax())})"
+        )
+    left[gone] = 0
+    return np.flatnonzero(good & ~gone[polygon]), left, tuple(notes)
+
+
+def _faces(corners: Ints, count: Ints, points: Array) -> tuple[Ints, Ints]:
+    """Return the corners of faces as positions, and the polygon of each face."""
     first = np.cumsum(count) - count
     many = count > 4
     apex = np.zeros_like(count)
-    for size in np.unique(count[many]):
-        same = np.flatnonzero(count == size)
-        apex[same] = _fan_apex(points[corners[first[same][:, None] + np.arange(size)]])
+    clipped = []
+    for k in np.unique(count[many]):
+        same = np.flatnonzero(count == k)
+        rings = points[corners[first[same][:, None] + np.arange(k)]]
+        apex[same], whole = _fan_apex(rings)
+        clipped += [(at, rings[i]) for i, at in enumerate(same) if not whole[i]]
     pieces = np.where(many, count - 2, 1)
     polygon = np.repeat(np.arange(count.size), pieces)
     piece = ranges(np.zeros_like(pieces), pieces)
@@ -97,17 +155,19 @@ def face_corners(corners: Ints, count: Ints, points: Array) -> tuple[Ints, Ints,
         p = polygon[inside]
         turn = apex[p] + (piece[inside] + k if k else 0)
         table[inside, k] = first[p] + turn % count[p]
-    if not many.any():
-        return table, polygon, ()
-    note = (
-        f"{int(many.sum())} polygons with more than four corners were cut into triangles "
-        f"(the first is face {int(many.argmax())})"
-    )
-    return table, polygon, (note,)
+    begin = np.cumsum(pieces) - pieces
+    for at, ring in clipped:
+        own = slice(begin[at], begin[at] + pieces[at])
+        table[own, :3] = first[at] + triangulated(_projected(ring))
+    return table, polygon
 
 
-def _fan_apex(rings: Array) -> Ints:
-    """Return the best fan apex of each polygon (n, k, 3): the smallest triangle is largest."""
+def _fan_apex(rings: Array) -> tuple[Ints, Flags]:
+    """Return the best fan apex of each polygon (n, k, 3), and whether its fan lies inside.
+
+    The smallest triangle of the best fan is largest, signed by the normal of the polygon. This
+    avoids triangles without area at corners in a line.
+    """
     with np.errstate(all="ignore"):
         p = rings - rings.mean(axis=1, keepdims=True)
         normal = np.cross(p, np.roll(p, -1, axis=1)).sum(axis=1, keepdims=True)
@@ -119,4 +179,17 @@ def _fan_apex(rings: Array) -> Ints:
             smallest = (area * normal).sum(axis=2).min(axis=1)
             better = smallest > best
             best[better], apex[better] = smallest[better], k
-    return apex
+        inside = best > _THIN * (normal**2).sum(axis=(1, 2))
+    return apex, inside
+
+
+def _projected(ring: Array) -> Array:
+    """Return a polygon (k, 3) seen along its normal, anticlockwise, (k, 2)."""
+    with np.errstate(all="ignore"):
+        p = ring - ring.mean(axis=0)
+        normal = np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)
+        if not (np.isfinite(normal).all() and normal.any()):
+            return np.asarray(p[:, :2])
+        plane = np.linalg.svd(normal[None])[2][1:]
+        plane[1] *= np.sign(normal @ np.cross(*plane))
+        return np.asarray(p @ plane.T)

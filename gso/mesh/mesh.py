@@ -10,11 +10,13 @@ from numpy.typing import ArrayLike
 
 from gso import geometry
 from gso.errors import MeshError
+from gso.geometry.polygon import reflex_corners
 from gso.mesh import topology
 from gso.mesh.attributes import Attributes
 from gso.mesh.validation import (
     JOINED,
     check_area,
+    check_vertices,
     checked_faces,
     checked_grid,
     checked_vertices,
@@ -100,7 +102,7 @@ class Mesh:
         table, flipped, said = checked_faces(faces, points)
         self.vertices: Array = points
         self.faces: Ints = table
-        topology.check_vertices(self.half_edges)
+        check_vertices(self.half_edges, points)
         self.given_notes: tuple[str, ...] = tuple(notes)
         self.notes: tuple[str, ...] = self.given_notes + unjoined(self) + said
         self.attributes = None if attributes is None else reordered(attributes, table, flipped)
@@ -170,7 +172,11 @@ class Mesh:
 
     @cached_property
     def _quad_splits(self) -> Flags:
-        return topology.quad_splits(self.faces, self.half_edges)
+        inwards = np.full(len(self.faces), -1)
+        quad = topology.are_quads(self.faces)
+        if quad.any():
+            inwards[quad] = reflex_corners(self.vertices[self.faces[quad]])
+        return topology.quad_splits(self.faces, self.half_edges, inwards)
 
     @cached_property
     def triangle_edges(self) -> topology.HalfEdges:

@@ -17,6 +17,26 @@ from gso.typing import Array, Flags, Ints
 if TYPE_CHECKING:
     from gso.mesh.mesh import Mesh
 
+
+class FaceError(MeshError):
+    """A face cannot be used.
+
+    Attributes
+    ----------
+    face : int
+        Its row in the table of faces.
+    what : str
+        Its corners, what is wrong, and what to do.
+    """
+
+    def __init__(self, face: int, what: str):
+        super().__init__(f"face {face} = {what}")
+        self.face, self.what = face, what
+
+    def __reduce__(self) -> tuple[type[FaceError], tuple[int, str]]:
+        return FaceError, (self.face, self.what)
+
+
 #: Tolerance for coincident vertices, relative to the longest side of the bounding box.
 JOINED = 1e-7
 
@@ -100,12 +120,13 @@ def checked_table(faces: ArrayLike, count: int) -> Ints:
 
 
 def _refuse(table: Ints, bad: Flags, what: str, instead: str = "") -> None:
-    """Raise a MeshError that names the first of some faces, if there are any."""
+    """Raise a FaceError that names the first of some faces, if there are any."""
     if bad.any():
         k = int(bad.argmax())
-        raise MeshError(
-            f"face {k} = {table[k].tolist()} {what} ({int(bad.sum())} such faces)"
-            + (f"; {instead}" if instead else "")
+        raise FaceError(
+            k,
+            f"{table[k].tolist()} {what} ({int(bad.sum())} such faces)"
+            + (f"; {instead}" if instead else ""),
         )
 
 
@@ -137,9 +158,10 @@ def check_corners(table: Ints) -> None:
     _refuse(table, twice, "repeats a vertex", "write it with one corner less or delete it")
     _, first, count = np.unique(ordered, axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
-        raise MeshError(
-            f"face {first[count > 1][0]} = {table[first[count > 1][0]].tolist()} is there "
-            f"{count[count > 1][0]} times; delete the duplicates"
+        face = int(first[count > 1][0])
+        raise FaceError(
+            face,
+            f"{table[face].tolist()} is there {count[count > 1][0]} times; delete the duplicates",
         )
 
 
@@ -177,6 +199,51 @@ def have_area(table: Ints, points: Array, size: float | None = None) -> Flags:
     size = float(np.ptp(p, axis=0).max()) if size is None else size
     x, y, z = geometry.quad_area_vectors(p / size, topology.four_corners(table)).T
     return np.asarray(np.sqrt(x * x + y * y + z * z) > 1e-14)
+
+
+def check_vertices(he: topology.HalfEdges, points: Array) -> None:
+    """Refuse non-manifold vertices; where an edge has a vertex on it, say that first.
+
+    Raises
+    ------
+    MeshError
+        Parts of the surface share no edge at a vertex.
+    """
+    try:
+        topology.check_vertices(he)
+    except MeshError:
+        _check_t_junctions(he, points)
+        raise
+
+
+def _check_t_junctions(he: topology.HalfEdges, points: Array) -> None:
+    """Refuse vertices of the outline that lie on its edges without being their ends."""
+    from scipy.spatial import cKDTree
+
+    rim = np.flatnonzero(he.twin < 0)
+    if not rim.size:
+        return
+    a, b = he.origin[rim], he.dest[rim]
+    ids = np.unique(a)
+    way = points[b] - points[a]
+    size = np.linalg.norm(way, axis=1)
+    tree = cKDTree(points[ids])
+    step = JOINED * np.ptp(points[ids], axis=0).max()
+    near = tree.query_ball_point(0.5 * (points[a] + points[b]), 0.5 * size)
+    edge = np.repeat(np.arange(len(rim)), [len(found) for found in near])
+    vertex = ids[np.concatenate([np.asarray(found, np.int64) for found in near])]
+    share = ((points[vertex] - points[a[edge]]) * way[edge]).sum(axis=1) / size[edge] ** 2
+    foot = points[a[edge]] + share[:, None] * way[edge]
+    on = np.linalg.norm(points[vertex] - foot, axis=1) <= step
+    on &= (share * size[edge] > step) & ((1.0 - share) * size[edge] > step)
+    if on.any():
+        k = int(on.argmax())
+        at = edge[k]
+        raise MeshError(
+            f"vertex {vertex[k]} lies on the edge from vertex {a[at]} to vertex {b[at]}, but the "
+            f"face {he.face[rim[at]]} of that edge does not have it ({int(on.sum())} such "
+            "vertices): add it to that face as a corner, so that the faces share edges"
+        )
 
 
 def weld_poles(grid: Array, faces: Ints) -> tuple[Array, Ints, tuple[str, ...]] | None:

@@ -35,6 +35,13 @@ from gso.metrics.gaussian_curvature import (
     mean_abs_K,
     worst_curvature,
 )
+from gso.metrics.hole_defects import (
+    hole_defects,
+    hole_gaps,
+    holes,
+    inner_outlines,
+    turning,
+)
 from gso.metrics.info import INFO, Info
 from gso.metrics.lengths import edge_length_error, isometry_defect, isometry_energy, loss_iso_cell
 from gso.metrics.normal_angles import dihedral_angles, face_normals, normal_angle
@@ -81,6 +88,10 @@ __all__ = [
     "flipped_cells",
     "flipped_faces",
     "flips",
+    "hole_defects",
+    "hole_gaps",
+    "holes",
+    "inner_outlines",
     "isometry_defect",
     "isometry_energy",
     "largest_distance",
@@ -101,6 +112,7 @@ __all__ = [
     "strains",
     "stretches",
     "surface_distance",
+    "turning",
     "unit",
     "worst_curvature",
 ]

@@ -51,6 +51,8 @@ INFO: dict[str, Info] = {
     "strain_mean": Info("", True, "mean of the larger principal strain"),
     "strain_p99": Info("", True, "99th percentile of the larger principal strain"),
     "strain_max": Info("", True, "largest principal strain", "max"),
+    "hole_defect_max": Info("deg", True, "largest angle that a hole lacks to lie flat", "max"),
+    "hole_gap_max": Info("%", True, "largest gap of an unrolled hole / its length", "max"),
     "area_error": Info("", True, "mean |A'/A - 1| over corner triangles"),
     "flipped_cells": Info("", True, "inverted cells (of grids: with an inverted corner)", "sum"),
     "strips": Info("", None, "strips side by side, parts of the pattern", "sum"),

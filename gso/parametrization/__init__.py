@@ -5,7 +5,7 @@ from gso.parametrization.arap import Relaxed, relax, strain_level
 from gso.parametrization.embedding import embeddings, flattens, parts, spanned
 from gso.parametrization.initial import begin, flips, given, oriented_triangles, refine, strain
 from gso.parametrization.low_strain import low_strain
-from gso.parametrization.opening import Opened, by_rows, opened, turning
+from gso.parametrization.opening import Opened, by_rows, opened
 from gso.parametrization.orientation import SAFETY, orientation
 from gso.parametrization.packing import beside, closest_motion, place, upright
 from gso.parametrization.rectangle import rectangle
@@ -36,6 +36,5 @@ __all__ = [
     "spanned",
     "strain",
     "strain_level",
-    "turning",
     "upright",
 ]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gso import geometry
+from gso import metrics
 from gso.faults import overlaps
 from gso.mesh import Mesh
 from gso.mesh.cut import Cut, cut, joining
@@ -21,8 +21,11 @@ _SMALL = 1e-3
 _BAD, _BETTER, _MUCH_BETTER = 0.1, 0.8, 0.2
 #: Fewer cuts are preferred if their strain is at most this multiple of the smallest.
 _ALIKE = 1.1
-#: Tolerance on the turning angle of a loop around a hole, -2 pi in the plane.
-_TURN = 0.5 * np.pi
+#: Angle that a hole lacks from which on the image of a surface that is cut there may need this many
+#: times as many iterations: the faces beside the cut turn by that angle.
+_LACKING, _LONGER = np.radians(1.0), 4
+#: A full turn, and the tolerance on the turning of a loop around a hole, -2 pi in the plane.
+_ROUND, _TURN = 2.0 * np.pi, 0.5 * np.pi
 
 
 class Opened(NamedTuple):
@@ -95,12 +98,14 @@ def opened(mesh: Mesh, *, iterations: int = 100) -> Opened:
     if len(mesh.boundary_loops) <= np.unique(mesh.components[mesh.used]).size:
         return Opened(mesh)
     lines, notes = [], []
+    turns = metrics.turning(mesh)
     for ids in parts(mesh):
         own = mesh.components[ids[0]]
-        loops = [loop for loop in mesh.boundary_loops if mesh.components[loop[0]] == own]
-        if len(loops) < 2:
+        here = [k for k, loop in enumerate(mesh.boundary_loops) if mesh.components[loop[0]] == own]
+        if len(here) < 2:
             continue
-        found = _best(mesh, ids, loops, iterations)
+        loops = [mesh.boundary_loops[k] for k in here]
+        found = _best(mesh, ids, loops, turns[here], iterations)
         if found is not None:
             lines.append(found[0])
             notes.append(found[1])
@@ -119,20 +124,31 @@ def by_rows(mesh: Mesh) -> tuple[Mesh, Ints]:
     return Mesh.from_grid(mesh.grid, weld=False), mesh.grid_index.ravel()
 
 
-def _best(mesh: Mesh, ids: Ints, loops: list[Ints], iterations: int) -> tuple[Ints, str] | None:
-    """Choose the edges along which to cut one component, with a note; None for no cut."""
+def _best(
+    mesh: Mesh, ids: Ints, loops: list[Ints], turns: Array, iterations: int
+) -> tuple[Ints, str] | None:
+    """Choose the edges along which to cut one component, with a note; None for no cut.
+
+    `loops` are its boundary loops and `turns` their turning angles.
+    """
     uncut, lies_on_itself = _tried(mesh, ids, np.empty((0, 2), np.int64), iterations)
     if uncut <= _SMALL:
         return None
-    turned = [abs(turning(mesh, loop) + 2.0 * np.pi) > _TURN for loop in loops]
-    tube = [loop for loop, turns in zip(loops, turned, strict=True) if turns]
+    tube = [loop for loop, angle in zip(loops, turns, strict=True) if abs(angle + _ROUND) > _TURN]
     choices = [tube, loops] if 2 <= len(tube) < len(loops) else [loops]
     trees = [joining(mesh, some) for some in choices]
-    tried = [_tried(mesh, ids, tree, iterations) for tree in trees]
-    levels = [level if lies_on_itself or not bad else np.inf for level, bad in tried]
-    enough = max(_ALIKE * min(levels), _SMALL)
-    which = next(k for k, level in enumerate(levels) if level <= enough)
-    if levels[which] > (_BETTER if uncut > _BAD else _MUCH_BETTER) * uncut:
+    # Only the outer outline turns more than the others. The rest lack these angles to lie flat.
+    lacking = float(np.sort(turns)[-2] + _ROUND)
+    for longer in (1, _LONGER):
+        tried = [_tried(mesh, ids, tree, longer * iterations) for tree in trees]
+        levels = [level if lies_on_itself or not bad else np.inf for level, bad in tried]
+        enough = max(_ALIKE * min(levels), _SMALL)
+        which = next(k for k, level in enumerate(levels) if level <= enough)
+        if levels[which] <= (_BETTER if uncut > _BAD else _MUCH_BETTER) * uncut:
+            break
+        if lacking < _LACKING or np.isinf(levels).all():
+            return None
+    else:
         return None
     between = len(choices[which])
     lines = "a shortest line" if between == 2 else f"{between - 1} shortest lines"
@@ -152,17 +168,3 @@ def _tried(mesh: Mesh, ids: Ints, edges: Ints, iterations: int) -> tuple[float, 
     ready, _ = by_rows(cut(part, local[edges]).mesh)
     start = begin(ready, iterations=iterations, doubtful=_SMALL)
     return start.level, bool(overlaps(ready, start.flat).size)
-
-
-def turning(mesh: Mesh, loop: Ints) -> float:
-    """Compute the total turning angle (geodesic curvature) of a boundary loop, in radians.
-
-    2 pi for the boundary of a disk in the plane, -2 pi for a hole in it, zero for the end of a
-    cylinder.
-    """
-    angles = np.zeros(len(mesh.vertices))
-    for k in range(3):
-        p, q, r = (mesh.vertices[mesh.triangles[:, (k + j) % 3]] for j in range(3))
-        at = geometry.angle(tuple((q - p).T), tuple((r - p).T))
-        angles += np.bincount(mesh.triangles[:, k], at, len(angles))
-    return float((np.pi - angles[loop]).sum())

@@ -12,10 +12,11 @@ from gso.mesh import Mesh
 from gso.parametrization import beside
 from gso.pattern import Pattern
 from gso.pipeline.case import Case
+from gso.pipeline.judgement import add_reasons
 from gso.result import Result
 from gso.status import Progress, Status
 from gso.typing import Array, Ints
-from gso.verdict import ordered
+from gso.verdict import judge_components, ordered
 
 #: Gap beside the flat images whose position is prescribed, as a share of their width.
 _GAP = 0.05
@@ -77,7 +78,7 @@ def merge(
         mesh = design.replaced(vertices)
     ran = [results[k] for k in chosen]
     starts = [r.warm_start for r in results]
-    return Result(
+    joined = Result(
         task=results[0].task,
         formulation=results[0].formulation,
         design=design,
@@ -103,6 +104,9 @@ def merge(
             why.within(f"component {k}") for k, r in enumerate(results) for why in r.reasons
         ),
     )
+    if whole.request.verdict:
+        add_reasons(joined, ordered([*joined.reasons, *judge_components(joined)]))
+    return joined
 
 
 def _side_by_side(

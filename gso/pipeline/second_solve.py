@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from gso.faults import crossings
 from gso.metrics import loss_gc_worst
 from gso.pipeline.case import Case
 from gso.pipeline.judgement import conclude
@@ -135,4 +136,6 @@ def _others(case: Case, first: Result) -> Iterator[Request[Options]]:
     codes = {reason.code for reason in first.reasons}
     if others is None or missed or not _may_go_on(case, first) or not codes or codes - _MENDED:
         return
-    yield from others(case.analysis, case.solver_request)
+    if Code.CROSSES_ITSELF in codes and crossings(case.design).size:
+        return
+    yield from others(case.analysis, case.solver_request, bool(codes - {Code.FAR}))

@@ -198,7 +198,7 @@ class Result:
         """Metrics of the task, computed at first access; see :data:`gso.metrics.INFO`."""
         from gso import tasks
         from gso.components import combined
-        from gso.metrics import area, strains
+        from gso.metrics import area, holes, strains
         from gso.tasks import compute_metrics
 
         if self.components:
@@ -214,7 +214,7 @@ class Result:
         surface = pattern.surface(self.mesh)
         if pattern.is_cut:
             known |= task.pattern_metrics(surface, pattern.flat)
-        found = strains(surface, pattern.flat)
+        found = strains(surface, pattern.flat) | holes(surface)
         return found | {k: v for k, v in known.items() if k not in found}
 
     def save(self, path: AnyPath, *, unit: str = "mm") -> None:

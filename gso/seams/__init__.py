@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from gso.cut_pieces import Piece, Pieces
 from gso.first_use import at_first_use
 from gso.seams.cutting import cut
-from gso.seams.kinds import Creases, Edges, Labels, Path, Seam, Slice
+from gso.seams.kinds import Creases, Edges, Groups, Labels, Path, Seam, Slice
 from gso.seams.polyline_seam import Polyline
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Creases",
     "Edges",
+    "Groups",
     "Labels",
     "Path",
     "Piece",

@@ -183,6 +183,25 @@ class Labels(Seam):
 
 
 @dataclass(frozen=True)
+class Groups(Seam):
+    """The edges between faces of different groups, objects or materials of an OBJ file.
+
+    Groups (``g``) are taken where there are two or more of them, otherwise objects (``o``),
+    otherwise materials (``usemtl``).
+    """
+
+    def edges(self, mesh: Mesh) -> Ints:
+        kinds = {} if mesh.attributes is None else mesh.attributes.labels
+        known = [kind for kind in ("g", "o", "usemtl") if kind in kinds]
+        if not known:
+            raise MeshError(
+                "the mesh has no groups (g), objects (o) or materials (usemtl) to cut between"
+            )
+        cut = (Labels(kind).edges(mesh) for kind in known)
+        return next((edges for edges in cut if len(edges)), np.empty((0, 2), np.int64))
+
+
+@dataclass(frozen=True)
 class Creases(Seam):
     """The edges at which the surface bends by more than an angle.
 

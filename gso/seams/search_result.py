@@ -17,7 +17,7 @@ from gso.seams.options import NECK, PieceSettings
 from gso.seams.segmentation import Segmentation
 from gso.seams.tree import Ground
 from gso.verdict import Code, Measurement, compare
-from gso.verdict.surface_checks import of_surface
+from gso.verdict.surface_checks import crossed, of_surface
 from gso.wording import length as said
 from gso.wording import percent
 
@@ -62,7 +62,9 @@ def packed(
         measured[Code.SMALL] = Measurement(areas / size**2, "piece", some)
         measured[Code.NARROW] = Measurement(widths / ground.mesh.size, "piece", some)
     notes = []
-    if result is not None:
+    if result is None:
+        measured |= crossed(own.design)
+    else:
         measured |= of_surface(result.design, result.mesh)
         away = metrics.surface_distance(ground.mesh, own.design)
         numbers["deviation_mean"] = away.there_mean

@@ -316,7 +316,8 @@ class Task:
         Metrics of the pattern (n, 2) of a surface, if its result is a surface that can be laid
         flat.
     others : callable, optional
-        Returns other requests to solve, in turn, where the result of one is not usable.
+        Returns other requests to solve, in turn, where the result of one is not usable. Its last
+        argument is whether more is wrong than the distance.
     """
 
     formulations: Mapping[str, Formulation[Any]]
@@ -325,7 +326,7 @@ class Task:
     lengths: tuple[str, ...] = ()
     analysis: type[Analysis] = Analysis
     pattern_metrics: Callable[[Mesh, Array], dict[str, float]] | None = None
-    others: Callable[[Any, Request[Any]], Iterator[Request[Any]]] | None = None
+    others: Callable[[Any, Request[Any], bool], Iterator[Request[Any]]] | None = None
 
     @property
     def options(self) -> type[Options]:

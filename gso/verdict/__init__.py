@@ -2,7 +2,7 @@
 
 from gso.verdict.codes import TIGHT, Code, Kind
 from gso.verdict.compare import Measurement, compare, failure, merge
-from gso.verdict.judge import judge
+from gso.verdict.judge import judge, judge_components
 from gso.verdict.reason import Places, Reason, describe, ordered
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "describe",
     "failure",
     "judge",
+    "judge_components",
     "merge",
     "ordered",
 ]

@@ -138,9 +138,10 @@ class Code(str, enum.Enum):
     )
     CROSSES_ITSELF = _fault(
         "crosses_itself",
-        "Faces that pass through others; not those of the design.",
+        "Faces that pass through others; where nothing is laid flat, not those of the design.",
         "the surface passes through itself",
-        "allow less distance (max_deviation), or hold fewer vertices",
+        "take apart what crosses in the design; if nothing does, allow less distance "
+        "(max_deviation), or hold fewer vertices",
     )
     COLLAPSED = _limit(
         "collapsed",

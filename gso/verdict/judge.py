@@ -12,7 +12,7 @@ from gso.tasks.request import Limits
 from gso.verdict.codes import Code
 from gso.verdict.compare import Measurement, compare, failure
 from gso.verdict.reason import Reason, ordered
-from gso.verdict.surface_checks import Measured, of_pattern, of_surface
+from gso.verdict.surface_checks import Measured, crossed, of_pattern, of_surface
 from gso.verdict.task_checks import CHECKS, Bounds
 
 if TYPE_CHECKING:
@@ -47,6 +47,18 @@ def judge(result: Result, limits: Limits, violation: float = 0.0) -> tuple[Reaso
     return ordered([*stopped, *compare(measured, bounds)])
 
 
+def judge_components(result: Result) -> tuple[Reason, ...]:
+    """List the reasons that the components of a result give together: one passes through another.
+
+    What is only edited and not laid flat may do so.
+    """
+    surface = result.design if tasks.get(result.task).flat else result.mesh
+    laid = result.pattern is not None and result.task not in _STRETCHED
+    if not laid or not np.isfinite(surface.vertices).all():
+        return ()
+    return compare(crossed(surface, surface.components[surface.faces[:, 0]]), {})
+
+
 def _measured(result: Result, limits: Limits, violation: float) -> tuple[Measured, Bounds]:
     pattern = result.pattern
     for points in (result.mesh.vertices, None if pattern is None else pattern.flat):
@@ -56,10 +68,14 @@ def _measured(result: Result, limits: Limits, violation: float) -> tuple[Measure
     measured: Measured = {}
     if tasks.get(result.task).flat:
         surface = result.design
+        if result.task not in _STRETCHED:
+            measured |= crossed(surface)
     else:
         surface = result.mesh
         if result.status is not Status.ALREADY_GOOD:
-            measured |= of_surface(result.design, surface)
+            measured |= of_surface(result.design, surface, built=pattern is not None)
+        elif pattern is not None:
+            measured |= crossed(surface)
     if pattern is not None:
         measured |= of_pattern(surface, pattern, lengths=result.task not in _STRETCHED)
     check = CHECKS.get(result.KIND or result.task)

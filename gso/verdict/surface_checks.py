@@ -17,23 +17,29 @@ Measured = dict[Code, Measurement]
 _EDGE, _OVER = 0.0, -0.87
 
 
-def of_surface(design: Mesh, surface: Mesh) -> Measured:
+def crossed(surface: Mesh, part: Ints | None = None) -> Measured:
+    """Find the faces of a surface that pass through others; of other parts (m,), if given."""
+    pairs = faults.crossings(surface)
+    if part is not None:
+        pairs = pairs[part[pairs[:, 0]] != part[pairs[:, 1]]]
+    return {Code.CROSSES_ITSELF: Measurement.count("face", np.unique(pairs))}
+
+
+def of_surface(design: Mesh, surface: Mesh, *, built: bool = True) -> Measured:
     """Find folds, self-intersections and collapsed edges of a surface.
 
-    Folds and self-intersections that the design has already are ignored, and edges are measured,
-    if the surface has its faces.
+    Folds that the design has already are ignored, and edges are measured, if the surface has its
+    faces. A surface that is not to be `built` may pass through itself where the design does.
     """
     same = np.array_equal(design.faces, surface.faces)
     bad = faults.folded(surface)
     if same and bad.size:
         bad = _new_folds(design, surface, bad)
-    pairs = faults.crossings(surface)
-    if same and pairs.size:
-        pairs = pairs[~_known(design, pairs)]
-    found = {
-        Code.FOLDED: Measurement.count("face", bad),
-        Code.CROSSES_ITSELF: Measurement.count("face", np.unique(pairs)),
-    }
+    found = {Code.FOLDED: Measurement.count("face", bad), **crossed(surface)}
+    if same and not built and found[Code.CROSSES_ITSELF].value:
+        pairs = faults.crossings(surface)
+        new = np.unique(pairs[~_known(design, pairs)])
+        found[Code.CROSSES_ITSELF] = Measurement.count("face", new)
     if same:
         found[Code.COLLAPSED] = _shortest(design, surface.vertices)
     return found

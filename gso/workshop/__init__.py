@@ -15,6 +15,7 @@ from gso.workshop.nesting import nest
 from gso.workshop.panels import Panel
 from gso.workshop.part import Drawing, Label, Notch, Part
 from gso.workshop.parts import fitted, parts_from
+from gso.workshop.tabs import TabSeam, with_tabs
 from gso.workshop.thickness import Thickness, thickened
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "Notch",
     "Panel",
     "Part",
+    "TabSeam",
     "Thickness",
     "designs_of",
     "fitted",
@@ -34,4 +36,5 @@ __all__ = [
     "nest",
     "parts_from",
     "thickened",
+    "with_tabs",
 ]

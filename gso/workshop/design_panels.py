@@ -7,13 +7,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree as Points
 
 from gso import parametrization
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.folded_pattern import folded_pattern
-from gso.io.raw_surface import welded
 from gso.mesh import Mesh
+from gso.mesh.topology import label_components
+from gso.mesh.welding import collapse
 from gso.ruled.paneling.lay_strips import lay_strips
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import RULED, Options
@@ -27,7 +27,7 @@ from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made
 from gso.workshop.pattern_panels import of_result, of_surface
 
-#: Distance of vertices that are merged, relative to the diagonal.
+#: Length of edges whose ends are joined, relative to the diagonal.
 _SAME = 1e-9
 
 Say = Callable[[str], None]
@@ -50,7 +50,7 @@ def made(
     workers : int, optional
         Number of processes for the pieces; one for each processor when not given.
     """
-    given = _welded(given)
+    given = _without_poles(given)
 
     def named(said: str) -> None:
         say(f"{given.name}: {said}")
@@ -67,13 +67,20 @@ def made(
         return _nearly(given, settings, named, workers)
 
 
-def _welded(given: Design) -> Design:
-    """Join the vertices of a grid's poles, whose edges have no length."""
+def _without_poles(given: Design) -> Design:
+    """Join the ends of edges without length, as at a grid's poles; seams stay open."""
     mesh = given.mesh
-    joined = welded(mesh, _SAME * mesh.diagonal)
-    if len(joined.vertices) == len(mesh.vertices):
+    short = mesh.edge_lengths <= _SAME * mesh.diagonal
+    if not short.any():
         return given
-    ids = Points(joined.vertices).query(mesh.vertices[given.kept])[1]
+    label = label_components(len(mesh.vertices), *mesh.edges[short].T)
+    first, number = np.unique(label, return_index=True, return_inverse=True)[1:]
+    order = np.argsort(first)
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    new = rank[number]
+    joined = Mesh(mesh.vertices[first[order]], collapse(mesh.faces, new).faces)
+    ids = new[given.kept]
     return replace(given, mesh=joined, kept=ids[ids[:, 0] != ids[:, 1]])
 
 

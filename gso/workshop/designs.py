@@ -10,9 +10,11 @@ import numpy as np
 
 from gso import io
 from gso.components import split
+from gso.faults import crossings
 from gso.mesh import Mesh
-from gso.seams.kinds import Labels
+from gso.seams.kinds import Groups
 from gso.typing import Ints, MeshLike
+from gso.verdict import Code, Measurement, Reason, compare
 from gso.workshop.job_folder import path_of
 from gso.workshop.names import different, spelled
 
@@ -34,11 +36,17 @@ class Design:
     mesh : Mesh
     kept : ndarray of int, (k, 2)
         Edges that are cut in any case.
+    notes : tuple of str
+        What was changed or found in the file.
+    reasons : tuple of Reason
+        Why what was given cannot be built: components of it pass through each other.
     """
 
     name: str
     mesh: Mesh
     kept: Ints = field(default_factory=_no_edges)
+    notes: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
 
 
 def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
@@ -47,7 +55,7 @@ def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
     Raises
     ------
     MeshError
-        A design cannot be read, or has no groups to cut between.
+        A design cannot be read, is a heap of loose faces, or has no groups to cut between.
     """
     many = several(given)
     out: list[Design] = []
@@ -56,15 +64,25 @@ def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
         suffix = number if len(many) > 1 else ""
         stem = f"design{suffix}" if path is None else path.stem
         mesh = io.as_mesh(one)
-        kept = Labels("g").edges(mesh) if keep_groups else _no_edges()
+        mesh.check_joined()
+        kept = Groups().edges(mesh) if keep_groups else _no_edges()
         components = split(mesh)
+        notes = tuple(f"{stem}: {note}" for note in mesh.notes)
+        met = np.zeros(len(mesh.faces), bool)
+        if len(components) > 1:
+            pairs = crossings(mesh)
+            own = mesh.components[mesh.faces[:, 0]]
+            met[pairs[own[pairs[:, 0]] != own[pairs[:, 1]]]] = True
         local = np.full(len(mesh.vertices), -1)
         for k, part in enumerate(components, start=1):
             local[:] = -1
             local[part.vertices] = np.arange(len(part.vertices))
             own = local[kept]
             name = f"{stem}-{k}" if len(components) > 1 else stem
-            out.append(Design(spelled(name), part.mesh, own[(own >= 0).all(axis=1)]))
+            through = Measurement.count("face", part.faces[met[part.faces]])
+            reasons = compare({Code.CROSSES_ITSELF: through}, {})
+            edges = own[(own >= 0).all(axis=1)]
+            out.append(Design(spelled(name), part.mesh, edges, notes, reasons))
     names = different(design.name for design in out)
     return [replace(design, name=name) for design, name in zip(out, names, strict=True)]
 

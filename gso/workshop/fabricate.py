@@ -17,7 +17,7 @@ from gso.mesh import Mesh
 from gso.quantities import Length, Strain, as_length, as_strain, millimetres
 from gso.seams.options import as_sheet
 from gso.typing import AnyPath, Json
-from gso.verdict import Code, Reason, failure, ordered
+from gso.verdict import Code, Reason, failure, merge, ordered
 from gso.workshop.certificate import design_record, digest, versions
 from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
@@ -125,7 +125,8 @@ def fabricate(
     darts : bool
         Whether cuts may end inside a piece.
     keep_groups : bool
-        Whether to cut between the groups of faces (``g``) of an OBJ file in any case.
+        Whether to cut between the groups of faces (``g``) of an OBJ file in any case; without
+        two of them, between its objects (``o``) or materials (``usemtl``).
     min_radius : float or str, optional
         Smallest radius that the surface may be bent to, as for `max_deviation`; a share is of the
         diagonal of all designs together.
@@ -217,7 +218,8 @@ def fabricate(
     records: list[Json] = []
     reasons: list[Reason] = []
     for k in chosen:
-        copies = [every[j].name for j, origin in enumerate(first) if origin == k]
+        same_as = [every[j] for j, origin in enumerate(first) if origin == k]
+        copies = [design.name for design in same_as]
         if k not in found:
             why: tuple[Reason, ...] = (failure(Code.FAILED, failed[k]),)
             records.append({"name": every[k].name, "copies": copies, "reasons": _words(why)})
@@ -229,6 +231,7 @@ def fabricate(
         own = [replace(part, count=len(copies)) for part in parts_from(fit, finish)]
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
         why = (*(r.scaled(scale) for r in one.reasons), *judge_sheet(fit, settings, finish))
+        why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
         record["reasons"] = _words(why)
         records.append(record)
         reasons += [reason.within(one.name) for reason in why]
@@ -243,7 +246,10 @@ def fabricate(
         "versions": versions(),
         "designs": records,
         "sheets": [],
-        "notes": _notes(records, settings),
+        "notes": [
+            *dict.fromkeys(note for design in every for note in design.notes),
+            *_notes(records, settings),
+        ],
     }
     sheets: list[Drawing] = []
     if size is not None and parts:

@@ -17,6 +17,7 @@ from gso.metrics import point_to_surface
 from gso.typing import Array, Ints
 from gso.verdict import Code, Measurement, Reason, compare
 from gso.workshop.panels import Panel
+from gso.workshop.polygons import region
 
 #: Number of points of a mark along the diagonal of a panel, at least, before those are left out
 #: from which the line is less than a share of its size away.
@@ -113,7 +114,7 @@ def cut(
     import shapely
 
     wanted = [replace(p, flat=flat) for p, flat in zip(panels, flats, strict=True)]
-    shapes = [shapely.Polygon(p.flat[p.loops[0]], [p.flat[x] for x in p.loops[1:]]) for p in wanted]
+    shapes = [region(p.flat[p.loops[0]], [p.flat[x] for x in p.loops[1:]]) for p in wanted]
     out: list[list[Array]] = [[] for _ in panels]
     bad: dict[Code, list[str]] = {
         Code.HOLE_ACROSS_SEAM: [],

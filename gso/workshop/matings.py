@@ -11,6 +11,7 @@ import numpy as np
 from gso.cut_pieces import Pieces
 from gso.geometry.polygon import arc_lengths
 from gso.mesh.polyline import Polylines
+from gso.mesh.topology import half_edges
 from gso.pattern import Pattern
 from gso.seams.chains import chains
 from gso.typing import Array, Ints
@@ -94,8 +95,9 @@ def numbered(matings: Sequence[Mating]) -> tuple[Mating, ...]:
 
 def _directed(pattern: Pattern, seams: Ints) -> list[bool]:
     """Tell whether the faces of the first copy of each seam edge lie to its left."""
-    he = pattern.mesh.half_edges
+    # The faces of a flat image may have no area there.
     n = len(pattern.flat)
+    he = half_edges(pattern.faces, n)
     keys = he.origin * n + he.dest
     first = seams[:, 0]
     left: list[bool] = np.isin(first[:, 0] * n + first[:, 1], keys[he.face >= 0]).tolist()

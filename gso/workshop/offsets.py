@@ -9,6 +9,7 @@ import numpy as np
 from gso.errors import MeshError
 from gso.typing import Array
 from gso.workshop.part import Part
+from gso.workshop.polygons import moved, region, rings
 
 #: Largest length of a mitred corner, in widths of the offset.
 _MITRE = 3.0
@@ -51,14 +52,7 @@ def with_allowance(part: Part, by: float) -> Part:
 
 def _moved(part: Part, polygon: Array, by: float, *, gone: bool = False) -> Array:
     """Return a polygon offset by a distance, anticlockwise; empty if it may be gone."""
-    import shapely
-
-    shape = shapely.buffer(
-        shapely.make_valid(shapely.Polygon(polygon)),
-        by,
-        join_style="mitre",
-        mitre_limit=_MITRE,
-    )
+    shape = moved(region(polygon), by, _MITRE)
     if shape.is_empty and gone:
         return np.empty((0, 2))
     if shape.geom_type != "Polygon" or shape.is_empty:
@@ -66,4 +60,4 @@ def _moved(part: Part, polygon: Array, by: float, *, gone: bool = False) -> Arra
         raise MeshError(
             f"part {part.name}: its outline cannot be moved by {by:g} mm, as {what}; take less"
         )
-    return np.asarray(shapely.orient_polygons(shape).exterior.coords)[:-1]
+    return rings(shape)[0]

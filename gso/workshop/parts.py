@@ -17,7 +17,8 @@ from gso.workshop.marks import cut, marked
 from gso.workshop.offsets import offset, with_allowance
 from gso.workshop.panels import Made, Mating, Panel, Side
 from gso.workshop.part import Label, Notch, Part
-from gso.workshop.tabs import with_tabs
+from gso.workshop.polygons import moved, region, roomiest
+from gso.workshop.tabs import TabSeam, with_tabs
 from gso.workshop.thickness import thickened
 
 #: Angle, in radians, from which on a bend is drawn; smaller ones are added to the next.
@@ -26,6 +27,8 @@ _DRAWN = np.radians(0.2)
 _ROUND = 48
 #: Largest number of notches of a seam, but for one, and their distance if there are only holes.
 _NOTCHES, _APART = 50, 50.0
+#: Height of the numbers of seams without names, in millimetres.
+_NUMBERS = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +118,10 @@ def parts_from(fitted: Fitted, finish: Finish) -> list[Part]:
             both.append((side.panel, joint))
         seams.append(both)
     bare = [_bare(*own) for own in zip(panels, fitted.marks, fitted.holes, strict=True)]
+    tabs = [_tab_seams(number, seams, bare) for number in range(len(panels))]
     if finish.registration is not None:
         bare = _registered(bare, seams, finish, *finish.registration)
-    return [_finished(part, own, finish) for part, own in zip(bare, joints, strict=True)]
+    return [_finished(*own, finish) for own in zip(bare, joints, tabs, strict=True)]
 
 
 def scaled(panels: Sequence[Panel], scale: float, finish: Finish) -> list[Panel]:
@@ -154,20 +158,37 @@ def drawn(bends: Sequence[Bend]) -> tuple[Bend, ...]:
     return tuple(out)
 
 
-def _finished(part: Part, joints: Sequence[Joint], finish: Finish) -> Part:
+def _tab_seams(
+    number: int, seams: Sequence[Sequence[tuple[int, Joint]]], parts: Sequence[Part]
+) -> list[TabSeam]:
+    """Return the seams of a part with the places of the other side, one for each side of it."""
+    out = []
+    for seam in seams:
+        for (own, here), (other, there) in (seam, seam[::-1]):
+            if own == number:
+                at = here.length - here.along
+                line = np.stack([np.interp(at, there.along, c) for c in there.line.T], axis=1)
+                out.append(TabSeam(here.number, here.line, line, parts[other], here.first))
+    return out
+
+
+def _finished(
+    part: Part, joints: Sequence[Joint], seams: Sequence[TabSeam], finish: Finish
+) -> Part:
     """Add notches, tabs, allowance, kerf and texts to a part, and turn it long side along x."""
     if finish.notches is not None:
         spacing = finish.notches
         part = replace(part, notches=tuple(n for j in joints for n in _notches(j, spacing)))
     if finish.tabs is not None:
-        part = with_tabs(part, [j.line for j in joints if j.first], finish.tabs)
+        numbers = (finish.labels or _NUMBERS) if finish.notches is None else None
+        part = with_tabs(part, seams, finish.tabs, numbers=numbers)
     part = part.turned(-rectangle(part.outline)[0])
     part = offset(with_allowance(part, finish.allowance), 0.5 * finish.kerf)
     if finish.face == "inside":
         part = part.mirrored()
     part = part.shifted(-part.low)
     if finish.labels is not None:
-        part = replace(part, labels=(_name(part, finish.labels),))
+        part = replace(part, labels=(*_name(part, finish.labels), *part.labels))
     return replace(part, grain=np.array([1.0, 0.0])) if finish.grain else part
 
 
@@ -248,7 +269,7 @@ def _registered(
     """Add holes beside the notches of each seam, where both sides have room for them."""
     import shapely
 
-    inside = [shapely.Polygon(p.outline, p.holes).buffer(-0.75 * diameter) for p in parts]
+    inside = [moved(region(p.outline, p.holes), -0.75 * diameter, 2.0) for p in parts]
     turn = -2.0 * np.pi * np.arange(_ROUND) / _ROUND
     ring = 0.5 * diameter * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     taken: list[list[Array]] = [[] for _ in parts]
@@ -273,14 +294,9 @@ def _registered(
     ]
 
 
-def _name(part: Part, height: float) -> Label:
+def _name(part: Part, height: float) -> tuple[Label, ...]:
     """Place the name where there is most room, no larger than fits."""
-    import shapely
-
-    shape = shapely.make_valid(shapely.Polygon(part.outline, part.holes))
-    radius = shapely.maximum_inscribed_circle(shape)
-    middle, rim = np.asarray(radius.coords)
-    room = float(np.linalg.norm(rim - middle))
+    middle, room = roomiest(region(part.outline, part.holes))
     # A letter is about 0.7 of its height wide.
     fits = 2.0 * room / max(0.7 * len(part.name), 1.0)
-    return Label(part.name, middle, min(height, fits))
+    return (Label(part.name, middle, min(height, fits)),) if room > 0 else ()

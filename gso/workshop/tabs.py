@@ -3,59 +3,113 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gso.geometry.polygon import arc_lengths
 from gso.typing import Array
-from gso.workshop.part import Part
+from gso.workshop.part import Label, Part
+from gso.workshop.polygons import common, region, rings, united, without
 
-#: Length of a tab in widths, and the largest turn along it, in radians.
+if TYPE_CHECKING:
+    from shapely import Geometry
+
+#: Length of a tab in widths, and the largest turn along it, in radians. Bends of a larger angle
+#: end the face that a tab is glued to.
 _LENGTH, _TURN = 6.0, 0.35
-#: Area of a tab that may lie on the part or on another tab, relative to its own.
+#: Area of a tab that may lie on the part, on another tab, or beside the face that it is glued to,
+#: relative to its own.
 _ON = 1e-3
+#: Widths of tabs that are tried, as shares of the one that is wanted.
+_SHARES = (1.0, 0.5, 0.25)
+#: Width of the cut along a bend, and distance of faces that meet a seam, in millimetres.
+_CUT, _NEAR = 1e-6, 1e-3
 
 
-def with_tabs(part: Part, lines: Sequence[Array], width: float) -> Part:
-    """Add trapezoidal tabs along lines of the outline, the part to the left of each.
+@dataclass(frozen=True, eq=False)
+class TabSeam:
+    """A seam, seen from the part that may get tabs along it.
 
-    A tab that would lie on the part or on another tab is made narrower, and left out if a quarter
-    of the width does not fit.
+    Attributes
+    ----------
+    number : int
+    line : ndarray, (k, 2)
+        Its points on the outline of the part, which is to the left.
+    other : ndarray, (k, 2)
+        The same points on the outline of the other part, which is to the right.
+    glued : Part
+        The other part.
+    tabs : bool
+        Whether this side gets the tabs.
+    """
+
+    number: int
+    line: Array
+    other: Array
+    glued: Part
+    tabs: bool
+
+
+def with_tabs(
+    part: Part, seams: Sequence[TabSeam], width: float, *, numbers: float | None = None
+) -> Part:
+    """Add trapezoidal tabs along seams, and the seams' numbers.
+
+    A tab lies within the face of the other part that it is glued to, and takes at most half of
+    that face's angle at a corner, so that tabs behind the same face do not meet there. A tab that
+    would lie on the part or on another tab is made narrower, and left out if a quarter of the width
+    does not fit.
 
     Parameters
     ----------
     part : Part
-    lines : sequence of ndarray (k, 2)
+    seams : sequence of TabSeam
     width : float
         Width of the tabs, in millimetres.
+    numbers : float, optional
+        Height of the numbers of seams, which stand on their longest tab and beside the other side.
     """
-    import shapely
+    whole = region(part.outline, part.holes)
+    creases: list[Array] = []
+    labels: list[Label] = []
+    if whole.geom_type != "Polygon":
+        return part
+    for seam in seams:
+        added: list[tuple[Array, float]] = []
+        for piece, there in _divided(seam.line, seam.other, width) if seam.tabs else ():
+            room = _room(seam.glued, piece, there)
+            for share in _SHARES:
+                corners = _tab(piece, share * width, _angles(seam.glued, there))
+                tab = region(corners)
+                if tab.area <= 0 or without(tab, room).area > _ON * tab.area:
+                    continue
+                joined = united(whole, tab) if common(whole, tab).area <= _ON * tab.area else None
+                if joined is not None:
+                    whole = joined
+                    added.append((piece, share * width))
+                    break
+        creases += [piece for piece, _ in added]
+        if numbers is not None:
+            labels.append(_number(seam, added, numbers))
+    outline, holes = rings(whole)
+    return replace(
+        part,
+        outline=outline,
+        holes=holes,
+        creases=(*part.creases, *creases),
+        labels=(*part.labels, *labels),
+    )
 
-    whole = shapely.Polygon(part.outline, part.holes)
-    creases = []
-    for line in lines:
-        for piece in _divided(line, width):
-            for share in (1.0, 0.5, 0.25):
-                tab = shapely.make_valid(shapely.Polygon(_tab(piece, share * width)))
-                if shapely.intersection(whole, tab).area <= _ON * tab.area:
-                    joined = shapely.union_all([whole, tab], grid_size=1e-9)
-                    if joined.geom_type == "Polygon":
-                        whole = joined
-                        creases.append(piece)
-                        break
-    whole = shapely.orient_polygons(whole)
-    outline, *holes = (np.asarray(r.coords)[:-1] for r in (whole.exterior, *whole.interiors))
-    creases = [*part.creases, *creases]
-    return replace(part, outline=outline, holes=tuple(holes), creases=tuple(creases))
 
-
-def _divided(line: Array, width: float) -> list[Array]:
-    """Divide a line into pieces of limited length and turn."""
+def _divided(line: Array, other: Array, width: float) -> list[tuple[Array, Array]]:
+    """Divide both sides of a seam into pieces of limited length and turn."""
     way = np.diff(line, axis=0)
-    keep = np.linalg.norm(way, axis=1) > 0
-    line = np.concatenate([line[:1], line[1:][keep]])
-    way = way[keep]
+    keep = np.r_[True, np.linalg.norm(way, axis=1) > 0]
+    line, other = line[keep], other[keep]
+    way = np.diff(line, axis=0)
     if not len(way):
         return []
     angle = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
@@ -64,15 +118,95 @@ def _divided(line: Array, width: float) -> list[Array]:
     number = np.maximum(along / (_LENGTH * width), turned / _TURN).astype(np.int64)
     ends = np.flatnonzero(np.diff(number)) + 1
     stops = [0, *ends.tolist(), len(line) - 1]
-    return [line[a : b + 1] for a, b in pairwise(stops) if b > a]
+    return [(line[a : b + 1], other[a : b + 1]) for a, b in pairwise(stops) if b > a]
 
 
-def _tab(piece: Array, width: float) -> Array:
-    """Return the polygon of a tab to the right of a line."""
+def _tab(piece: Array, width: float, angles: tuple[float, float]) -> Array:
+    """Return the polygon of a tab to the right of a line, with angles at its first and last point.
+
+    Where they are so small that the sides meet before the width it is a triangle.
+    """
     way = piece[-1] - piece[0]
     size = float(np.linalg.norm(way))
     along = way / max(size, 1e-300)
     out = np.array([along[1], -along[0]])
-    slant = min(width, 0.4 * size)
-    far = [piece[-1] + width * out - slant * along, piece[0] + width * out + slant * along]
-    return np.concatenate([piece, far])
+    slants = 1.0 / np.tan(np.array(angles))
+    height = min(width, 0.8 * size / float(slants.sum()))
+    first = piece[0] + height * (out + slants[0] * along)
+    last = piece[-1] + height * (out - slants[1] * along)
+    return np.concatenate([piece, [last, first]])
+
+
+def _angles(glued: Part, there: Array) -> tuple[float, float]:
+    """Return the angles of a tab at the first and the last point of a piece of a seam.
+
+    They are half of the angles of the face that it is glued to, and 45 degrees at most.
+    """
+    lines = [np.stack([loop, np.roll(loop, -1, axis=0)], axis=1) for loop in _loops(glued)]
+    lines += [bend.line[None] for bend in glued.bends if abs(bend.angle) > _TURN]
+    edges = np.concatenate(lines)
+    size = float(np.ptp(glued.outline, axis=0).max())
+    found = []
+    # The face is to the right of the seam, seen from this part.
+    for at, ahead, side in ((there[0], there[-1], -1.0), (there[-1], there[0], 1.0)):
+        base = ahead - at
+        ends = np.concatenate([edges[:, ::-1], edges])
+        ends = ends[np.linalg.norm(ends[:, 0] - at, axis=1) < 1e-6 * size]
+        rays = ends[:, 1] - ends[:, 0]
+        turn = np.arctan2(base[0] * rays[:, 1] - base[1] * rays[:, 0], rays @ base)
+        turn = side * turn % (2.0 * np.pi)
+        # An edge along the seam itself is no side of the face.
+        inner = turn[(turn > 1e-3) & (turn < 2.0 * np.pi - 1e-3)]
+        found.append(min(0.25 * np.pi, 0.5 * float(inner.min(initial=np.pi))))
+    return found[0], found[1]
+
+
+def _loops(part: Part) -> list[Array]:
+    return [part.outline, *part.holes]
+
+
+def _room(glued: Part, piece: Array, there: Array) -> Geometry:
+    """Return the face that a tab is glued to, laid beside the seam.
+
+    It is bounded by the outline of the other part and by its sharp bends.
+    """
+    import shapely
+
+    shape = region(glued.outline, glued.holes)
+    folds = [shapely.LineString(b.line) for b in glued.bends if abs(b.angle) > _TURN]
+    if folds:
+        cut = shapely.buffer(shapely.MultiLineString(folds), _CUT, cap_style="square")
+        shape = without(shape, cut)
+    faces = shapely.get_parts(shape)
+    middle = shapely.LineString(_inner(there))
+    shape = shapely.GeometryCollection(faces[shapely.distance(faces, middle) < _NEAR].tolist())
+    here, start = piece[-1] - piece[0], there[-1] - there[0]
+    turn = complex(*here) / complex(*start) if np.any(start) else 1.0 + 0.0j
+    turn /= abs(turn)
+    matrix = np.array([[turn.real, turn.imag], [-turn.imag, turn.real]])
+    shift = 0.5 * (piece[0] + piece[-1]) - 0.5 * (there[0] + there[-1]) @ matrix
+    placed = shapely.transform(shape, lambda points: points @ matrix + shift)
+    # Both sides of the seam may differ by their strain, and the cut along bends is no gap.
+    slack = 0.01 * float(np.linalg.norm(here))
+    return shapely.union_all(shapely.buffer(shapely.get_parts(placed), slack))
+
+
+def _inner(line: Array) -> Array:
+    """Return the middle half of a line."""
+    along = arc_lengths(line)
+    at = np.linspace(0.25, 0.75, 5) * along[-1]
+    return np.stack([np.interp(at, along, c) for c in line.T], axis=1)
+
+
+def _number(seam: TabSeam, added: Sequence[tuple[Array, float]], height: float) -> Label:
+    """Place the number of a seam on its longest tab, otherwise beside its middle in the part."""
+    if added:
+        piece, width = max(added, key=lambda one: float(np.linalg.norm(one[0][-1] - one[0][0])))
+        away = -0.5 * width
+        height = min(height, 0.6 * width)
+    else:
+        piece, away = _inner(seam.line), height
+    way = piece[-1] - piece[0]
+    along = way / max(float(np.linalg.norm(way)), 1e-300)
+    middle = 0.5 * (piece[0] + piece[-1]) + away * np.array([-along[1], along[0]])
+    return Label(str(seam.number), middle, height, float(np.arctan2(along[1], along[0])))

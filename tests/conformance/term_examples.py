@@ -22,6 +22,7 @@ from gso.mesh import Mesh, Polylines, topology, vertex_normals
     equation,
     fairness,
     gauss_image,
+    holonomy,
     isometry,
     length,
     planarity,
@@ -45,6 +46,7 @@ from gso.mesh import Mesh, Polylines, topology, vertex_normals
         "equation",
         "fairness",
         "gauss_image",
+        "holonomy",
         "isometry",
         "length",
         "planarity",
@@ -89,6 +91,10 @@ def _equation(mesh: Mesh) -> list[Term]:
     return out
 
 
+def _holonomy(mesh: Mesh) -> list[Term]:
+    return [replace(t, refresh=None) for t in holonomy.build(mesh, mesh.boundary_loops)]
+
+
 def _length(mesh: Mesh) -> list[Term]:
     lengths = np.full(len(mesh.edges), 0.3)
     return [length.build(mesh.edges, lengths, block=block) for block in ("surface", "flat")]
@@ -125,6 +131,7 @@ _BUILT: dict[str, Callable[[Mesh], list[Term]]] = {
     "equation": _equation,
     "fairness": lambda mesh: [fairness.build(mesh), fairness.build(mesh, block="flat")],
     "gauss_image": gauss_image.build,
+    "holonomy": _holonomy,
     "isometry": isometry.build,
     "length": _length,
     "planarity": _planarity,

@@ -20,7 +20,14 @@ from gso.mesh.topology.half_edges import (
     reverse,
 )
 from gso.mesh.topology.polylines import boundary_loops, hinges, polyline_crosses, polyline_triples
-from gso.mesh.topology.stars import RING_SIZES, Stars, face_stars, grid_stars, vertex_stars
+from gso.mesh.topology.stars import (
+    RING_SIZES,
+    Stars,
+    boundary_fans,
+    face_stars,
+    grid_stars,
+    vertex_stars,
+)
 from gso.mesh.topology.triangulation import (
     are_quads,
     by_size,
@@ -36,6 +43,7 @@ __all__ = [
     "Stars",
     "are_quads",
     "boundary_edges",
+    "boundary_fans",
     "boundary_loops",
     "by_size",
     "check_vertices",

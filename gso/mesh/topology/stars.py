@@ -81,6 +81,42 @@ def face_stars(he: HalfEdges) -> Stars:
     return found
 
 
+def boundary_fans(he: HalfEdges, loops: Sequence[Ints]) -> Ints:
+    """List the vertices of boundary loops with their open fans of neighbours, (r, 1 + k).
+
+    One row per vertex of each loop, in their order: the vertex, then its neighbours from the next
+    vertex of the loop to the one before, anticlockwise. Shorter fans repeat their last vertex,
+    which adds no angle; k is one of :data:`RING_SIZES`. A vertex where two fans meet has a row for
+    each.
+
+    Parameters
+    ----------
+    he : HalfEdges
+        Those of a triangulation.
+    loops : sequence of ndarray of int
+        Its boundary loops, anticlockwise round the surface.
+    """
+    if not loops:
+        return np.empty((0, 1 + RING_SIZES[0]), np.int64)
+    centre = np.concatenate(loops)
+    following = np.concatenate([np.roll(loop, -1) for loop in loops])
+    rim = np.flatnonzero(he.twin < 0)
+    key = he.origin[rim] * np.int64(he.vertex_count) + he.dest[rim]
+    order = np.argsort(key)
+    h = rim[order[np.searchsorted(key[order], centre * np.int64(he.vertex_count) + following)]]
+    columns = [centre, following]
+    while True:
+        back = he.prev[h]
+        columns.append(he.origin[back])
+        across = he.twin[back]
+        if (across < 0).all():
+            break
+        h = np.where(across < 0, h, across)
+    length = next((k for k in RING_SIZES if k >= len(columns) - 1), len(columns) - 1)
+    columns += (length + 1 - len(columns)) * columns[-1:]
+    return np.stack(columns, axis=1)
+
+
 def _spokes(he: HalfEdges) -> Stars:
     """List the interior vertices and the half-edges from them, anticlockwise, by their number.
 

@@ -41,8 +41,10 @@ def triangulate(faces: Ints, turned: Flags) -> Ints:
     return tris[keep]
 
 
-def quad_splits(faces: Ints, he: HalfEdges) -> Flags:
+def quad_splits(faces: Ints, he: HalfEdges, reflex: Ints | None = None) -> Flags:
     """Choose consistent diagonals: mask of the quads split along 1-3 instead of 0-2.
+
+    A quad that is not convex is split through its reflex corner (m,), -1 for the convex ones.
 
     The choice is propagated from the first face over its neighbours. Nearly every regular
     vertex then has six triangles, the only valence at which the angle defect converges
@@ -69,6 +71,8 @@ def quad_splits(faces: Ints, he: HalfEdges) -> Flags:
     there = local[he.twin[inner]] % 2 == 1
     # Consistent: the diagonals of two neighbours do not meet at an end of the shared edge.
     turn, _ = _tree_parity(len(faces), he.face[inner], he.face[he.twin[inner]], here == there)
+    if reflex is not None:
+        turn = np.where(reflex < 0, turn, reflex % 2 == 1)
     # Two quads with the same diagonal, or a diagonal that is also an edge, would give a
     # non-manifold triangulation: such quads are split the other way.
     clash = _clashing_splits(faces[quad], turn[quad], he)

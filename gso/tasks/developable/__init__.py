@@ -16,13 +16,17 @@ from gso.unknowns import ALONG
 
 __all__ = ["NEAR", "SHEET", "TASK", "Options"]
 
+#: Settings of the surface that a solve by isometry starts from. That solve closes holes by itself,
+#: and farther from the design it would have less room to.
+_START = Options(w_holes=0.02)
+
 
 def _before_isometry(analysis: Analysis, request: Request[joint_isometry.Options]) -> Plan:
     """Plan the curvature solve whose result the solve by isometry starts from."""
     bound = request.max_displacement
     # The box bounds of the solve by isometry cover only part of the ball around a vertex.
     bound = None if bound is None else 0.99 * ALONG * bound
-    begun = replace(request.with_options(Options()), max_displacement=bound)
+    begun = replace(request.with_options(_START), max_displacement=bound)
     return schedule.plan(analysis, begun)
 
 
@@ -30,7 +34,7 @@ def _curvature(request: Request[joint_isometry.Options]) -> Request[Options] | N
     """Return the request for the surface that a solve by isometry starts from."""
     if request.x0 is not None or request.options.begin != "curvature":
         return None
-    return replace(request.with_options(Options()), formulation="curvature")
+    return replace(request.with_options(_START), formulation="curvature")
 
 
 TASK = Task(

@@ -17,6 +17,7 @@ from gso.status import Status
 from gso.tasks.base import Analysis, Runner, Solution
 from gso.tasks.base import Options as BaseOptions
 from gso.tasks.developable import joint_isometry
+from gso.tasks.developable.objective import BOUNDED
 from gso.tasks.developable.options import DEVELOPABLE, NEAR, Options
 from gso.tasks.developable.target import (
     PROGRESS,
@@ -109,18 +110,30 @@ def _strain_left(run: Runner, solution: Solution) -> float:
     return strain_of(run, solution.points)
 
 
-def near_design(analysis: Analysis, request: SearchRequest) -> Iterator[SearchRequest]:
+def near_design(
+    analysis: Analysis, request: SearchRequest, strained: bool
+) -> Iterator[SearchRequest]:
     """Yield requests whose results stay near the design, for where one without limits does not.
 
-    First by the same formulation. Then, for "isometry", by that of the surface it starts from, and
-    else by "isometry", if the user did not name one and did not ask for a fast solve. There are
-    none with constraints, B-splines or the settings of a reference.
+    First by the same formulation: where the result was not `strained` with the same weights, and
+    then with those for results that are bounded. Then, for "isometry", by that of the surface it
+    starts from, and else by "isometry", if the user did not name one and did not ask for a fast
+    solve. There are none with constraints, B-splines or the settings of a reference.
     """
     options = request.options
     reference = isinstance(options, joint_isometry.Options) and options.begin == "design"
     if reference or options.variables == "surface" or not analysis.constraints.empty:
         return
     near = replace(request, x0=None, max_displacement=_USABLE)
+    if not strained and isinstance(options, Options):
+        curvature, fairness, proximity = BOUNDED
+        same = replace(
+            options,
+            w_fairness=options.w_fairness / fairness,
+            w_proximity=options.w_proximity / proximity,
+        )
+        factor = request.weight_factor / curvature
+        yield replace(near.with_options(same), weight_factor=factor)
     yield _with_borders(near)
     if isinstance(options, joint_isometry.Options):
         yield replace(near.with_options(Options()), formulation="curvature")

@@ -6,8 +6,9 @@ On the design scaled to the unit ball it is
     + w_elongation / 2 mean (elongation)^2
 
 with |K| smoothed by a decreasing epsilon. The absolute value concentrates bending along few
-lines, which lets a surface become developable. Second derivatives are relative to a share of
-the design's own, which is large where the design is developable. d penalises the displacement
+lines, which lets a surface become developable. The angle defects of holes that have to close in
+the plane count as curvature, too. Second derivatives are relative to a share of the design's
+own, which is large where the design is developable. d penalises the displacement
 from the design, its tangential part less: quadratically below `quadratic_below`, linearly
 beyond. The elongation of an edge is zero within a range of length ratios.
 
@@ -19,9 +20,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from gso import metrics as measure
 from gso.components import several
-from gso.energy import Weighted, curvature, elongation, fairness, gauss_image, proximity
+from gso.energy import Weighted, curvature, elongation, fairness, gauss_image, holonomy, proximity
 from gso.energy.losses import Absolute, Distance
 from gso.hierarchy import resample
 from gso.mesh import Mesh
@@ -30,7 +33,7 @@ from gso.tasks import per_component
 from gso.tasks.developable.analysis import Analysis, Shape, own_bending
 from gso.tasks.developable.options import Options
 from gso.tasks.request import Request
-from gso.typing import Array, N
+from gso.typing import Array, Ints, N
 
 #: Mean |K| and mean squared bending of a typical design, for which weights are quoted.
 TYPICAL_CURVATURE = 0.3
@@ -42,9 +45,14 @@ GENERAL = 1.8
 #: folds that finer meshes do not have; these weights lead to less energy on the design's own mesh.
 #: Under constraints they would not.
 COARSE_CURVATURE, COARSE_FAIRNESS = 1.5, 3.0
+#: Factors on the weights of curvature, fairness and proximity where displacements are bounded.
+BOUNDED = (4.5, 3.0, 0.3)
 #: The mean of squared second differences along both polylines of quads is twice that across the
 #: edges of triangles, in the mean over all directions.
 _QUADS = 2.0
+#: Defect in degrees up to which an inner outline counts as a hole, as where patterns are cut open;
+#: others are the ends of tubes. And the defect up to which a hole lacks no angle.
+_HOLE, _LACKS = 90.0, 0.1
 
 
 def adapted_weights(options: Options, curved: N, bending: N) -> tuple[N, N]:
@@ -97,14 +105,15 @@ def _terms(
     w_proximity = o.w_proximity
     if request.max_displacement is not None:
         # The bound keeps the result close, so the other terms can be stronger.
-        w_curvature, w_fairness = 4.5 * w_curvature, 3.0 * w_fairness
-        w_proximity = 0.3 * w_proximity
+        w_curvature, w_fairness = BOUNDED[0] * w_curvature, BOUNDED[1] * w_fairness
+        w_proximity = BOUNDED[2] * w_proximity
     normals = vertex_normals(mesh)
     near = proximity.build(mesh, normals, tangential=o.tangential)
     by_image = image * w_curvature
     bent = [(t, w_curvature - by_image) for t in curvature.build(mesh)]
     if image > 0:
         bent += [(t, by_image) for t in gauss_image.build(mesh)]
+    bent += [(t, o.w_holes * w_curvature) for t in holonomy.build(mesh, _holes(mesh))]
     items = [Weighted(t, w, Absolute(o.eps)) for t, w in bent]
     smooth = shape.smooth
     if mesh is shape.mesh:
@@ -117,6 +126,21 @@ def _terms(
     items.append(Weighted(near, w_proximity, Distance(o.quadratic_below)))
     items.append(Weighted(elongation.build(mesh), o.w_elongation))
     return items
+
+
+def _holes(mesh: Mesh) -> list[Ints]:
+    """Return the inner outlines that have to close in the plane.
+
+    They are those that nearly do in the design, unless all of them lack an angle: then the pattern
+    can be cut open at them. Cut open at a hole with too much angle it would lie on itself.
+    """
+    if len(mesh.boundary_loops) < 2:
+        return []
+    defects = measure.hole_defects(mesh)
+    near = np.abs(defects) < _HOLE
+    if (defects[near] > _LACKS).all():
+        return []
+    return [mesh.boundary_loops[k] for k in measure.inner_outlines(mesh)[near]]
 
 
 def _resample(source: Mesh, target: Mesh) -> Array:

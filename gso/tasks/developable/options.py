@@ -28,6 +28,9 @@ class Options(BaseOptions):
     w_curvature : float
         Weight of mean |K| for a design with typical mean |K|; the weight used decreases slowly
         with the design's mean |K|.
+    w_holes : float
+        Factor on that weight for holes, whose defects would strain the pattern; with 1 a defect of
+        a hole costs as much as that of a vertex, and the result is farther from the design.
     w_fairness : float
         Weight of the mean squared second derivative for a design with typical bending; the
         weight used decreases with the design's bending.
@@ -101,6 +104,7 @@ class Options(BaseOptions):
     iterations: int = 12
     method: str = "levenberg-marquardt"
     w_curvature: float = 9.0e-4
+    w_holes: float = 0.15
     w_fairness: float = 7.8e-6
     w_proximity: float = 1.0
     w_elongation: float = 0.1

@@ -12,6 +12,7 @@ from gso.pattern import Bend
 from gso.typing import Array
 from gso.workshop.names import different
 from gso.workshop.part import Drawing, Label, Part
+from gso.workshop.polygons import common, region
 
 # A bend by less is none, in radians.
 _FLAT = 1e-9
@@ -167,7 +168,7 @@ def _numbers(part: Part, depth: float, height: float) -> list[Label]:
     """
     import shapely
 
-    shape = shapely.Polygon(part.outline, part.holes)
+    shape = region(part.outline, part.holes)
     shapely.prepare(shape)
     found = []
     for notch in part.notches:
@@ -206,9 +207,8 @@ def _grain(part: Part, grain: Array) -> list[Line]:
     across = np.array([-along[1], along[0]])
     middle = part.low + 0.5 * np.array(part.size)
     far = np.hypot(*part.size) * along
-    inside = shapely.intersection(
-        shapely.make_valid(shapely.Polygon(part.outline, part.holes)),
-        shapely.LineString([middle - far, middle + far]),
+    inside = common(
+        region(part.outline, part.holes), shapely.LineString([middle - far, middle + far])
     )
     chord = max(shapely.get_parts(inside), key=shapely.length, default=inside)
     least = 0.5 * min(part.size)

@@ -9,6 +9,7 @@ import numpy as np
 from gso.errors import OptionError
 from gso.typing import Array
 from gso.workshop.part import Drawing
+from gso.workshop.polygons import region
 
 #: Height of the strip below the window that has the title and the scale bar, in millimetres.
 FOOT = 12.0
@@ -112,4 +113,4 @@ def _shows(drawing: Drawing, tile: Tile) -> bool:
     import shapely
 
     window = shapely.box(*tile.low, *tile.high)
-    return any(shapely.Polygon(part.outline).buffer(0).intersects(window) for part in drawing.parts)
+    return any(region(part.outline).intersects(window) for part in drawing.parts)

@@ -1,0 +1,146 @@
+"""Operations on the polygons of parts, which never end in an error of the geometry library."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gso.errors import MeshError
+from gso.geometry.polygon import anticlockwise
+from gso.typing import Array
+
+if TYPE_CHECKING:
+    from shapely import Geometry
+
+#: Grids to which coordinates are rounded where an operation fails, relative to the width.
+_GRIDS = (1e-12, 1e-10, 1e-8)
+#: Grids, in millimetres, on which polygons are united that touch but for rounding errors.
+_JOINTS = (1e-9, 1e-7, 1e-5)
+#: Distance of successive points that are one, in millimetres.
+_REPEATED = 1e-6
+#: Largest width of a hole that is a rounding error of a union, in millimetres, and the largest
+#: share of the area by which a union may miss what it unites.
+_SLIVER, _LOST = 1e-3, 1e-6
+
+
+def region(outline: Array, holes: Sequence[Array] = ()) -> Geometry:
+    """Return what an outline (k, 2) encloses but holes, as a valid polygon or several.
+
+    Of an outline that crosses itself it is all that lies within.
+    """
+    import shapely
+
+    shape = shapely.Polygon(outline, holes)
+    if shape.is_valid:
+        return shape
+
+    def mended(some: Geometry) -> Geometry:
+        return shapely.make_valid(some, method="structure", keep_collapsed=False)
+
+    return _steady(mended, shape)
+
+
+def moved(shape: Geometry, by: float, mitre: float) -> Geometry:
+    """Return a shape whose outline is moved outwards by a distance; corners are mitred."""
+    import shapely
+
+    def wider(some: Geometry) -> Geometry:
+        return shapely.buffer(some, by, join_style="mitre", mitre_limit=mitre)
+
+    return _steady(wider, shape)
+
+
+def common(one: Geometry, two: Geometry) -> Geometry:
+    """Return the intersection of two shapes."""
+    import shapely
+
+    return _steady(shapely.intersection, one, two)
+
+
+def without(one: Geometry, two: Geometry) -> Geometry:
+    """Return what of a shape is not in another one."""
+    import shapely
+
+    return _steady(shapely.difference, one, two)
+
+
+def united(one: Geometry, two: Geometry) -> Geometry | None:
+    """Return the union of two shapes if it is one polygon and has the area of both, else None.
+
+    Gaps that are rounding errors are closed.
+    """
+    import shapely
+
+    area = one.area + two.area - common(one, two).area
+    for grid in _JOINTS:
+        whole = _steady(partial(shapely.union, grid_size=grid), one, two)
+        if whole.geom_type == "Polygon":
+            break
+    if whole.geom_type != "Polygon" or abs(whole.area - area) > _LOST * area:
+        return None
+    holes = [ring for ring in whole.interiors if shapely.Polygon(ring).area > _SLIVER * ring.length]
+    return shapely.remove_repeated_points(shapely.Polygon(whole.exterior, holes), _REPEATED)
+
+
+def largest(shape: Geometry) -> Geometry | None:
+    """Return the largest polygon of a shape; None if it has no area."""
+    import shapely
+
+    parts = shapely.get_parts(shape)
+    parts = parts[(shapely.get_type_id(parts) == 3) & (shapely.area(parts) > 0)]
+    return None if not len(parts) else parts[int(np.argmax(shapely.area(parts)))]
+
+
+def rings(polygon: Geometry) -> tuple[Array, tuple[Array, ...]]:
+    """Return the outline of a polygon, anticlockwise, and its holes, clockwise."""
+    outline, *holes = (
+        anticlockwise(np.asarray(ring.coords)[:-1])
+        for ring in (polygon.exterior, *polygon.interiors)
+    )
+    return outline, tuple(hole[::-1] for hole in holes)
+
+
+def roomiest(shape: Geometry) -> tuple[Array, float]:
+    """Return the middle (2,) and the radius of the largest circle in a shape.
+
+    Without an area it is the middle of its points, and 0.
+    """
+    import shapely
+
+    polygon = largest(shape)
+    if polygon is None:
+        points = shapely.get_coordinates(shape)
+        return (points.mean(axis=0) if len(points) else np.zeros(2)), 0.0
+    try:
+        middle, rim = np.asarray(shapely.maximum_inscribed_circle(polygon).coords)
+    except (shapely.GEOSException, ValueError):
+        point = polygon.representative_point()
+        return np.array([point.x, point.y]), float(polygon.exterior.distance(point))
+    return middle, float(np.linalg.norm(rim - middle))
+
+
+def _steady(operation: Callable[..., Geometry], *shapes: Geometry) -> Geometry:
+    """Return the result of an operation; where it fails, that of shapes with rounded coordinates.
+
+    Raises
+    ------
+    MeshError
+        It fails on all grids, as with coordinates that are not finite.
+    """
+    import shapely
+
+    try:
+        return operation(*shapes)
+    except shapely.GEOSException as error:
+        why = error
+    box = shapely.total_bounds(np.array(shapes))
+    width = float(max(box[2] - box[0], box[3] - box[1]))
+    for grid in _GRIDS:
+        try:
+            return operation(*(shapely.set_precision(shape, grid * width) for shape in shapes))
+        except shapely.GEOSException as error:
+            why = error
+    raise MeshError(f"the outlines of the parts cannot be processed: {why}; take an evener mesh")
