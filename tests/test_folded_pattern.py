@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import shapely
 
 import gso
 from gso import metrics
-from gso.folded_pattern import folded_pattern
+from gso.exact import folded_pattern
 from gso.mesh import Mesh
 from gso.workshop.finish import Finish
 from gso.workshop.thickness import Thickness
@@ -24,7 +26,7 @@ def prism(n=8, radius=40.0, height=120.0) -> Mesh:
     """Sides and both caps, in triangles."""
     turn = 2 * np.pi * np.arange(n) / n
     ring = radius * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-    points = np.concatenate([ring, ring + [0, 0, height]])
+    points = np.concatenate([ring, ring + np.array([0, 0, height])])
     k = np.arange(n)
     j = (k + 1) % n
     sides = [np.stack([k, j, j + n], axis=1), np.stack([k, j + n, k + n], axis=1)]
@@ -83,7 +85,7 @@ def transition(side=150.0, radius=50.0, height=120.0, arcs=16) -> Mesh:
     faces = []
     for q in range(4):
         top = [4 + (q * arcs + k) % (4 * arcs) for k in range(arcs + 1)]
-        faces += [[q, b, a] for a, b in zip(top, top[1:])]
+        faces += [[q, b, a] for a, b in pairwise(top)]
         faces.append([q, (q + 1) % 4, top[-1]])
     return Mesh(points, np.array(faces)[:, ::-1])
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from gso import parametrization
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
-from gso.folded_pattern import folded_pattern
+from gso.exact import folded_pattern
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
 from gso.mesh.welding import collapse
@@ -21,6 +21,8 @@ from gso.ruled.paneling.strips_request import StripsRequest
 from gso.seams import pieces as search
 from gso.tasks.request import Limits
 from gso.tno import optimize
+from gso.verdict import Code, compare
+from gso.verdict.surface_checks import crossed
 from gso.workshop import measurements
 from gso.workshop.designs import Design
 from gso.workshop.fabrication_settings import FabricationSettings
@@ -56,7 +58,7 @@ def made(
         say(f"{given.name}: {said}")
 
     exact = _exact(given, settings)
-    if exact is not None and not exact.reasons:
+    if exact is not None and (not exact.reasons or _is_hopeless(exact)):
         return exact
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
@@ -111,7 +113,13 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
         "strain_p99": found.strain,
     }
     one = of_surface(given.name, found.surface, found.pattern, record, found.folded)
+    one = replace(one, reasons=compare(crossed(given.mesh), {}))
     return _checked(_bent(one), settings)
+
+
+def _is_hopeless(exact: Made) -> bool:
+    """Tell whether no other pattern of a design can be usable either."""
+    return any(reason.code is Code.CROSSES_ITSELF for reason in exact.reasons)
 
 
 def _strips(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:

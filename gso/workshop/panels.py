@@ -185,8 +185,11 @@ class Made:
         try:
             panels = []
             for k, own in enumerate(json.loads(data["names"].tobytes())):
-                points, faces, *rest, rolled = (data[f"panel{k}_{part}"] for part in _ARRAYS)
-                panels.append(Panel(str(own), Mesh(points, faces), *rest, rolled > 0))
+                points, faces, flat, bends, angles, radii, rolled = (
+                    data[f"panel{k}_{part}"] for part in _ARRAYS
+                )
+                surface = Mesh(points, faces)
+                panels.append(Panel(str(own), surface, flat, bends, angles, radii, rolled > 0))
             matings: list[Mating] = []
             while f"seam{len(matings)}_along" in data:
                 k = len(matings)

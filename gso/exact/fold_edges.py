@@ -1,0 +1,52 @@
+"""Folds of a pattern: the edges between its faces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gso.exact.sliced_pattern import SlicedPattern
+from gso.pattern import Folded
+from gso.recognition import Recognised
+from gso.typing import Array, Flags, Ints
+from gso.unfolding.dual_edges import dual_edges
+
+#: Angles in radians from which on an edge between two faces is a fold: between facets, and where
+#: one of them is a round surface, which meets its neighbour in the tessellation's accuracy.
+_FOLD, _TANGENT = np.radians(0.05), np.radians(1.0)
+
+
+def fold_edges(sliced: SlicedPattern, shape: Recognised) -> Folded:
+    """Return the edges between two faces that are folded, with their angles and radii of 0."""
+    edges = dual_edges(sliced.faces, np.pad(sliced.flat, ((0, 0), (0, 1))))
+    one, other = (sliced.label[edges.triangles[:, side]] for side in (0, 1))
+    border = one != other
+    ends, pair = edges.ends[border], edges.triangles[border]
+    middle = sliced.points[sliced.vertex[ends]].mean(axis=1)
+    (first, round_one), (second, round_two) = (
+        _normals(sliced, shape, pair[:, side], middle) for side in (0, 1)
+    )
+    way = sliced.points[sliced.vertex[ends[:, 1]]] - sliced.points[sliced.vertex[ends[:, 0]]]
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+    sine = np.einsum("kd,kd->k", np.cross(first, second), way)
+    angle = np.arctan2(sine, np.einsum("kd,kd->k", first, second))
+    folded = np.abs(angle) > np.where(round_one | round_two, _TANGENT, _FOLD)
+    return Folded(ends[folded], angle[folded], np.zeros(int(folded.sum())))
+
+
+def _normals(
+    sliced: SlicedPattern, shape: Recognised, triangles: Ints, points: Array
+) -> tuple[Array, Flags]:
+    """Return normals of triangles, of their round surface at a point where they have one."""
+    own = sliced.points[sliced.vertex[sliced.faces[triangles]]]
+    normal = np.cross(own[:, 1] - own[:, 0], own[:, 2] - own[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    number, is_round = sliced.label[triangles], np.zeros(len(triangles), bool)
+    for k in np.unique(number).tolist():
+        surface = shape.faces[k].surface
+        if surface is not None:
+            which = number == k
+            exact = surface.normals(points[which])
+            side = np.sign(np.einsum("kd,kd->k", exact, normal[which]))
+            normal[which] = side[:, None] * exact
+            is_round |= which
+    return normal, is_round

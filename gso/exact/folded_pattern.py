@@ -1,0 +1,136 @@
+"""The pattern of a design that is flat or developable as it is: nothing is moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gso.exact.fold_edges import fold_edges
+from gso.exact.low_poly import facets, is_low_poly
+from gso.exact.ruled_bends import joined_bends, ruled_bends
+from gso.exact.sliced_pattern import SlicedPattern, shape_size
+from gso.mesh import Mesh
+from gso.pattern import Folded, Pattern
+from gso.quantities import Length, Strain
+from gso.recognition import Recognised, recognise
+from gso.typing import Array, Ints
+from gso.unfolding.dual_edges import dual_edges
+from gso.unfolding.join_patches import join_patches
+
+#: Difference of lengths, relative to the size, up to which edges are equally long.
+_SAME = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class FoldedPattern:
+    """A design in the plane, with the lines to fold, bend and roll it along.
+
+    Attributes
+    ----------
+    surface : Mesh
+        The design in triangles, with more vertices where bend lines cross edges.
+    pattern : Pattern
+        Its pattern. On cylinders and cones lengths are those of the round surface.
+    folded : Folded
+        Edges of the pattern on bend lines; the radius of a fold is 0.
+    recognised : Recognised
+        The faces of the design.
+    parts : int
+        Number of parts.
+    strain : float
+        Largest strain of a face that has no equation.
+    """
+
+    surface: Mesh
+    pattern: Pattern
+    folded: Folded
+    recognised: Recognised
+    parts: int
+    strain: float
+
+
+def folded_pattern(
+    mesh: Mesh,
+    *,
+    max_strain: Strain = 1e-3,
+    max_deviation: Length | None = None,
+    cut: ArrayLike = (),
+    sheet: tuple[float, float] | None = None,
+    bend_step: float | None = None,
+) -> FoldedPattern | None:
+    """Unfold a design that consists of flat, rolled and conical faces.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    max_strain : float or str
+        Largest strain of a face that has no equation.
+    max_deviation : float or str, optional
+        Largest distance of vertices from the cylinder or cone that they are counted to; the
+        accuracy of the coordinates when not given.
+    cut : array_like of int, (k, 2)
+        Edges that are cut in any case.
+    sheet : (float, float), optional
+        Length and width that a part may have, in the mesh's unit.
+    bend_step : float, optional
+        Largest angle between neighbouring bend lines, in degrees.
+
+    Returns
+    -------
+    FoldedPattern or None
+        None if some face is not developable, unless the design is a polyhedron of few triangles
+        with sharp edges.
+
+    Examples
+    --------
+    >>> box = [[x, y, z] for z in (0, 2) for x, y in ((0, 0), (4, 0), (4, 3), (0, 3))]
+    >>> sides = [[k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4)]
+    >>> found = folded_pattern(Mesh(box, [*sides, [3, 2, 1, 0], [4, 5, 6, 7]]))
+    >>> found.parts, len(found.folded.edges), float(np.degrees(found.folded.angles).round(6).max())
+    (1, 5, 90.0)
+    """
+    shape = recognise(mesh, max_deviation=max_deviation, max_strain=max_strain, bend_step=bend_step)
+    if not shape.developable.all():
+        if not is_low_poly(shape):
+            return None
+        shape = facets(shape)
+    flat = shape.flat()
+    joined = join_patches(
+        shape.vertices,
+        shape.triangles,
+        shape.face,
+        flat,
+        cut=np.concatenate([np.reshape(cut, (-1, 2)).astype(int), _unequal(shape, flat)]),
+        sheet=sheet,
+    )
+    sliced = SlicedPattern.of(shape, joined)
+    bends = [ruled_bends(sliced, k, face, flat) for k, face in enumerate(shape.faces)]
+    edges, angles, radii = joined_bends([*bends, fold_edges(sliced, shape)])
+    surface = Mesh(sliced.points, sliced.vertex[sliced.faces])
+    # In the order of the surface's vertices, as patterns that are not cut have it.
+    order = np.argsort(sliced.vertex, kind="stable")
+    rank = np.argsort(order)
+    pattern = Pattern(
+        sliced.flat[order], rank[sliced.faces], sliced.vertex[order], rank[sliced.seams]
+    )
+    return FoldedPattern(
+        surface,
+        pattern,
+        Folded(rank[edges], angles, radii),
+        shape,
+        int(joined.part.max()) + 1,
+        max(face.strain for face in shape.faces),
+    )
+
+
+def _unequal(shape: Recognised, flat: Array) -> Ints:
+    """Find edges that are not equally long in the flat images of both sides: they must be cut."""
+    edges = dual_edges(shape.triangles, shape.vertices)
+    corners = flat.reshape(-1, 2)
+    one, other = (
+        np.linalg.norm(corners[ends[:, 0]] - corners[ends[:, 1]], axis=1)
+        for ends in edges.corners()
+    )
+    return np.asarray(edges.ends[np.abs(one - other) > _SAME * shape_size(shape)])

@@ -1,0 +1,32 @@
+"""Designs that are meant as polyhedra: few triangles, and sharp edges."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from gso.recognition import Recognised, ShapeFace
+from gso.unfolding.dual_edges import dual_edges
+
+#: Number of triangles up to which a design may be a polyhedron. The angles, in radians, from which
+#: on an edge is a fold and a sharp one, and the share of the folds' length that is sharp.
+_FEW, _FOLD, _SHARP, _SHARE = 1_000, np.radians(0.05), np.radians(20.0), 0.25
+
+
+def is_low_poly(shape: Recognised) -> bool:
+    """Tell whether a design is meant as a polyhedron: few triangles, and many sharp edges."""
+    if len(shape.triangles) > _FEW:
+        return False
+    edges = dual_edges(shape.triangles, shape.vertices)
+    a, b = shape.vertices[edges.ends].transpose(1, 0, 2)
+    angle, length = np.abs(edges.angles), np.linalg.norm(b - a, axis=1)
+    folded = angle > _FOLD
+    return bool(length[folded & (angle > _SHARP)].sum() >= _SHARE * length[folded].sum() > 0)
+
+
+def facets(shape: Recognised) -> Recognised:
+    """Return the design with each triangle as a face of its own."""
+    flat = replace(shape, faces=(ShapeFace("free", np.arange(len(shape.triangles))),)).flat()
+    faces = (ShapeFace("plane", np.array([k]), flat[k, None]) for k in range(len(flat)))
+    return replace(shape, faces=tuple(faces))

@@ -1,0 +1,149 @@
+"""Bends of developable faces along their rulings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gso.exact.ruling_rows import levels, ruling_rows
+from gso.exact.sliced_pattern import SlicedPattern
+from gso.mesh.topology import edge_keys
+from gso.pattern import Folded
+from gso.recognition import BendLine, ShapeFace
+from gso.typing import Array, Flags
+
+#: Distance, relative to the size, within which points are on a line.
+_SAME = 1e-7
+
+
+def ruled_bends(sliced: SlicedPattern, number: int, face: ShapeFace, flat: Array) -> Folded:
+    """Return the edges of a face to bend along, with angles and radii.
+
+    They are rows of edges along rulings where there are enough. Otherwise triangles are divided
+    along rulings.
+
+    Parameters
+    ----------
+    sliced : SlicedPattern
+    number : int
+        Number of the face in the shape.
+    face : ShapeFace
+    flat : ndarray, (t, 3, 2)
+        Flat corners of the shape's triangles, each face in its own place.
+    """
+    if not face.bend_lines:
+        return Folded()
+    bends = _rulings(face)
+    rows = ruling_rows(sliced, face, flat, max(3, len(bends)))
+    if rows is not None:
+        return rows
+    turn, shift = _motion(sliced, face, flat)
+    near = _SAME * float(np.linalg.norm(np.ptp(sliced.points, axis=0)))
+    lines = [_Line.of(np.stack([b.start, b.end]) @ turn + shift, face, shift, near) for b in bends]
+    for line in lines:
+        edges = sliced.edges_of(number)
+        away = line.away(sliced.flat[edges])
+        away[np.abs(away) < near] = 0.0
+        hit = away[:, 0] * away[:, 1] < 0
+        share = away[hit, 0] / (away[hit, 0] - away[hit, 1])
+        p, q = sliced.flat[edges[hit]].transpose(1, 0, 2)
+        inside = line.reaches(p + share[:, None] * (q - p))
+        if inside.any():
+            sliced.insert(edges[hit][inside], share[inside])
+    edges = sliced.edges_of(number)
+    inner = np.isin(edge_keys(edges[:, 0], edges[:, 1], len(sliced.flat)), sliced.inner())
+    on = [inner & line.carries(sliced.flat[edges], near) for line in lines]
+    found = [Folded()]
+    for line, bend, own in zip(lines, _weighted(bends, lines, on), on, strict=True):
+        share = line.along(sliced.flat[edges[own]]).mean(axis=1)
+        share = share / float(np.linalg.norm(bend.end - bend.start))
+        radii = bend.radius_start + share * (bend.radius_end - bend.radius_start)
+        angle = -bend.angle if bend.up else bend.angle
+        found.append(Folded(edges[own], np.full(len(radii), angle), radii))
+    return joined_bends(found)
+
+
+def joined_bends(some: list[Folded]) -> Folded:
+    """Return the bends of several faces together."""
+    return Folded(*(np.concatenate(column) for column in zip(*some, strict=True)))
+
+
+def _rulings(face: ShapeFace) -> list[BendLine]:
+    """Return the bend lines of a face; of those on one ruling of a round face the first."""
+    bends = list(face.bend_lines)
+    if face.surface is None:
+        return bends
+    level = levels(face.surface, np.array([line.end for line in bends]))
+    order = np.argsort(level, kind="stable")
+    new = np.diff(level[order], prepend=-np.inf) > _SAME * max(float(np.ptp(level)), 1e-300)
+    first = np.minimum.reduceat(order, np.flatnonzero(new))
+    return [bends[k] for k in sorted(first.tolist())]
+
+
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """A ruling in the pattern: its ends (2, 2), and how far it reaches from the first one."""
+
+    ends: Array
+    reach: tuple[float, float]
+
+    @classmethod
+    def of(cls, ends: Array, face: ShapeFace, apex: Array, near: float) -> _Line:
+        """Make a line that ends at `ends`, but on round faces only at the outline or the apex."""
+        if face.surface is None:
+            return cls(ends, (-near, float(np.linalg.norm(ends[1] - ends[0])) + near))
+        line = cls(ends, (-np.inf, np.inf))
+        return line if face.surface.slope == 0 else cls(ends, (float(line.along(apex)), np.inf))
+
+    @property
+    def way(self) -> Array:
+        """Its unit direction."""
+        d = self.ends[1] - self.ends[0]
+        return np.asarray(d / np.linalg.norm(d))
+
+    def away(self, points: Array) -> Array:
+        """Return the signed distances of points (..., 2)."""
+        x, y = self.way
+        return np.asarray((points - self.ends[0]) @ np.array([-y, x]))
+
+    def along(self, points: Array) -> Array:
+        """Return the places of points (..., 2) along the line."""
+        return np.asarray((points - self.ends[0]) @ self.way)
+
+    def reaches(self, points: Array) -> Flags:
+        """Tell which points are within its reach."""
+        at = self.along(points)
+        return np.asarray((at > self.reach[0]) & (at < self.reach[1]))
+
+    def carries(self, ends: Array, near: float) -> Flags:
+        """Tell which edges (e, 2, 2) lie on it."""
+        on = (np.abs(self.away(ends)) < 2 * near) & self.reaches(ends)
+        return np.asarray(on.all(axis=1))
+
+
+def _motion(sliced: SlicedPattern, face: ShapeFace, flat: Array) -> tuple[Array, Array]:
+    """Return how the flat image of a face was moved: p @ turn + shift."""
+    rows = np.flatnonzero(np.isin(sliced.source, face.triangles))
+    k = int(face.triangles[0])
+    whole = rows[sliced.source[rows] == k]
+    if len(whole) == 1:
+        ends = sliced.flat[sliced.faces[whole[0]]]
+    else:
+        raise AssertionError("a triangle was divided before its face was placed")
+    here = flat[k]
+    one, two = here[1:] - here[0], ends[1:] - ends[0]
+    turn = np.linalg.solve(one, two)
+    return turn, ends[0] - here[0] @ turn
+
+
+def _weighted(bends: list[BendLine], lines: list[_Line], on: list[Flags]) -> list[BendLine]:
+    """Give the angle of limiting lines on the outline to their neighbours."""
+    out = list(bends)
+    rest = [k for k, bend in enumerate(bends) if not bend.limit]
+    for k, bend in enumerate(bends):
+        if bend.limit and rest and not on[k].any():
+            middle = lines[k].ends.mean(axis=0)
+            near = min(rest, key=lambda j: abs(float(lines[j].away(middle))))
+            out[near] = replace(out[near], angle=out[near].angle + bend.angle)
+    return out
