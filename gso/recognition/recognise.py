@@ -56,10 +56,10 @@ def recognise(
     -----
     A mesh is either a polyhedron with folds, or a smooth surface that is tessellated: facets are
     one cylinder or cone if all their vertices lie on it, if at least three follow each other
-    around the axis, if three quarters of them span at most 30 degrees, and none more than three
-    times as much. Eight flat sides with folds of 45 degrees therefore stay folds, and twelve with
-    30 degrees are a tube. One row of facets whose border across the rulings is smooth is no proof
-    of straight rulings: a sphere consists of such rows.
+    around the axis, if half of the triangles span at most 30 degrees, and none more than 8 degrees
+    and more than three times the upper quartile. Eight flat sides with folds of 45 degrees
+    therefore stay folds, and twelve with 30 degrees are a tube. One row of facets whose border
+    across the rulings is smooth is no proof of straight rulings: a sphere consists of such rows.
 
     Examples
     --------

@@ -9,7 +9,7 @@ import numpy as np
 
 from gso.mesh import topology
 from gso.recognition.facet_graph import FacetGraph
-from gso.recognition.round_surface import RoundSurface, fit_round, on_quadrics
+from gso.recognition.round_surface import RoundSurface, fit_round, fit_quadrics
 from gso.typing import Array, Flags, Ints
 
 if TYPE_CHECKING:
@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 
 #: Fold, in radians, up to which a mesh can be a smooth surface: a tube of 12 sides has 30 degrees.
 SMOOTH = np.radians(30.5)
-#: Angle around the axis that one triangle can span, and its multiple of the upper quartile.
-_WIDEST, _WIDER = np.radians(62.0), 3.0
+#: Angle around the axis that one triangle can span, its multiple of the upper quartile, and the
+#: angle that it can always span.
+_WIDEST, _WIDER, _NARROW = np.radians(62.0), 3.0, np.radians(8.0)
 #: Facets around the axis from which on they are a smooth surface.
 _SEVERAL = 2.5
 #: Angle between the normals of a triangle and of the surface, in radians.
@@ -182,15 +183,24 @@ def _promising(
     more = given.sum(axis=1) > _FEWEST
     worst = np.full(len(chunk), np.inf)
     ready = np.flatnonzero(enough)
-    ready = ready[on_quadrics(points[ready], given[ready], graph.tolerance)]
     if not len(ready):
         return ready, around
-    for conical, axis in ((False, axes), (True, cone_axes)):
-        ready = ready[more[ready] & (worst[ready] > graph.tolerance)] if conical else ready
-        fits = fit_round(
-            points[ready], given[ready], axis[ready, :, 0], conical=conical, goal=graph.tolerance
-        )
-        worst[ready] = np.minimum(worst[ready], fits.worst)
+    off, quadric_axes = fit_quadrics(points[ready], given[ready])
+    quadric = np.zeros((len(chunk), 3))
+    quadric[ready] = quadric_axes
+    ready = ready[off <= graph.tolerance]
+    for conical, axis in (
+        (False, axes[:, :, 0]),
+        (True, cone_axes[:, :, 0]),
+        (False, quadric),
+        (True, quadric),
+    ):
+        left = ready[(worst[ready] > graph.tolerance) & (more[ready] | (not conical))]
+        if len(left):
+            fits = fit_round(
+                points[left], given[left], axis[left], conical=conical, goal=graph.tolerance
+            )
+            worst[left] = np.minimum(worst[left], fits.worst)
     order = np.argsort(worst, kind="stable")
     return order[worst[order] <= graph.tolerance], around
 
@@ -258,9 +268,9 @@ def _fitted(
         w = w / w.sum()
         mean = w @ n
         products = np.einsum("t,ti,tj->ij", w, n, n)
-        starts.append(np.linalg.eigh(products)[1][:, 0])
-        if conical:
-            starts.append(np.linalg.eigh(products - np.outer(mean, mean))[1][:, 0])
+        starts += list(np.linalg.eigh(products)[1].T)
+        starts += list(np.linalg.eigh(products - np.outer(mean, mean))[1].T)
+        starts += list(fit_quadrics(points[None], np.ones((1, len(points)), bool))[1])
     count = len(starts)
     sets = np.broadcast_to(points, (count, *points.shape))
     goal, given = _LOOSE * graph.tolerance, np.ones(sets.shape[:2], bool)
@@ -283,7 +293,8 @@ def _members(graph: FacetGraph, surface: RoundSurface, inside: Flags, free: Flag
     toward = np.einsum("td,td->t", surface.normals(graph.middles), graph.normals)
     sign = np.sign((toward * graph.areas)[inside].sum())
     typical = np.quantile(spans[inside], 0.75)
-    fits = free & on[graph.triangles].all(axis=1) & (spans <= min(_WIDER * typical, _WIDEST))
+    widest = min(max(_WIDER * typical, _NARROW), _WIDEST)
+    fits = free & on[graph.triangles].all(axis=1) & (spans <= widest)
     # A thin triangle of vertices on a curved surface may be tilted much, if it is no part of a
     # plane that cuts the surface.
     tilted = sign * toward < np.cos(_TILTED)
@@ -328,7 +339,7 @@ def _is_smooth(graph: FacetGraph, surface: RoundSurface, member: Flags, free: Fl
     around = np.sort(angle[far])
     gaps = np.diff(around, append=around[:1] + 2 * np.pi)
     covered = 2 * np.pi - gaps.max() if gaps.max() > 2 * typical else 2 * np.pi
-    if typical > SMOOTH or covered < _SEVERAL * typical:
+    if float(np.median(spans)) > SMOOTH or covered < _SEVERAL * typical:
         return False
     if float(np.abs(surface.distances(graph.points[ids])).max()) > graph.tolerance:
         return False
