@@ -330,6 +330,33 @@ def test_capped_tube_of_24_sides():
     assert sorted(face.kind for face in shape.faces) == ["cylinder", "plane", "plane"]
 
 
+@pytest.mark.parametrize("low", [50.0, 80.0])
+def test_neighbours_agree_in_the_length_of_an_edge(low):
+    """A cap, and a frustum or tube: the arcs of their circles are equally long on both sides."""
+    turn = 2 * np.pi * np.arange(24) / 24
+    circle = np.stack([np.cos(turn), np.sin(turn), np.zeros(24)], axis=1)
+    points = np.concatenate([low * circle, 50 * circle + [0, 0, 70], [[0, 0, 70]]])
+    n = 24
+    faces = [[k, (k + 1) % n, (k + 1) % n + n, k + n] for k in range(n)]
+    faces += [[k + n, (k + 1) % n + n, 48, -1] for k in range(n)]
+    shape = recognition.recognise((turned_in_space(points), faces))
+    assert sorted(face.kind for face in shape.faces)[1] == "plane"
+    lengths, start = shape.edge_lengths(), shape.triangles
+    end = np.roll(start, -1, axis=1)
+    kinds = np.array([face.kind for face in shape.faces])[shape.face]
+    top = (start >= n) & (start < 2 * n) & (end >= n) & (end < 2 * n)
+    arc = 50 * 2 * np.pi / 24
+    for kind in np.unique(kinds):
+        found = lengths[(kinds == kind)[:, None] & top]
+        assert len(found) == 24
+        assert found == pytest.approx([arc] * 24, rel=1e-9)
+    cap = shape.arcs[kinds == "plane"]
+    assert np.sort(cap.ravel())[-24:] == pytest.approx([2 * np.pi / 24] * 24)
+    if low == 80:
+        bottom = lengths[(start < n) & (end < n)]
+        assert bottom == pytest.approx([80 * 2 * np.pi / 24] * 24, rel=1e-9)
+
+
 def test_box_and_channel():
     corners = np.array([[x, y, z] for x in (0, 4) for y in (0, 3) for z in (0, 2)], float)
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]

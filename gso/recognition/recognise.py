@@ -110,6 +110,7 @@ def _round_face(graph: FacetGraph, region: Region, step: float | None) -> ShapeF
         float(np.arccos(np.clip(toward, 0.0, 1.0)).max()),
         seam=part.ends[~image.together],
         bend_lines=lines_of_round(part, surface, image, step),
+        bend_angle=float(np.ptp(image.angle)) * float(np.cos(surface.half_angle)),
     )
 
 
@@ -120,7 +121,12 @@ def _other_face(graph: FacetGraph, patch: Patch, limit: float) -> ShapeFace:
         if smooth is None:
             return ShapeFace("free", ids)
         return ShapeFace(
-            "torsal", ids, smooth.flat, strain=smooth.strain, bend_lines=smooth.bend_lines
+            "torsal",
+            ids,
+            smooth.flat,
+            strain=smooth.strain,
+            bend_lines=smooth.bend_lines,
+            bend_angle=sum(line.angle for line in smooth.bend_lines),
         )
     part = Part.of(graph.points, graph.triangles[ids])
     if patch.kind == "plane":
@@ -135,7 +141,8 @@ def _other_face(graph: FacetGraph, patch: Patch, limit: float) -> ShapeFace:
         "cone" if patch.kind == "cone" else "torsal", ids, flat, None, patch.axis, patch.apex
     )
     lines = lines_of_strip(part, flat, facet, fold, together)
-    return replace(face, seam=part.ends[~together], bend_lines=lines)
+    turned = sum(line.angle for line in lines)
+    return replace(face, seam=part.ends[~together], bend_lines=lines, bend_angle=turned)
 
 
 def _plane(graph: FacetGraph, part: Part, ids: Ints) -> ShapeFace:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gso.mesh import topology
 from gso.recognition.facet_graph import FacetGraph
-from gso.recognition.round_surface import RoundSurface, fit_round, fit_quadrics
+from gso.recognition.round_surface import RoundSurface, fit_quadrics, fit_round
 from gso.typing import Array, Flags, Ints
 
 if TYPE_CHECKING:
@@ -73,6 +73,8 @@ def round_regions(graph: FacetGraph) -> list[Region]:
         if count[part] < 3:
             break
         whole = label == part
+        if len(np.unique(graph.facet[whole])) < 3:
+            continue
         region = _best(graph, whole, free, np.zeros(0, bool))
         if region is not None:
             found.append(region)
