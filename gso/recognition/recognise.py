@@ -22,7 +22,7 @@ def recognise(
     mesh: MeshLike,
     *,
     max_deviation: Length | None = None,
-    max_strain: Strain = 1e-3,
+    max_strain: Strain = 2e-3,
     bend_step: float | None = None,
 ) -> Recognised:
     """Divide a mesh into planes, cylinders, cones, torsal surfaces and free surfaces.

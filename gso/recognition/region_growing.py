@@ -31,6 +31,9 @@ _POINTS, _FEWEST, _TOGETHER = 48, 8, 2000
 _PARTS = 100
 #: Seeds that are tried at most.
 _SEEDS = 20_000
+#: Facets around the axis from which on a region is one whatever is beside it, and multiple of the
+#: tolerance within which a point is almost on a surface.
+_MANY, _ALMOST = 8.0, 20.0
 #: Share of a seed region that its surface must hold.
 _KEPT = 0.3
 #: Length of a shared edge, relative to the longest of both facets.
@@ -319,6 +322,13 @@ def _turning_areas(surface: RoundSurface, angle: Array, height: Array, graph: Fa
     return np.asarray(turn[:, 1] * (h[:, 2] - h[:, 0]) - turn[:, 2] * (h[:, 1] - h[:, 0]))
 
 
+def _covered(angle: Array, rho: Array, ids: Ints, typical: float) -> float:
+    """Angle around the axis between the outermost vertices of a region; a full turn if closed."""
+    around = np.sort(angle[ids[rho[ids] > _APEX * rho[ids].max()]])
+    gap = float(np.diff(around, append=around[:1] + 2 * np.pi).max())
+    return 2 * np.pi - gap if gap > 2 * typical else 2 * np.pi
+
+
 def triangle_spans(surface: RoundSurface, angle: Array, rho: Array, triangles: Ints) -> Array:
     """Return the angles around the axis that triangles span; a corner at the apex has none."""
     turn = np.diff(angle[triangles], axis=1, append=angle[triangles[:, :1]])
@@ -337,10 +347,7 @@ def _is_smooth(graph: FacetGraph, surface: RoundSurface, member: Flags, free: Fl
     angle, rho, _ = surface.coordinates(graph.points)
     spans = triangle_spans(surface, angle, rho, triangles)
     typical = float(np.quantile(spans, 0.75))
-    far = ids[rho[ids] > _APEX * rho[ids].max()]
-    around = np.sort(angle[far])
-    gaps = np.diff(around, append=around[:1] + 2 * np.pi)
-    covered = 2 * np.pi - gaps.max() if gaps.max() > 2 * typical else 2 * np.pi
+    covered = _covered(angle, rho, ids, typical)
     if float(np.median(spans)) > SMOOTH or covered < _SEVERAL * typical:
         return False
     if float(np.abs(surface.distances(graph.points[ids])).max()) > graph.tolerance:
@@ -350,7 +357,31 @@ def _is_smooth(graph: FacetGraph, surface: RoundSurface, member: Flags, free: Fl
     direction = np.linalg.eigh(around_mean.T @ around_mean)[1][:, 0]
     if np.ptp(around_mean @ direction) <= 4 * graph.tolerance:
         return False
+    if covered < _MANY * typical and _goes_on(graph, surface, member):
+        return False
     return _has_straight_rulings(graph, surface, member, free, ids)
+
+
+def _goes_on(graph: FacetGraph, surface: RoundSurface, member: Flags) -> bool:
+    """Whether facets beside a region along its rulings lie almost on its surface.
+
+    Three facets of any smooth torsal surface lie on a cone, up to the rounding of coordinates, and
+    the next are a little off.
+    """
+    one, two = member[graph.pairs].T
+    border = (one != two) & (np.abs(graph.folds) <= SMOOTH)
+    ends = graph.points[graph.ends[border]]
+    along = ends[:, 1] - ends[:, 0]
+    cosine = np.einsum("ed,ed->e", along, surface.rulings(ends.mean(axis=1)))
+    ruling = np.abs(cosine) > np.cos(_TILTED) * np.linalg.norm(along, axis=1)
+    beside = np.where(one, graph.pairs[:, 1], graph.pairs[:, 0])[border][ruling]
+    if not len(beside):
+        return False
+    facets = np.isin(graph.facet, graph.facet[beside])
+    off = np.abs(surface.distances(graph.points[graph.triangles[facets]].reshape(-1, 3)))
+    worst = np.zeros(int(graph.facet.max()) + 1)
+    np.maximum.at(worst, np.repeat(graph.facet[facets], 3), off)
+    return bool((worst[graph.facet[beside]] <= _ALMOST * graph.tolerance).any())
 
 
 def _has_straight_rulings(
