@@ -31,6 +31,8 @@ _POINTS, _FEWEST, _TOGETHER = 48, 8, 2000
 _PARTS = 100
 #: Seeds that are tried at most.
 _SEEDS = 20_000
+#: Seeds of a chunk whose fits are tried from the axes of quadrics, too.
+_FURTHER = 100
 #: Facets around the axis from which on a region is one whatever is beside it, and multiple of the
 #: tolerance within which a point is almost on a surface.
 _MANY, _ALMOST = 8.0, 20.0
@@ -78,7 +80,7 @@ def round_regions(graph: FacetGraph) -> list[Region]:
         whole = label == part
         if len(np.unique(graph.facet[whole])) < 3:
             continue
-        region = _best(graph, whole, free, np.zeros(0, bool))
+        region = _best(graph, whole, free, np.zeros(0, bool), None)
         if region is not None:
             found.append(region)
             free &= ~region.member
@@ -114,13 +116,13 @@ def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = Fal
         chunk = chunk[free[first[chunk]]]
         if not len(chunk):
             continue
-        good, around = _promising(graph, near, chunk, rings)
+        good, around, axes = _promising(graph, near, chunk, rings)
         for k in good:
             if not free[first[chunk[k]]] or tried[chunk[k]]:
                 continue
             facets = around.indices[around.indptr[k] : around.indptr[k + 1]]
             seed = free & np.isin(graph.facet, facets)
-            region = _best(graph, seed, free, tried)
+            region = _best(graph, seed, free, tried, axes[k])
             if region is not None:
                 found.append(region)
                 free &= ~region.member
@@ -167,8 +169,11 @@ def _neighbours_along(graph: FacetGraph, free: Flags, small: Flags) -> csr_matri
 
 def _promising(
     graph: FacetGraph, near: csr_matrix, chunk: Ints, rings: int
-) -> tuple[Ints, csr_matrix]:
-    """Return seeds whose surroundings fit a cylinder or cone, best first, and their facets."""
+) -> tuple[Ints, csr_matrix, Array]:
+    """Return seeds whose surroundings fit a cylinder or cone, best first.
+
+    Also the facets around all seeds, and the axes that were found.
+    """
     around = near[chunk]
     for _ in range(rings - 1):
         around = around @ near
@@ -189,25 +194,26 @@ def _promising(
     worst = np.full(len(chunk), np.inf)
     ready = np.flatnonzero(enough)
     if not len(ready):
-        return ready, around
+        return ready, around, np.zeros((len(chunk), 3))
     off, quadric_axes = fit_quadrics(points[ready], given[ready])
     quadric = np.zeros((len(chunk), 3))
     quadric[ready] = quadric_axes
     ready = ready[off <= graph.tolerance]
-    for conical, axis in (
-        (False, axes[:, :, 0]),
-        (True, cone_axes[:, :, 0]),
-        (False, quadric),
-        (True, quadric),
+    found = np.zeros((len(chunk), 3))
+    for conical, axis, most in (
+        (False, axes[:, :, 0], len(chunk)),
+        (True, cone_axes[:, :, 0], len(chunk)),
+        (False, quadric, _FURTHER),
+        (True, quadric, _FURTHER),
     ):
-        left = ready[(worst[ready] > graph.tolerance) & (more[ready] | (not conical))]
+        left = ready[(worst[ready] > graph.tolerance) & (more[ready] | (not conical))][:most]
         if len(left):
             fits = fit_round(
                 points[left], given[left], axis[left], conical=conical, goal=graph.tolerance
             )
-            worst[left] = np.minimum(worst[left], fits.worst)
+            worst[left], found[left] = fits.worst, fits.axis
     order = np.argsort(worst, kind="stable")
-    return order[worst[order] <= graph.tolerance], around
+    return order[worst[order] <= graph.tolerance], around, found
 
 
 def _padded(table: csr_matrix) -> tuple[Ints, Flags]:
@@ -221,15 +227,19 @@ def _padded(table: csr_matrix) -> tuple[Ints, Flags]:
     return ids, given
 
 
-def _best(graph: FacetGraph, seed: Flags, free: Flags, tried: Flags) -> Region | None:
+def _best(
+    graph: FacetGraph, seed: Flags, free: Flags, tried: Flags, axis: Array | None
+) -> Region | None:
     """Grow a cylinder and a cone from a seed region, and return the better one, if any is good.
+
+    The fits start from an axis, if one is given.
 
     Otherwise the facets that were reached are marked as tried.
     """
     best, most = None, 0.0
     reached = []
     for conical in (False, True):
-        region = _grown(graph, seed, free, conical=conical)
+        region = _grown(graph, seed, free, axis, conical=conical)
         if region is None:
             continue
         reached.append(region.member)
@@ -242,13 +252,16 @@ def _best(graph: FacetGraph, seed: Flags, free: Flags, tried: Flags) -> Region |
     return best
 
 
-def _grown(graph: FacetGraph, seed: Flags, free: Flags, *, conical: bool) -> Region | None:
+def _grown(
+    graph: FacetGraph, seed: Flags, free: Flags, axis: Array | None, *, conical: bool
+) -> Region | None:
     """Fit a surface and add the triangles on it, until none is added."""
     member, surface = seed, None
     for _ in range(_ROUNDS):
-        surface = _fitted(graph, member, surface, conical)
+        surface = _fitted(graph, member, axis, conical)
         if surface is None:
             return None
+        axis = surface.axis
         new = _members(graph, surface, member, free)
         if (new == member).all():
             break
@@ -259,7 +272,7 @@ def _grown(graph: FacetGraph, seed: Flags, free: Flags, *, conical: bool) -> Reg
 
 
 def _fitted(
-    graph: FacetGraph, member: Flags, before: RoundSurface | None, conical: bool
+    graph: FacetGraph, member: Flags, axis: Array | None, conical: bool
 ) -> RoundSurface | None:
     """Fit a surface to the vertices of a region; None where they lie far from any."""
     ids = np.unique(graph.triangles[member])
@@ -267,8 +280,8 @@ def _fitted(
         return None
     ids = ids[np.linspace(0, len(ids) - 1, min(len(ids), _ENOUGH)).round().astype(int)]
     points = graph.points[ids]
-    starts = [] if before is None else [before.axis]
-    if before is None:
+    starts = [] if axis is None else [axis]
+    if axis is None:
         n, w = graph.normals[member], graph.areas[member]
         w = w / w.sum()
         mean = w @ n

@@ -197,7 +197,7 @@ def _stepped(state: Array, residual: Array, jacobian: Array, damping: Array) -> 
     new[:, 3:6] += step[:, 2:3] * e1 + step[:, 3:4] * e2
     new[:, 3:6] /= np.linalg.norm(new[:, 3:6], axis=1, keepdims=True)
     new[:, 6 : 2 + step.shape[1]] += step[:, 4:]
-    return new
+    return np.asarray(new)
 
 
 def fit_quadrics(points: Array, given: Flags) -> tuple[Array, Array]:
@@ -236,7 +236,7 @@ def fit_quadrics(points: Array, given: Flags) -> tuple[Array, Array]:
     # Of the three, two are equal.
     first = levels[:, 1] - levels[:, 0] > levels[:, 2] - levels[:, 1]
     axis = np.where(first[:, None], directions[:, :, 0], directions[:, :, 2])
-    return np.maximum(off - _ROUNDING, 0.0) * size / _STEEPEST, axis
+    return np.asarray(np.maximum(off - _ROUNDING, 0.0) * size / _STEEPEST), axis
 
 
 def _frames(axis: Array) -> tuple[Array, Array]:

@@ -131,9 +131,9 @@ def _lines(mesh: Mesh, flat: Array) -> tuple[BendLine, ...]:
     width = operator.areas.sum() / max(float(length.sum()), 1e-300)
     found = []
     for line, (first, last) in zip(lines, curvature, strict=True):
-        radii = [float(1 / max(abs(c), 1e-12)) for c in (first, last)]
+        one, two = (float(1 / max(abs(c), 1e-12)) for c in (first, last))
         angle = float(width * (abs(first) + abs(last)) / 2)
-        found.append(BendLine(line[0], line[-1], *radii, angle, bool(first + last < 0)))
+        found.append(BendLine(line[0], line[-1], one, two, angle, bool(first + last < 0)))
     return tuple(found)
 
 
