@@ -301,6 +301,44 @@ def test_tube_is_opened_where_no_hole_is():
     assert flat_area(face.flat).sum() == pytest.approx(len(kept) * cell, rel=1e-6)
 
 
+@pytest.mark.parametrize("low", [50.0, 90.0])
+def test_random_triangulation_is_opened_along_a_ruling(low):
+    """New vertices are on the ruling, so that the seam is straight."""
+    height = 150.0
+    slope = (low - 50.0) / height
+    plane, faces = domain("random", 2 * np.pi, height, 40, 16, closed=True)
+    turn, z = plane.T
+    radius = low - slope * z
+    lift = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
+    # The points where the rectangle closes would be a straight seam.
+    keep = np.abs(np.sin(turn / 2)) > 1e-9
+    shift = np.where(keep, 0.0, 0.04 * np.sin(z))
+    lift[~keep, :2] = (radius * [np.cos(shift), np.sin(shift)]).T[~keep]
+    points, faces, _ = joined([(lift, faces)])
+    shape = recognition.recognise((turned_in_space(points), faces))
+    (face,) = shape.faces
+    added = len(shape.vertices) - len(points)
+    assert added > 16
+    assert len(face.seam) == added - 1
+    a, b = shape.vertices[face.seam].transpose(1, 0, 2)
+    length = np.linalg.norm(b - a, axis=1)
+    assert length.sum() == pytest.approx(np.hypot(height, low - 50.0), rel=1e-9)
+    along = (b - a) / length[:, None]
+    assert np.abs(np.abs(along @ along[0]) - 1).max() < 1e-9
+    assert np.bincount(shape.source, minlength=len(faces)).min() == 1
+    assert (flat_area(face.flat) > 0).all()
+    # Outlines are as long as the circles.
+    heights = shape.vertices @ face.axis
+    lengths, end = shape.edge_lengths(), np.roll(shape.triangles, -1, axis=1)
+    sizes = []
+    for level in (heights.min(), heights.max()):
+        here = np.isclose(heights, level, atol=1e-6)
+        sizes.append(lengths[here[shape.triangles] & here[end]].sum() / (2 * np.pi))
+    assert sorted(sizes) == pytest.approx([50.0, low], rel=1e-9)
+    if low == 50:
+        assert flat_area(face.flat).sum() == pytest.approx(2 * np.pi * 50 * height, rel=1e-9)
+
+
 def extruded(outline, height):
     """A polygon as an open prism, one quad for each side."""
     outline = np.asarray(outline, float)

@@ -13,6 +13,8 @@ from gso.recognition.facet_graph import FacetGraph
 from gso.recognition.flat_and_torsal import Patch, other_patches
 from gso.recognition.flat_images import Part, developed, plane_image, round_image
 from gso.recognition.region_growing import Region, round_regions
+from gso.recognition.round_surface import RoundSurface
+from gso.recognition.ruling_cut import cut_along, opening_angle
 from gso.recognition.shape_face import Recognised, ShapeFace
 from gso.recognition.smooth_torsal import smooth_image
 from gso.typing import Array, Flags, Ints, MeshLike
@@ -82,17 +84,46 @@ def recognise(
     rest = np.ones(len(graph.triangles), bool)
     for region in regions:
         rest &= ~region.member
-    faces = [_round_face(graph, region, step) for region in regions]
-    faces += [_other_face(graph, patch, limit) for patch in other_patches(graph, rest)]
+    patches = other_patches(graph, rest)
+    graph, source, seams = _opened(graph, regions)
+    faces = [
+        _round_face(graph, np.flatnonzero(region.member[source]), region.surface, seam, step)
+        for region, seam in zip(regions, seams, strict=True)
+    ]
+    for patch in patches:
+        member = np.zeros(len(rest), bool)
+        member[patch.triangles] = True
+        faces.append(_other_face(graph, patch, np.flatnonzero(member[source]), limit))
     faces.sort(key=lambda face: int(face.triangles[0]))
-    source = np.arange(len(graph.triangles))
     return Recognised(graph.points, graph.triangles, source, tuple(faces), graph.tolerance)
 
 
-def _round_face(graph: FacetGraph, region: Region, step: float | None) -> ShapeFace:
-    ids, surface = np.flatnonzero(region.member), region.surface
+def _opened(
+    graph: FacetGraph, regions: list[Region]
+) -> tuple[FacetGraph, Ints, list[float | None]]:
+    """Choose where to open faces that close around an axis; refine the mesh along these rulings.
+
+    Also return the source of each triangle, and the angle of each region's seam.
+    """
+    source = np.arange(len(graph.triangles))
+    seams: list[float | None] = []
+    for region in regions:
+        part = Part.of(graph.points, graph.triangles[region.member[source]])
+        opening = opening_angle(part, region.surface, graph.tolerance)
+        seams.append(None if opening is None else opening[0])
+        if opening is not None and opening[1]:
+            points, triangles, old = cut_along(
+                part, region.surface, opening[0], graph.triangles, graph.tolerance
+            )
+            graph, source = graph.refined(points, triangles, old), source[old]
+    return graph, source, seams
+
+
+def _round_face(
+    graph: FacetGraph, ids: Ints, surface: RoundSurface, seam: float | None, step: float | None
+) -> ShapeFace:
     part = Part.of(graph.points, graph.triangles[ids])
-    image = round_image(part, surface)
+    image = round_image(part, surface, seam)
     size = float(np.linalg.norm(np.ptp(graph.points, axis=0)))
     radius = surface.radius
     if step is None:
@@ -114,8 +145,7 @@ def _round_face(graph: FacetGraph, region: Region, step: float | None) -> ShapeF
     )
 
 
-def _other_face(graph: FacetGraph, patch: Patch, limit: float) -> ShapeFace:
-    ids = patch.triangles
+def _other_face(graph: FacetGraph, patch: Patch, ids: Ints, limit: float) -> ShapeFace:
     if patch.kind == "free":
         smooth = smooth_image(graph.points, graph.triangles[ids], limit)
         if smooth is None:
