@@ -465,26 +465,46 @@ def test_cone_with_its_apex(sides):
     )
 
 
-def tangent_developable(count=30, rows=4):
-    """Tangents of a helix, from 20 to 80 along each."""
-    t = np.linspace(0, 1.6, count + 1)[None, :, None]
-    r = np.linspace(20, 80, rows + 1)[:, None, None]
-    curve = np.concatenate([50 * np.cos(t), 50 * np.sin(t), 30 * t], axis=2)
-    tangent = np.concatenate([-50 * np.sin(t), 50 * np.cos(t), np.full_like(t, 30)], axis=2)
-    return curve + r * tangent / np.hypot(50, 30)
+def helix_tangents(domain_points):
+    """Points at distances (second column) on tangents of a helix (parameters in the first)."""
+    t, r = domain_points.T
+    curve = np.stack([50 * np.cos(t), 50 * np.sin(t), 30 * t], axis=1)
+    along = np.stack([-50 * np.sin(t), 50 * np.cos(t), np.full_like(t, 30)], axis=1)
+    return curve + r[:, None] * along / np.hypot(50, 30)
 
 
-def test_tangent_developable():
-    grid = tangent_developable()
-    shape = recognition.recognise(grid)
-    assert {face.kind for face in shape.faces} == {"torsal"}
+def unrolled_helix(domain_points):
+    """The same points in the plane: tangents of a circle of the helix' curvature."""
+    t, r = domain_points.T
+    radius = (50**2 + 30**2) / 50
+    turn = t * np.hypot(50, 30) / radius
+    circle = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    return circle + r[:, None] * np.stack([-np.sin(turn), np.cos(turn)], axis=1)
+
+
+@pytest.mark.parametrize("way", ["grid", "random", "turned", "rounded"])
+def test_tangent_developable(way):
+    plane, faces = domain("grid" if way == "turned" else way, 1.6, 60.0, 60, 12, low=20.0)
+    if way == "turned":
+        plane[:, 0] += 0.004 * (plane[:, 1] - 50.0)
+    shape = recognition.recognise(prepared(helix_tangents(plane), faces, way))
     (face,) = shape.faces
-    space = flat_edges(shape.vertices[shape.triangles[face.triangles]])
-    # Quads of a tangent developable are not quite flat.
-    assert np.abs(flat_edges(face.flat) - space).max() < 2e-3 * space.max()
+    assert face.kind == "torsal"
+    assert face.strain < 1e-4
+    triangles = shape.triangles[face.triangles]
+    expected = flat_edges(unrolled_helix(plane)[triangles])
+    assert np.abs(flat_edges(face.flat) - expected).max() < 1e-3 * expected.max()
+    assert flat_area(face.flat).sum() == pytest.approx(
+        np.abs(flat_area(unrolled_helix(plane)[triangles])).sum(), rel=5e-4
+    )
     assert (flat_area(face.flat) > 0).all()
-    # The first curvature of the edge of regression, as a sector of the plane.
-    assert len(face.bend_lines) >= 25
+    # Of constant slope, the surface turns by the torsion along the curve.
+    turned = 1.6 * 30 / np.hypot(50, 30)
+    assert sum(line.angle for line in face.bend_lines) == pytest.approx(turned, rel=0.15)
+    if way == "grid":
+        assert len(face.bend_lines) == 59
+        lengths = [np.linalg.norm(line.end - line.start) for line in face.bend_lines]
+        assert lengths == pytest.approx([60.0] * 59, rel=1e-6)
 
 
 def loft(count, turned=False):
@@ -584,6 +604,23 @@ def test_noisy_cylinder(way):
     assert angle_between(face.axis, np.array([0.0, 1.0, 0.0])) < 0.1
     assert 0 < face.deviation < 0.001 * size
     assert np.abs(face.deviation - 0.0005 * size) < 0.0004 * size
+
+
+@pytest.mark.parametrize("way", ["grid", "random"])
+def test_noisy_sheet_with_two_plates(way):
+    zones = [(200.0, 0.0), (300.0, 1 / 200.0), (250.0, 0.0)]
+    plane, faces = zone_meshes(zones, 150.0, way, [8, 24, 8], 6)
+    points = bent(zones)(plane)
+    size = np.linalg.norm(np.ptp(points, axis=0))
+    noise = np.random.default_rng(3).normal(size=points.shape)
+    noise *= 5e-4 * size / np.linalg.norm(noise, axis=1).max()
+    shape = recognition.recognise(Mesh(points + noise, faces), max_deviation="0.1%")
+    assert sorted(face.kind for face in shape.faces) == ["cylinder", "plane", "plane"]
+    bend = next(face for face in shape.faces if face.kind == "cylinder")
+    assert bend.radius == pytest.approx(200.0, rel=0.01)
+    # Where a plate is as close to the cylinder as is allowed, it may belong to it.
+    apart = 0.001 * np.linalg.norm(np.ptp(points + noise, axis=0))
+    assert bend.bend_angle == pytest.approx(1.5, abs=2 * np.sqrt(2 * apart / 200.0))
 
 
 def test_fine_cylinder_is_quick_and_one_face():

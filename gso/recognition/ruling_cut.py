@@ -55,7 +55,8 @@ def _crossed(
     edge, share = np.concatenate(ends), np.concatenate(shares)
     turned = edge[:, 0] > edge[:, 1]
     edge[turned], share[turned] = edge[turned][:, ::-1], 1.0 - share[turned]
-    _, first = np.unique(topology.edge_keys(*edge.T, len(part.points)), return_index=True)
+    keys = topology.edge_keys(edge[:, 0], edge[:, 1], len(part.points))
+    first = np.unique(keys, return_index=True)[1]
     return edge[first], share[first]
 
 
@@ -107,7 +108,7 @@ def cut_along(
 
 def _divided(triangles: Ints, edge: Ints, first: int) -> tuple[Ints, Ints]:
     """Divide triangles at new vertices `first`, `first` + 1 ... on edges; also return sources."""
-    keys = topology.edge_keys(*np.sort(edge, axis=1).T, first)
+    keys = topology.edge_keys(edge.min(axis=1), edge.max(axis=1), first)
     order = np.argsort(keys)
     to = np.roll(triangles, -1, axis=1)
     wanted = topology.edge_keys(np.minimum(triangles, to), np.maximum(triangles, to), first)
