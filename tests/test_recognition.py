@@ -395,6 +395,102 @@ def test_neighbours_agree_in_the_length_of_an_edge(low):
         assert bottom == pytest.approx([80 * 2 * np.pi / 24] * 24, rel=1e-9)
 
 
+def prism_tube(outline, height, rows=1):
+    n = len(outline)
+    level = np.linspace(0, height, rows + 1)
+    points = np.concatenate([np.column_stack([outline, np.full(n, z)]) for z in level])
+    faces = [
+        [j * n + k, j * n + (k + 1) % n, (j + 1) * n + (k + 1) % n, (j + 1) * n + k]
+        for j in range(rows)
+        for k in range(n)
+    ]
+    return points, faces
+
+
+@pytest.mark.parametrize("count", [3, 4, 8])
+def test_tube_with_rounded_corners(count):
+    corners = [
+        (40 * x + 10 * np.cos(a), 20 * y + 10 * np.sin(a))
+        for x, y, begin in ((1, 1, 0), (-1, 1, 90), (-1, -1, 180), (1, -1, 270))
+        for a in np.radians(begin + np.linspace(0, 90, count + 1))
+    ]
+    shape = recognition.recognise(prism_tube(corners, 80.0))
+    assert sorted(face.kind for face in shape.faces) == ["cylinder"] * 4 + ["plane"] * 4
+    for face in shape.faces:
+        if face.kind == "cylinder":
+            assert face.radius == pytest.approx(10, rel=1e-9)
+            assert face.bend_angle == pytest.approx(np.pi / 2, rel=1e-9)
+            assert not any(line.up for line in face.bend_lines)
+
+
+def test_shaft_with_a_flat():
+    turn = np.radians(np.linspace(0, 330, 67))
+    outline = 50 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    shape = recognition.recognise(prism_tube(outline, 80.0, rows=3))
+    assert sorted(face.kind for face in shape.faces) == ["cylinder", "plane"]
+    cylinder = next(face for face in shape.faces if face.kind == "cylinder")
+    assert cylinder.seam.size == 0
+    assert np.ptp(cylinder.flat[..., 0]) == pytest.approx(50 * np.radians(330), rel=1e-9)
+
+
+@pytest.mark.parametrize("bend", [10.0, 45.0, 90.0])
+def test_elbow_of_two_pipes(bend):
+    turn = 2 * np.pi * np.arange(48) / 48
+    low = 30 * np.stack([np.cos(turn), np.sin(turn), np.zeros(48)], axis=1)
+    mitre = np.radians(bend / 2)
+    cut = low + np.outer(100 + low[:, 0] * np.tan(mitre), [0, 0, 1])
+    normal = np.array([-np.sin(mitre), 0, np.cos(mitre)])
+    high = low - 2 * np.outer((low - [0, 0, 100]) @ normal, normal)
+    faces = [
+        [j * 48 + k, j * 48 + (k + 1) % 48, (j + 1) * 48 + (k + 1) % 48, (j + 1) * 48 + k]
+        for j in range(2)
+        for k in range(48)
+    ]
+    shape = recognition.recognise((np.concatenate([low, cut, high]), faces))
+    assert [face.kind for face in shape.faces] == ["cylinder", "cylinder"]
+    one, two = shape.faces
+    assert np.degrees(np.arccos(abs(one.axis @ two.axis))) == pytest.approx(bend, abs=1e-6)
+    for face in shape.faces:
+        # The mitre is a sine curve in the plane.
+        assert np.ptp(face.flat[..., 0]) == pytest.approx(2 * np.pi * 30, rel=1e-9)
+        assert np.ptp(face.flat[..., 1]) == pytest.approx(100 + 30 * np.tan(mitre), rel=1e-9)
+        assert len(face.seam) == 1
+
+
+def test_strip_around_a_cylinder_is_not_opened():
+    turn = np.linspace(0, 5 * np.pi, 120)
+    grid = np.stack(
+        [np.stack([40 * np.cos(turn), 40 * np.sin(turn), 8 * turn + w], axis=1) for w in (0, 9, 20)]
+    )
+    (face,) = recognition.recognise(grid).faces
+    assert face.kind == "cylinder"
+    assert face.seam.size == 0
+    assert np.ptp(face.flat[..., 0]) == pytest.approx(40 * 5 * np.pi, rel=1e-9)
+
+
+def test_closed_extrusion_is_opened_along_a_ruling():
+    turn = 2 * np.pi * np.arange(40) / 40
+    outline = np.stack([60 * np.cos(turn), 40 * np.sin(turn)], axis=1)
+    shape = recognition.recognise(prism_tube(outline, 80.0, rows=4))
+    (face,) = shape.faces
+    assert face.kind == "torsal"
+    assert len(face.seam) == 4
+    around = np.linalg.norm(outline - np.roll(outline, -1, axis=0), axis=1).sum()
+    assert flat_area(face.flat).sum() == pytest.approx(80 * around, rel=1e-9)
+
+
+def test_torus_is_free():
+    u, v = np.meshgrid(2 * np.pi * np.arange(24) / 24, 2 * np.pi * np.arange(16) / 16)
+    ring = 50 + 20 * np.cos(v)
+    points = np.stack([ring * np.cos(u), ring * np.sin(u), 20 * np.sin(v)], axis=-1)
+    number = np.arange(u.size).reshape(u.shape)
+    right, up = np.roll(number, -1, axis=1), np.roll(number, -1, axis=0)
+    both = np.roll(right, -1, axis=0)
+    faces = np.stack([number, right, both, up], axis=-1).reshape(-1, 4)
+    shape = recognition.recognise((points.reshape(-1, 3), faces))
+    assert {face.kind for face in shape.faces} == {"free"}
+
+
 def test_box_and_channel():
     corners = np.array([[x, y, z] for x in (0, 4) for y in (0, 3) for z in (0, 2)], float)
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]

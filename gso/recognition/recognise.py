@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from gso.recognition.ruling_cut import cut_along, opening_angle
 from gso.recognition.shape_face import Recognised, ShapeFace
 from gso.recognition.smooth_torsal import smooth_image
 from gso.typing import Array, Flags, Ints, MeshLike
+
+#: Triangles of a smooth face at least, where more than this share of the area is free.
+_FEW, _MOSTLY = 12, 0.5
 
 
 def recognise(
@@ -60,8 +64,8 @@ def recognise(
     one cylinder or cone if all their vertices lie on it, if at least three follow each other
     around the axis, if half of the triangles span at most 30 degrees, and none more than 8 degrees
     and more than three times the upper quartile. Eight flat sides with folds of 45 degrees
-    therefore stay folds, and twelve with 30 degrees are a tube. One row of facets whose border
-    across the rulings is smooth is no proof of straight rulings: a sphere consists of such rows.
+    therefore stay folds, and twelve with 30 degrees are a tube. One row of facets between
+    circles with smooth folds is no proof of straight rulings: a sphere consists of such rows.
 
     Examples
     --------
@@ -90,10 +94,7 @@ def recognise(
         _round_face(graph, np.flatnonzero(region.member[source]), region.surface, seam, step)
         for region, seam in zip(regions, seams, strict=True)
     ]
-    for patch in patches:
-        member = np.zeros(len(rest), bool)
-        member[patch.triangles] = True
-        faces.append(_other_face(graph, patch, np.flatnonzero(member[source]), limit))
+    faces += _other_faces(graph, patches, source, limit)
     faces.sort(key=lambda face: int(face.triangles[0]))
     return Recognised(graph.points, graph.triangles, source, tuple(faces), graph.tolerance)
 
@@ -143,6 +144,31 @@ def _round_face(
         bend_lines=lines_of_round(part, surface, image, step),
         bend_angle=float(np.ptp(image.angle)) * float(np.cos(surface.half_angle)),
     )
+
+
+def _other_faces(
+    graph: FacetGraph, patches: list[Patch], source: Ints, limit: float
+) -> list[ShapeFace]:
+    """Make faces of patches, whose triangles are sources of those of the graph."""
+    owner = np.full(int(source.max()) + 1, -1)
+    for k, patch in enumerate(patches):
+        owner[patch.triangles] = k
+    order = np.argsort(owner[source], kind="stable")
+    bounds = np.searchsorted(owner[source][order], np.arange(len(patches) + 1))
+    ids = [order[a:b] for a, b in pairwise(bounds)]
+    free = sum(
+        float(graph.areas[i].sum())
+        for i, patch in zip(ids, patches, strict=True)
+        if patch.kind == "free"
+    )
+    # A few triangles of a free surface can always be laid flat.
+    fewest = _FEW if free > _MOSTLY * graph.areas.sum() else 0
+    return [
+        ShapeFace("free", i)
+        if patch.kind == "free" and len(i) < fewest
+        else _other_face(graph, patch, i, limit)
+        for i, patch in zip(ids, patches, strict=True)
+    ]
 
 
 def _other_face(graph: FacetGraph, patch: Patch, ids: Ints, limit: float) -> ShapeFace:

@@ -31,11 +31,15 @@ _POINTS, _FEWEST, _TOGETHER = 48, 8, 2000
 _PARTS = 100
 #: Seeds that are tried at most.
 _SEEDS = 20_000
+#: Seeds that failed after which only every second one is tried, then every third ...
+_PATIENCE = 10
 #: Seeds of a chunk whose fits are tried from the axes of quadrics, too.
 _FURTHER = 100
 #: Facets around the axis from which on a region is one whatever is beside it, and multiple of the
 #: tolerance within which a point is almost on a surface.
 _MANY, _ALMOST = 8.0, 20.0
+#: Multiple of the tolerance by which a surface that is curved both ways would be off.
+_SURE = 100.0
 #: Share of a seed region that its surface must hold.
 _KEPT = 0.3
 #: Length of a shared edge, relative to the longest of both facets.
@@ -108,7 +112,7 @@ def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = Fal
         # A single triangle has no direction.
         open_facets &= np.bincount(graph.facet) > 1
     order = order[open_facets[order] & (sizes[order] <= _POINTS // 2)][:_SEEDS]
-    tried = np.zeros(table.shape[0], bool)
+    tried, failures = np.zeros(table.shape[0], bool), 0
     first = np.zeros(table.shape[0], np.int64)
     first[graph.facet[::-1]] = np.arange(len(graph.facet))[::-1]
     for start in range(0, len(order), _TOGETHER):
@@ -117,15 +121,19 @@ def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = Fal
         if not len(chunk):
             continue
         good, around, axes = _promising(graph, near, chunk, rings)
-        for k in good:
+        for place, k in enumerate(good):
             if not free[first[chunk[k]]] or tried[chunk[k]]:
+                continue
+            if place % max(failures // _PATIENCE, 1):
                 continue
             facets = around.indices[around.indptr[k] : around.indptr[k + 1]]
             seed = free & np.isin(graph.facet, facets)
             region = _best(graph, seed, free, tried, axes[k])
-            if region is not None:
-                found.append(region)
-                free &= ~region.member
+            if region is None:
+                failures += 1
+                continue
+            found.append(region)
+            free &= ~region.member
     return found
 
 
@@ -372,7 +380,12 @@ def _is_smooth(graph: FacetGraph, surface: RoundSurface, member: Flags, free: Fl
         return False
     if covered < _MANY * typical and _goes_on(graph, surface, member):
         return False
-    return _has_straight_rulings(graph, surface, member, free, ids)
+    around = float(np.median(rho[ids])) * covered
+    width = float(graph.areas[member].sum()) / max(around, 1e-300)
+    # A surface that is as curved along its rulings as around would be this much off.
+    off = width**2 * covered / (8 * around)
+    proved = covered >= _MANY * typical and off > _SURE * graph.tolerance
+    return _has_straight_rulings(graph, surface, member, free, ids, only_circles=proved)
 
 
 def _goes_on(graph: FacetGraph, surface: RoundSurface, member: Flags) -> bool:
@@ -398,11 +411,18 @@ def _goes_on(graph: FacetGraph, surface: RoundSurface, member: Flags) -> bool:
 
 
 def _has_straight_rulings(
-    graph: FacetGraph, surface: RoundSurface, member: Flags, free: Flags, ids: Ints
+    graph: FacetGraph,
+    surface: RoundSurface,
+    member: Flags,
+    free: Flags,
+    ids: Ints,
+    *,
+    only_circles: bool,
 ) -> bool:
     """Whether the rulings are proved straight, by points inside, or end at edges or sharp folds.
 
-    One row of facets of a sphere lies on a cone, too.
+    One row of facets of a sphere lies on a cone, too: it ends at circles, and with `only_circles`
+    only these count.
     """
     one, two = member[graph.pairs].T
     inside = np.zeros(len(graph.points), bool)
@@ -419,7 +439,9 @@ def _has_straight_rulings(
     cosine = np.abs(np.einsum("ed,ed->e", along, surface.rulings((a + b) / 2)))
     across = cosine < np.cos(_TILTED) * length
     fold = np.abs(graph.folds[border])
-    smooth = across & (fold <= SMOOTH) & free[graph.pairs[border]].all(axis=1)
+    level = not only_circles
+    level |= np.abs(along @ surface.axis) <= _LEVEL * length + 4 * graph.tolerance
+    smooth = across & level & (fold <= SMOOTH) & free[graph.pairs[border]].all(axis=1)
     return bool(length[smooth].sum() <= _INSIDE * max(length[across].sum(), 1e-300))
 
 
@@ -427,6 +449,8 @@ def _open_edges(graph: FacetGraph) -> Flags:
     return np.asarray(graph.half_edges.twin < 0)
 
 
+#: Slope of an edge against the plane of a circle up to which it is on a circle.
+_LEVEL = 5e-3
 #: Distance from the axis, relative to the largest, below which a point is the apex.
 _APEX = 1e-4
 #: Radius relative to a region's size above which it is flat.
