@@ -38,6 +38,8 @@ _FURTHER = 100
 #: Facets around the axis from which on a region is one whatever is beside it, and multiple of the
 #: tolerance within which a point is almost on a surface.
 _MANY, _ALMOST = 8.0, 20.0
+#: Angle around the axis from which on cuts may be any curves, in radians.
+_FAR = 3.0
 #: Multiple of the tolerance by which a surface that is curved both ways would be off.
 _SURE = 100.0
 #: Share of a seed region that its surface must hold.
@@ -384,7 +386,7 @@ def _is_smooth(graph: FacetGraph, surface: RoundSurface, member: Flags, free: Fl
     width = float(graph.areas[member].sum()) / max(around, 1e-300)
     # A surface that is as curved along its rulings as around would be this much off.
     off = width**2 * covered / (8 * around)
-    proved = covered >= _MANY * typical and off > _SURE * graph.tolerance
+    proved = covered >= max(_MANY * typical, _FAR) and off > _SURE * graph.tolerance
     return _has_straight_rulings(graph, surface, member, free, ids, only_circles=proved)
 
 
