@@ -301,6 +301,44 @@ def test_tube_is_opened_where_no_hole_is():
     assert flat_area(face.flat).sum() == pytest.approx(len(kept) * cell, rel=1e-6)
 
 
+@pytest.mark.parametrize("low", [50.0, 90.0])
+def test_random_triangulation_is_opened_along_a_ruling(low):
+    """New vertices are on the ruling, so that the seam is straight."""
+    height = 150.0
+    slope = (low - 50.0) / height
+    plane, faces = domain("random", 2 * np.pi, height, 40, 16, closed=True)
+    turn, z = plane.T
+    radius = low - slope * z
+    lift = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
+    # The points where the rectangle closes would be a straight seam.
+    keep = np.abs(np.sin(turn / 2)) > 1e-9
+    shift = np.where(keep, 0.0, 0.04 * np.sin(z))
+    lift[~keep, :2] = (radius * [np.cos(shift), np.sin(shift)]).T[~keep]
+    points, faces, _ = joined([(lift, faces)])
+    shape = recognition.recognise((turned_in_space(points), faces))
+    (face,) = shape.faces
+    added = len(shape.vertices) - len(points)
+    assert added > 16
+    assert len(face.seam) == added - 1
+    a, b = shape.vertices[face.seam].transpose(1, 0, 2)
+    length = np.linalg.norm(b - a, axis=1)
+    assert length.sum() == pytest.approx(np.hypot(height, low - 50.0), rel=1e-9)
+    along = (b - a) / length[:, None]
+    assert np.abs(np.abs(along @ along[0]) - 1).max() < 1e-9
+    assert np.bincount(shape.source, minlength=len(faces)).min() == 1
+    assert (flat_area(face.flat) > 0).all()
+    # Outlines are as long as the circles.
+    heights = shape.vertices @ face.axis
+    lengths, end = shape.edge_lengths(), np.roll(shape.triangles, -1, axis=1)
+    sizes = []
+    for level in (heights.min(), heights.max()):
+        here = np.isclose(heights, level, atol=1e-6)
+        sizes.append(lengths[here[shape.triangles] & here[end]].sum() / (2 * np.pi))
+    assert sorted(sizes) == pytest.approx([50.0, low], rel=1e-9)
+    if low == 50:
+        assert flat_area(face.flat).sum() == pytest.approx(2 * np.pi * 50 * height, rel=1e-9)
+
+
 def extruded(outline, height):
     """A polygon as an open prism, one quad for each side."""
     outline = np.asarray(outline, float)
@@ -328,6 +366,129 @@ def test_capped_tube_of_24_sides():
     faces += [[k + n, (k + 1) % n + n, 49, -1] for k in range(n)]
     shape = recognition.recognise((points, faces))
     assert sorted(face.kind for face in shape.faces) == ["cylinder", "plane", "plane"]
+
+
+@pytest.mark.parametrize("low", [50.0, 80.0])
+def test_neighbours_agree_in_the_length_of_an_edge(low):
+    """A cap, and a frustum or tube: the arcs of their circles are equally long on both sides."""
+    turn = 2 * np.pi * np.arange(24) / 24
+    circle = np.stack([np.cos(turn), np.sin(turn), np.zeros(24)], axis=1)
+    points = np.concatenate([low * circle, 50 * circle + [0, 0, 70], [[0, 0, 70]]])
+    n = 24
+    faces = [[k, (k + 1) % n, (k + 1) % n + n, k + n] for k in range(n)]
+    faces += [[k + n, (k + 1) % n + n, 48, -1] for k in range(n)]
+    shape = recognition.recognise((turned_in_space(points), faces))
+    assert sorted(face.kind for face in shape.faces)[1] == "plane"
+    lengths, start = shape.edge_lengths(), shape.triangles
+    end = np.roll(start, -1, axis=1)
+    kinds = np.array([face.kind for face in shape.faces])[shape.face]
+    top = (start >= n) & (start < 2 * n) & (end >= n) & (end < 2 * n)
+    arc = 50 * 2 * np.pi / 24
+    for kind in np.unique(kinds):
+        found = lengths[(kinds == kind)[:, None] & top]
+        assert len(found) == 24
+        assert found == pytest.approx([arc] * 24, rel=1e-9)
+    cap = shape.arcs[kinds == "plane"]
+    assert np.sort(cap.ravel())[-24:] == pytest.approx([2 * np.pi / 24] * 24)
+    if low == 80:
+        bottom = lengths[(start < n) & (end < n)]
+        assert bottom == pytest.approx([80 * 2 * np.pi / 24] * 24, rel=1e-9)
+
+
+def prism_tube(outline, height, rows=1):
+    n = len(outline)
+    level = np.linspace(0, height, rows + 1)
+    points = np.concatenate([np.column_stack([outline, np.full(n, z)]) for z in level])
+    faces = [
+        [j * n + k, j * n + (k + 1) % n, (j + 1) * n + (k + 1) % n, (j + 1) * n + k]
+        for j in range(rows)
+        for k in range(n)
+    ]
+    return points, faces
+
+
+@pytest.mark.parametrize("count", [3, 4, 8])
+def test_tube_with_rounded_corners(count):
+    corners = [
+        (40 * x + 10 * np.cos(a), 20 * y + 10 * np.sin(a))
+        for x, y, begin in ((1, 1, 0), (-1, 1, 90), (-1, -1, 180), (1, -1, 270))
+        for a in np.radians(begin + np.linspace(0, 90, count + 1))
+    ]
+    shape = recognition.recognise(prism_tube(corners, 80.0))
+    assert sorted(face.kind for face in shape.faces) == ["cylinder"] * 4 + ["plane"] * 4
+    for face in shape.faces:
+        if face.kind == "cylinder":
+            assert face.radius == pytest.approx(10, rel=1e-9)
+            assert face.bend_angle == pytest.approx(np.pi / 2, rel=1e-9)
+            assert not any(line.up for line in face.bend_lines)
+
+
+def test_shaft_with_a_flat():
+    turn = np.radians(np.linspace(0, 330, 67))
+    outline = 50 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    shape = recognition.recognise(prism_tube(outline, 80.0, rows=3))
+    assert sorted(face.kind for face in shape.faces) == ["cylinder", "plane"]
+    cylinder = next(face for face in shape.faces if face.kind == "cylinder")
+    assert cylinder.seam.size == 0
+    assert np.ptp(cylinder.flat[..., 0]) == pytest.approx(50 * np.radians(330), rel=1e-9)
+
+
+@pytest.mark.parametrize("bend", [10.0, 45.0, 90.0])
+def test_elbow_of_two_pipes(bend):
+    turn = 2 * np.pi * np.arange(48) / 48
+    low = 30 * np.stack([np.cos(turn), np.sin(turn), np.zeros(48)], axis=1)
+    mitre = np.radians(bend / 2)
+    cut = low + np.outer(100 + low[:, 0] * np.tan(mitre), [0, 0, 1])
+    normal = np.array([-np.sin(mitre), 0, np.cos(mitre)])
+    high = low - 2 * np.outer((low - [0, 0, 100]) @ normal, normal)
+    faces = [
+        [j * 48 + k, j * 48 + (k + 1) % 48, (j + 1) * 48 + (k + 1) % 48, (j + 1) * 48 + k]
+        for j in range(2)
+        for k in range(48)
+    ]
+    shape = recognition.recognise((np.concatenate([low, cut, high]), faces))
+    assert [face.kind for face in shape.faces] == ["cylinder", "cylinder"]
+    one, two = shape.faces
+    assert np.degrees(np.arccos(abs(one.axis @ two.axis))) == pytest.approx(bend, abs=1e-6)
+    for face in shape.faces:
+        # The mitre is a sine curve in the plane.
+        assert np.ptp(face.flat[..., 0]) == pytest.approx(2 * np.pi * 30, rel=1e-9)
+        assert np.ptp(face.flat[..., 1]) == pytest.approx(100 + 30 * np.tan(mitre), rel=1e-9)
+        assert len(face.seam) == 1
+
+
+def test_strip_around_a_cylinder_is_not_opened():
+    turn = np.linspace(0, 5 * np.pi, 120)
+    grid = np.stack(
+        [np.stack([40 * np.cos(turn), 40 * np.sin(turn), 8 * turn + w], axis=1) for w in (0, 9, 20)]
+    )
+    (face,) = recognition.recognise(grid).faces
+    assert face.kind == "cylinder"
+    assert face.seam.size == 0
+    assert np.ptp(face.flat[..., 0]) == pytest.approx(40 * 5 * np.pi, rel=1e-9)
+
+
+def test_closed_extrusion_is_opened_along_a_ruling():
+    turn = 2 * np.pi * np.arange(40) / 40
+    outline = np.stack([60 * np.cos(turn), 40 * np.sin(turn)], axis=1)
+    shape = recognition.recognise(prism_tube(outline, 80.0, rows=4))
+    (face,) = shape.faces
+    assert face.kind == "torsal"
+    assert len(face.seam) == 4
+    around = np.linalg.norm(outline - np.roll(outline, -1, axis=0), axis=1).sum()
+    assert flat_area(face.flat).sum() == pytest.approx(80 * around, rel=1e-9)
+
+
+def test_torus_is_free():
+    u, v = np.meshgrid(2 * np.pi * np.arange(24) / 24, 2 * np.pi * np.arange(16) / 16)
+    ring = 50 + 20 * np.cos(v)
+    points = np.stack([ring * np.cos(u), ring * np.sin(u), 20 * np.sin(v)], axis=-1)
+    number = np.arange(u.size).reshape(u.shape)
+    right, up = np.roll(number, -1, axis=1), np.roll(number, -1, axis=0)
+    both = np.roll(right, -1, axis=0)
+    faces = np.stack([number, right, both, up], axis=-1).reshape(-1, 4)
+    shape = recognition.recognise((points.reshape(-1, 3), faces))
+    assert {face.kind for face in shape.faces} == {"free"}
 
 
 def test_box_and_channel():
@@ -400,26 +561,46 @@ def test_cone_with_its_apex(sides):
     )
 
 
-def tangent_developable(count=30, rows=4):
-    """Tangents of a helix, from 20 to 80 along each."""
-    t = np.linspace(0, 1.6, count + 1)[None, :, None]
-    r = np.linspace(20, 80, rows + 1)[:, None, None]
-    curve = np.concatenate([50 * np.cos(t), 50 * np.sin(t), 30 * t], axis=2)
-    tangent = np.concatenate([-50 * np.sin(t), 50 * np.cos(t), np.full_like(t, 30)], axis=2)
-    return curve + r * tangent / np.hypot(50, 30)
+def helix_tangents(domain_points):
+    """Points at distances (second column) on tangents of a helix (parameters in the first)."""
+    t, r = domain_points.T
+    curve = np.stack([50 * np.cos(t), 50 * np.sin(t), 30 * t], axis=1)
+    along = np.stack([-50 * np.sin(t), 50 * np.cos(t), np.full_like(t, 30)], axis=1)
+    return curve + r[:, None] * along / np.hypot(50, 30)
 
 
-def test_tangent_developable():
-    grid = tangent_developable()
-    shape = recognition.recognise(grid)
-    assert {face.kind for face in shape.faces} == {"torsal"}
+def unrolled_helix(domain_points):
+    """The same points in the plane: tangents of a circle of the helix' curvature."""
+    t, r = domain_points.T
+    radius = (50**2 + 30**2) / 50
+    turn = t * np.hypot(50, 30) / radius
+    circle = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    return circle + r[:, None] * np.stack([-np.sin(turn), np.cos(turn)], axis=1)
+
+
+@pytest.mark.parametrize("way", ["grid", "random", "turned", "rounded"])
+def test_tangent_developable(way):
+    plane, faces = domain("grid" if way == "turned" else way, 1.6, 60.0, 60, 12, low=20.0)
+    if way == "turned":
+        plane[:, 0] += 0.004 * (plane[:, 1] - 50.0)
+    shape = recognition.recognise(prepared(helix_tangents(plane), faces, way))
     (face,) = shape.faces
-    space = flat_edges(shape.vertices[shape.triangles[face.triangles]])
-    # Quads of a tangent developable are not quite flat.
-    assert np.abs(flat_edges(face.flat) - space).max() < 2e-3 * space.max()
+    assert face.kind == "torsal"
+    assert face.strain < 1e-4
+    triangles = shape.triangles[face.triangles]
+    expected = flat_edges(unrolled_helix(plane)[triangles])
+    assert np.abs(flat_edges(face.flat) - expected).max() < 1e-3 * expected.max()
+    assert flat_area(face.flat).sum() == pytest.approx(
+        np.abs(flat_area(unrolled_helix(plane)[triangles])).sum(), rel=5e-4
+    )
     assert (flat_area(face.flat) > 0).all()
-    # The first curvature of the edge of regression, as a sector of the plane.
-    assert len(face.bend_lines) >= 25
+    # Of constant slope, the surface turns by the torsion along the curve.
+    turned = 1.6 * 30 / np.hypot(50, 30)
+    assert sum(line.angle for line in face.bend_lines) == pytest.approx(turned, rel=0.15)
+    if way == "grid":
+        assert len(face.bend_lines) == 59
+        lengths = [np.linalg.norm(line.end - line.start) for line in face.bend_lines]
+        assert lengths == pytest.approx([60.0] * 59, rel=1e-6)
 
 
 def loft(count, turned=False):
@@ -519,6 +700,23 @@ def test_noisy_cylinder(way):
     assert angle_between(face.axis, np.array([0.0, 1.0, 0.0])) < 0.1
     assert 0 < face.deviation < 0.001 * size
     assert np.abs(face.deviation - 0.0005 * size) < 0.0004 * size
+
+
+@pytest.mark.parametrize("way", ["grid", "random"])
+def test_noisy_sheet_with_two_plates(way):
+    zones = [(200.0, 0.0), (300.0, 1 / 200.0), (250.0, 0.0)]
+    plane, faces = zone_meshes(zones, 150.0, way, [8, 24, 8], 6)
+    points = bent(zones)(plane)
+    size = np.linalg.norm(np.ptp(points, axis=0))
+    noise = np.random.default_rng(3).normal(size=points.shape)
+    noise *= 5e-4 * size / np.linalg.norm(noise, axis=1).max()
+    shape = recognition.recognise(Mesh(points + noise, faces), max_deviation="0.1%")
+    assert sorted(face.kind for face in shape.faces) == ["cylinder", "plane", "plane"]
+    bend = next(face for face in shape.faces if face.kind == "cylinder")
+    assert bend.radius == pytest.approx(200.0, rel=0.01)
+    # Where a plate is as close to the cylinder as is allowed, it may belong to it.
+    apart = 0.001 * np.linalg.norm(np.ptp(points + noise, axis=0))
+    assert bend.bend_angle == pytest.approx(1.5, abs=2 * np.sqrt(2 * apart / 200.0))
 
 
 def test_fine_cylinder_is_quick_and_one_face():

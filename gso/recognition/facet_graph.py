@@ -77,6 +77,12 @@ class FacetGraph:
         step = coordinate_step(mesh.vertices[mesh.used])
         return cls(mesh.vertices, mesh.triangles, step, allowed)
 
+    def refined(self, points: Array, triangles: Ints, source: Ints) -> FacetGraph:
+        """Return the graph of a refined mesh; facets are those of the triangles' sources (t2,)."""
+        new = FacetGraph(points, triangles, self.step, self.allowed)
+        new.__dict__["facet"] = self.facet[source]
+        return new
+
     @property
     def tolerance(self) -> float:
         """Distance within which a point counts as on a surface."""

@@ -75,7 +75,9 @@ def other_patches(graph: FacetGraph, free: Flags) -> list[Patch]:
     straight = _straight_parts(graph, label, smooth & ~inner, count)
     facets = _facets_of(graph, label, count)
     strip = straight & (facets >= _SEVERAL)
-    flat = (facets == 1) | (straight & ~strip)
+    whole = (facets == 1) | _flat_parts(graph, label, count)
+    strip &= ~whole
+    flat = whole | (straight & ~strip)
     kind = np.full(len(free), _FREE)
     kind[free & flat[label]] = _PLANE
     ribbon = free & strip[label]
@@ -85,6 +87,7 @@ def other_patches(graph: FacetGraph, free: Flags) -> list[Patch]:
     kind[~free] = _NONE
     bent = free & ~flat[label] & ~strip[label]
     kind[_plates(graph, bent, label)] = _PLANE
+    inner |= smooth & (free & whole[label])[graph.pairs].all(axis=1)
     return _absorbed(graph, _patches(graph, kind, ribbon_label, smooth, inner))
 
 
@@ -96,6 +99,23 @@ def _facets_of(graph: FacetGraph, label: Ints, count: int) -> Ints:
     first = np.unique(graph.facet, return_index=True)[1]
     known = label[first]
     return np.bincount(known[known >= 0], minlength=count)
+
+
+def _flat_parts(graph: FacetGraph, label: Ints, count: int) -> Flags:
+    """Which parts lie in a plane as a whole, within the tolerance; (count,)."""
+    corners = graph.triangles[label >= 0].ravel()
+    of = np.repeat(label[label >= 0], 3)
+    number = np.bincount(of, minlength=count)
+    points = graph.points[corners]
+    mean = np.stack([np.bincount(of, x, count) for x in points.T], axis=1) / number[:, None]
+    d = points - mean[of]
+    products = np.stack(
+        [np.bincount(of, d[:, i] * d[:, j], count) for i in range(3) for j in range(3)], axis=1
+    )
+    normal = np.linalg.eigh(products.reshape(-1, 3, 3))[1][:, :, 0]
+    off = np.zeros(count)
+    np.maximum.at(off, of, np.abs(np.einsum("kd,kd->k", d, normal[of])))
+    return off <= graph.tolerance
 
 
 def _straight_parts(graph: FacetGraph, label: Ints, folded: Flags, count: int) -> Flags:

@@ -154,23 +154,21 @@ class RoundImage:
     sign: float
 
 
-def round_image(part: Part, surface: RoundSurface) -> RoundImage:
+def round_image(part: Part, surface: RoundSurface, seam: float | None = None) -> RoundImage:
     """Unroll triangles of a cylinder or cone by its equation.
 
     On a cylinder a corner is at (radius * angle, height), on a cone at its distance from the apex
     and the angle around the axis times the sine of the half angle. Lengths are those of the
     surface: two vertices of a circle are as far apart as the arc is long. A face that closes
-    around the axis is opened along a ruling that meets no hole, if there is one.
+    around the axis is opened at an angle, along the ruling or the edges nearest to it.
     """
-    theta, rho, height = surface.coordinates(part.points)
-    angle = _continuous(part, theta, rho)
-    shift, closes = _turns(part, angle, rho)
-    if closes:
-        seam = seam_angle(part, surface, theta, rho, height)
+    theta, rho, _ = surface.coordinates(part.points)
+    angle = continuous(part, theta, rho)
+    if seam is None:
+        angle = angle + 2 * np.pi * turns(part, angle, rho)[0][:, None]
+    else:
         middle = angle.mean(axis=1)
         angle = angle - 2 * np.pi * np.floor((middle - seam) / (2 * np.pi))[:, None]
-    else:
-        angle = angle + 2 * np.pi * shift[:, None]
     return placed(part, surface, angle)
 
 
@@ -191,7 +189,7 @@ def placed(part: Part, surface: RoundSurface, angle: Array) -> RoundImage:
     return RoundImage(angle, flat, ~_apart(part, angle, rho), sign)
 
 
-def _continuous(part: Part, theta: Array, rho: Array) -> Array:
+def continuous(part: Part, theta: Array, rho: Array) -> Array:
     """Return the angles of corners (k, 3), within half a turn of each other in a triangle."""
     t = part.triangles
     far = rho[t] > _APEX * rho[t].max()
@@ -218,7 +216,7 @@ def _apart(part: Part, angle: Array, rho: Array) -> Flags:
     return np.asarray(_jumps(part, angle, rho) != 0)
 
 
-def _turns(part: Part, angle: Array, rho: Array) -> tuple[Ints, bool]:
+def turns(part: Part, angle: Array, rho: Array) -> tuple[Ints, bool]:
     """Return the turns to add to each triangle, and whether the face closes around the axis."""
     jump = _jumps(part, angle, rho)
     count = len(part.triangles)
@@ -232,7 +230,7 @@ def _turns(part: Part, angle: Array, rho: Array) -> tuple[Ints, bool]:
     return shift, bool(closes)
 
 
-def seam_angle(part: Part, surface: RoundSurface, theta: Array, rho: Array, height: Array) -> float:
+def seam_angle(part: Part, theta: Array, rho: Array, height: Array, tolerance: float) -> float:
     """Choose the angle around the axis at which to open a face that closes around it.
 
     Of the rulings that meet no hole, the one with most of its length along edges; the middle of
@@ -241,17 +239,18 @@ def seam_angle(part: Part, surface: RoundSurface, theta: Array, rho: Array, heig
     """
     a, b = part.ends.T
     scale = max(float(rho[part.triangles].max()), 1e-300)
+    close = max(1e-5, 4 * tolerance / scale)
     turn = theta[b] - theta[a]
     turn -= 2 * np.pi * np.round(turn / (2 * np.pi))
     apex = np.minimum(rho[a], rho[b]) <= _APEX * scale
-    along = (np.abs(turn) * np.maximum(rho[a], rho[b]) <= 1e-5 * scale) | apex
+    along = (np.abs(turn) * np.maximum(rho[a], rho[b]) <= close * scale) | apex
     length = np.hypot(height[b] - height[a], rho[b] - rho[a])[along]
     at = np.where(rho[a] > rho[b], theta[a], theta[b])[along]
-    holes = _holes(part, theta, rho)
+    holes = hole_angles(part, theta, rho)
     candidates = np.sort(np.mod(at, 2 * np.pi))
     weights = length[np.argsort(np.mod(at, 2 * np.pi), kind="stable")]
     if len(candidates):
-        new = np.diff(candidates, prepend=candidates[0] - 1) > 1e-5
+        new = np.diff(candidates, prepend=candidates[0] - 1) > close
         group = np.cumsum(new) - 1
         total = np.bincount(group, weights)
         angles = candidates[new]
@@ -267,7 +266,7 @@ def seam_angle(part: Part, surface: RoundSurface, theta: Array, rho: Array, heig
     return float(angles[np.flatnonzero(best & longest)[0]])
 
 
-def _holes(part: Part, theta: Array, rho: Array) -> list[tuple[float, float]]:
+def hole_angles(part: Part, theta: Array, rho: Array) -> list[tuple[float, float]]:
     """Return the angles at which each hole begins and ends."""
     he = topology.half_edges(part.triangles, len(part.points))
     open_edges = he.twin < 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,16 +14,21 @@ from gso.recognition.facet_graph import FacetGraph
 from gso.recognition.flat_and_torsal import Patch, other_patches
 from gso.recognition.flat_images import Part, developed, plane_image, round_image
 from gso.recognition.region_growing import Region, round_regions
+from gso.recognition.round_surface import RoundSurface
+from gso.recognition.ruling_cut import cut_along, opening_angle
 from gso.recognition.shape_face import Recognised, ShapeFace
 from gso.recognition.smooth_torsal import smooth_image
 from gso.typing import Array, Flags, Ints, MeshLike
+
+#: Triangles of a smooth face at least, where more than this share of the area is free.
+_FEW, _MOSTLY = 12, 0.5
 
 
 def recognise(
     mesh: MeshLike,
     *,
     max_deviation: Length | None = None,
-    max_strain: Strain = 1e-3,
+    max_strain: Strain = 2e-3,
     bend_step: float | None = None,
 ) -> Recognised:
     """Divide a mesh into planes, cylinders, cones, torsal surfaces and free surfaces.
@@ -56,10 +62,10 @@ def recognise(
     -----
     A mesh is either a polyhedron with folds, or a smooth surface that is tessellated: facets are
     one cylinder or cone if all their vertices lie on it, if at least three follow each other
-    around the axis, if three quarters of them span at most 30 degrees, and none more than three
-    times as much. Eight flat sides with folds of 45 degrees therefore stay folds, and twelve with
-    30 degrees are a tube. One row of facets whose border across the rulings is smooth is no proof
-    of straight rulings: a sphere consists of such rows.
+    around the axis, if half of the triangles span at most 30 degrees, and none more than 8 degrees
+    and more than three times the upper quartile. Eight flat sides with folds of 45 degrees
+    therefore stay folds, and twelve with 30 degrees are a tube. One row of facets between
+    circles with smooth folds is no proof of straight rulings: a sphere consists of such rows.
 
     Examples
     --------
@@ -82,17 +88,43 @@ def recognise(
     rest = np.ones(len(graph.triangles), bool)
     for region in regions:
         rest &= ~region.member
-    faces = [_round_face(graph, region, step) for region in regions]
-    faces += [_other_face(graph, patch, limit) for patch in other_patches(graph, rest)]
+    patches = other_patches(graph, rest)
+    graph, source, seams = _opened(graph, regions)
+    faces = [
+        _round_face(graph, np.flatnonzero(region.member[source]), region.surface, seam, step)
+        for region, seam in zip(regions, seams, strict=True)
+    ]
+    faces += _other_faces(graph, patches, source, limit)
     faces.sort(key=lambda face: int(face.triangles[0]))
-    source = np.arange(len(graph.triangles))
     return Recognised(graph.points, graph.triangles, source, tuple(faces), graph.tolerance)
 
 
-def _round_face(graph: FacetGraph, region: Region, step: float | None) -> ShapeFace:
-    ids, surface = np.flatnonzero(region.member), region.surface
+def _opened(
+    graph: FacetGraph, regions: list[Region]
+) -> tuple[FacetGraph, Ints, list[float | None]]:
+    """Choose where to open faces that close around an axis; refine the mesh along these rulings.
+
+    Also return the source of each triangle, and the angle of each region's seam.
+    """
+    source = np.arange(len(graph.triangles))
+    seams: list[float | None] = []
+    for region in regions:
+        part = Part.of(graph.points, graph.triangles[region.member[source]])
+        opening = opening_angle(part, region.surface, graph.tolerance)
+        seams.append(None if opening is None else opening[0])
+        if opening is not None and opening[1]:
+            points, triangles, old = cut_along(
+                part, region.surface, opening[0], graph.triangles, graph.tolerance
+            )
+            graph, source = graph.refined(points, triangles, old), source[old]
+    return graph, source, seams
+
+
+def _round_face(
+    graph: FacetGraph, ids: Ints, surface: RoundSurface, seam: float | None, step: float | None
+) -> ShapeFace:
     part = Part.of(graph.points, graph.triangles[ids])
-    image = round_image(part, surface)
+    image = round_image(part, surface, seam)
     size = float(np.linalg.norm(np.ptp(graph.points, axis=0)))
     radius = surface.radius
     if step is None:
@@ -110,17 +142,47 @@ def _round_face(graph: FacetGraph, region: Region, step: float | None) -> ShapeF
         float(np.arccos(np.clip(toward, 0.0, 1.0)).max()),
         seam=part.ends[~image.together],
         bend_lines=lines_of_round(part, surface, image, step),
+        bend_angle=float(np.ptp(image.angle)) * float(np.cos(surface.half_angle)),
     )
 
 
-def _other_face(graph: FacetGraph, patch: Patch, limit: float) -> ShapeFace:
-    ids = patch.triangles
+def _other_faces(
+    graph: FacetGraph, patches: list[Patch], source: Ints, limit: float
+) -> list[ShapeFace]:
+    """Make faces of patches, whose triangles are sources of those of the graph."""
+    owner = np.full(int(source.max()) + 1, -1)
+    for k, patch in enumerate(patches):
+        owner[patch.triangles] = k
+    order = np.argsort(owner[source], kind="stable")
+    bounds = np.searchsorted(owner[source][order], np.arange(len(patches) + 1))
+    ids = [order[a:b] for a, b in pairwise(bounds)]
+    free = sum(
+        float(graph.areas[i].sum())
+        for i, patch in zip(ids, patches, strict=True)
+        if patch.kind == "free"
+    )
+    # A few triangles of a free surface can always be laid flat.
+    fewest = _FEW if free > _MOSTLY * graph.areas.sum() else 0
+    return [
+        ShapeFace("free", i)
+        if patch.kind == "free" and len(i) < fewest
+        else _other_face(graph, patch, i, limit)
+        for i, patch in zip(ids, patches, strict=True)
+    ]
+
+
+def _other_face(graph: FacetGraph, patch: Patch, ids: Ints, limit: float) -> ShapeFace:
     if patch.kind == "free":
         smooth = smooth_image(graph.points, graph.triangles[ids], limit)
         if smooth is None:
             return ShapeFace("free", ids)
         return ShapeFace(
-            "torsal", ids, smooth.flat, strain=smooth.strain, bend_lines=smooth.bend_lines
+            "torsal",
+            ids,
+            smooth.flat,
+            strain=smooth.strain,
+            bend_lines=smooth.bend_lines,
+            bend_angle=sum(line.angle for line in smooth.bend_lines),
         )
     part = Part.of(graph.points, graph.triangles[ids])
     if patch.kind == "plane":
@@ -135,7 +197,8 @@ def _other_face(graph: FacetGraph, patch: Patch, limit: float) -> ShapeFace:
         "cone" if patch.kind == "cone" else "torsal", ids, flat, None, patch.axis, patch.apex
     )
     lines = lines_of_strip(part, flat, facet, fold, together)
-    return replace(face, seam=part.ends[~together], bend_lines=lines)
+    turned = sum(line.angle for line in lines)
+    return replace(face, seam=part.ends[~together], bend_lines=lines, bend_angle=turned)
 
 
 def _plane(graph: FacetGraph, part: Part, ids: Ints) -> ShapeFace:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gso.mesh import topology
 from gso.recognition.facet_graph import FacetGraph
-from gso.recognition.round_surface import RoundSurface, fit_round, on_quadrics
+from gso.recognition.round_surface import RoundSurface, fit_quadrics, fit_round
 from gso.typing import Array, Flags, Ints
 
 if TYPE_CHECKING:
@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 
 #: Fold, in radians, up to which a mesh can be a smooth surface: a tube of 12 sides has 30 degrees.
 SMOOTH = np.radians(30.5)
-#: Angle around the axis that one triangle can span, and its multiple of the upper quartile.
-_WIDEST, _WIDER = np.radians(62.0), 3.0
+#: Angle around the axis that one triangle can span, its multiple of the upper quartile, and the
+#: angle that it can always span.
+_WIDEST, _WIDER, _NARROW = np.radians(62.0), 3.0, np.radians(8.0)
 #: Facets around the axis from which on they are a smooth surface.
 _SEVERAL = 2.5
 #: Angle between the normals of a triangle and of the surface, in radians.
@@ -30,6 +31,17 @@ _POINTS, _FEWEST, _TOGETHER = 48, 8, 2000
 _PARTS = 100
 #: Seeds that are tried at most.
 _SEEDS = 20_000
+#: Seeds that failed after which only every second one is tried, then every third ...
+_PATIENCE = 10
+#: Seeds of a chunk whose fits are tried from the axes of quadrics, too.
+_FURTHER = 100
+#: Facets around the axis from which on a region is one whatever is beside it, and multiple of the
+#: tolerance within which a point is almost on a surface.
+_MANY, _ALMOST = 8.0, 20.0
+#: Angle around the axis from which on cuts may be any curves, in radians.
+_FAR = 3.0
+#: Multiple of the tolerance by which a surface that is curved both ways would be off.
+_SURE = 100.0
 #: Share of a seed region that its surface must hold.
 _KEPT = 0.3
 #: Length of a shared edge, relative to the longest of both facets.
@@ -72,7 +84,9 @@ def round_regions(graph: FacetGraph) -> list[Region]:
         if count[part] < 3:
             break
         whole = label == part
-        region = _best(graph, whole, free, np.zeros(0, bool))
+        if len(np.unique(graph.facet[whole])) < 3:
+            continue
+        region = _best(graph, whole, free, np.zeros(0, bool), None)
         if region is not None:
             found.append(region)
             free &= ~region.member
@@ -100,7 +114,7 @@ def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = Fal
         # A single triangle has no direction.
         open_facets &= np.bincount(graph.facet) > 1
     order = order[open_facets[order] & (sizes[order] <= _POINTS // 2)][:_SEEDS]
-    tried = np.zeros(table.shape[0], bool)
+    tried, failures = np.zeros(table.shape[0], bool), 0
     first = np.zeros(table.shape[0], np.int64)
     first[graph.facet[::-1]] = np.arange(len(graph.facet))[::-1]
     for start in range(0, len(order), _TOGETHER):
@@ -108,16 +122,20 @@ def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = Fal
         chunk = chunk[free[first[chunk]]]
         if not len(chunk):
             continue
-        good, around = _promising(graph, near, chunk, rings)
-        for k in good:
+        good, around, axes = _promising(graph, near, chunk, rings)
+        for place, k in enumerate(good):
             if not free[first[chunk[k]]] or tried[chunk[k]]:
+                continue
+            if place % max(failures // _PATIENCE, 1):
                 continue
             facets = around.indices[around.indptr[k] : around.indptr[k + 1]]
             seed = free & np.isin(graph.facet, facets)
-            region = _best(graph, seed, free, tried)
-            if region is not None:
-                found.append(region)
-                free &= ~region.member
+            region = _best(graph, seed, free, tried, axes[k])
+            if region is None:
+                failures += 1
+                continue
+            found.append(region)
+            free &= ~region.member
     return found
 
 
@@ -161,8 +179,11 @@ def _neighbours_along(graph: FacetGraph, free: Flags, small: Flags) -> csr_matri
 
 def _promising(
     graph: FacetGraph, near: csr_matrix, chunk: Ints, rings: int
-) -> tuple[Ints, csr_matrix]:
-    """Return seeds whose surroundings fit a cylinder or cone, best first, and their facets."""
+) -> tuple[Ints, csr_matrix, Array]:
+    """Return seeds whose surroundings fit a cylinder or cone, best first.
+
+    Also the facets around all seeds, and the axes that were found.
+    """
     around = near[chunk]
     for _ in range(rings - 1):
         around = around @ near
@@ -182,17 +203,27 @@ def _promising(
     more = given.sum(axis=1) > _FEWEST
     worst = np.full(len(chunk), np.inf)
     ready = np.flatnonzero(enough)
-    ready = ready[on_quadrics(points[ready], given[ready], graph.tolerance)]
     if not len(ready):
-        return ready, around
-    for conical, axis in ((False, axes), (True, cone_axes)):
-        ready = ready[more[ready] & (worst[ready] > graph.tolerance)] if conical else ready
-        fits = fit_round(
-            points[ready], given[ready], axis[ready, :, 0], conical=conical, goal=graph.tolerance
-        )
-        worst[ready] = np.minimum(worst[ready], fits.worst)
+        return ready, around, np.zeros((len(chunk), 3))
+    off, quadric_axes = fit_quadrics(points[ready], given[ready])
+    quadric = np.zeros((len(chunk), 3))
+    quadric[ready] = quadric_axes
+    ready = ready[off <= graph.tolerance]
+    found = np.zeros((len(chunk), 3))
+    for conical, axis, most in (
+        (False, axes[:, :, 0], len(chunk)),
+        (True, cone_axes[:, :, 0], len(chunk)),
+        (False, quadric, _FURTHER),
+        (True, quadric, _FURTHER),
+    ):
+        left = ready[(worst[ready] > graph.tolerance) & (more[ready] | (not conical))][:most]
+        if len(left):
+            fits = fit_round(
+                points[left], given[left], axis[left], conical=conical, goal=graph.tolerance
+            )
+            worst[left], found[left] = fits.worst, fits.axis
     order = np.argsort(worst, kind="stable")
-    return order[worst[order] <= graph.tolerance], around
+    return order[worst[order] <= graph.tolerance], around, found
 
 
 def _padded(table: csr_matrix) -> tuple[Ints, Flags]:
@@ -206,15 +237,19 @@ def _padded(table: csr_matrix) -> tuple[Ints, Flags]:
     return ids, given
 
 
-def _best(graph: FacetGraph, seed: Flags, free: Flags, tried: Flags) -> Region | None:
+def _best(
+    graph: FacetGraph, seed: Flags, free: Flags, tried: Flags, axis: Array | None
+) -> Region | None:
     """Grow a cylinder and a cone from a seed region, and return the better one, if any is good.
+
+    The fits start from an axis, if one is given.
 
     Otherwise the facets that were reached are marked as tried.
     """
     best, most = None, 0.0
     reached = []
     for conical in (False, True):
-        region = _grown(graph, seed, free, conical=conical)
+        region = _grown(graph, seed, free, axis, conical=conical)
         if region is None:
             continue
         reached.append(region.member)
@@ -227,13 +262,16 @@ def _best(graph: FacetGraph, seed: Flags, free: Flags, tried: Flags) -> Region |
     return best
 
 
-def _grown(graph: FacetGraph, seed: Flags, free: Flags, *, conical: bool) -> Region | None:
+def _grown(
+    graph: FacetGraph, seed: Flags, free: Flags, axis: Array | None, *, conical: bool
+) -> Region | None:
     """Fit a surface and add the triangles on it, until none is added."""
     member, surface = seed, None
     for _ in range(_ROUNDS):
-        surface = _fitted(graph, member, surface, conical)
+        surface = _fitted(graph, member, axis, conical)
         if surface is None:
             return None
+        axis = surface.axis
         new = _members(graph, surface, member, free)
         if (new == member).all():
             break
@@ -244,7 +282,7 @@ def _grown(graph: FacetGraph, seed: Flags, free: Flags, *, conical: bool) -> Reg
 
 
 def _fitted(
-    graph: FacetGraph, member: Flags, before: RoundSurface | None, conical: bool
+    graph: FacetGraph, member: Flags, axis: Array | None, conical: bool
 ) -> RoundSurface | None:
     """Fit a surface to the vertices of a region; None where they lie far from any."""
     ids = np.unique(graph.triangles[member])
@@ -252,15 +290,15 @@ def _fitted(
         return None
     ids = ids[np.linspace(0, len(ids) - 1, min(len(ids), _ENOUGH)).round().astype(int)]
     points = graph.points[ids]
-    starts = [] if before is None else [before.axis]
-    if before is None:
+    starts = [] if axis is None else [axis]
+    if axis is None:
         n, w = graph.normals[member], graph.areas[member]
         w = w / w.sum()
         mean = w @ n
         products = np.einsum("t,ti,tj->ij", w, n, n)
-        starts.append(np.linalg.eigh(products)[1][:, 0])
-        if conical:
-            starts.append(np.linalg.eigh(products - np.outer(mean, mean))[1][:, 0])
+        starts += list(np.linalg.eigh(products)[1].T)
+        starts += list(np.linalg.eigh(products - np.outer(mean, mean))[1].T)
+        starts += list(fit_quadrics(points[None], np.ones((1, len(points)), bool))[1])
     count = len(starts)
     sets = np.broadcast_to(points, (count, *points.shape))
     goal, given = _LOOSE * graph.tolerance, np.ones(sets.shape[:2], bool)
@@ -283,7 +321,8 @@ def _members(graph: FacetGraph, surface: RoundSurface, inside: Flags, free: Flag
     toward = np.einsum("td,td->t", surface.normals(graph.middles), graph.normals)
     sign = np.sign((toward * graph.areas)[inside].sum())
     typical = np.quantile(spans[inside], 0.75)
-    fits = free & on[graph.triangles].all(axis=1) & (spans <= min(_WIDER * typical, _WIDEST))
+    widest = min(max(_WIDER * typical, _NARROW), _WIDEST)
+    fits = free & on[graph.triangles].all(axis=1) & (spans <= widest)
     # A thin triangle of vertices on a curved surface may be tilted much, if it is no part of a
     # plane that cuts the surface.
     tilted = sign * toward < np.cos(_TILTED)
@@ -306,6 +345,13 @@ def _turning_areas(surface: RoundSurface, angle: Array, height: Array, graph: Fa
     return np.asarray(turn[:, 1] * (h[:, 2] - h[:, 0]) - turn[:, 2] * (h[:, 1] - h[:, 0]))
 
 
+def _covered(angle: Array, rho: Array, ids: Ints, typical: float) -> float:
+    """Angle around the axis between the outermost vertices of a region; a full turn if closed."""
+    around = np.sort(angle[ids[rho[ids] > _APEX * rho[ids].max()]])
+    gap = float(np.diff(around, append=around[:1] + 2 * np.pi).max())
+    return 2 * np.pi - gap if gap > 2 * typical else 2 * np.pi
+
+
 def triangle_spans(surface: RoundSurface, angle: Array, rho: Array, triangles: Ints) -> Array:
     """Return the angles around the axis that triangles span; a corner at the apex has none."""
     turn = np.diff(angle[triangles], axis=1, append=angle[triangles[:, :1]])
@@ -324,11 +370,8 @@ def _is_smooth(graph: FacetGraph, surface: RoundSurface, member: Flags, free: Fl
     angle, rho, _ = surface.coordinates(graph.points)
     spans = triangle_spans(surface, angle, rho, triangles)
     typical = float(np.quantile(spans, 0.75))
-    far = ids[rho[ids] > _APEX * rho[ids].max()]
-    around = np.sort(angle[far])
-    gaps = np.diff(around, append=around[:1] + 2 * np.pi)
-    covered = 2 * np.pi - gaps.max() if gaps.max() > 2 * typical else 2 * np.pi
-    if typical > SMOOTH or covered < _SEVERAL * typical:
+    covered = _covered(angle, rho, ids, typical)
+    if float(np.median(spans)) > SMOOTH or covered < _SEVERAL * typical:
         return False
     if float(np.abs(surface.distances(graph.points[ids])).max()) > graph.tolerance:
         return False
@@ -337,15 +380,51 @@ def _is_smooth(graph: FacetGraph, surface: RoundSurface, member: Flags, free: Fl
     direction = np.linalg.eigh(around_mean.T @ around_mean)[1][:, 0]
     if np.ptp(around_mean @ direction) <= 4 * graph.tolerance:
         return False
-    return _has_straight_rulings(graph, surface, member, free, ids)
+    if covered < _MANY * typical and _goes_on(graph, surface, member):
+        return False
+    around = float(np.median(rho[ids])) * covered
+    width = float(graph.areas[member].sum()) / max(around, 1e-300)
+    # A surface that is as curved along its rulings as around would be this much off.
+    off = width**2 * covered / (8 * around)
+    proved = covered >= max(_MANY * typical, _FAR) and off > _SURE * graph.tolerance
+    return _has_straight_rulings(graph, surface, member, free, ids, only_circles=proved)
+
+
+def _goes_on(graph: FacetGraph, surface: RoundSurface, member: Flags) -> bool:
+    """Whether facets beside a region along its rulings lie almost on its surface.
+
+    Three facets of any smooth torsal surface lie on a cone, up to the rounding of coordinates, and
+    the next are a little off.
+    """
+    one, two = member[graph.pairs].T
+    border = (one != two) & (np.abs(graph.folds) <= SMOOTH)
+    ends = graph.points[graph.ends[border]]
+    along = ends[:, 1] - ends[:, 0]
+    cosine = np.einsum("ed,ed->e", along, surface.rulings(ends.mean(axis=1)))
+    ruling = np.abs(cosine) > np.cos(_TILTED) * np.linalg.norm(along, axis=1)
+    beside = np.where(one, graph.pairs[:, 1], graph.pairs[:, 0])[border][ruling]
+    if not len(beside):
+        return False
+    facets = np.isin(graph.facet, graph.facet[beside])
+    off = np.abs(surface.distances(graph.points[graph.triangles[facets]].reshape(-1, 3)))
+    worst = np.zeros(int(graph.facet.max()) + 1)
+    np.maximum.at(worst, np.repeat(graph.facet[facets], 3), off)
+    return bool((worst[graph.facet[beside]] <= _ALMOST * graph.tolerance).any())
 
 
 def _has_straight_rulings(
-    graph: FacetGraph, surface: RoundSurface, member: Flags, free: Flags, ids: Ints
+    graph: FacetGraph,
+    surface: RoundSurface,
+    member: Flags,
+    free: Flags,
+    ids: Ints,
+    *,
+    only_circles: bool,
 ) -> bool:
     """Whether the rulings are proved straight, by points inside, or end at edges or sharp folds.
 
-    One row of facets of a sphere lies on a cone, too.
+    One row of facets of a sphere lies on a cone, too: it ends at circles, and with `only_circles`
+    only these count.
     """
     one, two = member[graph.pairs].T
     inside = np.zeros(len(graph.points), bool)
@@ -362,7 +441,9 @@ def _has_straight_rulings(
     cosine = np.abs(np.einsum("ed,ed->e", along, surface.rulings((a + b) / 2)))
     across = cosine < np.cos(_TILTED) * length
     fold = np.abs(graph.folds[border])
-    smooth = across & (fold <= SMOOTH) & free[graph.pairs[border]].all(axis=1)
+    level = not only_circles
+    level |= np.abs(along @ surface.axis) <= _LEVEL * length + 4 * graph.tolerance
+    smooth = across & level & (fold <= SMOOTH) & free[graph.pairs[border]].all(axis=1)
     return bool(length[smooth].sum() <= _INSIDE * max(length[across].sum(), 1e-300))
 
 
@@ -370,6 +451,8 @@ def _open_edges(graph: FacetGraph) -> Flags:
     return np.asarray(graph.half_edges.twin < 0)
 
 
+#: Slope of an edge against the plane of a circle up to which it is on a circle.
+_LEVEL = 5e-3
 #: Distance from the axis, relative to the largest, below which a point is the apex.
 _APEX = 1e-4
 #: Radius relative to a region's size above which it is flat.

@@ -197,11 +197,11 @@ def _stepped(state: Array, residual: Array, jacobian: Array, damping: Array) -> 
     new[:, 3:6] += step[:, 2:3] * e1 + step[:, 3:4] * e2
     new[:, 3:6] /= np.linalg.norm(new[:, 3:6], axis=1, keepdims=True)
     new[:, 6 : 2 + step.shape[1]] += step[:, 4:]
-    return new
+    return np.asarray(new)
 
 
-def on_quadrics(points: Array, given: Flags, tolerance: float) -> Flags:
-    """Whether sets of points may lie on quadrics, a quick test before cylinders are fitted.
+def fit_quadrics(points: Array, given: Flags) -> tuple[Array, Array]:
+    """Fit quadrics to sets of points, a quick test before cylinders and cones are fitted.
 
     Parameters
     ----------
@@ -209,8 +209,13 @@ def on_quadrics(points: Array, given: Flags, tolerance: float) -> Flags:
         Sets of points.
     given : ndarray of bool, (b, k)
         Which of the points count.
-    tolerance : float
-        Distance from the quadric.
+
+    Returns
+    -------
+    off : ndarray, (b,)
+        Lower bound of the root mean square distance of the points from a quadric.
+    axis : ndarray, (b, 3)
+        Axis of the quadric if it is one of revolution.
     """
     count = np.maximum(given.sum(axis=1), 1)
     local = points - (points * given[..., None]).sum(axis=1, keepdims=True) / count[:, None, None]
@@ -219,9 +224,19 @@ def on_quadrics(points: Array, given: Flags, tolerance: float) -> Flags:
     x, y, z = np.moveaxis(local / size[:, None, None], -1, 0)
     terms = [x * x, y * y, z * z, x * y, x * z, y * z, x, y, z, given.astype(float)]
     table = np.stack(terms, axis=-1)
-    least = np.linalg.eigvalsh(table.transpose(0, 2, 1) @ table)[:, 0]
-    off = np.sqrt(np.maximum(least, 0.0) / count)
-    return np.asarray(off <= _STEEPEST * tolerance / size + _ROUNDING)
+    values, vectors = np.linalg.eigh(table.transpose(0, 2, 1) @ table)
+    off = np.sqrt(np.maximum(values[:, 0], 0.0) / count)
+    q = vectors[:, :, 0]
+    half = q[:, 3:6] / 2
+    form = np.stack(
+        [q[:, 0], half[:, 0], half[:, 1], half[:, 0], q[:, 1], half[:, 2], half[:, 1], half[:, 2],
+         q[:, 2]], axis=1,
+    )  # fmt: skip
+    levels, directions = np.linalg.eigh(form.reshape(-1, 3, 3))
+    # Of the three, two are equal.
+    first = levels[:, 1] - levels[:, 0] > levels[:, 2] - levels[:, 1]
+    axis = np.where(first[:, None], directions[:, :, 0], directions[:, :, 2])
+    return np.asarray(np.maximum(off - _ROUNDING, 0.0) * size / _STEEPEST), axis
 
 
 def _frames(axis: Array) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from gso.recognition.bend_lines import BendLine
+from gso.recognition.edge_arcs import arc_angles
 from gso.recognition.round_surface import RoundSurface
 from gso.typing import Array, Flags, Ints
 
@@ -47,6 +48,8 @@ class ShapeFace:
         Vertices at the ends of edges along which a face that closes around was opened.
     bend_lines : tuple of BendLine
         In the plane of `flat`.
+    bend_angle : float
+        Angle by which the face turns in all, in radians; 0 for planes and free faces.
     """
 
     kind: Kind
@@ -60,6 +63,7 @@ class ShapeFace:
     strain: float = 0.0
     seam: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
     bend_lines: tuple[BendLine, ...] = ()
+    bend_angle: float = 0.0
 
     @property
     def radius(self) -> float | None:
@@ -110,6 +114,31 @@ class Recognised:
         """Which triangles have a flat image, (t,)."""
         flat = np.array([face.flat is not None for face in self.faces])
         return flat[self.face]
+
+    @cached_property
+    def arcs(self) -> Array:
+        """Angle of the arc that each edge is in the flat image, (t, 3), in radians.
+
+        Of the edge from corner k to corner k + 1, positive where the arc runs anticlockwise, 0
+        where the edge is straight. Outlines that are circles around the axis of a cylinder or
+        cone are arcs in the flat image of the cone, and in that of a plane across the axis; the
+        arc is as long as the edge on the cylinder or cone, so that neighbours agree.
+        """
+        return arc_angles(
+            self.vertices,
+            self.triangles,
+            self.face,
+            [face.surface for face in self.faces],
+            [face.axis if face.kind == "plane" else None for face in self.faces],
+            self.tolerance,
+        )
+
+    def edge_lengths(self) -> Array:
+        """Return the lengths of edges in the flat image, along their arcs; (t, 3)."""
+        image = self.flat()
+        chord = np.linalg.norm(np.roll(image, -1, axis=1) - image, axis=2)
+        half = np.abs(self.arcs) / 2
+        return np.asarray(chord / np.sinc(half / np.pi))
 
     def flat(self) -> Array:
         """Return the corners of all triangles in the plane, each face in its place; (t, 3, 2).

@@ -15,7 +15,7 @@ from gso.rulings import shape_operator, trace
 from gso.typing import Array, Flags, Ints
 
 #: Triangles of a face, at least and at most, whose flat image is tried.
-_FEWEST, _MOST = 8, 20_000
+_FEWEST, _MOST = 2, 20_000
 #: Sum of the absolute curvatures, smoothed, above which no image of low strain exists, in radians.
 _CURVED = 1.0
 #: Angle between bend lines, in radians, and their largest number.
@@ -131,9 +131,10 @@ def _lines(mesh: Mesh, flat: Array) -> tuple[BendLine, ...]:
     width = operator.areas.sum() / max(float(length.sum()), 1e-300)
     found = []
     for line, (first, last) in zip(lines, curvature, strict=True):
-        radii = [float(1 / max(abs(c), 1e-12)) for c in (first, last)]
-        angle = float(width * (abs(first) + abs(last)) / 2)
-        found.append(BendLine(line[0], line[-1], *radii, angle, bool(first + last < 0)))
+        one, two = (float(1 / max(abs(c), 1e-12)) for c in (first, last))
+        # Along a ruling the radius grows linearly, and the width with it.
+        angle = float(2 * width / (one + two))
+        found.append(BendLine(line[0], line[-1], one, two, angle, bool(first + last < 0)))
     return tuple(found)
 
 
