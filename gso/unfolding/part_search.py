@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,9 +19,9 @@ _HOT, _COLD = 0.15, 0.003
 #: Weight of the lengths of cut edges, in mean edges.
 _CUT = 0.02
 #: Largest number of edges along which a subtree is tried to be joined again.
-_TRIES = 16
-#: Number of patches up to which the search follows each of several starts.
-_SMALL = 700
+_TRIES = 8
+#: Work of the search, and more of it for each patch, in microseconds about.
+_WORK, _WORK_EACH = 5e5, 1.2e3
 #: Largest number of passes that shorten cuts.
 _PASSES = 3
 
@@ -53,17 +54,17 @@ def searched(start: Layout, seed: int, effort: float) -> Layout:
         return best
     least = _least(links, edges)
     random = np.random.default_rng(seed)
+    end = effort * (_WORK + _WORK_EACH * links.count)
     for _ in range(_STARTS):
-        if best.number == least:
+        if best.number == least or best.work[0] > 0.3 * end:
             break
         noise = 1.0 + _VARIED * random.standard_normal(len(edges))
-        other = merged(start.copy(), edges[np.argsort(-links.weights[edges] * noise)])
+        varied = replace(start.copy(), work=best.work)
+        other = merged(varied, edges[np.argsort(-links.weights[edges] * noise)])
         best = min(best, other, key=_value)
     if best.number > least:
-        best = _Search(best, random).run(
-            least, int(effort * (800 + 2 * links.count))
-        )
-    return _shortened(best)
+        best = _Search(best, random).run(least, end)
+    return _shortened(best, best.work[0] + 0.3 * end)
 
 
 def _longest(edges: Ints, weights: Array) -> Ints:
@@ -90,11 +91,14 @@ class _Search:
         self.around = layout.links.around()
         self.mean = float(layout.links.weights.mean())
 
-    def run(self, least: int, trials: int) -> Layout:
-        """Try so many changes, or until there are as few parts as can be."""
+    def run(self, least: int, end: float) -> Layout:
+        """Change the layout until so much work is done, or there are as few parts as can be."""
         energy = self._energy(self.now)
-        for k in range(trials):
-            heat = _HOT * (_COLD / _HOT) ** (k / trials)
+        work = self.now.work
+        begin = work[0]
+        while work[0] < end:
+            work[0] += 100.0
+            heat = _HOT * (_COLD / _HOT) ** ((work[0] - begin) / max(end - begin, 1.0))
             new = self._changed()
             if new is None:
                 continue
@@ -143,11 +147,11 @@ class _Search:
         corners, own = new.moved(second, new.motion(edge, side))
         if not new.fits(first, corners):
             return None
-        pairs = new.clashes(first, corners, own)
+        pairs = new.clashes(int(new.part[i]), corners, own)
         loose: list[list[int]] = []
         if len(pairs):
             ways = []
-            for root, which in ((j, second[pairs[:, 1]]), (i, first[pairs[:, 0]])):
+            for root, which in ((j, second[pairs[:, 1]]), (i, pairs[:, 0])):
                 blocked = np.unique(links.patch[which])
                 if root not in blocked:
                     subtrees = self._below(new, root, blocked)
@@ -253,7 +257,7 @@ def exchanged(
     return new if new.join(edge) else None
 
 
-def _shortened(layout: Layout) -> Layout:
+def _shortened(layout: Layout, end: float) -> Layout:
     """Exchange long cuts for shorter ones, as far as nothing overlaps."""
     links = layout.links
     around = links.around()
@@ -266,6 +270,8 @@ def _shortened(layout: Layout) -> Layout:
             a, b = layout.part[links.patches[edge]]
             if layout.joined[edge] or a != b:
                 continue
+            if layout.work[0] > end:
+                return layout
             path = _path(layout, around, edge)
             if not path:
                 continue
