@@ -51,8 +51,7 @@ def ears(polygon: Array) -> Ints:
             raise ValueError("the polygon crosses itself, or has no area")
         out.append((a[k], b[k], c[k]))
         ring = np.delete(ring, k)
-    out.append(tuple(ring))
-    return np.array(out, np.int64)
+    return np.array([*out, tuple(ring)], np.int64)
 
 
 def _free(z: np.ndarray, ring: Ints, a: int, b: int, c: int) -> bool:

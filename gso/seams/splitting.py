@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
+from gso.geometry.polygon import rectangle
 from gso.mesh import between
 from gso.mesh.separation import spans
 from gso.mesh.topology import edge_graph
-from gso.geometry.polygon import rectangle
 from gso.seams.sheets import Sheet
 from gso.typing import Array, Ints
 

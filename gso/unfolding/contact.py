@@ -30,9 +30,7 @@ def boxes(corners: Corners) -> Array:
 
 def crossing(own: Array, box: Array) -> Flags:
     """Mark the boxes (4, ...) that cross another one, or others."""
-    return np.asarray(
-        (own[0] < box[2]) & (own[2] > box[0]) & (own[1] < box[3]) & (own[3] > box[1])
-    )
+    return np.asarray((own[0] < box[2]) & (own[2] > box[0]) & (own[1] < box[3]) & (own[3] > box[1]))
 
 
 def around(own: Array) -> Array:

@@ -124,7 +124,7 @@ def join_patches(
     whole = (part[edges.triangles[:, 0]] == part[edges.triangles[:, 1]]) & ~must_cut
     whole &= _coincide(done.corners, edges, SAME * size)
     names = np.unique(part, return_inverse=True)[1].ravel()
-    total = np.bincount(names, area)
+    total = np.asarray(np.bincount(names, area), float)
     rank = np.empty(len(total), np.int64)
     rank[np.argsort(-classes(total), kind="stable")] = np.arange(len(total))
     out = np.stack([done.corners.real, done.corners.imag], axis=-1)
@@ -144,9 +144,7 @@ def _marked(edges: DualEdges, given: ArrayLike, count: int, name: str, triangles
     return np.isin(edge_keys(edges.ends[:, 0], edges.ends[:, 1], count), keys)
 
 
-def _planes(
-    points: Array, triangles: Ints, edges: DualEdges, smooth: Flags
-) -> tuple[Ints, Array]:
+def _planes(points: Array, triangles: Ints, edges: DualEdges, smooth: Flags) -> tuple[Ints, Array]:
     """Return the patches of triangles in common planes, and their flat corners.
 
     Triangles that are not exactly in one plane are patches of their own: they are turned into a
@@ -156,8 +154,8 @@ def _planes(
     patch = label_components(len(triangles), pair[:, 0], pair[:, 1])
     p = points[triangles]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    mean = np.stack([np.bincount(patch, normal[:, d]) for d in range(3)], axis=1)[patch]
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+    total = np.stack([np.bincount(patch, normal[:, d]) for d in range(3)], axis=1)[patch]
+    mean = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
     _, first = np.unique(patch, return_index=True)
     away = np.einsum("tkd,td->tk", p - p[first[patch], 0][:, None], mean)
     far = np.zeros(int(patch.max()) + 1)
@@ -217,7 +215,8 @@ def _first(
         return patch, corners
     one, other = edges.corners()
     area = np.bincount(patch, _areas(corners))
-    links = Links(patch, pair[every], one[every], other[every], size[every], area / area.sum(), sheet)
+    shares = area / area.sum()
+    links = Links(patch, pair[every], one[every], other[every], size[every], shares, sheet)
     layout = Layout.apart(links, corners)
     for number in range(len(every)):
         a, b = layout.part[links.patches[number]]
@@ -254,7 +253,7 @@ def _ordered(
     kinds = [
         classes(np.linalg.norm(way, axis=2).ravel()),
         classes(angle),
-        classes(np.bincount(patch, area))[np.repeat(patch, 3)],
+        classes(np.asarray(np.bincount(patch, area), float))[np.repeat(patch, 3)],
     ]
     walk = canonical_order(triangles, twin, inner, kinds)
     reached = of_half[walk]
@@ -281,9 +280,7 @@ def _linked(
     pair = patch[edges.triangles]
     one, other = edges.corners()
     pair = np.where(turned[:, None], pair[:, ::-1], pair)
-    one, other = (
-        np.where(turned[:, None], x, y) for x, y in ((other, one), (one, other))
-    )
+    one, other = (np.where(turned[:, None], x, y) for x, y in ((other, one), (one, other)))
     reached = np.r_[pair.ravel(), np.arange(int(patch.max()) + 1)]
     names, first = np.unique(reached, return_index=True)
     rank = np.empty(len(names), np.int64)
@@ -310,8 +307,10 @@ def _hinges(
         while len(left) > 1:
             k, left = left[0], left[1:]
             same = pair[left, 0] == pair[k, 0]
-            a, b = (np.where(same[:, None], x, y) for x, y in ((one[left], other[left]),
-                                                               (other[left], one[left])))
+            a, b = (
+                np.where(same[:, None], x, y)
+                for x, y in ((one[left], other[left]), (other[left], one[left]))
+            )
             turn = np.diff(one[k])[0] / np.diff(other[k])[0]
             turn /= abs(turn)
             shift = one[k].mean() - turn * other[k].mean()

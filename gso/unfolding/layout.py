@@ -101,7 +101,7 @@ class Layout:
         return np.flatnonzero((self.part == part)[self.links.patch])
 
     def motion(self, edge: int, side: int) -> tuple[complex, complex]:
-        """Return how the patches on one side of an edge move onto the other: z -> turn z + shift."""
+        """Return how one side of an edge moves onto the other: z -> turn z + shift."""
         here, there = self.links.one[edge], self.links.other[edge]
         if side == 0:
             here, there = there, here

@@ -114,7 +114,7 @@ class _Search:
 
     def _energy(self, layout: Layout) -> float:
         cut = layout.cut / (self.mean * np.sqrt(layout.links.count))
-        return layout.number + 2.0 * layout.spread + _CUT * cut
+        return float(layout.number + 2.0 * layout.spread + _CUT * cut)
 
     def _changed(self) -> Layout | None:
         """Return a changed copy; None where nothing could be changed."""
@@ -150,12 +150,14 @@ class _Search:
         pairs = new.clashes(int(new.part[i]), corners, own)
         loose: list[list[int]] = []
         if len(pairs):
-            ways = []
+            ways: list[tuple[float, int, list[list[int]]]] = []
             for root, which in ((j, second[pairs[:, 1]]), (i, pairs[:, 0])):
                 blocked = np.unique(links.patch[which])
                 if root not in blocked:
                     subtrees = self._below(new, root, blocked)
-                    ways.append((sum(links.areas[x].sum() for x in subtrees), len(ways), subtrees))
+                    ways.append(
+                        (float(sum(links.areas[x].sum() for x in subtrees)), len(ways), subtrees)
+                    )
             if not ways:
                 return None
             loose = min(ways)[2]

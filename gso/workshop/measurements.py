@@ -6,9 +6,9 @@ import numpy as np
 
 from gso import faults, metrics, rulings
 from gso.errors import MeshError
+from gso.geometry.polygon import rectangle
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.geometry.polygon import rectangle
 from gso.typing import Json
 from gso.verdict import Code, Measurement, Reason, compare, merge
 from gso.workshop.fabrication_settings import FabricationSettings

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.geometry.polygon import anticlockwise, arc_lengths
+from gso.geometry.polygon import anticlockwise, arc_lengths, rectangle
 from gso.pattern import Bend
-from gso.geometry.polygon import rectangle
 from gso.typing import Array
 from gso.verdict import Reason
 from gso.workshop.finish import Finish
