@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 from gso.first_use import at_first_use
 
 if TYPE_CHECKING:
-    from gso.unfolding.join_patches import Joined, join_patches
+    from gso.unfolding.patch_joining import Joined, join_patches
     from gso.unfolding.planar_faces import PlanarFaces
     from gso.unfolding.polyhedral_net import Net
-    from gso.unfolding.unfold import net_of, unfold
+    from gso.unfolding.unfold_mesh import net_of, unfold
 
 __all__ = ["Joined", "Net", "PlanarFaces", "join_patches", "net_of", "unfold"]
 
@@ -22,9 +22,9 @@ __all__ = ["Joined", "Net", "PlanarFaces", "join_patches", "net_of", "unfold"]
 __getattr__, __dir__ = at_first_use(
     __name__,
     {
-        "join_patches": "Joined",
+        "patch_joining": "Joined join_patches",
         "planar_faces": "PlanarFaces",
         "polyhedral_net": "Net",
-        "unfold": "net_of",
+        "unfold_mesh": "net_of unfold",
     },
 )

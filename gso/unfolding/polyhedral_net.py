@@ -100,7 +100,7 @@ class Net:
             angle = np.where(keys[at] == own, self.folded.angles[at], 0.0)
         turn, shift = _motions(flat, edges.triangles, edges.ends, angle, len(faces))
         out = np.einsum("tij,tkj->tki", turn, flat[faces]) + shift[:, None]
-        points = flat.copy()
+        points: Array = flat.copy()
         points[faces.ravel()[::-1]] = out.reshape(-1, 3)[::-1]
         return points
 

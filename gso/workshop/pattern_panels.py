@@ -17,7 +17,9 @@ from gso.workshop.matings import across, numbered, of_pattern
 from gso.workshop.panels import Made, Panel
 
 
-def of_surface(name: str, surface: Mesh, pattern: Pattern, record: Json) -> Made:
+def of_surface(
+    name: str, surface: Mesh, pattern: Pattern, record: Json, folded: Folded | None = None
+) -> Made:
     """Divide a surface with a pattern into panels.
 
     Parameters
@@ -28,8 +30,10 @@ def of_surface(name: str, surface: Mesh, pattern: Pattern, record: Json) -> Made
     pattern : Pattern
     record : dict
         What was measured.
+    folded : Folded, optional
+        Edges of the pattern to bend along.
     """
-    panels, label, local = _divided(surface.vertices, pattern, Folded())
+    panels, label, local = _divided(surface.vertices, pattern, folded or Folded())
     matings = of_pattern(surface.vertices, pattern, label, local)
     return Made(name, _named(panels, [name] * len(panels)), numbered(matings), record)
 

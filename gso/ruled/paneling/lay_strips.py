@@ -13,7 +13,6 @@ from gso.components import split
 from gso.constraints import Constraint
 from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning, GSOError, MeshError
-from gso.geometry.polygon import rectangle
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pipeline.judgement import add_reasons, violation_of, warning
@@ -24,7 +23,7 @@ from gso.ruled.paneling.options import MOST, Options
 from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import case_of, check_whole, of_surface
-from gso.seams import Edges, Segmentation, cut
+from gso.seams import Edges, Segmentation, cut, rectangle
 from gso.solver import Callback
 from gso.status import Status
 from gso.tasks import Limits

@@ -18,7 +18,7 @@ from gso.mesh.validation import checked_vertices
 from gso.pattern import Folded, Pattern
 from gso.quantities import Length, as_positive, as_sheet
 from gso.typing import Array, Ints, MeshLike
-from gso.unfolding.join_patches import Joined, join_patches
+from gso.unfolding.patch_joining import Joined, join_patches
 from gso.unfolding.planar_faces import PlanarFaces
 from gso.unfolding.polyhedral_net import Net
 
