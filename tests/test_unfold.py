@@ -198,8 +198,8 @@ def test_box_with_a_lid(angle):
     assert len(net) == 1
     assert len(net.angles) == 5
     assert net.areas.sum() == pytest.approx(2 * 60 * 40 + 2 * 25 * (60 + 40))
-    lid = net.angles[np.argmin(np.abs(np.abs(net.angles) - abs(angle - 90.0)))]
-    assert lid == pytest.approx(angle - 90.0, abs=1e-9)
+    lid = net.angles[np.argmin(np.abs(np.abs(net.angles) - abs(90.0 - angle)))]
+    assert lid == pytest.approx(90.0 - angle, abs=1e-9)
 
 
 def test_concave_faces_keep_their_area_from_every_corner():
@@ -223,10 +223,10 @@ def test_folds_say_up_and_down():
     assert len(net) == 1
     assert np.ptp(net.pattern.flat, axis=0).tolist() == pytest.approx([100.0, 100.0])
     order = np.argsort(
-        net.mesh.vertices[net.pattern.vertex[net.folded.edges[:, 0]], 0], kind="stable"
+        net.mesh.vertices[net.pattern.vertex[net.folds.edges[:, 0]], 0], kind="stable"
     )
     assert sorted(net.angles[order].round(9).tolist()) == [-90.0, -90.0, 90.0, 90.0]
-    top = np.isclose(net.mesh.vertices[net.pattern.vertex[net.folded.edges]][:, :, 2], 15).all(
+    top = np.isclose(net.mesh.vertices[net.pattern.vertex[net.folds.edges]][:, :, 2], 15).all(
         axis=1
     )
     assert net.angles[top].tolist() == pytest.approx([90.0, 90.0])

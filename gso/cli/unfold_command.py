@@ -116,7 +116,7 @@ def drawn(net: Net, name: str, unit: str) -> Drawing:
     from gso.workshop.output_files import beside
     from gso.workshop.pattern_panels import of_surface
 
-    made = of_surface(spelled(name), net.mesh, net.pattern, {}, net.folded)
+    made = of_surface(spelled(name), net.mesh, net.pattern, {}, net.folds)
     finish = Finish(notches=None)
     return beside(parts_from(fitted(made, millimetres(unit), finish), finish))
 
@@ -129,7 +129,7 @@ def text(net: Net, unit: str) -> list[str]:
 
     part = np.empty(len(net.pattern.flat), np.int64)
     part[net.pattern.faces] = net.part[:, None]
-    folds = np.bincount(part[net.folded.edges[:, 0]], minlength=len(net))
+    folds = np.bincount(part[net.folds.edges[:, 0]], minlength=len(net))
     rows: list[tuple[str, ...]] = [("part", f"area {unit}2", "folds")]
     for k, area in enumerate(net.areas.tolist()):
         rows.append((str(k + 1), f"{area:.6g}", str(folds[k])))

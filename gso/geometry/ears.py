@@ -36,6 +36,8 @@ def ears(polygon: Array) -> Ints:
     """
     way = 1.0 if signed_area(polygon) > 0 else -1.0
     z = polygon @ np.array([1.0, 1j * way])
+    if _crosses(z):
+        raise ValueError("the polygon crosses itself")
     least = _STRAIGHT * float(np.ptp(polygon, axis=0).max()) ** 2
     ring = np.arange(len(z))
     out = []
@@ -52,6 +54,15 @@ def ears(polygon: Array) -> Ints:
         out.append((a[k], b[k], c[k]))
         ring = np.delete(ring, k)
     return np.array([*out, tuple(ring)], np.int64)
+
+
+def _crosses(z: np.ndarray) -> bool:
+    """Tell whether two sides of a polygon cross each other between their ends."""
+    p, q = z[:, None], np.roll(z, -1)[:, None]
+    a, b = z[None], np.roll(z, -1)[None]
+    one = np.sign(_cross(q - p, a - p)) * np.sign(_cross(q - p, b - p))
+    other = np.sign(_cross(b - a, p - a)) * np.sign(_cross(b - a, q - a))
+    return bool(((one < 0) & (other < 0)).any())
 
 
 def _free(z: np.ndarray, ring: Ints, a: int, b: int, c: int) -> bool:

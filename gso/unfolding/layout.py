@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from gso.geometry.polygon import rectangle
+from gso.mesh.topology import label_components
 from gso.typing import Array, Flags, Ints
 from gso.unfolding.contact import Corners, around, boxes, crossing, overlapping
 
@@ -43,6 +45,11 @@ class Links:
     def count(self) -> int:
         """Number of patches."""
         return len(self.areas)
+
+    @cached_property
+    def least(self) -> int:
+        """Number of parts if nothing overlapped."""
+        return int(label_components(self.count, *self.patches.T).max()) + 1
 
     def around(self) -> list[list[tuple[int, int]]]:
         """Return the edges of each patch, and the patches behind them."""

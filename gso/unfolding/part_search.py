@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from gso.mesh.topology import label_components
 from gso.typing import Array, Ints
 from gso.unfolding.canonical_order import classes
-from gso.unfolding.layout import Layout, Links
+from gso.unfolding.layout import Layout
 
 #: How many times orders of the edges are varied, and by how much their lengths.
 _STARTS, _VARIED = 4, 0.3
@@ -52,7 +51,7 @@ def searched(start: Layout, seed: int, effort: float) -> Layout:
     best = merged(start.copy(), _longest(edges, links.weights))
     if effort <= 0:
         return best
-    least = _least(links, edges)
+    least = links.least
     random = np.random.default_rng(seed)
     end = effort * (_WORK + _WORK_EACH * links.count)
     for _ in range(_STARTS):
@@ -70,11 +69,6 @@ def searched(start: Layout, seed: int, effort: float) -> Layout:
 def _longest(edges: Ints, weights: Array) -> Ints:
     """Return edges in the order of their weights, the largest first; equal ones stay in order."""
     return edges[np.argsort(-classes(weights[edges]), kind="stable")]
-
-
-def _least(links: Links, edges: Ints) -> int:
-    """Return the number of parts if nothing overlapped."""
-    return int(label_components(links.count, *links.patches[edges].T).max()) + 1
 
 
 def _value(layout: Layout) -> tuple[int, float]:

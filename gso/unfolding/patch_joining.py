@@ -17,6 +17,8 @@ from gso.unfolding.part_search import searched
 
 #: Distance, relative to the size, within which two flat copies of an edge are one.
 SAME = 1e-7
+#: How much longer a cut through a flat face counts.
+_FLAT_CUT = 4.0
 #: Distance from their plane, relative to the size, up to which triangles are projected to it.
 _PLANE = 1e-12
 
@@ -96,7 +98,9 @@ def join_patches(
         a, b = edges.ends[both][0]
         raise OptionError(f"edge {a}-{b} is in keep and in cut; leave it out of one of them")
     smooth = (np.abs(edges.angles) <= np.radians(flat_angle)) & ~must_cut
+    rigid = patch
     if patch is None or flat is None:
+        rigid = np.arange(len(triangles))
         patch, flat = _planes(points, triangles, edges, smooth)
     corners = np.asarray(flat, float) @ np.array([1.0, 1j])
     _check_upright(corners)
@@ -112,15 +116,30 @@ def join_patches(
             f"edge {a}-{b} cannot be kept: the faces beside it overlap when they are laid flat "
             "with all edges in keep; leave some of them out"
         )
-    area = _areas(corners)
     if sheet is not None:
         _check_sheet(corners, patch, sheet, triangles)
-    order, turned = _ordered(triangles, points, patch, edges, inside, area)
-    free = ~(same | must_cut)[order]
-    chosen = edges.taken(order[free])
-    links = _linked(patch, chosen, turned[free], area, corners, SAME * size, sheet)
-    done = searched(Layout.apart(links, corners), seed, effort)
-    part = done.part[links.patch]
+
+    def found(patch: Ints) -> Layout:
+        same = patch[edges.triangles[:, 0]] == patch[edges.triangles[:, 1]]
+        inside = same & ~must_cut & _coincide(corners, edges, SAME * size)
+        order, turned = _ordered(triangles, points, patch, edges, inside, area)
+        free = ~(same | must_cut)[order]
+        chosen = edges.taken(order[free])
+        worth = np.where(smooth[order[free]], _FLAT_CUT, 1.0)
+        links = _linked(patch, chosen, turned[free], worth, area, corners, SAME * size, sheet)
+        return searched(Layout.apart(links, corners), seed, effort)
+
+    area = _areas(corners)
+    done = found(patch)
+    ringed = _ringed(patch, edges, inside)[patch]
+    if effort > 0 and ringed.any() and done.number > done.links.least:
+        # What bounds a hole of a flat face may have no room in it: the face is then opened.
+        pair = rigid[edges.triangles] if rigid is not None else patch[edges.triangles]
+        held = (must_keep & inside) | (pair[:, 0] == pair[:, 1]) | ~ringed[edges.triangles[:, 0]]
+        held &= same
+        one, other = edges.triangles[held].T
+        done = min(done, found(label_components(len(triangles), one, other)), key=_number)
+    part = done.part[done.links.patch]
     whole = (part[edges.triangles[:, 0]] == part[edges.triangles[:, 1]]) & ~must_cut
     whole &= _coincide(done.corners, edges, SAME * size)
     names = np.unique(part, return_inverse=True)[1].ravel()
@@ -129,6 +148,22 @@ def join_patches(
     rank[np.argsort(-classes(total), kind="stable")] = np.arange(len(total))
     out = np.stack([done.corners.real, done.corners.imag], axis=-1)
     return Joined(out, rank[names], edges, whole)
+
+
+def _number(layout: Layout) -> int:
+    return layout.number
+
+
+def _ringed(patch: Ints, edges: DualEdges, inside: Flags) -> Flags:
+    """Mark the patches that have holes: those whose Euler characteristic is below 1."""
+    one, other = edges.corners()
+    corner = label_components(3 * len(patch), one[inside].ravel(), other[inside].ravel())
+    _, first = np.unique(corner, return_index=True)
+    count = int(patch.max()) + 1
+    vertices = np.bincount(np.repeat(patch, 3)[first], minlength=count)
+    joints = np.bincount(patch[edges.triangles[inside, 0]], minlength=count)
+    # A triangle has three edges, of which two triangles share one.
+    return np.asarray(vertices - 2 * np.bincount(patch, minlength=count) + joints < 1)
 
 
 def _marked(edges: DualEdges, given: ArrayLike, count: int, name: str, triangles: Ints) -> Flags:
@@ -267,6 +302,7 @@ def _linked(
     patch: Ints,
     edges: DualEdges,
     turned: Flags,
+    worth: Array,
     area: Array,
     corners: np.ndarray,
     distance: float,
@@ -287,7 +323,7 @@ def _linked(
     rank[np.argsort(first)] = np.arange(len(names))
     patch, pair = rank[patch], rank[pair]
     flat = corners.reshape(-1)
-    length = np.abs(np.diff(flat[one], axis=1)).ravel()
+    length = worth * np.abs(np.diff(flat[one], axis=1)).ravel()
     kept, weights = _hinges(pair, flat[one], flat[other], length, distance)
     shares = np.bincount(patch, area) / area.sum()
     return Links(patch, pair[kept], one[kept], other[kept], weights, shares, sheet)

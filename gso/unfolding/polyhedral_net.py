@@ -33,7 +33,9 @@ class Net:
         Part of each triangle; 0 is the largest part.
     folded : Folded
         The edges to fold along, as vertices of the pattern. Angles are positive for mountain folds;
-        radii are 0.
+        radii are 0. There are small ones in faces that are not exactly flat, see :attr:`folds`.
+    flat_angle : float
+        Angle in degrees up to which an edge counts as flat.
     notes : tuple of str
         What was found or changed.
     """
@@ -44,13 +46,14 @@ class Net:
     pattern: Pattern
     part: Ints
     folded: Folded
+    flat_angle: float = 0.0
     notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return int(self.part.max()) + 1
 
     def __repr__(self) -> str:
-        folds, cuts = len(self.folded.edges), len(self.pattern.seams)
+        folds, cuts = len(self.folds.edges), len(self.pattern.seams)
         return f"Net({len(self)} parts, {folds} folds, {cuts} edges cut)"
 
     @cached_property
@@ -61,10 +64,16 @@ class Net:
         area = 0.5 * (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
         return np.asarray(np.bincount(self.part, area), float)
 
+    @cached_property
+    def folds(self) -> Folded:
+        """The folds that are drawn: edges that do not count as flat."""
+        bent = np.abs(self.folded.angles) > np.radians(self.flat_angle)
+        return Folded(*(values[bent] for values in self.folded))
+
     @property
     def angles(self) -> Array:
-        """Angles of the folds in degrees, (f,): positive for mountain folds."""
-        return np.asarray(np.degrees(self.folded.angles))
+        """Angles of :attr:`folds` in degrees, (f,): positive for mountain folds."""
+        return np.asarray(np.degrees(self.folds.angles))
 
     @property
     def cut_edges(self) -> Ints:

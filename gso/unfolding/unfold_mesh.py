@@ -25,6 +25,8 @@ from gso.unfolding.polyhedral_net import Net
 #: A surface, or vertices and polygons with any number of corners.
 Polygons: TypeAlias = "MeshLike | tuple[ArrayLike, Sequence[Sequence[int]]]"
 
+#: Angle in radians up to which an edge is exactly flat.
+_LEVEL = 1e-10
 #: Gap between parts that are laid side by side, as a share of the largest.
 _GAP = 0.05
 
@@ -178,9 +180,18 @@ def net_of(faces: PlanarFaces, joined: Joined, flat_angle: float) -> Net:
     flat = _laid(joined.flat, joined.part).reshape(-1, 2)[first]
     seams = np.stack([corner[one[~whole]], corner[other[~whole]]], axis=1)
     pattern = Pattern(flat, corner.reshape(-1, 3), triangles.ravel()[first], seams)
-    bent = whole & (np.abs(edges.angles) > np.radians(flat_angle))
+    bent = whole & (np.abs(edges.angles) > _LEVEL)
     folded = Folded(corner[one[bent]], edges.angles[bent], np.zeros(int(bent.sum())))
-    return Net(faces.mesh, faces.face, faces.vertex, pattern, joined.part, folded, faces.mesh.notes)
+    return Net(
+        faces.mesh,
+        faces.face,
+        faces.vertex,
+        pattern,
+        joined.part,
+        folded,
+        flat_angle,
+        faces.mesh.notes,
+    )
 
 
 def _laid(flat: Array, part: Ints) -> Array:
