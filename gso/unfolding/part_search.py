@@ -19,8 +19,9 @@ _HOT, _COLD = 0.15, 0.003
 _CUT = 0.02
 #: Largest number of edges along which a subtree is tried to be joined again.
 _TRIES = 8
-#: Work of the search, and more of it for each patch, in microseconds about.
-_WORK, _WORK_EACH = 5e5, 1.2e3
+#: Work of the search in microseconds about, more of it for each patch, and for each pair of patches
+#: up to a bound.
+_WORK, _WORK_EACH, _WORK_PAIR, _WORK_PAIRS = 3e5, 1e3, 0.3, 7.5e6
 #: Largest number of passes that shorten cuts.
 _PASSES = 3
 
@@ -53,7 +54,8 @@ def searched(start: Layout, seed: int, effort: float) -> Layout:
         return best
     least = links.least
     random = np.random.default_rng(seed)
-    end = effort * (_WORK + _WORK_EACH * links.count)
+    pairs = min(_WORK_PAIR * links.count**2, _WORK_PAIRS)
+    end = effort * (_WORK + _WORK_EACH * links.count + pairs)
     for _ in range(_STARTS):
         if best.number == least or best.work[0] > 0.3 * end:
             break

@@ -182,15 +182,11 @@ def net_of(faces: PlanarFaces, joined: Joined, flat_angle: float) -> Net:
     pattern = Pattern(flat, corner.reshape(-1, 3), triangles.ravel()[first], seams)
     bent = whole & (np.abs(edges.angles) > _LEVEL)
     folded = Folded(corner[one[bent]], edges.angles[bent], np.zeros(int(bent.sum())))
+    notes = faces.mesh.notes
+    if opened := int((~whole & (np.abs(edges.angles) <= np.radians(flat_angle))).sum()):
+        notes += (f"{opened} edges in flat faces were cut, as asked for or to save parts",)
     return Net(
-        faces.mesh,
-        faces.face,
-        faces.vertex,
-        pattern,
-        joined.part,
-        folded,
-        flat_angle,
-        faces.mesh.notes,
+        faces.mesh, faces.face, faces.vertex, pattern, joined.part, folded, flat_angle, notes
     )
 
 
