@@ -219,6 +219,38 @@ def test_concave_faces_keep_their_area_from_every_corner():
         assert net.areas.tolist() == pytest.approx([100.0])
 
 
+def test_faces_with_holes_and_straight_corners():
+    """A hole that a bridge joins to the outline, and stairs with points on straight sides."""
+    square = np.array([[0, 0], [4, 0], [4, 4], [0, 4], [1, 1], [1, 3], [3, 3], [3, 1.0]])
+    net = made(np.pad(square, ((0, 0), (0, 1))), [[0, 1, 2, 3, 0, 4, 5, 6, 7, 4]])
+    assert net.areas.tolist() == pytest.approx([12.0])
+    assert len(net.cut_edges) == 0
+    k = np.arange(1.0, 13.0)
+    up = np.stack([np.repeat(k, 2) - np.tile([1.0, 0.0], 12), np.repeat(k, 2)], axis=1)
+    outline = np.r_[[[0.0, 0.0]], up, [[12.0, 6.0], [12.0, 0.0], [6.0, 0.0], [3.0, 0.0]]][::-1]
+    net = made(*prism(outline, 5.0))
+    assert len(net) == 1
+    assert net.areas.sum() == pytest.approx(2 * 78 + 5 * (4 * 12))
+
+
+@pytest.mark.parametrize("suffix", ["obj", "off"])
+def test_files_with_concave_polygons(tmp_path, suffix):
+    points, faces = gear(9)
+    rows = [" ".join(f"{x:.17g}" for x in p) for p in points]
+    start = 1 if suffix == "obj" else 0
+    table = [[start + k for k in face] for face in faces]
+    text = [f"v {row}" for row in rows] + ["f " + " ".join(map(str, face)) for face in table]
+    if suffix == "off":
+        text = ["OFF", f"{len(points)} {len(faces)} 0", *rows]
+        text += [f"{len(face)} " + " ".join(map(str, face)) for face in table]
+    path = tmp_path / f"gear.{suffix}"
+    path.write_text("\n".join(text) + "\n")
+    net = check(gso.unfold(path))
+    own = made(points, faces)
+    assert (len(net), len(net.angles)) == (1, 37)
+    assert net.areas.sum() == pytest.approx(own.areas.sum(), rel=1e-12)
+
+
 def test_folds_say_up_and_down():
     """A hat section: two folds each way, with the angles that it was made with."""
     x = np.array([0.0, 20.0, 20.0, 50.0, 50.0, 70.0])

@@ -65,7 +65,9 @@ def _models() -> dict[str, _Model]:
 def _hull(points: Array) -> _Model:
     made = ConvexHull(points)
     p = points[made.simplices]
-    out = np.einsum("td,td->t", np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), made.equations[:, :3])
+    out = np.einsum(
+        "td,td->t", np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), made.equations[:, :3]
+    )
     return points, np.where((out > 0)[:, None], made.simplices, made.simplices[:, ::-1])
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 
 import numpy as np
 
 from gso.errors import MeshError
-from gso.typing import AnyPath, Array, Ints
+from gso.geometry.ears import ears, in_plane
+from gso.typing import AnyPath, Array, Flags, Ints
 
 # Largest number of fan apexes tried per polygon, because the work is quadratic.
 _MOST_APEXES = 64
@@ -57,7 +59,8 @@ def face_table(corners: Ints, count: Ints, points: Array) -> tuple[Ints, tuple[s
         Vertex indices, polygon after polygon.
     count : ndarray of int, (p,)
         Corners of each polygon, at least three. A polygon with five or more corners is
-        replaced by a triangle fan at its place in the sequence.
+        replaced by a triangle fan at its place in the sequence, or where a fan leaves it by other
+        triangles inside.
     points : ndarray, (n, 3)
         The vertices. The apex of a fan is the corner that maximises the smallest triangle
         area (signed by the polygon normal), which avoids degenerate triangles at collinear
@@ -83,10 +86,11 @@ def face_corners(corners: Ints, count: Ints, points: Array) -> tuple[Ints, Ints,
     """
     first = np.cumsum(count) - count
     many = count > 4
-    apex = np.zeros_like(count)
+    apex, fan = np.zeros_like(count), np.ones(count.size, bool)
     for size in np.unique(count[many]):
         same = np.flatnonzero(count == size)
-        apex[same] = _fan_apex(points[corners[first[same][:, None] + np.arange(size)]])
+        rings = points[corners[first[same][:, None] + np.arange(size)]]
+        apex[same], fan[same] = _fan_apex(rings)
     pieces = np.where(many, count - 2, 1)
     polygon = np.repeat(np.arange(count.size), pieces)
     piece = ranges(np.zeros_like(pieces), pieces)
@@ -97,6 +101,11 @@ def face_corners(corners: Ints, count: Ints, points: Array) -> tuple[Ints, Ints,
         p = polygon[inside]
         turn = apex[p] + (piece[inside] + k if k else 0)
         table[inside, k] = first[p] + turn % count[p]
+    for p in np.flatnonzero(~fan).tolist():
+        # A fan of a concave polygon would leave it.
+        ring = first[p] + np.arange(count[p])
+        with suppress(ValueError):
+            table[polygon == p, :3] = ring[ears(in_plane(points[corners[ring]]))]
     if not many.any():
         return table, polygon, ()
     note = (
@@ -106,8 +115,11 @@ def face_corners(corners: Ints, count: Ints, points: Array) -> tuple[Ints, Ints,
     return table, polygon, (note,)
 
 
-def _fan_apex(rings: Array) -> Ints:
-    """Return the best fan apex of each polygon (n, k, 3): the smallest triangle is largest."""
+def _fan_apex(rings: Array) -> tuple[Ints, Flags]:
+    """Return the best fan apex of each polygon (n, k, 3), and whether no triangle is inverted.
+
+    It is the apex whose smallest triangle is largest.
+    """
     with np.errstate(all="ignore"):
         p = rings - rings.mean(axis=1, keepdims=True)
         normal = np.cross(p, np.roll(p, -1, axis=1)).sum(axis=1, keepdims=True)
@@ -119,4 +131,4 @@ def _fan_apex(rings: Array) -> Ints:
             smallest = (area * normal).sum(axis=2).min(axis=1)
             better = smallest > best
             best[better], apex[better] = smallest[better], k
-    return apex
+    return apex, np.isnan(best) | (best >= 0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gso.errors import MeshError
-from gso.geometry.ears import ears
+from gso.geometry.ears import ears, in_plane
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys, label_components
 from gso.typing import Array, Ints
@@ -94,7 +94,7 @@ def _triangles(points: Array, polygons: Sequence[Sequence[int]]) -> tuple[Ints, 
     for k in np.flatnonzero(size > 4).tolist():
         own = corners[first[k] : first[k] + size[k]]
         try:
-            table.append(own[ears(_plane(points[own]))])
+            table.append(own[ears(in_plane(points[own]))])
         except ValueError as error:
             raise MeshError(f"face {k} cannot be divided into triangles: {error}") from None
         face.append(np.full(size[k] - 2, k))
@@ -120,19 +120,6 @@ def _halves(points: Array, first: Ints, corners: Ints) -> tuple[Ints, Ints]:
     odd = np.where(at_even == at_odd, shorter, at_odd)
     quad = np.where(odd[:, None], np.roll(quad, -1, axis=1), quad)
     return quad[:, [0, 1, 2]], quad[:, [0, 2, 3]]
-
-
-def _plane(polygon: Array) -> Array:
-    """Return a polygon (k, 3) in its plane, (k, 2)."""
-    p = polygon - polygon.mean(axis=0)
-    normal = np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)
-    size = float(np.linalg.norm(normal))
-    if size == 0.0:
-        raise ValueError("it has no area")
-    normal /= size
-    x = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
-    x /= np.linalg.norm(x)
-    return np.stack([p @ x, p @ np.cross(normal, x)], axis=1)
 
 
 def _bent(points: Array, triangles: Ints, face: Ints) -> Ints:
