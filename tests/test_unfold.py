@@ -15,6 +15,7 @@ import gso
 from gso import Mesh, MeshError, OptionError
 from gso.cli import main
 from gso.unfolding import join_patches
+from gso.workshop import Finish, fitted, of_net, parts_from
 
 GOLD = 0.5 * (1.0 + np.sqrt(5.0))
 ROOT = np.sqrt(2.0)
@@ -437,6 +438,28 @@ def test_bad_input_is_refused():
         gso.unfold((np.eye(3), [[0, 1, 2]]), effort=-1.0)
     with pytest.raises(OptionError, match="seed"):
         gso.unfold((np.eye(3), [[0, 1, 2]]), seed=-1)
+
+
+@pytest.mark.parametrize("model", [ball(60), gear(9), box(110.0), nut(6)])
+def test_parts_of_the_workshop_lose_no_fold_and_no_area(model):
+    net = made(*model)
+    finish = Finish(notches=None)
+    parts = parts_from(fitted(of_net("it", net), 10.0, finish), finish)
+    assert len(parts) == len(net)
+    p = net.mesh.vertices[net.mesh.faces]
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    assert sum(part.area for part in parts) == pytest.approx(50.0 * area.sum(), rel=1e-9)
+    # The angles of the design at all edges, without those that were cut.
+    he = net.mesh.half_edges
+    k = he.interior
+    one, other = (normal / area[:, None])[np.stack([he.face[k], he.face[he.twin[k]]])]
+    angle = np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), (one * other).sum(axis=1))
+    cut = {tuple(sorted(edge)) for edge in net.cut_edges.tolist()}
+    edges = np.sort(np.stack([he.origin[k], he.dest[k]], axis=1), axis=1).tolist()
+    folded = np.array([tuple(edge) not in cut for edge in edges]) & (angle > np.radians(0.01))
+    drawn = sum(abs(bend.angle) for part in parts for bend in part.bends)
+    assert drawn == pytest.approx(angle[folded].sum(), rel=1e-9)
 
 
 @pytest.mark.parametrize("suffix", ["svg", "dxf", "pdf"])

@@ -111,12 +111,11 @@ def _edges(given: tuple[str, ...], name: str) -> Ints:
 def drawn(net: Net, name: str, unit: str) -> Drawing:
     """Return the parts of a net side by side, in millimetres."""
     from gso.quantities import millimetres
-    from gso.workshop import Finish, fitted, parts_from
+    from gso.workshop import Finish, fitted, of_net, parts_from
     from gso.workshop.names import spelled
     from gso.workshop.output_files import beside
-    from gso.workshop.pattern_panels import of_surface
 
-    made = of_surface(spelled(name), net.mesh, net.pattern, {}, net.folds)
+    made = of_net(spelled(name), net)
     finish = Finish(notches=None)
     return beside(parts_from(fitted(made, millimetres(unit), finish), finish))
 

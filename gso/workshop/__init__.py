@@ -15,6 +15,7 @@ from gso.workshop.nesting import nest
 from gso.workshop.panels import Panel
 from gso.workshop.part import Drawing, Label, Notch, Part
 from gso.workshop.parts import fitted, parts_from
+from gso.workshop.pattern_panels import of_net
 from gso.workshop.thickness import Thickness, thickened
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "fitted",
     "made",
     "nest",
+    "of_net",
     "parts_from",
     "thickened",
 ]
