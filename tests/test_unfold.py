@@ -426,6 +426,16 @@ def test_time(count, seconds, parts):
     check(net)
 
 
+def test_flat_surfaces_that_cover_themselves_are_divided():
+    """A flat ramp of five quarters of a turn, and single triangles."""
+    angle = np.radians(15.0) * np.arange(31)
+    both = [r * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) for r in (1.0, 2.0)]
+    net = made(np.concatenate(both), [[k, 31 + k, 32 + k, k + 1] for k in range(30)])
+    assert len(net) == 2
+    net = made(np.r_[np.eye(3), np.eye(3) + 5.0], [[0, 1, 2], [3, 4, 5]])
+    assert net.areas.tolist() == pytest.approx([0.5 * np.sqrt(3.0)] * 2)
+
+
 def test_bad_input_is_refused():
     with pytest.raises(MeshError, match="face 0 has 2 corners"):
         gso.unfold((np.eye(3), [[0, 1]]))

@@ -11,6 +11,7 @@ from gso.errors import MeshError, OptionError
 from gso.mesh.topology import edge_keys, label_components
 from gso.typing import Array, Flags, Ints
 from gso.unfolding.canonical_order import canonical_order, classes
+from gso.unfolding.contact import boxes, overlapping
 from gso.unfolding.dual_edges import DualEdges, dual_edges
 from gso.unfolding.layout import Layout, Links, within
 from gso.unfolding.part_search import searched
@@ -182,8 +183,8 @@ def _marked(edges: DualEdges, given: ArrayLike, count: int, name: str, triangles
 def _planes(points: Array, triangles: Ints, edges: DualEdges, smooth: Flags) -> tuple[Ints, Array]:
     """Return the patches of triangles in common planes, and their flat corners.
 
-    Triangles that are not exactly in one plane are patches of their own: they are turned into a
-    plane one by one, so that no length changes.
+    Triangles that are not exactly in one plane, or overlap in it, are patches of their own: they
+    are turned into a plane one by one, so that no length changes.
     """
     pair = edges.triangles[smooth]
     patch = label_components(len(triangles), pair[:, 0], pair[:, 1])
@@ -205,9 +206,23 @@ def _planes(points: Array, triangles: Ints, edges: DualEdges, smooth: Flags) -> 
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     y = np.cross(mean, x)
     way = p - origin[:, None]
-    return patch, np.stack(
-        [np.einsum("tkd,td->tk", way, x), np.einsum("tkd,td->tk", way, y)], axis=-1
-    )
+    flat = np.stack([np.einsum("tkd,td->tk", way, x), np.einsum("tkd,td->tk", way, y)], axis=-1)
+    return _once(patch, flat), flat
+
+
+def _once(patch: Ints, flat: Array) -> Ints:
+    """Divide patches that cover a part of their plane twice into their triangles."""
+    corners = flat @ np.array([1.0, 1j])
+    out = patch.copy()
+    order = np.argsort(patch, kind="stable")
+    for own in np.split(order, np.flatnonzero(np.diff(patch[order])) + 1):
+        if len(own) < 3:
+            continue
+        some = corners[own]
+        pairs = overlapping(some, some, boxes(some), boxes(some))
+        if (pairs[:, 0] != pairs[:, 1]).any():
+            out[own] = int(out.max()) + 1 + np.arange(len(own))
+    return out
 
 
 def _check_upright(corners: np.ndarray) -> None:

@@ -149,6 +149,8 @@ def _motions(flat: Array, pairs: Ints, ends: Ints, angle: Array, count: int) -> 
         for here in order[1:].tolist():
             depth[here] = depth[above[here]] + 1
     below = np.flatnonzero(above >= 0)
+    if not len(below):
+        return turn, shift
     by = np.asarray(graph[below, above[below]]).ravel().astype(np.int64) - 1
     edge = np.full(count, -1)
     edge[below] = by
