@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from gso.tasks.developable.joint_isometry import Options as IsometryOptions
     from gso.tasks.flatten import Options as FlattenOptions
     from gso.tasks.options import Options
+    from gso.unfolding.unfold_mesh import unfold
     from gso.workshop.fabricate import fabricate
 
     __version__: str
@@ -120,6 +121,7 @@ __all__ = [
     "strips",
     "tno",
     "topology",
+    "unfold",
     "verdict",
 ]
 
@@ -145,6 +147,7 @@ _PLACES = {
     "gso.spline.fit": "fit_spline",
     "gso.status": "Progress Status",
     "gso.tasks.options": "Options",
+    "gso.unfolding.unfold_mesh": "unfold",
     "gso.workshop.fabricate": "fabricate",
 }
 _NAMES = {name: module for module, names in _PLACES.items() for name in names.split()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from numbers import Real
 from typing import TypeAlias
 
@@ -123,6 +124,20 @@ def millimetres(unit: str, name: str = "unit") -> float:
     if unit not in MILLIMETRES:
         raise OptionError(f"{name}: unknown unit {unit!r}; {choices(unit, MILLIMETRES)}")
     return MILLIMETRES[unit]
+
+
+def as_sheet(sheet: Sequence[Length] | None, unit: str) -> tuple[float, float] | None:
+    """Return length and width of a sheet in the unit of a mesh; numbers are in millimetres.
+
+    >>> as_sheet((3000, "1.5m"), "m")
+    (3.0, 1.5)
+    """
+    if sheet is None:
+        return None
+    if isinstance(sheet, str) or len(sheet) != 2:
+        raise OptionError(f"sheet is {sheet!r}; it must be length and width of a sheet")
+    long, wide = (as_length(side, "sheet", diagonal=math.nan) / millimetres(unit) for side in sheet)
+    return long, wide
 
 
 def _split(value: object) -> tuple[float, str]:

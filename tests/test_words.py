@@ -26,6 +26,7 @@ FUNCTIONS = {
     "strips": gso.strips,
     "pieces": gso.pieces,
     "fabricate": gso.fabricate,
+    "unfold": gso.unfold,
 }
 TERMS = (Path(__file__).parents[1] / "docs" / "terms.rst").read_text()
 #: Options that mean the same wherever they are, by the names of Python.
@@ -66,7 +67,7 @@ def test_functions_agree_with_each_other_and_with_the_page_of_terms(name):
     assert len(kinds) <= 1, kinds
 
 
-@pytest.mark.parametrize("command", ["optimize", "strips", "pieces", "fabricate"])
+@pytest.mark.parametrize("command", ["optimize", "strips", "pieces", "fabricate", "unfold"])
 def test_options_of_a_command_have_the_defaults_of_its_function(command):
     given = FUNCTIONS[command].__kwdefaults__
     for param in COMMANDS[command].params:

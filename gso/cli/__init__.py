@@ -11,6 +11,7 @@ from gso.cli.optimize_command import optimize
 from gso.cli.pieces_command import pieces
 from gso.cli.strips_command import strips
 from gso.cli.train import train
+from gso.cli.unfold_command import unfold
 from gso.errors import GSOError
 
 __all__ = ["main"]
@@ -61,9 +62,10 @@ def main() -> None:
     """Make surfaces that can be built from flat sheets.
 
     Make them developable, lay them flat or denoise them (optimize), cut whole designs into pieces
-    (pieces), make exactly developable strips (strips), write what a cutter needs (fabricate).
+    (pieces), make exactly developable strips (strips), make nets of flat faces (unfold), write what
+    a cutter needs (fabricate).
     """
 
 
-for _command in (optimize, strips, pieces, metrics, info, plot, dataset, fabricate, train):
+for _command in (optimize, strips, pieces, unfold, metrics, info, plot, dataset, fabricate, train):
     main.add_command(_command)

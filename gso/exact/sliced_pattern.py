@@ -10,7 +10,7 @@ from gso.mesh.topology import edge_keys, label_components
 from gso.recognition import Recognised
 from gso.seams.slicing import subdivided
 from gso.typing import Array, Ints
-from gso.unfolding.join_patches import Joined
+from gso.unfolding import Joined
 
 #: Space between parts, relative to the size.
 _APART = 0.02

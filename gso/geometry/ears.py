@@ -37,6 +37,8 @@ def ears(polygon: Array) -> Ints:
     way = 1.0 if signed_area(polygon) > 0 else -1.0
     z = polygon @ np.array([1.0, 1j * way])
     least = _STRAIGHT * float(np.ptp(polygon, axis=0).max()) ** 2
+    if _crosses(z, least):
+        raise ValueError("the polygon crosses itself")
     ring = np.arange(len(z))
     out = []
     while len(ring) > 3:
@@ -44,25 +46,78 @@ def ears(polygon: Array) -> Ints:
         area = _cross(z[b] - z[a], z[c] - z[a])
         sides = np.maximum.reduce([abs(z[b] - z[a]), abs(z[c] - z[b]), abs(z[a] - z[c])])
         thin = area / np.maximum(sides, 1e-300) ** 2
-        for k in np.argsort(-thin, kind="stable"):
-            if area[k] > least and _free(z, ring, a[k], b[k], c[k]):
-                break
-        else:
+        best = np.argsort(-thin, kind="stable")
+        best = best[area[best] > least].tolist()
+        # Points on the sides of an ear are in the way only if there is another one.
+        ways = ((k, x) for x in (-least, least) for k in best)
+        found = (k for k, x in ways if _free(z, ring, (a[k], b[k], c[k]), x))
+        k = next(found, int(np.abs(area).argmin()))
+        if area[k] < -least:
             raise ValueError("the polygon crosses itself, or has no area")
         out.append((a[k], b[k], c[k]))
         ring = np.delete(ring, k)
-    out.append(tuple(ring))
-    return np.array(out, np.int64)
+    table = np.array([*out, tuple(ring)], np.int64)
+    for _ in range(4 * len(table)):
+        area = _cross(z[table[:, 1]] - z[table[:, 0]], z[table[:, 2]] - z[table[:, 0]])
+        if area.min() > least:
+            return table
+        _turn_side(z, table, int(area.argmin()))
+    raise ValueError("the polygon crosses itself, or has no area")
 
 
-def _free(z: np.ndarray, ring: Ints, a: int, b: int, c: int) -> bool:
-    """Tell whether no other corner of a ring lies in a triangle or on its sides."""
+def in_plane(polygon: Array) -> Array:
+    """Return a polygon (k, 3) in its plane, (k, 2), from the side where it is anticlockwise.
+
+    Raises
+    ------
+    ValueError
+        It has no area.
+    """
+    p = polygon - polygon.mean(axis=0)
+    normal = np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)
+    size = float(np.linalg.norm(normal))
+    if size == 0.0:
+        raise ValueError("it has no area")
+    normal /= size
+    x = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
+    x /= np.linalg.norm(x)
+    return np.stack([p @ x, p @ np.cross(normal, x)], axis=1)
+
+
+def _free(z: np.ndarray, ring: Ints, ear: tuple[int, int, int], depth: float) -> bool:
+    """Tell whether no other corner of a ring lies in a triangle, deeper than a doubled area."""
+    corners = z[list(ear)]
     others = z[ring]
-    others = others[(others != z[a]) & (others != z[b]) & (others != z[c])]
+    others = others[~np.isin(others, corners)]
     inside = np.ones(len(others), bool)
-    for p, q in ((a, b), (b, c), (c, a)):
-        inside &= _cross(z[q] - z[p], others - z[p]) >= 0
+    for p, q in zip(corners, np.roll(corners, -1), strict=True):
+        inside &= _cross(q - p, others - p) > depth
     return not inside.any()
+
+
+def _turn_side(z: np.ndarray, table: Ints, at: int) -> None:
+    """Turn the longest side of a triangle without area into the other diagonal of its quad."""
+    k = int(np.abs(z[table[at]] - z[np.roll(table[at], -1)]).argmax())
+    a, c, b = np.roll(table[at], -k).tolist()
+    for number, row in enumerate(table.tolist()):
+        for j in range(3):
+            if (row[j], row[(j + 1) % 3]) == (c, a):
+                d = row[(j + 2) % 3]
+                table[at], table[number] = (b, d, c), (b, a, d)
+                return
+    raise ValueError("the polygon crosses itself, or has no area")
+
+
+def _crosses(z: np.ndarray, least: float) -> bool:
+    """Tell whether two sides of a polygon cross each other between their ends."""
+    p, q = z[:, None], np.roll(z, -1)[:, None]
+    a, b = z[None], np.roll(z, -1)[None]
+    sides = (
+        (_cross(q - p, a - p), _cross(q - p, b - p)),
+        (_cross(b - a, p - a), _cross(b - a, q - a)),
+    )
+    apart = [((x > least) & (y < -least)) | ((x < -least) & (y > least)) for x, y in sides]
+    return bool((apart[0] & apart[1]).any())
 
 
 def _cross(p: np.ndarray, q: np.ndarray) -> Array:

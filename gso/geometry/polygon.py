@@ -89,40 +89,6 @@ def rectangle(flat: Array) -> tuple[float, tuple[float, float]]:
     return float(angle[k] + 0.5 * np.pi), (float(high[k]), float(wide[k]))
 
 
-def triangulated(polygon: Array) -> Ints:
-    """Cut a closed polygon (k, 2) into triangles inside it, (k - 2, 3).
-
-    Ears are cut off one by one (Meisters 1975), the best-shaped first. An ear is a triangle of
-    three successive corners that has no other corner inside it or on its border. A polygon that
-    crosses itself has no such triangulation; the triangles are then those of the sharpest corners.
-
-    Parameters
-    ----------
-    polygon : ndarray, (k, 2)
-        Clockwise or anticlockwise; the first point is not repeated.
-
-    Returns
-    -------
-    ndarray of int, (k - 2, 3)
-        Corners, in the direction of the polygon.
-
-    Examples
-    --------
-    >>> arrow = np.array([[4.0, 0], [1, 1], [0, 4], [0, 0]])
-    >>> triangulated(arrow)
-    array([[0, 1, 3],
-           [1, 2, 3]])
-    """
-    points = polygon * ([1.0, 1.0] if signed_area(polygon) >= 0 else [1.0, -1.0])
-    ring = np.arange(len(points))
-    out = []
-    while len(ring) > 3:
-        at = _best_ear(points[ring])
-        out.append(ring[[at - 1, at, (at + 1) % len(ring)]])
-        ring = np.delete(ring, at)
-    return np.array([*out, ring])
-
-
 def reflex_corners(quads: Array) -> Ints:
     """Return the corner at which each quad (m, 4, 3) is not convex, (m,); -1 for convex ones.
 
@@ -140,24 +106,3 @@ def reflex_corners(quads: Array) -> Ints:
         turn = np.einsum("mkd,md->mk", np.cross(before, np.roll(before, -1, axis=1)), normal)
         inwards = turn <= _STRAIGHT * (normal**2).sum(axis=1, keepdims=True)
     return np.where(inwards.sum(axis=1) == 1, inwards.argmax(axis=1), -1)
-
-
-def _best_ear(p: Array) -> int:
-    """Return the corner of an anticlockwise polygon (k, 2) whose ear has the best shape."""
-    before, after = np.roll(p, 1, axis=0), np.roll(p, -1, axis=0)
-    ends = ((before, p), (p, after), (after, before))
-    area = _cross(p - before, after - p)
-    shape = area / np.maximum(sum(((b - a) ** 2).sum(axis=1) for a, b in ends), 1e-300)
-    for at in np.argsort(-shape, kind="stable"):
-        if shape[at] <= 0:
-            break
-        corners = np.array([before[at], p[at], after[at]])
-        other = p[(p[:, None] != corners).any(axis=2).all(axis=1)]
-        sides = [_cross(b[at] - a[at], other - a[at]) for a, b in ends]
-        if not (np.minimum.reduce(sides) >= -1e-12 * area[at]).any():
-            return int(at)
-    return int(shape.argmax())
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

@@ -15,7 +15,7 @@ import os
 import warnings
 from collections.abc import Callable
 from types import ModuleType
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 from gso.errors import MeshError, OptionError
 from gso.io import arrays, glb, obj, off, ply, stl
@@ -42,6 +42,7 @@ __all__ = [
     "checked_weld",
     "left_out",
     "load",
+    "read_surface",
     "replacing",
     "save",
     "save_faces",
@@ -55,6 +56,7 @@ __all__ = [
 ]
 
 
+_Made = TypeVar("_Made")
 #: Reader and writer of a file format.
 _Format = tuple[Callable[[bytes], Surface], Callable[[Mesh, BinaryIO], None]]
 _FORMATS: dict[str, _Format] = {
@@ -120,6 +122,22 @@ def load(path: AnyPath, *, weld: float | None = None) -> Mesh:
     OptionError
         `weld` is not a finite number of 0 or more.
     """
+    return _read(path, lambda surface: surface.mesh(weld))
+
+
+def read_surface(path: AnyPath) -> Surface:
+    """Read the vertices and faces of a mesh file without checking that they are a surface.
+
+    Raises
+    ------
+    MeshError
+        The file is missing, of an unknown format or damaged.
+    """
+    return _read(path, lambda surface: surface)
+
+
+def _read(path: AnyPath, made: Callable[[Surface], _Made]) -> _Made:
+    """Make something of the content of a file; errors name the file."""
     name = os.fsdecode(path)
     suffix = suffix_of(name)
     try:
@@ -127,7 +145,7 @@ def load(path: AnyPath, *, weld: float | None = None) -> Mesh:
             what = f"a {suffix!r} file" if suffix else "a file without a suffix"
             raise MeshError(f"cannot read {what}; use {', '.join(_FORMATS)}")
         data = read_bytes(name)
-        return _FORMATS[suffix][0](data).mesh(weld)
+        return made(_FORMATS[suffix][0](data))
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from error.__cause__
     except MemoryError:

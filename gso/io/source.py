@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 
 import numpy as np
 
 from gso.errors import MeshError
-from gso.geometry.polygon import triangulated
+from gso.geometry.ears import ears, in_plane
 from gso.typing import AnyPath, Array, Flags, Ints
 
 # Largest number of fan apexes tried per polygon, because the work is quadratic.
@@ -158,7 +159,9 @@ def _faces(corners: Ints, count: Ints, points: Array) -> tuple[Ints, Ints]:
     begin = np.cumsum(pieces) - pieces
     for at, ring in clipped:
         own = slice(begin[at], begin[at] + pieces[at])
-        table[own, :3] = first[at] + triangulated(_projected(ring))
+        # A polygon that crosses itself stays a fan.
+        with suppress(ValueError), np.errstate(all="ignore"):
+            table[own, :3] = first[at] + ears(in_plane(ring))
     return table, polygon
 
 
@@ -181,15 +184,3 @@ def _fan_apex(rings: Array) -> tuple[Ints, Flags]:
             best[better], apex[better] = smallest[better], k
         inside = best > _THIN * (normal**2).sum(axis=(1, 2))
     return apex, inside
-
-
-def _projected(ring: Array) -> Array:
-    """Return a polygon (k, 3) seen along its normal, anticlockwise, (k, 2)."""
-    with np.errstate(all="ignore"):
-        p = ring - ring.mean(axis=0)
-        normal = np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)
-        if not (np.isfinite(normal).all() and normal.any()):
-            return np.asarray(p[:, :2])
-        plane = np.linalg.svd(normal[None])[2][1:]
-        plane[1] *= np.sign(normal @ np.cross(*plane))
-        return np.asarray(p @ plane.T)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from gso.cut_pieces import Piece, Pieces
 from gso.first_use import at_first_use
+from gso.geometry.polygon import rectangle
 from gso.seams.cutting import cut
 from gso.seams.kinds import Creases, Edges, Groups, Labels, Path, Seam, Slice
 from gso.seams.polyline_seam import Polyline
@@ -37,6 +38,7 @@ __all__ = [
     "cut",
     "opening",
     "pieces",
+    "rectangle",
 ]
 
 # These import SciPy.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from gso.errors import OptionError
 from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
-from gso.quantities import Length, as_length, as_positive, millimetres
+from gso.quantities import as_positive
 from gso.typing import Array, Ints
 from gso.verdict import Code
 
@@ -75,20 +75,6 @@ class PieceSettings:
             Code.TOO_LONG: long,
             Code.TOO_WIDE: wide,
         }
-
-
-def as_sheet(sheet: Sequence[Length] | None, unit: str) -> tuple[float, float] | None:
-    """Return length and width of a sheet in the unit of a mesh; numbers are in millimetres.
-
-    >>> as_sheet((3000, "1.5m"), "m")
-    (3.0, 1.5)
-    """
-    if sheet is None:
-        return None
-    if isinstance(sheet, str) or np.shape(sheet) != (2,):
-        raise OptionError(f"sheet is {sheet!r}; it must be length and width of a sheet")
-    long, wide = (as_length(side, "sheet", diagonal=np.nan) / millimetres(unit) for side in sheet)
-    return long, wide
 
 
 def too_large(mesh: Mesh, sheet: tuple[float, float]) -> bool:

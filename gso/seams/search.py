@@ -16,7 +16,7 @@ from gso.errors import ConvergenceWarning, OptionError
 from gso.executors import open_executor, processors
 from gso.mesh import Mesh
 from gso.pipeline.component_solves import solve_mesh
-from gso.quantities import Length, Strain, as_length, as_strain
+from gso.quantities import Length, Strain, as_length, as_sheet, as_strain
 from gso.seams.candidates import (
     Candidate,
     cuts,
@@ -30,7 +30,7 @@ from gso.seams.dartless import dartless
 from gso.seams.design_noise import noise
 from gso.seams.kinds import Seam
 from gso.seams.mirror_plane import mirror_of
-from gso.seams.options import CHANGES, STAYS, PieceSettings, as_sheet, prices, too_large
+from gso.seams.options import CHANGES, STAYS, PieceSettings, prices, too_large
 from gso.seams.reshaping import reshaped
 from gso.seams.search_result import packed
 from gso.seams.segmentation import Segmentation

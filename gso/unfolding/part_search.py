@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 
-from gso.mesh.topology import label_components
 from gso.typing import Array, Ints
 from gso.unfolding.canonical_order import classes
-from gso.unfolding.layout import Layout, Links
+from gso.unfolding.layout import Layout
 
 #: How many times orders of the edges are varied, and by how much their lengths.
 _STARTS, _VARIED = 4, 0.3
@@ -18,9 +18,10 @@ _HOT, _COLD = 0.15, 0.003
 #: Weight of the lengths of cut edges, in mean edges.
 _CUT = 0.02
 #: Largest number of edges along which a subtree is tried to be joined again.
-_TRIES = 16
-#: Number of patches up to which the search follows each of several starts.
-_SMALL = 700
+_TRIES = 8
+#: Work of the search in microseconds about, more of it for each patch, and for each pair of patches
+#: up to a bound.
+_WORK, _WORK_EACH, _WORK_PAIR, _WORK_PAIRS = 3e5, 1e3, 0.2, 4e6
 #: Largest number of passes that shorten cuts.
 _PASSES = 3
 
@@ -51,27 +52,25 @@ def searched(start: Layout, seed: int, effort: float) -> Layout:
     best = merged(start.copy(), _longest(edges, links.weights))
     if effort <= 0:
         return best
-    least = _least(links, edges)
+    least = links.least
     random = np.random.default_rng(seed)
+    pairs = min(_WORK_PAIR * links.count**2, _WORK_PAIRS)
+    end = effort * (_WORK + _WORK_EACH * links.count + pairs)
     for _ in range(_STARTS):
-        if best.number == least:
+        if best.number == least or best.work[0] > 0.3 * end:
             break
         noise = 1.0 + _VARIED * random.standard_normal(len(edges))
-        other = merged(start.copy(), edges[np.argsort(-links.weights[edges] * noise)])
+        varied = replace(start.copy(), work=best.work)
+        other = merged(varied, edges[np.argsort(-links.weights[edges] * noise)])
         best = min(best, other, key=_value)
     if best.number > least:
-        best = _Search(best, random).run(least, int(effort * (800 + 2 * links.count)))
-    return _shortened(best)
+        best = _Search(best, random).run(least, end)
+    return _shortened(best, best.work[0] + 0.3 * end)
 
 
 def _longest(edges: Ints, weights: Array) -> Ints:
     """Return edges in the order of their weights, the largest first; equal ones stay in order."""
     return edges[np.argsort(-classes(weights[edges]), kind="stable")]
-
-
-def _least(links: Links, edges: Ints) -> int:
-    """Return the number of parts if nothing overlapped."""
-    return int(label_components(links.count, *links.patches[edges].T).max()) + 1
 
 
 def _value(layout: Layout) -> tuple[int, float]:
@@ -88,11 +87,14 @@ class _Search:
         self.around = layout.links.around()
         self.mean = float(layout.links.weights.mean())
 
-    def run(self, least: int, trials: int) -> Layout:
-        """Try so many changes, or until there are as few parts as can be."""
+    def run(self, least: int, end: float) -> Layout:
+        """Change the layout until so much work is done, or there are as few parts as can be."""
         energy = self._energy(self.now)
-        for k in range(trials):
-            heat = _HOT * (_COLD / _HOT) ** (k / trials)
+        work = self.now.work
+        begin = work[0]
+        while work[0] < end:
+            work[0] += 100.0
+            heat = _HOT * (_COLD / _HOT) ** ((work[0] - begin) / max(end - begin, 1.0))
             new = self._changed()
             if new is None:
                 continue
@@ -108,7 +110,7 @@ class _Search:
 
     def _energy(self, layout: Layout) -> float:
         cut = layout.cut / (self.mean * np.sqrt(layout.links.count))
-        return layout.number + 2.0 * layout.spread + _CUT * cut
+        return float(layout.number + 2.0 * layout.spread + _CUT * cut)
 
     def _changed(self) -> Layout | None:
         """Return a changed copy; None where nothing could be changed."""
@@ -141,15 +143,17 @@ class _Search:
         corners, own = new.moved(second, new.motion(edge, side))
         if not new.fits(first, corners):
             return None
-        pairs = new.clashes(first, corners, own)
+        pairs = new.clashes(int(new.part[i]), corners, own)
         loose: list[list[int]] = []
         if len(pairs):
-            ways = []
-            for root, which in ((j, second[pairs[:, 1]]), (i, first[pairs[:, 0]])):
+            ways: list[tuple[float, int, list[list[int]]]] = []
+            for root, which in ((j, second[pairs[:, 1]]), (i, pairs[:, 0])):
                 blocked = np.unique(links.patch[which])
                 if root not in blocked:
                     subtrees = self._below(new, root, blocked)
-                    ways.append((sum(links.areas[x].sum() for x in subtrees), len(ways), subtrees))
+                    ways.append(
+                        (float(sum(links.areas[x].sum() for x in subtrees)), len(ways), subtrees)
+                    )
             if not ways:
                 return None
             loose = min(ways)[2]
@@ -251,7 +255,7 @@ def exchanged(
     return new if new.join(edge) else None
 
 
-def _shortened(layout: Layout) -> Layout:
+def _shortened(layout: Layout, end: float) -> Layout:
     """Exchange long cuts for shorter ones, as far as nothing overlaps."""
     links = layout.links
     around = links.around()
@@ -264,6 +268,8 @@ def _shortened(layout: Layout) -> Layout:
             a, b = layout.part[links.patches[edge]]
             if layout.joined[edge] or a != b:
                 continue
+            if layout.work[0] > end:
+                return layout
             path = _path(layout, around, edge)
             if not path:
                 continue

@@ -15,6 +15,7 @@ from gso.workshop.nesting import nest
 from gso.workshop.panels import Panel
 from gso.workshop.part import Drawing, Label, Notch, Part
 from gso.workshop.parts import fitted, parts_from
+from gso.workshop.pattern_panels import of_net
 from gso.workshop.tabs import TabSeam, with_tabs
 from gso.workshop.thickness import Thickness, thickened
 
@@ -34,6 +35,7 @@ __all__ = [
     "fitted",
     "made",
     "nest",
+    "of_net",
     "parts_from",
     "thickened",
     "with_tabs",

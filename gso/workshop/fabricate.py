@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 from gso.errors import OptionError
 from gso.io.json_file import plain, write_json
 from gso.mesh import Mesh
-from gso.quantities import Length, Strain, as_length, as_strain, millimetres
-from gso.seams.options import as_sheet
+from gso.quantities import Length, Strain, as_length, as_sheet, as_strain, millimetres
 from gso.typing import AnyPath, Json
 from gso.verdict import Code, Reason, failure, merge, ordered
 from gso.workshop.certificate import design_record, digest, versions

@@ -144,6 +144,8 @@ def _bare(panel: Panel, marks: Sequence[Array], cut: Sequence[Array]) -> Part:
 def drawn(bends: Sequence[Bend]) -> tuple[Bend, ...]:
     """Return the bends that are drawn: small ones are added to the next, so that none is lost.
 
+    Folds, whose radius is 0, are drawn in any case.
+
     >>> line = np.zeros((2, 2))
     >>> some = [Bend(line, np.radians(x), 9.0) for x in (0.15, 0.1, 0.1, -0.1, 5.0)]
     >>> [round(float(np.degrees(bend.angle)), 2) for bend in drawn(some)]
@@ -152,7 +154,7 @@ def drawn(bends: Sequence[Bend]) -> tuple[Bend, ...]:
     out, angle = [], 0.0
     for bend in bends:
         angle += bend.angle
-        if abs(angle) >= _DRAWN:
+        if abs(angle) >= _DRAWN or bend.radius == 0:
             out.append(bend._replace(angle=angle))
             angle = 0.0
     return tuple(out)

@@ -13,12 +13,20 @@ from gso.mesh import Mesh
 from gso.pattern import Folded, Pattern
 from gso.result import Result
 from gso.typing import Array, Ints, Json
+from gso.unfolding import Net
 from gso.workshop.matings import across, numbered, of_pattern
 from gso.workshop.panels import Made, Panel
 
+_NO_FOLDS = Folded()
+
+
+def of_net(name: str, net: Net) -> Made:
+    """Divide a net into panels that are folded along its folds, with radius 0."""
+    return of_surface(name, net.mesh, net.pattern, {}, net.folds)
+
 
 def of_surface(
-    name: str, surface: Mesh, pattern: Pattern, record: Json, folded: Folded | None = None
+    name: str, surface: Mesh, pattern: Pattern, record: Json, folded: Folded = _NO_FOLDS
 ) -> Made:
     """Divide a surface with a pattern into panels.
 
@@ -33,7 +41,7 @@ def of_surface(
     folded : Folded, optional
         Bend lines: rulings of round faces, which are rolled to their radius, and folds.
     """
-    panels, label, local = _divided(surface.vertices, pattern, folded or Folded())
+    panels, label, local = _divided(surface.vertices, pattern, folded)
     panels = [replace(panel, rolled=panel.radii > 0) for panel in panels]
     matings = of_pattern(surface.vertices, pattern, label, local)
     return Made(name, _named(panels, [name] * len(panels)), numbered(matings), record)

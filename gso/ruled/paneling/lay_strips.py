@@ -17,7 +17,7 @@ from gso.geometry.polygon import rectangle
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pipeline.judgement import add_reasons, violation_of, warning
-from gso.quantities import Length, Strain, as_length, as_strain
+from gso.quantities import Length, Strain, as_length, as_sheet, as_strain
 from gso.result import Result
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import MOST, Options
@@ -25,7 +25,6 @@ from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import case_of, check_whole, of_surface
 from gso.seams import Edges, Segmentation, cut
-from gso.seams.options import as_sheet
 from gso.solver import Callback
 from gso.status import Status
 from gso.tasks import Limits

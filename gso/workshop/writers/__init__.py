@@ -59,6 +59,25 @@ def suffixes() -> dict[str, str]:
     return {get(name).SUFFIX: name for name in names()}
 
 
+def check_output(path: AnyPath) -> ModuleType:
+    """Return the writer of a file, after checking that it can be written.
+
+    Raises
+    ------
+    OptionError, MeshError, GSOError
+        As of :func:`write`.
+    """
+    suffix = suffix_of(path)
+    known = suffixes()
+    if suffix not in known:
+        what = f"{suffix!r} files" if suffix else "files without a suffix"
+        raise OptionError(f"{path}: no writer for {what}; there are {', '.join(known)}")
+    writer = get(known[suffix])
+    require_package(writer)
+    check_writable(path)
+    return writer
+
+
 def write(
     drawing: Drawing, path: AnyPath, *, layers: str = "operations", **options: object
 ) -> None:
@@ -99,14 +118,7 @@ def write(
     Traceback (most recent call last):
     gso.errors.OptionError: plate.dwg: no writer for '.dwg' files; there are .dxf, .pdf, .svg
     """
-    suffix = suffix_of(path)
-    known = suffixes()
-    if suffix not in known:
-        what = f"{suffix!r} files" if suffix else "files without a suffix"
-        raise OptionError(f"{path}: no writer for {what}; there are {', '.join(known)}")
-    writer = get(known[suffix])
-    require_package(writer)
-    check_writable(path)
+    writer = check_output(path)
     check(drawing)
     content: bytes = writer.content(drawing, layer_set(layers), **options)
     write_bytes(path, content)

@@ -16,8 +16,8 @@ from gso.pattern import Folded, Pattern
 from gso.quantities import Length, Strain
 from gso.recognition import Recognised, recognise
 from gso.typing import Array, Ints
+from gso.unfolding import join_patches
 from gso.unfolding.dual_edges import dual_edges
-from gso.unfolding.join_patches import join_patches
 
 #: Difference of lengths, relative to the size, up to which edges are equally long.
 _SAME = 1e-7

@@ -11,12 +11,15 @@ from gso.errors import MeshError, OptionError
 from gso.mesh.topology import edge_keys, label_components
 from gso.typing import Array, Flags, Ints
 from gso.unfolding.canonical_order import canonical_order, classes
+from gso.unfolding.contact import boxes, overlapping
 from gso.unfolding.dual_edges import DualEdges, dual_edges
 from gso.unfolding.layout import Layout, Links, within
 from gso.unfolding.part_search import searched
 
 #: Distance, relative to the size, within which two flat copies of an edge are one.
 SAME = 1e-7
+#: How much longer a cut through a flat face counts.
+_FLAT_CUT = 4.0
 #: Distance from their plane, relative to the size, up to which triangles are projected to it.
 _PLANE = 1e-12
 
@@ -96,7 +99,9 @@ def join_patches(
         a, b = edges.ends[both][0]
         raise OptionError(f"edge {a}-{b} is in keep and in cut; leave it out of one of them")
     smooth = (np.abs(edges.angles) <= np.radians(flat_angle)) & ~must_cut
+    rigid = patch
     if patch is None or flat is None:
+        rigid = np.arange(len(triangles))
         patch, flat = _planes(points, triangles, edges, smooth)
     corners = np.asarray(flat, float) @ np.array([1.0, 1j])
     _check_upright(corners)
@@ -112,23 +117,54 @@ def join_patches(
             f"edge {a}-{b} cannot be kept: the faces beside it overlap when they are laid flat "
             "with all edges in keep; leave some of them out"
         )
-    area = _areas(corners)
     if sheet is not None:
         _check_sheet(corners, patch, sheet, triangles)
-    order, turned = _ordered(triangles, points, patch, edges, inside, area)
-    free = ~(same | must_cut)[order]
-    chosen = edges.taken(order[free])
-    links = _linked(patch, chosen, turned[free], area, corners, SAME * size, sheet)
-    done = searched(Layout.apart(links, corners), seed, effort)
-    part = done.part[links.patch]
+
+    def found(patch: Ints) -> Layout:
+        same = patch[edges.triangles[:, 0]] == patch[edges.triangles[:, 1]]
+        inside = same & ~must_cut & _coincide(corners, edges, SAME * size)
+        order, turned = _ordered(triangles, points, patch, edges, inside, area)
+        free = ~(same | must_cut)[order]
+        chosen = edges.taken(order[free])
+        worth = np.where(smooth[order[free]], _FLAT_CUT, 1.0)
+        links = _linked(patch, chosen, turned[free], worth, area, corners, SAME * size, sheet)
+        return searched(Layout.apart(links, corners), seed, effort)
+
+    area = _areas(corners)
+    done = found(patch)
+    ringed = _ringed(patch, edges, inside)[patch]
+    if effort > 0 and ringed.any() and done.number > done.links.least:
+        # What bounds a hole of a flat face may have no room in it: the face is then opened.
+        pair = rigid[edges.triangles] if rigid is not None else patch[edges.triangles]
+        held = (must_keep & inside) | (pair[:, 0] == pair[:, 1]) | ~ringed[edges.triangles[:, 0]]
+        held &= same
+        one, other = edges.triangles[held].T
+        done = min(done, found(label_components(len(triangles), one, other)), key=_number)
+    part = done.part[done.links.patch]
     whole = (part[edges.triangles[:, 0]] == part[edges.triangles[:, 1]]) & ~must_cut
     whole &= _coincide(done.corners, edges, SAME * size)
     names = np.unique(part, return_inverse=True)[1].ravel()
-    total = np.bincount(names, area)
+    total = np.asarray(np.bincount(names, area), float)
     rank = np.empty(len(total), np.int64)
     rank[np.argsort(-classes(total), kind="stable")] = np.arange(len(total))
     out = np.stack([done.corners.real, done.corners.imag], axis=-1)
     return Joined(out, rank[names], edges, whole)
+
+
+def _number(layout: Layout) -> int:
+    return layout.number
+
+
+def _ringed(patch: Ints, edges: DualEdges, inside: Flags) -> Flags:
+    """Mark the patches that have holes: those whose Euler characteristic is below 1."""
+    one, other = edges.corners()
+    corner = label_components(3 * len(patch), one[inside].ravel(), other[inside].ravel())
+    _, first = np.unique(corner, return_index=True)
+    count = int(patch.max()) + 1
+    vertices = np.bincount(np.repeat(patch, 3)[first], minlength=count)
+    joints = np.bincount(patch[edges.triangles[inside, 0]], minlength=count)
+    # A triangle has three edges, of which two triangles share one.
+    return np.asarray(vertices - 2 * np.bincount(patch, minlength=count) + joints < 1)
 
 
 def _marked(edges: DualEdges, given: ArrayLike, count: int, name: str, triangles: Ints) -> Flags:
@@ -147,15 +183,15 @@ def _marked(edges: DualEdges, given: ArrayLike, count: int, name: str, triangles
 def _planes(points: Array, triangles: Ints, edges: DualEdges, smooth: Flags) -> tuple[Ints, Array]:
     """Return the patches of triangles in common planes, and their flat corners.
 
-    Triangles that are not exactly in one plane are patches of their own: they are turned into a
-    plane one by one, so that no length changes.
+    Triangles that are not exactly in one plane, or overlap in it, are patches of their own: they
+    are turned into a plane one by one, so that no length changes.
     """
     pair = edges.triangles[smooth]
     patch = label_components(len(triangles), pair[:, 0], pair[:, 1])
     p = points[triangles]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    mean = np.stack([np.bincount(patch, normal[:, d]) for d in range(3)], axis=1)[patch]
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+    total = np.stack([np.bincount(patch, normal[:, d]) for d in range(3)], axis=1)[patch]
+    mean = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
     _, first = np.unique(patch, return_index=True)
     away = np.einsum("tkd,td->tk", p - p[first[patch], 0][:, None], mean)
     far = np.zeros(int(patch.max()) + 1)
@@ -170,9 +206,23 @@ def _planes(points: Array, triangles: Ints, edges: DualEdges, smooth: Flags) -> 
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     y = np.cross(mean, x)
     way = p - origin[:, None]
-    return patch, np.stack(
-        [np.einsum("tkd,td->tk", way, x), np.einsum("tkd,td->tk", way, y)], axis=-1
-    )
+    flat = np.stack([np.einsum("tkd,td->tk", way, x), np.einsum("tkd,td->tk", way, y)], axis=-1)
+    return _once(patch, flat), flat
+
+
+def _once(patch: Ints, flat: Array) -> Ints:
+    """Divide patches that cover a part of their plane twice into their triangles."""
+    corners = flat @ np.array([1.0, 1j])
+    out = patch.copy()
+    order = np.argsort(patch, kind="stable")
+    for own in np.split(order, np.flatnonzero(np.diff(patch[order])) + 1):
+        if len(own) < 3:
+            continue
+        some = corners[own]
+        pairs = overlapping(some, some, boxes(some), boxes(some))
+        if (pairs[:, 0] != pairs[:, 1]).any():
+            out[own] = int(out.max()) + 1 + np.arange(len(own))
+    return out
 
 
 def _check_upright(corners: np.ndarray) -> None:
@@ -215,9 +265,8 @@ def _first(
         return patch, corners
     one, other = edges.corners()
     area = np.bincount(patch, _areas(corners))
-    links = Links(
-        patch, pair[every], one[every], other[every], size[every], area / area.sum(), sheet
-    )
+    shares = area / area.sum()
+    links = Links(patch, pair[every], one[every], other[every], size[every], shares, sheet)
     layout = Layout.apart(links, corners)
     for number in range(len(every)):
         a, b = layout.part[links.patches[number]]
@@ -254,7 +303,7 @@ def _ordered(
     kinds = [
         classes(np.linalg.norm(way, axis=2).ravel()),
         classes(angle),
-        classes(np.bincount(patch, area))[np.repeat(patch, 3)],
+        classes(np.asarray(np.bincount(patch, area), float))[np.repeat(patch, 3)],
     ]
     walk = canonical_order(triangles, twin, inner, kinds)
     reached = of_half[walk]
@@ -268,6 +317,7 @@ def _linked(
     patch: Ints,
     edges: DualEdges,
     turned: Flags,
+    worth: Array,
     area: Array,
     corners: np.ndarray,
     distance: float,
@@ -288,7 +338,7 @@ def _linked(
     rank[np.argsort(first)] = np.arange(len(names))
     patch, pair = rank[patch], rank[pair]
     flat = corners.reshape(-1)
-    length = np.abs(np.diff(flat[one], axis=1)).ravel()
+    length = worth * np.abs(np.diff(flat[one], axis=1)).ravel()
     kept, weights = _hinges(pair, flat[one], flat[other], length, distance)
     shares = np.bincount(patch, area) / area.sum()
     return Links(patch, pair[kept], one[kept], other[kept], weights, shares, sheet)

@@ -1,0 +1,177 @@
+"""Triangles of surfaces as people bring them: polygons, concave ones, and what is not manifold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gso.errors import MeshError
+from gso.geometry.ears import ears, in_plane
+from gso.mesh import Mesh
+from gso.mesh.topology import edge_keys, label_components
+from gso.typing import Array, Ints
+
+#: Distance of the corners of a face from its plane, relative to its size, that a note names.
+_BENT = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarFaces:
+    """A manifold surface of triangles made of polygons.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The triangles.
+    face : ndarray of int, (t,)
+        The polygon of each triangle.
+    vertex : ndarray of int, (n,)
+        For each vertex, that of the surface as it was given.
+    """
+
+    mesh: Mesh
+    face: Ints
+    vertex: Ints
+
+    @classmethod
+    def of(
+        cls, points: Array, polygons: Sequence[Sequence[int]], notes: tuple[str, ...] = ()
+    ) -> PlanarFaces:
+        """Divide polygons, given by their corners, into triangles inside them.
+
+        Where an edge has more than two faces, or parts of the surface share a vertex only, the
+        surface is divided, and a note says so.
+
+        Raises
+        ------
+        MeshError
+            A face has fewer than three corners, points outside the vertices, or crosses itself;
+            or :class:`gso.Mesh` rejects the triangles.
+        """
+        triangles, face = _triangles(points, polygons)
+        bent = _bent(points, triangles, face)
+        if len(bent):
+            notes += (
+                f"{len(bent)} faces are not flat and are folded along a diagonal (the first is "
+                f"face {bent[0]})",
+            )
+        vertex = np.arange(len(points))
+        divided = _divided(triangles, len(points))
+        if divided is not None:
+            triangles, vertex, note = divided
+            notes += (note,)
+        mesh = Mesh(points[vertex], triangles, notes=notes)
+        return cls(mesh, face, vertex)
+
+    def edges(self, given: Ints) -> Ints:
+        """Return all edges of the triangles between vertices (k, 2) as they were given."""
+        count = int(self.vertex.max()) + 1
+        ends = self.mesh.edges
+        own = self.vertex[ends]
+        keys = edge_keys(given[:, 0], given[:, 1], count)
+        return ends[np.isin(edge_keys(own[:, 0], own[:, 1], count), keys)]
+
+
+def _triangles(points: Array, polygons: Sequence[Sequence[int]]) -> tuple[Ints, Ints]:
+    size = np.array([len(polygon) for polygon in polygons], np.int64)
+    corners = np.array([c for polygon in polygons for c in polygon], np.int64)
+    first = np.cumsum(size) - size
+    bad = np.flatnonzero(size < 3)
+    if len(bad):
+        raise MeshError(f"face {bad[0]} has {size[bad[0]]} corners; a face needs three or more")
+    owner = np.repeat(np.arange(len(size)), size)
+    outside = (corners < 0) | (corners >= len(points))
+    if outside.any():
+        raise MeshError(
+            f"face {owner[outside][0]} points outside the {len(points)} vertices; correct it"
+        )
+    tri = np.flatnonzero(size == 3)
+    quad = np.flatnonzero(size == 4)
+    table = [corners[first[tri][:, None] + np.arange(3)], *_halves(points, first[quad], corners)]
+    face = [tri, quad, quad]
+    for k in np.flatnonzero(size > 4).tolist():
+        own = corners[first[k] : first[k] + size[k]]
+        try:
+            table.append(own[ears(in_plane(points[own]))])
+        except ValueError as error:
+            raise MeshError(f"face {k} cannot be divided into triangles: {error}") from None
+        face.append(np.full(size[k] - 2, k))
+    every = np.concatenate(face)
+    order = np.argsort(every, kind="stable")
+    return np.concatenate(table)[order], every[order]
+
+
+def _halves(points: Array, first: Ints, corners: Ints) -> tuple[Ints, Ints]:
+    """Divide quads along the shorter diagonal that lies inside."""
+    quad = corners[first[:, None] + np.arange(4)]
+    p = points[quad]
+    area = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    turn = np.cross(np.roll(p, -1, axis=1) - p, np.roll(p, -2, axis=1) - p)
+    # Of the triangles on both sides of diagonal 1-3 one is inverted where corner 0 or 2 is
+    # concave, else those of diagonal 0-2 may be.
+    concave = np.einsum("qkd,qd->qk", turn, area) <= 0
+    length = np.linalg.norm(p[:, 2:] - p[:, :2], axis=2)
+    # turn[k] belongs to corner k + 1.
+    at_even = concave[:, 1] | concave[:, 3]
+    at_odd = concave[:, 0] | concave[:, 2]
+    shorter = length[:, 1] < (1.0 - 1e-9) * length[:, 0]
+    odd = np.where(at_even == at_odd, shorter, at_odd)
+    quad = np.where(odd[:, None], np.roll(quad, -1, axis=1), quad)
+    return quad[:, [0, 1, 2]], quad[:, [0, 2, 3]]
+
+
+def _bent(points: Array, triangles: Ints, face: Ints) -> Ints:
+    """Return the polygons whose triangles lie in different planes."""
+    p = points[triangles]
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    count = int(face.max(initial=-1)) + 1
+    total = np.stack([np.bincount(face, normal[:, d], count) for d in range(3)], axis=1)
+    mean = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+    _, first = np.unique(face, return_index=True)
+    start = np.zeros((count, 3))
+    start[face[first]] = p[first, 0]
+    away = np.abs(np.einsum("tkd,td->tk", p - start[face][:, None], mean[face])).max(axis=1)
+    size = np.linalg.norm(p - start[face][:, None], axis=2).max(axis=1)
+    return np.unique(face[away > _BENT * size])
+
+
+def _divided(triangles: Ints, count: int) -> tuple[Ints, Ints, str] | None:
+    """Divide triangles where they are not manifold.
+
+    Returns the triangles, the given vertex of each vertex, and a note; None if they are manifold.
+    """
+    origin, dest = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    key = edge_keys(origin, dest, count)
+    order = np.argsort(key, kind="stable")
+    _, start, often = np.unique(key[order], return_index=True, return_counts=True)
+    pair = start[often == 2]
+    one, other = order[pair], order[pair + 1]
+    # The corners at both ends of an edge with two faces are joined.
+    ahead = np.arange(len(origin)) // 3 * 3 + (np.arange(len(origin)) + 1) % 3
+    same = origin[one] == origin[other]
+    a = np.r_[one, ahead[one]]
+    b = np.r_[np.where(same, other, ahead[other]), np.where(same, ahead[other], other)]
+    fan = label_components(len(origin), a, b)
+    _, corner = np.unique(fan, return_index=True)
+    owner = origin[corner]
+    used = len(np.unique(origin))
+    if len(owner) == used:
+        return None
+    rank = np.argsort(owner, kind="stable")
+    fresh = np.r_[True, owner[rank][1:] != owner[rank][:-1]]
+    # The first fan of a vertex keeps its number.
+    number = owner.copy()
+    number[rank[~fresh]] = count + np.arange(int((~fresh).sum()))
+    vertex = np.r_[np.arange(count), owner[rank[~fresh]]]
+    bad = int((often > 2).sum())
+    at = int(owner[rank[~fresh]][0])
+    note = (
+        f"the surface was divided at {len(np.unique(owner[rank[~fresh]]))} vertices where its "
+        f"parts share no edge with two faces (the first is vertex {at})"
+    )
+    if bad:
+        edge = int(order[start[often > 2][0]])
+        note += f"; {bad} edges have more than two faces (the first is {origin[edge]}-{dest[edge]})"
+    return number[fan].reshape(triangles.shape), vertex, note

@@ -1,0 +1,215 @@
+"""Nets of surfaces of flat faces (``gso.unfold``)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gso import io
+from gso.errors import MeshError, OptionError
+from gso.geometry.polygon import rectangle
+from gso.mesh import Mesh
+from gso.mesh.topology import label_components
+from gso.mesh.validation import checked_vertices
+from gso.pattern import Folded, Pattern
+from gso.quantities import Length, as_positive, as_sheet
+from gso.typing import Array, Ints, MeshLike
+from gso.unfolding.patch_joining import Joined, join_patches
+from gso.unfolding.planar_faces import PlanarFaces
+from gso.unfolding.polyhedral_net import Net
+
+#: A surface, or vertices and polygons with any number of corners.
+Polygons: TypeAlias = "MeshLike | tuple[ArrayLike, Sequence[Sequence[int]]]"
+
+#: Angle in radians up to which an edge is exactly flat.
+_LEVEL = 1e-10
+#: Gap between parts that are laid side by side, as a share of the largest.
+_GAP = 0.05
+
+
+def unfold(
+    mesh: Polygons,
+    *,
+    keep: ArrayLike | None = None,
+    cut: ArrayLike | None = None,
+    sheet: tuple[Length, Length] | None = None,
+    unit: str = "mm",
+    flat_angle: float = 0.01,
+    effort: float = 1.0,
+    seed: int = 0,
+) -> Net:
+    """Unfold a surface of flat faces: few flat parts that do not overlap, then short cuts.
+
+    The shape stays as it is, and no length changes. Faces in one plane are one. They are joined
+    along the longest edges first wherever nothing overlaps; then a search (simulated annealing)
+    takes subtrees of the parts off and joins them elsewhere, so that parts can be united. The
+    result does not depend on the numbering of the mesh or its place in space, but for symmetric
+    ones, whose nets are then congruent.
+
+    Parameters
+    ----------
+    mesh : Mesh, (vertices, polygons), str or PathLike
+        Anything that :func:`gso.as_mesh` takes, and polygons with any number of corners, concave
+        ones, too. Surfaces may be closed, of several components, or not manifold: then they are
+        divided, and `notes` says so.
+    keep, cut : array_like of int, (k, 2), optional
+        Edges, by their vertices, that are not cut in any case, and that are. One edge that is cut
+        inside a part opens nothing.
+    sheet : (float, float), optional
+        Length and width of a sheet that every part must fit on, in millimetres, or texts such as
+        "3m".
+    unit : str
+        Unit of the coordinates.
+    flat_angle : float
+        Angle in degrees up to which an edge is no fold, and is not cut where that can be avoided.
+    effort : float
+        Factor of the time of the search, which is about 1 s for 500 faces and in proportion to
+        them; 0 for none.
+    seed : int
+        Of the search.
+
+    Returns
+    -------
+    Net
+
+    Raises
+    ------
+    MeshError
+        The surface cannot be read, is one-sided, or has faces without area.
+    OptionError
+        Edges in `keep` cannot all be kept, a face is larger than the sheet, or an option is wrong.
+
+    Examples
+    --------
+    >>> import itertools
+    >>> corners = list(itertools.product([0.0, 100.0], repeat=3))
+    >>> sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    >>> net = unfold((corners, sides))
+    >>> len(net), net.angles.round(9).tolist(), round(net.cut_length, 6)
+    (1, [90.0, 90.0, 90.0, 90.0, 90.0], 700.0)
+    >>> bool(net.misfit() < 1e-10)
+    True
+    """
+    as_positive(flat_angle, "flat_angle", zero=True)
+    as_positive(effort, "effort", zero=True)
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise OptionError(f"seed is {seed!r}; it must be a whole number of 0 or more")
+    faces = _faces(mesh)
+    size = as_sheet(sheet, unit)
+    joined = join_patches(
+        faces.mesh.vertices,
+        faces.mesh.triangles,
+        keep=_given(faces, keep, "keep"),
+        cut=_given(faces, cut, "cut"),
+        sheet=size,
+        flat_angle=flat_angle,
+        seed=int(seed),
+        effort=effort,
+    )
+    return net_of(faces, joined, flat_angle)
+
+
+def _faces(given: Polygons) -> PlanarFaces:
+    """Return the triangles of what was given."""
+    if isinstance(given, str | os.PathLike):
+        surface = io.read_surface(given)
+        if surface.faces is not None:
+            table = np.asarray(surface.faces)
+            return _of_table(checked_vertices(surface.vertices), table, surface.notes)
+        return _of_mesh(surface.mesh())
+    if isinstance(given, tuple | list) and len(given) == 2:
+        points, polygons = given
+        if np.ndim(points) == 2:
+            return PlanarFaces.of(checked_vertices(points), _rows(polygons))
+    return _of_mesh(io.as_mesh(given))
+
+
+def _of_mesh(mesh: Mesh) -> PlanarFaces:
+    return _of_table(mesh.vertices, mesh.faces, mesh.given_notes)
+
+
+def _of_table(points: Array, table: Ints, notes: tuple[str, ...]) -> PlanarFaces:
+    rows = table.tolist()
+    return PlanarFaces.of(points, [[c for c in row if c >= 0] for row in rows], notes)
+
+
+def _rows(polygons: object) -> list[list[int]]:
+    """Return polygons as lists of integers; rows of arrays end in -1 where they are shorter."""
+    try:
+        rows = [[int(c) for c in row] for row in polygons]  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise MeshError("faces must be rows of vertex numbers") from None
+    return [row[:-1] if row and row[-1] == -1 else row for row in rows]
+
+
+def _given(faces: PlanarFaces, edges: ArrayLike | None, name: str) -> Ints:
+    """Return the edges of the triangles between given vertices.
+
+    Raises
+    ------
+    OptionError
+        A pair is no edge of a face.
+    """
+    if edges is None or np.size(edges) == 0:
+        return np.empty((0, 2), np.int64)
+    pairs = np.asarray(edges)
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
+        raise OptionError(f"{name} must be pairs of vertices, (k, 2), not {pairs.shape}")
+    out = faces.edges(pairs.astype(np.int64))
+    own = {tuple(sorted(pair)) for pair in faces.vertex[out].tolist()}
+    for a, b in pairs.tolist():
+        if (min(a, b), max(a, b)) not in own:
+            raise OptionError(f"{name}: {a}-{b} is no edge of a face; cuts run along edges")
+    return out
+
+
+def net_of(faces: PlanarFaces, joined: Joined, flat_angle: float) -> Net:
+    """Make the net of faces from the parts that they were joined to."""
+    triangles, edges = faces.mesh.triangles, joined.edges
+    one, other = edges.corners()
+    corner = label_components(
+        3 * len(triangles), one[joined.whole].ravel(), other[joined.whole].ravel()
+    )
+    # An edge whose both ends are joined around it is not cut, whatever was asked for.
+    whole = (corner[one] == corner[other]).all(axis=1)
+    _, first = np.unique(corner, return_index=True)
+    flat = _laid(joined.flat, joined.part).reshape(-1, 2)[first]
+    seams = np.stack([corner[one[~whole]], corner[other[~whole]]], axis=1)
+    pattern = Pattern(flat, corner.reshape(-1, 3), triangles.ravel()[first], seams)
+    bent = whole & (np.abs(edges.angles) > _LEVEL)
+    folded = Folded(corner[one[bent]], edges.angles[bent], np.zeros(int(bent.sum())))
+    notes = faces.mesh.notes
+    if opened := int((~whole & (np.abs(edges.angles) <= np.radians(flat_angle))).sum()):
+        notes += (f"{opened} edges in flat faces were cut, as asked for or to save parts",)
+    return Net(
+        faces.mesh, faces.face, faces.vertex, pattern, joined.part, folded, flat_angle, notes
+    )
+
+
+def _laid(flat: Array, part: Ints) -> Array:
+    """Turn parts (t, 3, 2) long side along x, and lay them side by side in rows."""
+    out = np.empty_like(flat)
+    sizes, boxes = [], []
+    for number in range(int(part.max()) + 1):
+        own = flat[part == number]
+        angle = -rectangle(own.reshape(-1, 2))[0]
+        c, s = np.cos(angle), np.sin(angle)
+        own = own @ np.array([[c, s], [-s, c]])
+        own -= own.min(axis=(0, 1))
+        boxes.append(own)
+        sizes.append(own.max(axis=(0, 1)))
+    size = np.array(sizes)
+    gap = _GAP * float(size.max())
+    wide = max(float(size[:, 0].max()), 1.3 * float(np.sqrt((size + gap).prod(axis=1).sum())))
+    x = y = high = 0.0
+    for number in np.argsort(-size[:, 1], kind="stable").tolist():
+        if x > 0 and x + size[number, 0] > wide:
+            x, y, high = 0.0, y + high + gap, 0.0
+        out[part == number] = boxes[number] + [x, y]
+        x += float(size[number, 0]) + gap
+        high = max(high, float(size[number, 1]))
+    return out
