@@ -133,10 +133,9 @@ def _gear(teeth: int) -> Array:
 
 
 def _stairs(steps: int) -> Array:
-    k = np.arange(steps + 1, dtype=float)
-    line = np.stack([np.repeat(k, 2)[1:], np.repeat(k, 2)[:-1]], axis=1)[:-1]
-    up = np.r_[line, [[float(steps), float(steps)]], [[float(steps), -1.0]], [[0.0, -1.0]]]
-    return up[::-1][np.r_[True, np.abs(np.diff(up[::-1], axis=0)).sum(axis=1) > 0]][::-1]
+    k = np.arange(1.0, steps + 1.0)
+    up = np.stack([np.repeat(k, 2) - np.tile([1.0, 0.0], steps), np.repeat(k, 2)], axis=1)
+    return np.r_[[[0.0, 0.0]], up, [[float(steps), 0.0]]][::-1]
 
 
 SECTIONS = (nets,)

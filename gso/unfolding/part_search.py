@@ -21,7 +21,7 @@ _CUT = 0.02
 _TRIES = 8
 #: Work of the search in microseconds about, more of it for each patch, and for each pair of patches
 #: up to a bound.
-_WORK, _WORK_EACH, _WORK_PAIR, _WORK_PAIRS = 3e5, 1e3, 0.2, 4e6
+_WORK, _WORK_EACH, _WORK_PAIR, _WORK_PAIRS = 3e5, 1e3, 0.3, 7.5e6
 #: Largest number of passes that shorten cuts.
 _PASSES = 3
 

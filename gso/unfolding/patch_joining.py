@@ -213,7 +213,7 @@ def _planes(points: Array, triangles: Ints, edges: DualEdges, smooth: Flags) -> 
 def _once(patch: Ints, flat: Array) -> Ints:
     """Divide patches that cover a part of their plane twice into their triangles."""
     corners = flat @ np.array([1.0, 1j])
-    out = patch.copy()
+    out: Ints = patch.copy()
     order = np.argsort(patch, kind="stable")
     for own in np.split(order, np.flatnonzero(np.diff(patch[order])) + 1):
         if len(own) < 3:
