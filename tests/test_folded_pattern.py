@@ -12,8 +12,7 @@ import gso
 from gso import metrics
 from gso.exact import folded_pattern
 from gso.mesh import Mesh
-from gso.workshop.finish import Finish
-from gso.workshop.thickness import Thickness
+from gso.workshop import Finish, Thickness
 
 
 def box(x=1.0, y=1.0, z=1.0) -> Mesh:
