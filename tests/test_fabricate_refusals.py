@@ -34,6 +34,12 @@ def cylinder():
 
 
 @pytest.fixture(scope="module")
+def folded_cylinder(cylinder):
+    """The same panel, whose bends are folded as those of strips are."""
+    return replace(cylinder, panels=tuple(replace(p, rolled=~p.rolled) for p in cylinder.panels))
+
+
+@pytest.fixture(scope="module")
 def strips():
     return made(Design("dome", dome(17, height=0.6)), FabricationSettings(max_deviation="3%"))
 
@@ -155,17 +161,24 @@ class TestSheets:
         assert (why.code, why.bound, why.places.ids) == (Code.TOO_THICK, 2.5, ("arch",))
         assert why.value == pytest.approx(cylinder.record["bend_radius_min"])
 
-    def test_a_bend_beyond_the_table_is_refused(self, cylinder, reasons_for):
-        (why,) = reasons_for(cylinder, sheet=0.01, table=[[0.0, 0.0], [1e-3, 1e-4]])
+    def test_a_bend_beyond_the_table_is_refused(self, cylinder, folded_cylinder, reasons_for):
+        assert reasons_for(cylinder, sheet=0.01, table=[[0.0, 0.0], [1e-3, 1e-4]]) == ()
+        (why,) = reasons_for(folded_cylinder, sheet=0.01, table=[[0.0, 0.0], [1e-3, 1e-4]])
         assert (why.code, why.bound) == (Code.BEND_ANGLE, pytest.approx(np.degrees(1e-3)))
         assert why.value == pytest.approx(np.degrees(np.abs(cylinder.panels[0].angles).max()))
 
-    def test_bends_without_room_for_the_tool_are_refused(self, cylinder, reasons_for):
-        (why,) = reasons_for(cylinder, sheet=0.02, radius=3.0)
+    def test_bends_without_room_for_the_tool_are_refused(
+        self, cylinder, folded_cylinder, reasons_for
+    ):
+        assert reasons_for(cylinder, sheet=0.02, radius=3.0) == ()
+        (why,) = reasons_for(folded_cylinder, sheet=0.02, radius=3.0)
         assert why.code is Code.BENDS_NEAR and why.value < why.bound
 
     def test_a_part_without_bend_lines_is_refused_where_the_thickness_matters(self, reasons_for):
-        flat = made(Design("arch", arch()), FabricationSettings(formulation="curvature"))
+        # Not quite a cylinder, which would have bend lines.
+        points = arch().vertices
+        swelled = arch().replaced(points * (1 + 0.01 * np.sin(1.5 * points[:, 1:2]) * [1, 0, 1]))
+        flat = made(Design("arch", swelled), FabricationSettings(formulation="curvature"))
         assert not len(flat.panels[0].bends)
         assert flat.record["bend_radius_min"] == pytest.approx(1.0, rel=0.05)
         assert reasons_for(flat, sheet=0.02) == ()

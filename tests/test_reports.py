@@ -68,8 +68,8 @@ def test_groups_objects_and_materials_are_kept(tmp_path, kind):
     whole = flat(path, tmp_path / "whole")
     job = flat(path, tmp_path / "out", keep_groups=True)
     assert len(whole.parts) == 1 and sum(part.count for part in job.parts) == 2
-    # The length of the polygon of 24 chords, and half of the width.
-    size = [24 * 100 * np.sin(np.pi / 48), 20.0]
+    # The length of the arc, and half of the width.
+    size = [50 * np.pi, 20.0]
     np.testing.assert_allclose(job.parts[0].size, size, rtol=1e-6)
 
 
@@ -117,9 +117,8 @@ def test_a_slit_of_the_design_stays_a_slit(tmp_path):
     job = flat(path, tmp_path / "out")
     assert job.usable and len(job.parts) == 1 and job.parts[0].count == 1
     assert job.certificate["designs"][0]["seams"] == 0
-    # A sector from 40 to 100 of 360 / sqrt(5) degrees, of 32 flat sides: the ends of its two
-    # straight sides are as far apart as on the file's first and last generators.
-    turn = 32 * 2 * np.arcsin(np.sin(np.pi / 32) / np.sqrt(5))
+    # A sector of 360 / sqrt(5) degrees from 40 to 100, whose arcs have 32 sides.
+    turn = 2 * np.pi / np.sqrt(5)
     outline = job.parts[0].outline
     assert part_area(job) == pytest.approx(
         0.5 * (100**2 - 40**2) * 32 * np.sin(turn / 32), rel=1e-4

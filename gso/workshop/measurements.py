@@ -61,7 +61,7 @@ def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
     record, names = made.record, [panel.name for panel in made.panels]
     sizes = np.array([rectangle(panel.flat)[1] for panel in made.panels])
     # Strips keep the smallest radius themselves, or say why not.
-    plain = [panel for panel in made.panels if settings.min_radius and not len(panel.bends)]
+    plain = [panel for panel in made.panels if settings.min_radius and not _is_strip(panel)]
     wide, long = (None, None) if settings.max_size is None else sorted(settings.max_size)
     limits = {
         Code.DEVIATION: record["allowed"],
@@ -94,6 +94,11 @@ def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
     # large is said as the record has it.
     decided = {Code.DEVIATION} | ({Code.STRAIN} & {reason.code for reason in later})
     return merge(made.reasons, later, decided)
+
+
+def _is_strip(panel: Panel) -> bool:
+    """Tell whether a panel has bends that are neither rolled nor sharp folds."""
+    return bool((~panel.rolled & (panel.radii > 0)).any())
 
 
 def _worst(design: Mesh, surface: Mesh) -> list[float]:
