@@ -226,6 +226,14 @@ class Code(str, enum.Enum):
         "bends of up to {value} are beyond the end of the bend table, {bound}",
         "add larger angles to the table",
     )
+    UNMARKED_FOLD = _limit(
+        "unmarked_fold",
+        Kind.ANGLE,
+        "Angle between two faces of a part at an edge that no bend line lies on.",
+        "parts are folded by {value} where no bend line is drawn, more than {bound}",
+        "cut the design there (keep), or smooth it",
+        limit=45.0,
+    )
     BENDS_NEAR = _limit(
         "bends_near",
         Kind.LENGTH,

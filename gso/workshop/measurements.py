@@ -8,6 +8,7 @@ from gso import faults, metrics, rulings
 from gso.errors import MeshError
 from gso.geometry.polygon import mean_width, rectangle
 from gso.mesh import Mesh
+from gso.mesh.topology import edge_keys
 from gso.pattern import Pattern
 from gso.typing import Json
 from gso.verdict import Code, Measurement, Reason, compare, merge
@@ -81,6 +82,8 @@ def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
             np.array([bend_radius(panel) for panel in plain]), "part", [p.name for p in plain]
         ),
     }
+    unmarked = np.array([_unmarked_fold(panel) for panel in made.panels])
+    measured[Code.UNMARKED_FOLD] = Measurement(unmarked, "part", names)
     pairs = [{seam.one.panel, seam.two.panel} for seam in made.matings]
     joined = [made.panels[k] for k in sorted(set().union(*(p for p in pairs if len(p) > 1)))]
     if joined:
@@ -94,6 +97,16 @@ def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
     # large is said as the record has it.
     decided = {Code.DEVIATION} | ({Code.STRAIN} & {reason.code for reason in later})
     return merge(made.reasons, later, decided)
+
+
+def _unmarked_fold(panel: Panel) -> float:
+    """Return the largest angle between two faces where no bend lies, in degrees."""
+    he, count = panel.surface.half_edges, len(panel.flat)
+    inner = he.interior
+    keys = edge_keys(he.origin[inner], he.dest[inner], count)
+    bent = edge_keys(panel.bends[:, 0], panel.bends[:, 1], count)
+    angles = metrics.dihedral_angles(panel.surface)
+    return float(angles[~np.isin(keys, bent)].max(initial=0.0))
 
 
 def _is_strip(panel: Panel) -> bool:
