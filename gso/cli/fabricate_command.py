@@ -137,6 +137,7 @@ def fabricate(
 ) -> None:
     """Make the designs IN of flat parts, and write what a workshop needs to DIR.
 
+    A design that is flat or developable as it is keeps its shape; others are changed.
     --max-deviation is 1 % of the diagonal when it is not given, and --max-strain 0.1 %. With
     --formulation flatten the shape stays as it is, and --max-strain is 1 % when it is not given.
     The exit code is 0 only if everything can be made as it was asked for; otherwise the reasons
