@@ -13,7 +13,20 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     # The same names for type checkers and editors; they are imported at first use.
-    from gso import constraints, dataset, hybrid, io, metrics, net, plot, rulings, seams, tno
+    from gso import (
+        constraints,
+        dataset,
+        exact,
+        hybrid,
+        io,
+        metrics,
+        net,
+        plot,
+        recognition,
+        rulings,
+        seams,
+        tno,
+    )
     from gso import executors as executors
     from gso import verdict as verdict
     from gso.constraints import (
@@ -102,6 +115,7 @@ __all__ = [
     "constraints",
     "cut",
     "dataset",
+    "exact",
     "executors",
     "fabricate",
     "fit_spline",
@@ -113,6 +127,7 @@ __all__ = [
     "net",
     "pieces",
     "plot",
+    "recognition",
     "rulings",
     "save",
     "save_spline",
