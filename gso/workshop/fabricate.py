@@ -99,8 +99,8 @@ def fabricate(
 
     A component that is flat or developable as it is keeps its shape
     (:func:`gso.exact.folded_pattern`). Any other is made developable within `max_deviation`, in one
-    piece or in several, and laid flat. The folder gets the parts, the sheets, the surfaces, a certificate and
-    a page to look at. A call that was ended goes on where it was.
+    piece or in several, and laid flat. The folder gets the parts, the sheets, the surfaces, a
+    certificate and a page to look at. A call that was ended goes on where it was.
 
     Parameters
     ----------
