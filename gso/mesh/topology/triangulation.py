@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.errors import MeshError
-from gso.mesh.topology.half_edges import HalfEdges, _tree_parity, edge_keys
+from gso.mesh.topology.half_edges import HalfEdges, tree_parity, edge_keys
 from gso.typing import Flags, Ints
 
 
@@ -68,7 +68,7 @@ def quad_splits(faces: Ints, he: HalfEdges) -> Flags:
     here = local[inner] % 2 == 0
     there = local[he.twin[inner]] % 2 == 1
     # Consistent: the diagonals of two neighbours do not meet at an end of the shared edge.
-    turn, _ = _tree_parity(len(faces), he.face[inner], he.face[he.twin[inner]], here == there)
+    turn, _ = tree_parity(len(faces), he.face[inner], he.face[he.twin[inner]], here == there)
     # Two quads with the same diagonal, or a diagonal that is also an edge, would give a
     # non-manifold triangulation: such quads are split the other way.
     clash = _clashing_splits(faces[quad], turn[quad], he)
