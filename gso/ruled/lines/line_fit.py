@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from gso.energy import Term, Weighted, hardened, mean_weights
 from gso.energy.barycentric import build as barycentric
 from gso.energy.coplanarity import build as coplanarity
 from gso.energy.curve import build as curve
+from gso.energy.facing import build as facing
 from gso.energy.fairness import residual as fairness_residual
 from gso.energy.proximity import residual as proximity_residual
-from gso.energy.spacing import build as spacing
 from gso.mesh import Mesh, Nearest, Polylines, vertex_normals
 from gso.ruled.lines.ears import ears
-from gso.ruled.lines.strip_cells import Cells
+from gso.ruled.lines.polygons import Polygons
 from gso.ruled.vectors import cross, lengths, unit
 from gso.solver import Problem, minimise
 from gso.typing import Array, Ints
@@ -26,33 +24,18 @@ _BACK, _OUTLINE = 0.5, 0.3
 #: Factor on tangential displacements.
 _TANGENTIAL = 0.02
 #: Weights of coplanarity and of second differences of the displacement, by round.
-_PHASES = tuple((float(1.6**k), max(float(0.6**k), 1e-3)) for k in range(0, 21, 2))
+_PHASES = tuple((float(1.6**k), max(float(0.6**k), 0.03)) for k in range(0, 21, 2))
 #: Weight of coplanarity when it becomes exact, rounds of multipliers, and the distance at which
 #: these end.
 _STIFF, _ROUNDS, _EXACT = 1e5, 12, 1e-14
 #: Share of second differences across creases.
 _ACROSS = 0.01
-#: Weight of the spacing of rulings along creases, and the least one relative to the design's.
-_SPACING, _LEAST = 1e-4, 0.3
+#: Weight of the barrier against folds, and the least area of triangles relative to the design's.
+_FACING, _LEAST = 1e-2, 0.2
 #: Weight of the places of vertices.
-_PLACES = 0.1
+_PLACES = 0.3
 #: Iterations of each round.
 _ITERATIONS = 3
-
-
-@dataclass(frozen=True)
-class LineFit:
-    """Strips along lines, as positions of the design's vertices of which only some are used.
-
-    Attributes
-    ----------
-    cells : Cells
-    points : ndarray, (n, 3)
-        For vertices that are left out, the points of their rulings.
-    """
-
-    cells: Cells
-    points: Array
 
 
 class LineFitter:
@@ -71,17 +54,20 @@ class LineFitter:
         np.add.at(share, mesh.triangles.ravel(), np.repeat(area, 3) / (3.0 * area.sum()))
         self.share = share
 
-    def fit(self, cells: Cells, start: Array) -> LineFit:
-        """Fit strips, from positions (n, 3) of the mesh's vertices."""
-        used = np.unique(np.concatenate(cells.rings))
+    def fit(self, polygons: Polygons, start: Array) -> Array:
+        """Fit strips, from positions (n, 3) of the mesh's vertices; return their positions.
+
+        Vertices that are no corners stay.
+        """
+        used = np.unique(np.concatenate(polygons.rings))
         number = np.full(len(self.mesh.vertices), -1)
         number[used] = np.arange(len(used))
         layout = Layout.of(len(used), "surface")
         variables = free(layout)
-        triangles = number[ears(cells.rings, start)]
-        planes = number[cells.planes(start)]
-        fixed = self._fixed(cells, used, number)
-        smooth = self._smooth(cells, number)
+        triangles = number[ears(polygons.rings, start)]
+        planes = number[polygons.planes(start)]
+        fixed = self._fixed(polygons, used, number)
+        smooth = self._smooth(polygons, number)
         x = start[used].ravel()
 
         def solved(x: Array, planar: Term, stiff: float, fair: float, iterations: int) -> Array:
@@ -109,19 +95,8 @@ class LineFitter:
             x = solved(x, hard, _STIFF, _PHASES[-1][1], 2)
             if hard.multipliers.update(layout.split(x)) <= _EXACT:
                 break
-        return LineFit(cells, self._filled(cells, used, x.reshape(-1, 3)))
-
-    def _filled(self, cells: Cells, used: Ints, points: Array) -> Array:
-        """Return positions of all vertices: those left out at their shares of the rulings."""
-        out = self.mesh.vertices.copy()
-        out[used] = points
-        vertex, ruling = cells.inside
-        a, b = self.mesh.vertices[cells.ends[ruling]].transpose(1, 0, 2)
-        way = b - a
-        share = np.einsum("kd,kd->k", self.mesh.vertices[vertex] - a, way)
-        share = np.clip(share / np.einsum("kd,kd->k", way, way), 0.0, 1.0)[:, None]
-        p, q = out[cells.ends[ruling]].transpose(1, 0, 2)
-        out[vertex] = (1.0 - share) * p + share * q
+        out = start.copy()
+        out[used] = x.reshape(-1, 3)
         return out
 
     def _distances(self, points: Array, triangles: Ints) -> list[Weighted]:
@@ -143,7 +118,7 @@ class LineFitter:
         back = barycentric(triangles, third, feet.points, feet.normals, area / area.sum())
         return [Weighted(there, 1.0), Weighted(back, _BACK)]
 
-    def _fixed(self, cells: Cells, used: Ints, number: Ints) -> list[Weighted]:
+    def _fixed(self, polygons: Polygons, used: Ints, number: Ints) -> list[Weighted]:
         """Return the terms of the outline, and of the places of vertices."""
         mesh = self.mesh
         rim = number[np.concatenate(mesh.boundary_loops)]
@@ -162,21 +137,29 @@ class LineFitter:
         return [
             Weighted(curve(rim, self.outline, weight=share), _OUTLINE),
             Weighted(places, _PLACES),
-            Weighted(self._spacing(cells, number), _SPACING),
+            Weighted(self._facing(polygons, number), _FACING),
         ]
 
-    def _spacing(self, cells: Cells, number: Ints) -> Term:
-        """Return the least spacing of vertices that follow each other on creases and outlines."""
-        mesh = self.mesh
-        edges = mesh.edges[cells.is_crease | mesh.boundary_edges]
-        way = mesh.vertices[edges[:, 1]] - mesh.vertices[edges[:, 0]]
-        scaled = way / np.einsum("kd,kd->k", way, way)[:, None]
-        return spacing(number[edges], scaled, mean_weights(len(edges)), least=_LEAST)
+    def _facing(self, polygons: Polygons, number: Ints) -> Term:
+        """Return the barrier against polygons that fold over."""
+        v = self.mesh.vertices
+        corners = [ring for ring in polygons.rings if len(ring) == 4]
+        quads = np.array(corners, np.int64).reshape(-1, 4)
+        ids = np.concatenate(
+            [ears(polygons.rings, v), quads[:, [0, 1, 3]], quads[:, [1, 2, 3]], quads[:, :3], quads[:, [0, 2, 3]]]
+        )
+        ids = np.unique(ids, axis=0)
+        a, b, c = v[ids].transpose(1, 0, 2)
+        normal, ways = cross(b - a, c - a), unit(self.normals[ids].mean(axis=1))
+        area = np.einsum("kd,kd->k", normal, ways)
+        kept = area > 0.1 * lengths(normal)
+        ids, ways = ids[kept], ways[kept] / area[kept, None]
+        return facing(number[ids], ways, mean_weights(len(ids)), least=_LEAST)
 
-    def _smooth(self, cells: Cells, number: Ints) -> list[tuple[Term, float]]:
+    def _smooth(self, polygons: Polygons, number: Ints) -> list[tuple[Term, float]]:
         """Return second differences of the displacement, along creases and across them."""
         out = []
-        for triples, share in ((cells.creased, 1.0), (cells.bordered, 1.0), (cells.across, _ACROSS)):
+        for triples, share in ((polygons.lines, 1.0), (polygons.across, _ACROSS)):
             if not len(triples):
                 continue
             a, b, c = self.mesh.vertices[triples].transpose(1, 0, 2)

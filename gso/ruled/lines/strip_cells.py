@@ -10,8 +10,8 @@ import numpy as np
 from gso.errors import MeshError
 from gso.mesh import topology
 from gso.ruled.lines.line_families import Family
-from gso.ruled.vectors import cross, lengths
-from gso.typing import Array, Flags, Ints
+from gso.ruled.lines.polygons import Polygons
+from gso.typing import Flags, Ints
 
 
 @dataclass(frozen=True)
@@ -63,30 +63,43 @@ class Cells:
     @cached_property
     def rings(self) -> list[Ints]:
         """The corners of the polygons, anticlockwise, as vertices of the mesh."""
-        he = self.family.mesh.half_edges
-        open_ = ~self._removed[self.family.edge]
-        ahead = he.next.copy()
-        while True:
-            shut = ~open_[ahead]
-            if not shut.any():
-                break
-            ahead[shut] = he.next[he.twin[ahead[shut]]]
-        k = np.flatnonzero(open_)
-        owner = self.cell[he.face[k]]
-        count = int(self.cell.max()) + 1
-        first = k[np.unique(owner, return_index=True)[1]]
-        size = np.bincount(owner, minlength=count)
-        walk, at = [first], ahead[first]
-        for _ in range(int(size.max()) - 1):
-            walk.append(at)
-            at = ahead[at]
-        table = np.stack(walk, axis=1)
-        steps = np.argmax(np.c_[table[:, 1:], at] == first[:, None], axis=1) + 1
-        if (steps != size).any():
+        owner, loops = self._loops(self._removed)
+        if len(loops) > owner[-1] + 1:
             raise MeshError("strips along the lines of this mesh would have holes")
-        origin = he.origin[table]
-        inside = (np.arange(table.shape[1]) < size[:, None]) & ~self.dropped[origin]
-        return [ids[own] for ids, own in zip(origin, inside, strict=True)]
+        return loops
+
+    @cached_property
+    def outlines(self) -> tuple[Ints, list[Ints]]:
+        """The strip that each loop of strips' borders belongs to, and the loops."""
+        owner, loops = self._loops(self._removed | self.family.is_ruling)
+        # Strips are numbered by their first faces, as regions are.
+        return owner, loops
+
+    def _loops(self, removed: Flags) -> tuple[Ints, list[Ints]]:
+        """Return the borders of regions of faces joined across edges, and the region of each."""
+        he = self.family.mesh.half_edges
+        shut = removed[self.family.edge]
+        k = he.interior
+        k = k[shut[k]]
+        count = len(self.family.mesh.faces)
+        region = topology.label_components(count, he.face[k], he.face[he.twin[k]])
+        k = np.flatnonzero(~shut)
+        ahead = np.full(len(shut), -1)
+        ahead[k] = he.next[k]
+        while (again := k[shut[ahead[k]]]).size:
+            ahead[again] = he.next[he.twin[ahead[again]]]
+        loop = topology.label_components(len(shut), k, ahead[k])[k]
+        loop = np.unique(loop, return_inverse=True)[1]
+        first = k[np.unique(loop, return_index=True)[1]]
+        size = np.bincount(loop)
+        walk = [first]
+        for _ in range(int(size.max()) - 1):
+            walk.append(ahead[walk[-1]])
+        origin = he.origin[np.stack(walk, axis=1)]
+        inside = (np.arange(origin.shape[1]) < size[:, None]) & ~self.dropped[origin]
+        owner = region[he.face[first]]
+        order = np.argsort(owner, kind="stable")
+        return owner[order], [origin[i][inside[i]] for i in order]
 
     @cached_property
     def ruling(self) -> Ints:
@@ -151,36 +164,40 @@ class Cells:
             far.append(np.where(ends[:, 0] == at, ends[:, 1], ends[:, 0]))
         return np.stack([far[0], at, far[1]], axis=1)
 
-    def planes(self, points: Array) -> Ints:
-        """Return three corners and another one (e, 4) for each condition that polygons are planar.
+    @cached_property
+    def _pairs(self) -> tuple[Ints, Ints, Ints]:
+        """Pairs of polygons (k,), (k,) that a ruling joins, and the ruling."""
+        family, he = self.family, self.family.mesh.half_edges
+        k = he.interior
+        k = k[family.is_ruling[family.edge[k]]]
+        rulings, first = np.unique(self.ruling[family.edge[k]], return_index=True)
+        k = k[first]
+        return self.cell[he.face[k]], self.cell[he.face[he.twin[k]]], rulings
 
-        Parameters
-        ----------
-        points : ndarray, (n, 3)
-            Positions of the mesh's vertices, from which three corners far apart are chosen.
-        """
-        out = []
-        size = np.array([len(ring) for ring in self.rings])
-        for n in np.unique(size[size > 3]):
-            ids = np.array([ring for ring in self.rings if len(ring) == n])
-            out.append(_base(points, ids))
-        return np.concatenate(out) if out else np.empty((0, 4), np.int64)
+    @cached_property
+    def neighbours(self) -> Ints:
+        """Number of rulings of each polygon."""
+        one, two, _ = self._pairs
+        return np.bincount(np.r_[one, two], minlength=len(self.rings))
 
+    @cached_property
+    def strip_of_ruling(self) -> Ints:
+        """The strip that each ruling is in."""
+        one, _, rulings = self._pairs
+        out = np.zeros(len(self.ends), np.int64)
+        out[rulings] = self.strip[one]
+        return out
 
-def _base(points: Array, ids: Ints) -> Ints:
-    """Return the conditions (e, 4) of polygons (p, n) with the same number of corners."""
-    count, n = ids.shape
-    corner = points[ids]
-    rows = np.arange(count)
-    # The longest diagonal or side, and the corner farthest from it.
-    square = ((corner[:, :, None] - corner[:, None]) ** 2).sum(axis=3).reshape(count, -1)
-    a, b = np.divmod(square.argmax(axis=1), n)
-    way = corner[rows, b] - corner[rows, a]
-    off = lengths(cross(np.broadcast_to(way[:, None], corner.shape), corner - corner[rows, a][:, None]))
-    c = off.argmax(axis=1)
-    other = np.ones((count, n), bool)
-    for k in (a, b, c):
-        other[rows, k] = False
-    p, at = np.nonzero(other)
-    base = np.stack([ids[rows, k] for k in (a, b, c)], axis=1)
-    return np.column_stack([base[p], ids[p, at]])
+    def end_ruling(self, cell: int) -> tuple[int, int]:
+        """Return the ends of the only ruling of a polygon."""
+        one, two, rulings = self._pairs
+        a, b = self.ends[rulings[int(((one == cell) | (two == cell)).argmax())]]
+        return int(a), int(b)
+
+    @cached_property
+    def polygons(self) -> Polygons:
+        """The polygons, with the lines between them."""
+        edges = self.family.mesh.edges
+        lines = np.concatenate([self.creased, self.bordered])
+        creases = edges[self.is_crease]
+        return Polygons(self.rings, self.strip, self.ends, creases, lines, self.across)

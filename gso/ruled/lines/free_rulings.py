@@ -1,0 +1,213 @@
+"""Rulings of each strip on its own, conjugate to its creases.
+
+The rulings of a mesh run on across creases, which is right only where its lines are conjugate.
+Here a dynamic program chooses those of each strip among all pairs of vertices on its two sides, so
+that the planes of successive rulings have the design's normals. Between them are planar quads, and
+triangles where several rulings meet in one vertex.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gso.ruled.lines.polygons import Polygons
+from gso.ruled.lines.strip_cells import Cells
+from gso.ruled.vectors import cross, lengths, unit
+from gso.typing import Array, Flags, Ints
+
+#: Cost of a triangle's area, and of that of a slanted quad, relative to squared errors of normals.
+_TRIANGLE, _SLANTED = 2e-3, 1e-4
+#: Sine of the angle between a side and a ruling below which triangles are avoided.
+_NARROW = 0.1
+#: Numbers of vertices by which the first ruling of a closed strip is moved to either side.
+_TURNED = 6
+
+
+def free_rulings(cells: Cells, points: Array, normals: Array) -> Polygons:
+    """Choose rulings strip by strip.
+
+    Parameters
+    ----------
+    cells : Cells
+        Strips with the rulings of a mesh.
+    points, normals : ndarray, (n, 3)
+        The mesh's vertices, and unit normals there.
+    """
+    own = cells.polygons
+    owner, loops = cells.outlines
+    rings: list[Ints] = []
+    strip: list[int] = []
+    rulings: list[Ints] = []
+    cell_strip, of_ruling = own.strip, cells.strip_of_ruling
+    for k in range(int(cell_strip.max()) + 1):
+        sides = _sides([loops[i] for i in np.flatnonzero(owner == k)], cells, k)
+        found: list[tuple[int, int]] = []
+        if sides is not None:
+            (one, two), closed = sides
+            found = _path(one, two, points, normals, closed=closed)
+        if not found:
+            rings += [own.rings[i] for i in np.flatnonzero(cell_strip == k)]
+            rulings.append(own.rulings[of_ruling == k])
+        else:
+            more, lines = _cells(one, two, found, closed=closed)
+            rings += more
+            rulings.append(lines)
+        strip += [k] * (len(rings) - len(strip))
+    return own.with_rulings(rings, np.array(strip), np.concatenate(rulings))
+
+
+def _sides(loops: list[Ints], cells: Cells, strip: int) -> tuple[tuple[Ints, Ints], bool] | None:
+    """Return the vertices on both sides of a strip, in one direction, and whether it closes."""
+    degree = cells.neighbours
+    mine = np.flatnonzero(cells.strip == strip)
+    if len(loops) == 2 and (degree[mine] == 2).all():
+        one, two = loops[0], loops[1][::-1]
+        starts = cells.ends[cells.strip_of_ruling == strip]
+        partner = dict(np.concatenate([starts, starts[:, ::-1]]).tolist())
+        if int(one[0]) not in partner or partner[int(one[0])] not in two:
+            return None
+        at = int(np.flatnonzero(two == partner[int(one[0])])[0])
+        return (one, np.roll(two, -at)), True
+    last = mine[degree[mine] == 1]
+    if len(loops) != 1 or len(last) != 2 or (degree[mine] > 2).any():
+        return None
+    (loop,) = loops
+    if len(np.unique(loop)) < len(loop):
+        return None
+    place = {int(v): i for i, v in enumerate(loop)}
+    pairs = []
+    for cell in last:
+        ring = cells.rings[cell]
+        x, y = cells.end_ruling(int(cell))
+        i, n = int(np.flatnonzero(ring == x)[0]), len(ring)
+        ring = np.roll(ring, -i)
+        # From one end of the ruling around the outside to the other.
+        inner = ring[1:-1] if ring[-1] == y else ring[2:]
+        if n < 3 or not len(inner):
+            return None
+        pairs.append((place[int(inner[(len(inner) - 1) // 2])], place[int(inner[len(inner) // 2])]))
+    (a0, b0), (b1, a1) = pairs
+    # Anticlockwise, a ring continues at its second middle vertex; the other way at its first.
+    one = _between(loop, b0, b1)
+    two = _between(loop, a1, a0)[::-1]
+    return (one, two), False
+
+
+def _between(loop: Ints, first: int, last: int) -> Ints:
+    return loop[np.arange(first, last + 1 if last >= first else last + len(loop) + 1) % len(loop)]
+
+
+def _path(
+    one: Ints, two: Ints, points: Array, normals: Array, *, closed: bool
+) -> list[tuple[int, int]]:
+    """Return the successive rulings between two sides, as positions on these."""
+    if not closed:
+        return _cheapest(one, two, points, normals)[1]
+    tried = []
+    most = min(_TURNED, len(two) // 4)
+    for turn in range(-most, most + 1):
+        ends = np.r_[one, one[:1]], np.r_[np.roll(two, -turn), np.roll(two, -turn)[:1]]
+        cost, path = _cheapest(*ends, points, normals)
+        tried.append((cost, abs(turn), turn, path))
+    _, _, turn, path = min(tried)
+    return [(i % len(one), (j + turn) % len(two)) for i, j in path]
+
+
+def _cheapest(
+    one: Ints, two: Ints, points: Array, normals: Array
+) -> tuple[float, list[tuple[int, int]]]:
+    """Return the cost and the positions of the rulings from the first ends to the last."""
+    p, q, m, n = points[one], points[two], normals[one], normals[two]
+    first = _errors(p, m, q, n)
+    second = _errors(q, n, p, m, turned=True).T
+    same = one[:, None] == two[None]
+    first[same[:-1] | same[1:]] = np.inf
+    second[same[:, :-1] | same[:, 1:]] = np.inf
+    quad = _quads(p, q, first, second, same)
+    na, nb = len(p), len(q)
+    total = np.full((na, nb), np.inf)
+    step = np.zeros((na, nb), np.int8)
+    total[0, 0] = 0.0
+    for d in range(1, na + nb - 1):
+        i = np.arange(max(0, d - nb + 1), min(d, na - 1) + 1)
+        j = d - i
+        tried = np.full((3, len(i)), np.inf)
+        a, b = i > 0, j > 0
+        c = a & b
+        tried[0, c] = total[i[c] - 1, j[c] - 1] + quad[i[c] - 1, j[c] - 1]
+        tried[1, a] = total[i[a] - 1, j[a]] + first[i[a] - 1, j[a]]
+        tried[2, b] = total[i[b], j[b] - 1] + second[i[b], j[b] - 1]
+        step[i, j] = tried.argmin(axis=0)
+        total[i, j] = tried.min(axis=0)
+    if not np.isfinite(total[-1, -1]):
+        return np.inf, []
+    i, j = na - 1, nb - 1
+    path = [(i, j)]
+    while i > 0 or j > 0:
+        kind = step[i, j]
+        i, j = i - (kind != 2), j - (kind != 1)
+        path.append((i, j))
+    return float(total[-1, -1]), path[::-1]
+
+
+def _errors(p: Array, m: Array, q: Array, n: Array, *, turned: bool = False) -> Array:
+    """Return the costs (na - 1, nb) of triangles on a side and opposite vertices."""
+    way = p[1:] - p[:-1]
+    normal = cross(
+        np.broadcast_to(way[:, None], (len(way), len(q), 3)), q[None] - p[:-1][:, None]
+    )
+    if turned:
+        normal = -normal
+    area = 0.5 * lengths(normal)
+    design = unit(0.25 * (m[1:] + m[:-1])[:, None] + 0.5 * n[None])
+    error = unit(normal) - design
+    # Only the part of the error along the side tells whether the ruling is conjugate.
+    along = np.einsum("ijd,id->ij", error, unit(way)) ** 2
+    upright = np.einsum("ijd,ijd->ij", normal, design)
+    # The smallest angle decides: a triangle with its corners on a line is none.
+    size = lengths(way)[:, None] * np.minimum(
+        lengths(q[None] - p[:-1][:, None]), lengths(q[None] - p[1:][:, None])
+    )
+    narrow = size * (upright < _NARROW * size)
+    return np.asarray(area * (along + _TRIANGLE) + narrow)
+
+
+def _quads(p: Array, q: Array, first: Array, second: Array, same: Flags) -> Array:
+    """Return the costs (na - 1, nb - 1) of quads between two rulings."""
+    na, nb = len(p), len(q)
+    one, two = first[:, :-1] + second[1:], second[:-1] + first[:, 1:]
+    # Where an end is one vertex the quad is the other triangle.
+    out = np.where(np.isfinite(one) & np.isfinite(two), 0.5 * (one + two), np.minimum(one, two))
+    begins, ends = same[:-1, :-1], same[1:, 1:]
+    out[begins] = _corner(p, q, begins, 0)
+    out[ends] = _corner(p, q, ends, 1)
+    side = 0.5 * (p[1:] - p[:-1])[:, None] + 0.5 * (q[1:] - q[:-1])[None]
+    ruling = 0.5 * (q[None, :-1] + q[None, 1:] - p[:-1, None] - p[1:, None])
+    area = lengths(cross(side, ruling))
+    slant = np.einsum("ijd,ijd->ij", unit(side), unit(ruling)) ** 2
+    # Triangles pay for themselves; those of a quad do not.
+    return np.asarray(out + area * (_SLANTED * slant - _TRIANGLE)).reshape(na - 1, nb - 1)
+
+
+def _corner(p: Array, q: Array, where: Flags, end: int) -> Array:
+    """Return costs of the triangles at common ends of both sides."""
+    i, j = np.nonzero(where)
+    if end:
+        a, b, c = p[i + 1], p[i], q[j]
+    else:
+        a, b, c = p[i], p[i + 1], q[j + 1]
+    double, size = lengths(cross(b - a, c - a)), lengths(b - a) * lengths(c - a)
+    return np.asarray(_TRIANGLE * 0.5 * double + size * (double < _NARROW * size))
+
+
+def _cells(
+    one: Ints, two: Ints, path: list[tuple[int, int]], *, closed: bool
+) -> tuple[list[Ints], Ints]:
+    """Return the polygons (anticlockwise for sides in this order) and the rulings of a path."""
+    pairs = [(int(one[i]), int(two[j])) for i, j in path]
+    rings = []
+    for (a, b), (c, d) in zip(pairs[:-1], pairs[1:], strict=True):
+        ring = [a, c, d, b]
+        rings.append(np.array([v for k, v in enumerate(ring) if v != ring[k - 1]]))
+    lines = pairs[:-1] if closed else pairs[1:-1]
+    return rings, np.array(lines, np.int64).reshape(-1, 2)
