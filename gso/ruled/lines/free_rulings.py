@@ -8,6 +8,8 @@ triangles where several rulings meet in one vertex.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from gso.ruled.lines.polygons import Polygons
@@ -19,6 +21,8 @@ from gso.typing import Array, Flags, Ints
 _TRIANGLE, _SLANTED = 2e-3, 1e-4
 #: Sine of the angle between a side and a ruling below which triangles are avoided.
 _NARROW = 0.1
+#: Distance of the end of a strip from its chord, relative to that, up to which it is one edge.
+_STRAIGHT = 0.15
 #: Numbers of vertices by which the first ruling of a closed strip is moved to either side.
 _TURNED = 6
 
@@ -40,24 +44,45 @@ def free_rulings(cells: Cells, points: Array, normals: Array) -> Polygons:
     rulings: list[Ints] = []
     cell_strip, of_ruling = own.strip, cells.strip_of_ruling
     for k in range(int(cell_strip.max()) + 1):
-        sides = _sides([loops[i] for i in np.flatnonzero(owner == k)], cells, k)
+        sides = _sides([loops[i] for i in np.flatnonzero(owner == k)], cells, k, points)
         found: list[tuple[int, int]] = []
         if sides is not None:
-            (one, two), closed = sides
-            found = _path(one, two, points, normals, closed=closed)
-        if not found:
+            found = _path(sides, points, normals)
+        if sides is None or not found:
             rings += [own.rings[i] for i in np.flatnonzero(cell_strip == k)]
             rulings.append(own.rulings[of_ruling == k])
         else:
-            more, lines = _cells(one, two, found, closed=closed)
+            more, lines = _cells(sides, found)
             rings += more
             rulings.append(lines)
         strip += [k] * (len(rings) - len(strip))
     return own.with_rulings(rings, np.array(strip), np.concatenate(rulings))
 
 
-def _sides(loops: list[Ints], cells: Cells, strip: int) -> tuple[tuple[Ints, Ints], bool] | None:
-    """Return the vertices on both sides of a strip, in one direction, and whether it closes."""
+@dataclass(frozen=True)
+class _Sides:
+    """The vertices on both sides of a strip, in one direction.
+
+    Attributes
+    ----------
+    one, two : ndarray of int
+        The strip is to the left of `one`.
+    closed : bool
+        Whether the strip closes around.
+    begin, end : ndarray of int
+        Vertices between both sides where they begin and end.
+    """
+
+    one: Ints
+    two: Ints
+    closed: bool
+    begin: Ints
+    end: Ints
+
+
+def _sides(loops: list[Ints], cells: Cells, strip: int, points: Array) -> _Sides | None:
+    """Return the sides of a strip; None where it branches."""
+    none = np.empty(0, np.int64)
     degree = cells.neighbours
     mine = np.flatnonzero(cells.strip == strip)
     if len(loops) == 2 and (degree[mine] == 2).all():
@@ -67,7 +92,7 @@ def _sides(loops: list[Ints], cells: Cells, strip: int) -> tuple[tuple[Ints, Int
         if int(one[0]) not in partner or partner[int(one[0])] not in two:
             return None
         at = int(np.flatnonzero(two == partner[int(one[0])])[0])
-        return (one, np.roll(two, -at)), True
+        return _Sides(one, np.roll(two, -at), True, none, none)
     last = mine[degree[mine] == 1]
     if len(loops) != 1 or len(last) != 2 or (degree[mine] > 2).any():
         return None
@@ -75,33 +100,44 @@ def _sides(loops: list[Ints], cells: Cells, strip: int) -> tuple[tuple[Ints, Int
     if len(np.unique(loop)) < len(loop):
         return None
     place = {int(v): i for i, v in enumerate(loop)}
-    pairs = []
+    ends = []
     for cell in last:
         ring = cells.rings[cell]
         x, y = cells.end_ruling(int(cell))
-        i, n = int(np.flatnonzero(ring == x)[0]), len(ring)
-        ring = np.roll(ring, -i)
+        ring = np.roll(ring, -int(np.flatnonzero(ring == x)[0]))
         # From one end of the ruling around the outside to the other.
         inner = ring[1:-1] if ring[-1] == y else ring[2:]
-        if n < 3 or not len(inner):
+        if not len(inner):
             return None
-        pairs.append((place[int(inner[(len(inner) - 1) // 2])], place[int(inner[len(inner) // 2])]))
-    (a0, b0), (b1, a1) = pairs
-    # Anticlockwise, a ring continues at its second middle vertex; the other way at its first.
-    one = _between(loop, b0, b1)
-    two = _between(loop, a1, a0)[::-1]
-    return (one, two), False
+        if not _is_straight(points[inner]):
+            half = len(inner) // 2
+            inner = inner[len(inner) - 1 - half : half + 1]
+        ends.append(inner)
+    begin, end = ends
+    one = _between(loop, place[int(begin[-1])], place[int(end[0])])
+    two = _between(loop, place[int(end[-1])], place[int(begin[0])])[::-1]
+    return _Sides(one, two, False, begin[1:-1], end[1:-1])
+
+
+def _is_straight(points: Array) -> bool:
+    """Return whether a polyline is nearly straight."""
+    way = points[-1] - points[0]
+    size = float(lengths(way))
+    off = lengths(cross(np.broadcast_to(unit(way), points.shape), points - points[0]))
+    return len(points) > 1 and float(off.max()) < _STRAIGHT * size
 
 
 def _between(loop: Ints, first: int, last: int) -> Ints:
     return loop[np.arange(first, last + 1 if last >= first else last + len(loop) + 1) % len(loop)]
 
 
-def _path(
-    one: Ints, two: Ints, points: Array, normals: Array, *, closed: bool
-) -> list[tuple[int, int]]:
-    """Return the successive rulings between two sides, as positions on these."""
-    if not closed:
+def _path(sides: _Sides, points: Array, normals: Array) -> list[tuple[int, int]]:
+    """Return the successive rulings between two sides, as positions on these; none if there are no.
+
+    Those at both ends of an open strip are included.
+    """
+    one, two = sides.one, sides.two
+    if not sides.closed:
         return _cheapest(one, two, points, normals)[1]
     tried = []
     most = min(_TURNED, len(two) // 4)
@@ -200,14 +236,14 @@ def _corner(p: Array, q: Array, where: Flags, end: int) -> Array:
     return np.asarray(_TRIANGLE * 0.5 * double + size * (double < _NARROW * size))
 
 
-def _cells(
-    one: Ints, two: Ints, path: list[tuple[int, int]], *, closed: bool
-) -> tuple[list[Ints], Ints]:
-    """Return the polygons (anticlockwise for sides in this order) and the rulings of a path."""
-    pairs = [(int(one[i]), int(two[j])) for i, j in path]
-    rings = []
-    for (a, b), (c, d) in zip(pairs[:-1], pairs[1:], strict=True):
-        ring = [a, c, d, b]
-        rings.append(np.array([v for k, v in enumerate(ring) if v != ring[k - 1]]))
-    lines = pairs[:-1] if closed else pairs[1:-1]
+def _cells(sides: _Sides, path: list[tuple[int, int]]) -> tuple[list[Ints], Ints]:
+    """Return the polygons, anticlockwise, and the rulings of a path."""
+    pairs = [(int(sides.one[i]), int(sides.two[j])) for i, j in path]
+    rings, last = [], len(pairs) - 2
+    for k, ((a, b), (c, d)) in enumerate(zip(pairs[:-1], pairs[1:], strict=True)):
+        begin = sides.begin.tolist() if k == 0 else []
+        end = sides.end.tolist() if k == last else []
+        ring = [a, c, *end, d, b, *begin]
+        rings.append(np.array([v for i, v in enumerate(ring) if v != ring[i - 1]]))
+    lines = pairs[:-1] if sides.closed else pairs[1:-1]
     return rings, np.array(lines, np.int64).reshape(-1, 2)
