@@ -10,6 +10,7 @@ from gso.energy.coplanarity import build as coplanarity
 from gso.energy.curve import build as curve
 from gso.energy.facing import build as facing
 from gso.energy.fairness import residual as fairness_residual
+from gso.energy.position import build as position
 from gso.energy.proximity import residual as proximity_residual
 from gso.mesh import Mesh, Nearest, Polylines, vertex_normals
 from gso.ruled.lines.ears import ears
@@ -25,9 +26,9 @@ _BACK, _OUTLINE = 0.5, 0.3
 _TANGENTIAL = 0.02
 #: Weights of coplanarity and of second differences of the displacement, by round.
 _PHASES = tuple((float(1.6**k), max(float(0.6**k), 0.03)) for k in range(0, 21, 2))
-#: Weight of coplanarity when it becomes exact, rounds of multipliers, and the distance at which
-#: these end.
-_STIFF, _ROUNDS, _EXACT = 1e5, 12, 1e-14
+#: Weight of coplanarity when it becomes exact, rounds of that, updates of multipliers in each, and
+#: the distance at which these end.
+_STIFF, _ROUNDS, _SHIFTED, _EXACT = 1e6, 3, 4, 1e-13
 #: Share of second differences across creases.
 _ACROSS = 0.01
 #: Weight of the barrier against folds, and the least area of triangles relative to the design's.
@@ -62,8 +63,7 @@ class LineFitter:
         used = np.unique(np.concatenate(polygons.rings))
         number = np.full(len(self.mesh.vertices), -1)
         number[used] = np.arange(len(used))
-        layout = Layout.of(len(used), "surface")
-        variables = free(layout)
+        variables = free(Layout.of(len(used), "surface"))
         triangles = number[ears(polygons.rings, start)]
         planes = number[polygons.planes(start)]
         fixed = self._fixed(polygons, used, number)
@@ -89,12 +89,7 @@ class LineFitter:
         soft = coplanarity(planes, weight=1.0 / count)
         for stiff, fair in _PHASES:
             x = solved(x, soft, stiff, fair, _ITERATIONS)
-        hard = hardened(soft)
-        assert hard.multipliers is not None
-        for _ in range(_ROUNDS):
-            x = solved(x, hard, _STIFF, _PHASES[-1][1], 2)
-            if hard.multipliers.update(layout.split(x)) <= _EXACT:
-                break
+        x = _planar(polygons, used, number, x, start)
         out = start.copy()
         out[used] = x.reshape(-1, 3)
         return out
@@ -177,3 +172,24 @@ class LineFitter:
             )
             out.append((term, share))
         return out
+
+
+def _planar(polygons: Polygons, used: Ints, number: Ints, x: Array, start: Array) -> Array:
+    """Make polygons planar with the smallest displacement of their corners."""
+    layout = Layout.of(len(used), "surface")
+    for _ in range(_ROUNDS):
+        points = start.copy()
+        points[used] = x.reshape(-1, 3)
+        planes = number[polygons.planes(points)]
+        hard = hardened(coplanarity(planes, weight=1.0))
+        if hard.multipliers is None or hard.multipliers.update(layout.split(x)) <= _EXACT:
+            break
+        hard = hardened(coplanarity(planes, weight=1.0))
+        assert hard.multipliers is not None
+        hold = position(np.arange(len(used)), x.reshape(-1, 3), np.ones(len(used)))
+        items = [Weighted(hold, 1.0), Weighted(hard, _STIFF)]
+        for _ in range(_SHIFTED):
+            x = minimise(Problem(items, free(layout)), x, iterations=4, tolerance=1e-12).x
+            if hard.multipliers.update(layout.split(x)) <= _EXACT:
+                break
+    return x
