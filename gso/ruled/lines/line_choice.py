@@ -21,8 +21,8 @@ from gso.typing import Array, Flags, Ints
 _COLUMNS = 64
 #: Power of the sagittas.
 _POWER = 4
-#: Lines of a closed band that the first crease is chosen from.
-_FIRST = 8
+#: Largest number of lines of a band that creases are chosen from.
+_LEVELS = 97
 
 
 @dataclass(frozen=True)
@@ -35,22 +35,16 @@ class _Costs:
         The line at each level; -1 where the band ends.
     cost : ndarray, (n + 1, n + 1)
         Cost of the strip between two levels.
-    fixed : ndarray of bool, (n + 1,)
-        Levels that are creases in any case.
     """
 
     levels: Ints
     cost: Array
-    fixed: Flags
 
     def best(self, most: int) -> tuple[Array, list[Ints]]:
         """Return costs (most,) and lines for 1 to `most` strips; infinite where there are none."""
         n = len(self.levels) - 1
         most = min(most, n)
-        forbidden = np.concatenate([[0], np.cumsum(self.fixed)])
-        # A strip has no fixed level inside.
-        inside = forbidden[None, :-1] - forbidden[1:, None]
-        cost = np.where(np.triu(inside > 0, 2), np.inf, self.cost)
+        cost = self.cost
         value, before = cost[0].copy(), [np.zeros(n + 1, np.int64)]
         values, chosen = [value[n]], [np.empty(0, np.int64)]
         for k in range(1, most):
@@ -76,49 +70,43 @@ class Choice:
 
     def __init__(self, family: Family):
         self.family = family
-        self._places = [_places(family, band) for band in family.bands]
-        self._weight = 1.0 / max(sum(np.isfinite(p[:, :, 0]).sum() for p in self._places), 1)
-        self._costs: list[list[_Costs]] = []
-        for band, places in zip(family.bands, self._places, strict=True):
-            own = self._weight * _sagittas(places)
-            lines = np.r_[-1, band.lines[: len(band.rows) - 1], -1]
-            if not band.closed:
-                self._costs.append([_Costs(lines, own, np.zeros(len(lines), bool))])
-                continue
-            lines[[0, -1]] = band.lines[-1]
-            self._costs.append([_Costs(lines, own, np.zeros(len(lines), bool))])
+        places = [_places(family, band) for band in family.bands]
+        weight = 1.0 / max(sum(int(np.isfinite(p[:, :, 0]).sum()) for p in places), 1)
+        self._costs = [
+            _costs(band, p, weight) for band, p in zip(family.bands, places, strict=True)
+        ]
+        self._known: dict[int, tuple[Ints, float] | None] = {}
+        self._far: dict[bytes, float] = {}
 
     @property
     def least(self) -> int:
         """The smallest number of strips."""
-        return len(self._costs)
+        return sum(3 if band.closed else 1 for band in self.family.bands)
 
     @property
     def rows(self) -> int:
         """The largest number of strips."""
         return sum(len(band.rows) for band in self.family.bands)
 
-    def lines(self, count: int, among: Ints | None = None) -> tuple[Ints, float] | None:
-        """Return the lines for a number of strips, and the predicted distance.
+    def predicted(self, lines: Ints) -> float:
+        """Return the distance that was predicted for lines that were chosen."""
+        return self._far[lines.tobytes()]
 
-        Parameters
-        ----------
-        count : int
-            Number of strips.
-        among : ndarray of int, optional
-            Lines that are creases in any case.
-        """
+    def lines(self, count: int) -> tuple[Ints, float] | None:
+        """Return the lines for a number of strips, and the predicted distance; None without any."""
+        if count not in self._known:
+            self._known[count] = self._chosen(count)
+        return self._known[count]
+
+    def _chosen(self, count: int) -> tuple[Ints, float] | None:
         total, chosen = np.array([0.0]), [np.empty(0, np.int64)]
-        used = 0
-        for (costs,), band in zip(self._costs, self.family.bands, strict=True):
-            if among is not None:
-                costs = _Costs(costs.levels, costs.cost, np.isin(costs.levels, among))
+        for costs, band in zip(self._costs, self.family.bands, strict=True):
             values, lines = costs.best(count)
             if band.closed:
-                first = band.lines[-1:]
-                lines = [np.r_[first, own] for own in lines]
-            used += 1
-            # Entry i has i + used strips.
+                # Rulings around a closed band need three different creases at least.
+                values[:2] = np.inf
+                lines = [np.r_[band.lines[-1:], own] for own in lines]
+            # Entry i has i strips more than bands.
             both = total[:, None] + values[None]
             new, picks = [], []
             for strips in range(len(total) + len(values) - 1):
@@ -127,10 +115,22 @@ class Choice:
                 new.append(both[at, strips - at])
                 picks.append(np.r_[chosen[at], lines[strips - at]])
             total, chosen = np.array(new), picks
-        place = count - used
+        place = count - len(self._costs)
         if not 0 <= place < len(total) or not np.isfinite(total[place]):
             return None
-        return np.sort(chosen[place]), float(total[place] ** (1.0 / _POWER))
+        picked = np.sort(chosen[place])
+        far = float(total[place] ** (1.0 / _POWER))
+        self._far[picked.tobytes()] = far
+        return picked, far
+
+
+def _costs(band: Band, places: Array, weight: float) -> _Costs:
+    """Return the costs of the strips of a band, on some of its levels if there are many."""
+    lines = np.r_[-1, band.lines[: len(band.rows) - 1], -1]
+    if band.closed:
+        lines[[0, -1]] = band.lines[-1]
+    levels = np.unique(np.linspace(0, len(lines) - 1, min(len(lines), _LEVELS)).round().astype(int))
+    return _Costs(lines[levels], weight * _sagittas(places[levels]))
 
 
 def _places(family: Family, band: Band) -> Array:

@@ -22,7 +22,7 @@ from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import MOST, Options
 from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
 from gso.ruled.paneling.strips_request import StripsRequest
-from gso.ruled.paneling.surface_strips import case_of, check_whole, of_surface
+from gso.ruled.paneling.surface_strips import along_lines, case_of, check_whole, of_surface
 from gso.seams import Edges, Segmentation, cut, rectangle
 from gso.seams.options import as_sheet
 from gso.solver import Callback
@@ -221,9 +221,14 @@ class _Task:
         asked = self.request
         light = LightDesign.of(self.design, asked.max_deviation, named=asked.names_vertices)
         tried = []
-        if self.whole and (not self.divisible or _is_whole(light.mesh)):
-            tried.append(self._as_a_whole(light))
-            if not self.divisible or tried[0].ended or tried[0].holds:
+        if self.whole:
+            for way in (self._as_a_whole, self._along_lines):
+                tried += way(light)
+                if tried and (tried[-1].ended or (self.divisible and tried[-1].holds)):
+                    return self._answer(tried)
+            if not self.divisible:
+                if not tried:
+                    check_whole(light.mesh)
                 return self._answer(tried)
         failed: GSOError | None = None
         for division in self._divisions(light):
@@ -255,10 +260,11 @@ class _Task:
             add_reasons(best.result, best.reasons)
         return best.result
 
-    def _as_a_whole(self, light: LightDesign) -> _Tried:
+    def _as_a_whole(self, light: LightDesign) -> list[_Tried]:
         asked = self.request
+        if not _is_whole(light.mesh):
+            return []
         asked.say("as a whole")
-        check_whole(light.mesh)
         result = light.whole(of_surface(light.mesh, asked, light.allowed), asked)
         clock = time.perf_counter()
         reasons: tuple[Reason, ...] = ()
@@ -267,7 +273,19 @@ class _Task:
             own = judge(result, asked.limits, violation)
             reasons = ordered([*own, *_against_sheet(result, asked)])
         result.seconds["verdict"] = time.perf_counter() - clock
-        return _Tried(result, reasons)
+        return [_Tried(result, reasons)]
+
+    def _along_lines(self, light: LightDesign) -> list[_Tried]:
+        """Return strips along the design's own lines, if it has any."""
+        asked, design = self.request, self.design
+        if asked.constraints or len(np.unique(design.components[design.used])) > 1:
+            return []
+        asked.say("along its lines")
+        result = along_lines(design, asked)
+        if result is None:
+            return []
+        own = judge(result, asked.limits) if asked.verdict or self.divisible else ()
+        return [_Tried(result, ordered([*own, *_against_sheet(result, asked)]))]
 
     def _in_pieces(self, light: LightDesign, division: Pieces) -> _Tried:
         asked = self.request
