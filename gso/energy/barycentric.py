@@ -19,9 +19,8 @@ def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
 
     Constants: its three barycentric coordinates, then those of :func:`proximity.residual`.
     """
-    place = tuple(
-        sum(c * p[d] for c, p in zip(constants[:3], points, strict=True)) for d in range(3)
-    )
+    a, b, c = constants[:3]
+    place = tuple(a * p + b * q + c * r for p, q, r in zip(*points, strict=True))
     return proximity.residual((place,), constants[3:])
 
 

@@ -86,7 +86,7 @@ def half_edges(faces: Ints, vertex_count: int) -> HalfEdges:
 def tree_parity(count: int, a: Ints, b: Ints, odd: Flags) -> tuple[Flags, Ints]:
     """Propagate a parity along a spanning forest; edges a-b with `odd` change it.
 
-    Each component has a first node of parity 0. Returns the parity and the component label of each node. Pointer jumping takes
+    Returns the parity and the component label of each node. Pointer jumping takes
     log2(depth) vectorised passes.
     """
     from scipy.sparse.csgraph import breadth_first_order

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.errors import MeshError
-from gso.mesh.topology.half_edges import HalfEdges, tree_parity, edge_keys
+from gso.mesh.topology.half_edges import HalfEdges, edge_keys, tree_parity
 from gso.typing import Flags, Ints
 
 

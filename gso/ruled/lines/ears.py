@@ -58,4 +58,4 @@ def _divided(ring: Ints, corner: Array) -> Ints:
         out.append(ids[k])
         left.pop(k)
     out.append(np.array(left))
-    return ring[np.array(out)]
+    return np.asarray(ring[np.array(out)])

@@ -9,6 +9,7 @@ triangles where several rulings meet in one vertex.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -177,21 +178,19 @@ def _cheapest(
         total[i, j] = tried.min(axis=0)
     if not np.isfinite(total[-1, -1]):
         return np.inf, []
-    i, j = na - 1, nb - 1
-    path = [(i, j)]
-    while i > 0 or j > 0:
-        kind = step[i, j]
-        i, j = i - (kind != 2), j - (kind != 1)
-        path.append((i, j))
+    row, column = na - 1, nb - 1
+    path = [(row, column)]
+    while row > 0 or column > 0:
+        kind = int(step[row, column])
+        row, column = row - (kind != 2), column - (kind != 1)
+        path.append((row, column))
     return float(total[-1, -1]), path[::-1]
 
 
 def _errors(p: Array, m: Array, q: Array, n: Array, *, turned: bool = False) -> Array:
     """Return the costs (na - 1, nb) of triangles on a side and opposite vertices."""
     way = p[1:] - p[:-1]
-    normal = cross(
-        np.broadcast_to(way[:, None], (len(way), len(q), 3)), q[None] - p[:-1][:, None]
-    )
+    normal = cross(np.broadcast_to(way[:, None], (len(way), len(q), 3)), q[None] - p[:-1][:, None])
     if turned:
         normal = -normal
     area = 0.5 * lengths(normal)
@@ -240,7 +239,7 @@ def _cells(sides: _Sides, path: list[tuple[int, int]]) -> tuple[list[Ints], Ints
     """Return the polygons, anticlockwise, and the rulings of a path."""
     pairs = [(int(sides.one[i]), int(sides.two[j])) for i, j in path]
     rings, last = [], len(pairs) - 2
-    for k, ((a, b), (c, d)) in enumerate(zip(pairs[:-1], pairs[1:], strict=True)):
+    for k, ((a, b), (c, d)) in enumerate(pairwise(pairs)):
         begin = sides.begin.tolist() if k == 0 else []
         end = sides.end.tolist() if k == last else []
         ring = [a, c, *end, d, b, *begin]

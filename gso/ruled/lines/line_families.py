@@ -48,7 +48,7 @@ class Family:
     def lengthwise(self) -> Flags:
         """Mask over half-edges: those along the strip of their face."""
         he = self.mesh.half_edges
-        return np.arange(len(he.face)) % 2 == self.along[he.face]
+        return np.asarray(np.arange(len(he.face)) % 2 == self.along[he.face])
 
     @cached_property
     def _counts(self) -> tuple[Ints, Ints]:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from gso.energy import Term, Weighted, hardened, mean_weights
+from gso.energy import Term, Weighted, mean_weights
 from gso.energy.barycentric import build as barycentric
 from gso.energy.coplanarity import build as coplanarity
 from gso.energy.curve import build as curve
 from gso.energy.facing import build as facing
 from gso.energy.fairness import residual as fairness_residual
+from gso.energy.multipliers import Shifts
 from gso.energy.position import build as position
 from gso.energy.proximity import residual as proximity_residual
 from gso.mesh import Mesh, Nearest, Polylines, vertex_normals
@@ -90,7 +93,7 @@ class LineFitter:
         for stiff, fair in _PHASES:
             x = solved(x, soft, stiff, fair, _ITERATIONS)
         x = _planar(polygons, used, number, x, start)
-        out = start.copy()
+        out: Array = start.copy()
         out[used] = x.reshape(-1, 3)
         return out
 
@@ -141,7 +144,13 @@ class LineFitter:
         corners = [ring for ring in polygons.rings if len(ring) == 4]
         quads = np.array(corners, np.int64).reshape(-1, 4)
         ids = np.concatenate(
-            [ears(polygons.rings, v), quads[:, [0, 1, 3]], quads[:, [1, 2, 3]], quads[:, :3], quads[:, [0, 2, 3]]]
+            [
+                ears(polygons.rings, v),
+                quads[:, [0, 1, 3]],
+                quads[:, [1, 2, 3]],
+                quads[:, :3],
+                quads[:, [0, 2, 3]],
+            ]
         )
         ids = np.unique(ids, axis=0)
         a, b, c = v[ids].transpose(1, 0, 2)
@@ -181,15 +190,20 @@ def _planar(polygons: Polygons, used: Ints, number: Ints, x: Array, start: Array
         points = start.copy()
         points[used] = x.reshape(-1, 3)
         planes = number[polygons.planes(points)]
-        hard = hardened(coplanarity(planes, weight=1.0))
-        if hard.multipliers is None or hard.multipliers.update(layout.split(x)) <= _EXACT:
+        hard = coplanarity(planes)
+        if _largest(hard, points[used]) <= _EXACT:
             break
-        hard = hardened(coplanarity(planes, weight=1.0))
-        assert hard.multipliers is not None
+        shifts = Shifts(hard)
+        hard = replace(hard, refresh=shifts.constants)
         hold = position(np.arange(len(used)), x.reshape(-1, 3), np.ones(len(used)))
         items = [Weighted(hold, 1.0), Weighted(hard, _STIFF)]
         for _ in range(_SHIFTED):
             x = minimise(Problem(items, free(layout)), x, iterations=4, tolerance=1e-12).x
-            if hard.multipliers.update(layout.split(x)) <= _EXACT:
+            if shifts.update(layout.split(x)) <= _EXACT:
                 break
     return x
+
+
+def _largest(term: Term, points: Array) -> float:
+    """Return the largest residual."""
+    return Shifts(term).update({"surface": points})

@@ -47,7 +47,7 @@ class LineStrips:
             self.choices = [Choice(family) for family in families(mesh)]
         except MeshError:
             self.choices = []
-        self._fitter = LineFitter(mesh) if self.choices else None
+        self._fitter = LineFitter(mesh)
 
     def predicted(self, count: int) -> float:
         """Return the distance that is predicted for a number of strips."""
@@ -101,7 +101,6 @@ class LineStrips:
 
     def _solved(self, candidate: tuple[Choice, Ints]) -> Found | None:
         choice, lines = candidate
-        assert self._fitter is not None
         v = self.mesh.vertices
         try:
             cells = Cells(choice.family, lines)

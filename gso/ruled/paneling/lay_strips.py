@@ -226,6 +226,8 @@ class _Task:
                 tried += way(light)
                 if tried and (tried[-1].ended or (self.divisible and tried[-1].holds)):
                     return self._answer(tried)
+                if tried and self.divisible and tried[0].is_near:
+                    break
             if not self.divisible:
                 if not tried:
                     check_whole(light.mesh)
@@ -311,6 +313,12 @@ class _Tried:
     def holds(self) -> bool:
         """Whether it is what was asked for."""
         return not (self.reasons or self.result.status.is_failure)
+
+    @property
+    def is_near(self) -> bool:
+        """Whether only the sheet is too small for its parts, so that these are to be divided."""
+        small = {Code.TOO_LONG, Code.TOO_WIDE}
+        return {why.code for why in self.reasons} <= small
 
     @property
     def far(self) -> float:

@@ -16,7 +16,7 @@ from gso.pipeline.user_result import pack, record_violations
 from gso.result import Result, StripsResult
 from gso.ruled.conditions import Conditions
 from gso.ruled.domain import Domain
-from gso.ruled.lines.line_search import LineStrips
+from gso.ruled.lines import LineStrips
 from gso.ruled.paneling.options import RULED, Options
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.ruled_surface import RuledSurface
