@@ -11,15 +11,18 @@ from gso.energy import Term, registry
 from gso.mesh import Mesh, Polylines, topology, vertex_normals
 
 (
+    barycentric,
     bending,
     christoffel,
     collapse,
     congruence,
+    coplanarity,
     curvature,
     curve,
     edges,
     elongation,
     equation,
+    facing,
     fairness,
     gauss_image,
     isometry,
@@ -34,15 +37,18 @@ from gso.mesh import Mesh, Polylines, topology, vertex_normals
 ) = (
     registry()[name]
     for name in (
+        "barycentric",
         "bending",
         "christoffel",
         "collapse",
         "congruence",
+        "coplanarity",
         "curvature",
         "curve",
         "edges",
         "elongation",
         "equation",
+        "facing",
         "fairness",
         "gauss_image",
         "isometry",

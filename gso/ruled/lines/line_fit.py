@@ -16,6 +16,7 @@ from gso.energy.multipliers import Shifts
 from gso.energy.position import build as position
 from gso.energy.proximity import residual as proximity_residual
 from gso.mesh import Mesh, Nearest, Polylines, vertex_normals
+from gso.mesh.polyline import turns
 from gso.ruled.lines.ears import ears
 from gso.ruled.lines.polygons import Polygons
 from gso.ruled.vectors import cross, lengths, unit
@@ -29,6 +30,8 @@ _BACK, _OUTLINE = 0.5, 0.3
 _TANGENTIAL = 0.02
 #: Weights of coplanarity and of second differences of the displacement, by round.
 _PHASES = tuple((float(1.6**k), max(float(0.6**k), 0.03)) for k in range(0, 21, 2))
+#: Weight of the places of the outline's corners, and the turning of the outline there, in degrees.
+_CORNERS, _SHARP = 3.0, 30.0
 #: Weight of coplanarity when it becomes exact, rounds of that, updates of multipliers in each, and
 #: the distance at which these end.
 _STIFF, _ROUNDS, _SHIFTED, _EXACT = 1e6, 3, 4, 1e-13
@@ -52,6 +55,12 @@ class LineFitter:
         self.outline = Polylines.join(
             [Polylines.of(mesh.vertices[loop], closed=True) for loop in mesh.boundary_loops]
         )
+        sharp = [
+            loop[turns(unit(np.roll(way, -1, axis=0) - way)) > _SHARP]
+            for loop in mesh.boundary_loops
+            for way in [mesh.vertices[loop]]
+        ]
+        self._corners = np.unique(np.concatenate(sharp))
         corner = mesh.vertices[mesh.triangles]
         area = 0.5 * lengths(cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
         share = np.zeros(len(mesh.vertices))
@@ -73,7 +82,7 @@ class LineFitter:
         smooth = self._smooth(polygons, number)
         x = start[used].ravel()
 
-        def solved(x: Array, planar: Term, stiff: float, fair: float, iterations: int) -> Array:
+        def solved(x: Array, planar: Term, stiff: float, fair: float) -> Array:
             items = [
                 *self._distances(x.reshape(-1, 3), triangles),
                 *fixed,
@@ -83,7 +92,7 @@ class LineFitter:
             return minimise(
                 Problem(items, variables),
                 x,
-                iterations=iterations,
+                iterations=_ITERATIONS,
                 tolerance=1e-6,
                 method="levenberg-marquardt",
             ).x
@@ -91,7 +100,7 @@ class LineFitter:
         count = max(len(planes), 1)
         soft = coplanarity(planes, weight=1.0 / count)
         for stiff, fair in _PHASES:
-            x = solved(x, soft, stiff, fair, _ITERATIONS)
+            x = solved(x, soft, stiff, fair)
         x = _planar(polygons, used, number, x, start)
         out: Array = start.copy()
         out[used] = x.reshape(-1, 3)
@@ -132,7 +141,10 @@ class LineFitter:
             constants=np.concatenate([own.T, ways.T, factor]),
             linear=True,
         )
+        sharp = number[self._corners]
+        corners = position(sharp, mesh.vertices[self._corners], np.full(len(sharp), share))
         return [
+            Weighted(corners, _CORNERS),
             Weighted(curve(rim, self.outline, weight=share), _OUTLINE),
             Weighted(places, _PLACES),
             Weighted(self._facing(polygons, number), _FACING),

@@ -174,6 +174,10 @@ def lay_strips(given: MeshLike | Pieces, request: StripsRequest) -> Result:
     return result
 
 
+#: Distance relative to the diagonal at which strips need not be nearer.
+_CLOSE = 1e-4
+
+
 @dataclass(frozen=True)
 class _Task:
     """A design, what was asked of its strips, and how it may be divided.
@@ -220,13 +224,13 @@ class _Task:
         """Return the whole or the pieces: what holds the limits, or else the closest."""
         asked = self.request
         light = LightDesign.of(self.design, asked.max_deviation, named=asked.names_vertices)
-        tried = []
+        tried: list[_Tried] = []
         if self.whole:
             for way in (self._as_a_whole, self._along_lines):
                 tried += way(light)
                 if tried and (tried[-1].ended or (self.divisible and tried[-1].holds)):
                     return self._answer(tried)
-                if tried and self.divisible and tried[0].is_near:
+                if tried and (tried[0].is_near if self.divisible else tried[0].is_close):
                     break
             if not self.divisible:
                 if not tried:
@@ -313,6 +317,11 @@ class _Tried:
     def holds(self) -> bool:
         """Whether it is what was asked for."""
         return not (self.reasons or self.result.status.is_failure)
+
+    @property
+    def is_close(self) -> bool:
+        """Whether it is so close to the design that nothing nearer is looked for."""
+        return self.holds and self.far <= _CLOSE * self.result.design.diagonal
 
     @property
     def is_near(self) -> bool:
