@@ -29,7 +29,9 @@ _BACK, _OUTLINE = 0.5, 0.3
 #: Factor on tangential displacements.
 _TANGENTIAL = 0.02
 #: Weights of coplanarity and of second differences of the displacement, by round.
-_PHASES = tuple((float(1.6**k), max(float(0.6**k), 0.03)) for k in range(0, 21, 2))
+_PHASES = tuple((float(1.6**k), float(0.6**k)) for k in range(0, 21, 2))
+#: Least weight of these second differences.
+_FAIR = 0.03
 #: Weight of the places of the outline's corners, and the turning of the outline there, in degrees.
 _CORNERS, _SHARP = 3.0, 30.0
 #: Weight of coplanarity when it becomes exact, rounds of that, updates of multipliers in each, and
@@ -67,10 +69,11 @@ class LineFitter:
         np.add.at(share, mesh.triangles.ravel(), np.repeat(area, 3) / (3.0 * area.sum()))
         self.share = share
 
-    def fit(self, polygons: Polygons, start: Array) -> Array:
+    def fit(self, polygons: Polygons, start: Array, *, fairness: float = _FAIR) -> Array:
         """Fit strips, from positions (n, 3) of the mesh's vertices; return their positions.
 
-        Vertices that are no corners stay.
+        Vertices that are no corners stay. With more fairness, the least weight of second
+        differences, folds are rarer and distances larger.
         """
         used = np.unique(np.concatenate(polygons.rings))
         number = np.full(len(self.mesh.vertices), -1)
@@ -100,7 +103,7 @@ class LineFitter:
         count = max(len(planes), 1)
         soft = coplanarity(planes, weight=1.0 / count)
         for stiff, fair in _PHASES:
-            x = solved(x, soft, stiff, fair)
+            x = solved(x, soft, stiff, max(fair, fairness))
         x = _planar(polygons, used, number, x, start)
         out: Array = start.copy()
         out[used] = x.reshape(-1, 3)

@@ -23,8 +23,10 @@ from gso.typing import Array, Ints
 LINES = "lines"
 #: Families that are tried, and the ratio of their predicted distance to the smallest up to which.
 _FAMILIES, _RATIO = 2, 2.0
-#: Share of the predicted distance up to which polygons of the mesh's own rulings are planar enough.
+#: Share of the predicted distance up to which the mesh's own rulings give planar enough polygons.
 _PLANAR = 0.2
+#: Whether to take the other kind of rulings, and fairness, one after the other until nothing folds.
+_SETTINGS = ((False, 0.03), (True, 0.03), (False, 0.5), (True, 0.5))
 #: Ratio of numbers of strips in the search for a bound, and largest number of solves.
 _MORE, _SOLVES = 1.3, 10
 
@@ -61,7 +63,13 @@ class LineStrips:
         are nearer.
         """
         if count not in self.results and not self.stopped:
-            tried = [found for found in map(self._solved, self._candidates(count)) if found]
+            tried: list[Found] = []
+            for candidate in self._candidates(count):
+                for settings in _SETTINGS:
+                    found = self._solved(*candidate, *settings)
+                    tried += [] if found is None else [found]
+                    if found is None or found.surface.sound:
+                        break
             if tried:
                 self.results[count] = min(tried, key=lambda found: found.order)
         known = [found for k, found in sorted(self.results.items()) if k <= count]
@@ -99,8 +107,8 @@ class LineStrips:
             if far <= _RATIO * found[0][0]
         ]
 
-    def _solved(self, candidate: tuple[Choice, Ints]) -> Found | None:
-        choice, lines = candidate
+    def _solved(self, choice: Choice, lines: Ints, other: bool, fairness: float) -> Found | None:
+        """Solve for strips; with the other kind of rulings than the mesh calls for if asked."""
         v = self.mesh.vertices
         try:
             cells = Cells(choice.family, lines)
@@ -111,9 +119,9 @@ class LineStrips:
         if self.stopped or not self.tell(count):
             self.stopped = True
             return None
-        if _gaps(polygons, v) > _PLANAR * choice.predicted(lines):
+        if (_gaps(polygons, v) > _PLANAR * choice.predicted(lines)) != other:
             polygons = free_rulings(cells, v, self._fitter.normals)
-        points = self._fitter.fit(polygons, v)
+        points = self._fitter.fit(polygons, v, fairness=fairness)
         if not np.isfinite(points).all():
             return None
         surface = line_surface(self.mesh, polygons, points)
