@@ -199,3 +199,25 @@ def test_a_tube_becomes_strips():
     assert result.metrics["strain_max"] < 1e-9
     with pytest.raises(gso.MeshError, match="close around"):
         gso.strips(tube, strips=1)
+
+
+def test_files_keep_strips_along_lines(tmp_path):
+    result = gso.strips(revolved(), strips=6)
+    result.save(tmp_path / "a.npz")
+    again = gso.Result.load(tmp_path / "a.npz")
+    np.testing.assert_array_equal(again.pattern.flat, result.pattern.flat)
+    assert again.metrics == pytest.approx(result.metrics)
+    result.save(tmp_path / "a.obj")
+    assert len(gso.as_mesh(tmp_path / "a.obj").vertices) == len(result.mesh.vertices)
+
+
+def test_as_few_strips_as_hold_a_distance():
+    tube = revolved(rows=16, around=32)
+    allowed = 0.01 * tube.diagonal
+    result = gso.strips(tube, max_deviation=allowed)
+    assert result.usable, result.reasons
+    assert result.pieces is None and result.ruled.farthest <= allowed
+    fewer = gso.strips(tube, strips=result.ruled.strips - 1)
+    assert fewer.ruled.farthest > allowed
+    # The profile bends by 0.6 / (2 * 0.6) of the height in all: its sagitta is 0.3 / strips^2.
+    assert result.ruled.strips <= np.ceil(np.sqrt(0.3 / allowed))

@@ -72,8 +72,8 @@ class LineStrips:
                         break
             if tried:
                 self.results[count] = min(tried, key=lambda found: found.order)
-        known = [found for k, found in sorted(self.results.items()) if k <= count]
-        return min(known, key=lambda found: found.order, default=None)
+        known = [found for k, found in sorted(self.results.items(), reverse=True) if k <= count]
+        return min(known, key=_distance, default=None)
 
     def within(self, wanted: Wanted) -> Found | None:
         """Return as few strips as meet bounds, or else the best."""
@@ -95,7 +95,7 @@ class LineStrips:
                 count = min(more, most) if high is None else (low + high) // 2
         every = [self.results[k] for k in sorted(self.results)]
         met = [found for found in every if wanted.met(found.surface)]
-        return met[0] if met else min(every, key=lambda found: found.order, default=None)
+        return met[0] if met else min(every, key=_distance, default=None)
 
     def _candidates(self, count: int) -> list[tuple[Choice, Ints]]:
         chosen = [(choice, choice.lines(count)) for choice in self.choices]
@@ -127,6 +127,11 @@ class LineStrips:
         surface = line_surface(self.mesh, polygons, points)
         far = surface.distances(self.mesh)
         return Found(replace(surface, deviation=far), max(far.there_mean, far.back_mean), LINES)
+
+
+def _distance(found: Found) -> tuple[bool, float]:
+    """Sort key: sound surfaces first, then by the largest distance."""
+    return not found.surface.sound, found.surface.farthest
 
 
 def _gaps(polygons: Polygons, points: Array) -> float:

@@ -55,8 +55,9 @@ def strips(
 ) -> Result:
     """Make strips of planar faces near a design: exactly developable, with straight bend lines.
 
-    The design is tried as one surface, with as few strips side by side as hold `max_deviation`.
-    Where that does not hold it, the design is cut into pieces without darts, which become
+    The design is tried as one surface, with as few strips side by side as hold `max_deviation`. On
+    quad meshes strips along the design's own lines are tried, too, which may close around.
+    Where neither holds it, the design is cut into pieces without darts, which become
     developable together, and each piece becomes strips that follow it. The result that holds the
     limits is returned, or else the closest.
 
