@@ -175,6 +175,8 @@ def lay_strips(given: MeshLike | Pieces, request: StripsRequest) -> Result:
     return result
 
 
+#: Ratio of distances below which strips without smooth surfaces are preferred to others.
+_NEARER = 0.5
 #: Distance relative to the diagonal at which strips need not be nearer.
 _CLOSE = 1e-4
 
@@ -262,7 +264,7 @@ class _Task:
         yield lambda: found_pieces(light, asked, JOINT)
 
     def _answer(self, tried: Sequence[_Tried]) -> Result:
-        best = min(tried, key=lambda one: (not one.holds, one.far))
+        best = min(tried, key=lambda one: one.order)
         if self.request.verdict:
             add_reasons(best.result, best.reasons)
         return best.result
@@ -318,6 +320,16 @@ class _Tried:
     def holds(self) -> bool:
         """Whether it is what was asked for."""
         return not (self.reasons or self.result.status.is_failure)
+
+    @property
+    def order(self) -> tuple[bool, float]:
+        """Sort key: what was asked for first, then by distance.
+
+        Of results that hold, those without smooth surfaces for CAD have to be clearly nearer.
+        """
+        surface = self.result.ruled
+        plain = surface is None or surface.untrimmed is None
+        return not self.holds, self.far / (_NEARER if self.holds and plain else 1.0)
 
     @property
     def is_close(self) -> bool:
