@@ -25,7 +25,8 @@ LINES = "lines"
 _FAMILIES, _RATIO = 2, 2.0
 #: Share of the predicted distance up to which the mesh's own rulings give planar enough polygons.
 _PLANAR = 0.2
-#: Whether to take the other kind of rulings, and fairness, one after the other until nothing folds.
+#: Whether to take the other kind of rulings, and fairness, one after the other until nothing folds;
+#: half of them for the second family.
 _SETTINGS = ((False, 0.03), (True, 0.03), (False, 0.5), (True, 0.5))
 #: Ratio of numbers of strips in the search for a bound, and largest number of solves.
 _MORE, _SOLVES = 1.3, 10
@@ -64,8 +65,8 @@ class LineStrips:
         """
         if count not in self.results and not self.stopped:
             tried: list[Found] = []
-            for candidate in self._candidates(count):
-                for settings in _SETTINGS:
+            for place, candidate in enumerate(self._candidates(count)):
+                for settings in _SETTINGS[: len(_SETTINGS) >> place]:
                     found = self._solved(*candidate, *settings)
                     tried += [] if found is None else [found]
                     if found is None or found.surface.sound:
