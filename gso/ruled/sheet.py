@@ -23,10 +23,10 @@ def unrolled_pattern(mesh: Mesh, owner: Ints, part: Ints, unrolled: Unrolled) ->
     pieces = [upright(flat[label == k])[:, ::-1] * [1.0, -1.0] for k in range(int(part.max()) + 1)]
     for k, piece in enumerate(beside(pieces)):
         flat[label == k] = piece
-    return Pattern(flat, table, vertex, _seams(mesh, table))
+    return Pattern(flat, table, vertex, seam_pairs(mesh, table))
 
 
-def _seams(mesh: Mesh, table: Ints) -> Ints:
+def seam_pairs(mesh: Mesh, table: Ints) -> Ints:
     """Return the pairs of pattern edges that are one edge of the surface."""
     he = mesh.half_edges
     k = np.flatnonzero((he.twin >= 0) & (he.origin < he.dest))

@@ -11,15 +11,18 @@ from gso.energy import Term, registry
 from gso.mesh import Mesh, Polylines, topology, vertex_normals
 
 (
+    barycentric,
     bending,
     christoffel,
     collapse,
     congruence,
+    coplanarity,
     curvature,
     curve,
     edges,
     elongation,
     equation,
+    facing,
     fairness,
     gauss_image,
     holonomy,
@@ -35,15 +38,18 @@ from gso.mesh import Mesh, Polylines, topology, vertex_normals
 ) = (
     registry()[name]
     for name in (
+        "barycentric",
         "bending",
         "christoffel",
         "collapse",
         "congruence",
+        "coplanarity",
         "curvature",
         "curve",
         "edges",
         "elongation",
         "equation",
+        "facing",
         "fairness",
         "gauss_image",
         "holonomy",
@@ -100,6 +106,29 @@ def _length(mesh: Mesh) -> list[Term]:
     return [length.build(mesh.edges, lengths, block=block) for block in ("surface", "flat")]
 
 
+def _barycentric(mesh: Mesh) -> list[Term]:
+    triangles = mesh.triangles[:3]
+    shares = np.tile([0.2, 0.5, 0.3], (3, 1))
+    targets, normals = mesh.vertices[:3] + 0.1, vertex_normals(mesh)[:3]
+    return [
+        barycentric.build(triangles, shares, targets, normals, np.ones(3), tangential=t)
+        for t in (0.0, 0.5)
+    ]
+
+
+def _coplanarity(mesh: Mesh) -> list[Term]:
+    hinges = topology.hinges(mesh.triangle_edges)
+    return [coplanarity.build(hinges[:5])]
+
+
+def _facing(mesh: Mesh) -> list[Term]:
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    scaled = normals / (normals**2).sum(axis=1, keepdims=True)
+    count = len(scaled)
+    return [facing.build(mesh.triangles, scaled, np.full(count, 1.0 / count), least=1.5)]
+
+
 def _planarity(mesh: Mesh) -> list[Term]:
     quads = topology.by_size(mesh.faces)[0]
     return [planarity.build(quads)] if len(quads) else []
@@ -117,6 +146,7 @@ def _smooth_curve(mesh: Mesh) -> list[Term]:
 
 
 _BUILT: dict[str, Callable[[Mesh], list[Term]]] = {
+    "barycentric": _barycentric,
     "bending": lambda mesh: bending.build(mesh, tangential=0.5),
     "christoffel": lambda mesh: [
         *christoffel.build(mesh, "surface", counterpart="flat"),
@@ -124,11 +154,13 @@ _BUILT: dict[str, Callable[[Mesh], list[Term]]] = {
     ],
     "collapse": collapse.build,
     "congruence": _congruence,
+    "coplanarity": _coplanarity,
     "curvature": curvature.build,
     "curve": _curve,
     "edges": lambda mesh: [edges.build(mesh)],
     "elongation": lambda mesh: [elongation.build(mesh)],
     "equation": _equation,
+    "facing": _facing,
     "fairness": lambda mesh: [fairness.build(mesh), fairness.build(mesh, block="flat")],
     "gauss_image": gauss_image.build,
     "holonomy": _holonomy,

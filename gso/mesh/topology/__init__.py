@@ -18,6 +18,7 @@ from gso.mesh.topology.half_edges import (
     half_edges,
     orient,
     reverse,
+    tree_parity,
 )
 from gso.mesh.topology.polylines import boundary_loops, hinges, polyline_crosses, polyline_triples
 from gso.mesh.topology.stars import (
@@ -64,6 +65,7 @@ __all__ = [
     "quad_splits",
     "recognise_grid",
     "reverse",
+    "tree_parity",
     "triangulate",
     "vertex_stars",
 ]

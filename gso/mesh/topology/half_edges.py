@@ -83,7 +83,7 @@ def half_edges(faces: Ints, vertex_count: int) -> HalfEdges:
     return HalfEdges(origin, dest, face, nxt, prev, twin, vertex_count)
 
 
-def _tree_parity(count: int, a: Ints, b: Ints, odd: Flags) -> tuple[Flags, Ints]:
+def tree_parity(count: int, a: Ints, b: Ints, odd: Flags) -> tuple[Flags, Ints]:
     """Propagate a parity along a spanning forest; edges a-b with `odd` change it.
 
     Returns the parity and the component label of each node. Pointer jumping takes
@@ -143,7 +143,7 @@ def orient(faces: Ints, vertex_count: int) -> tuple[Ints, int, int]:
         )
     h, g = order[:-1][same], order[1:][same]
     odd = origin[h] == origin[g]
-    flip, label = _tree_parity(len(faces), face[h], face[g], odd)
+    flip, label = tree_parity(len(faces), face[h], face[g], odd)
     wrong = (flip[face[h]] ^ flip[face[g]]) != odd
     if wrong.any():
         at = h[wrong][0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.errors import MeshError
-from gso.mesh.topology.half_edges import HalfEdges, _tree_parity, edge_keys
+from gso.mesh.topology.half_edges import HalfEdges, edge_keys, tree_parity
 from gso.typing import Flags, Ints
 
 
@@ -70,7 +70,7 @@ def quad_splits(faces: Ints, he: HalfEdges, reflex: Ints | None = None) -> Flags
     here = local[inner] % 2 == 0
     there = local[he.twin[inner]] % 2 == 1
     # Consistent: the diagonals of two neighbours do not meet at an end of the shared edge.
-    turn, _ = _tree_parity(len(faces), he.face[inner], he.face[he.twin[inner]], here == there)
+    turn, _ = tree_parity(len(faces), he.face[inner], he.face[he.twin[inner]], here == there)
     if reflex is not None:
         turn = np.where(reflex < 0, turn, reflex % 2 == 1)
     # Two quads with the same diagonal, or a diagonal that is also an edge, would give a

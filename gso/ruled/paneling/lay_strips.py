@@ -23,7 +23,7 @@ from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import MOST, Options
 from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
 from gso.ruled.paneling.strips_request import StripsRequest
-from gso.ruled.paneling.surface_strips import case_of, check_whole, of_surface
+from gso.ruled.paneling.surface_strips import along_lines, case_of, check_whole, of_surface
 from gso.seams import Edges, Segmentation, cut
 from gso.solver import Callback
 from gso.status import Status
@@ -55,8 +55,9 @@ def strips(
 ) -> Result:
     """Make strips of planar faces near a design: exactly developable, with straight bend lines.
 
-    The design is tried as one surface, with as few strips side by side as hold `max_deviation`.
-    Where that does not hold it, the design is cut into pieces without darts, which become
+    The design is tried as one surface, with as few strips side by side as hold `max_deviation`. On
+    quad meshes strips along the design's own lines are tried, too, which may close around.
+    Where neither holds it, the design is cut into pieces without darts, which become
     developable together, and each piece becomes strips that follow it. The result that holds the
     limits is returned, or else the closest.
 
@@ -174,6 +175,12 @@ def lay_strips(given: MeshLike | Pieces, request: StripsRequest) -> Result:
     return result
 
 
+#: Ratio of distances below which strips without smooth surfaces are preferred to others.
+_NEARER = 0.5
+#: Distance relative to the diagonal at which strips need not be nearer.
+_CLOSE = 1e-4
+
+
 @dataclass(frozen=True)
 class _Task:
     """A design, what was asked of its strips, and how it may be divided.
@@ -220,10 +227,17 @@ class _Task:
         """Return the whole or the pieces: what holds the limits, or else the closest."""
         asked = self.request
         light = LightDesign.of(self.design, asked.max_deviation, named=asked.names_vertices)
-        tried = []
-        if self.whole and (not self.divisible or _is_whole(light.mesh)):
-            tried.append(self._as_a_whole(light))
-            if not self.divisible or tried[0].ended or tried[0].holds:
+        tried: list[_Tried] = []
+        if self.whole:
+            for way in (self._as_a_whole, self._along_lines):
+                tried += way(light)
+                if tried and (tried[-1].ended or (self.divisible and tried[-1].holds)):
+                    return self._answer(tried)
+                if tried and (tried[0].is_near if self.divisible else tried[0].is_close):
+                    break
+            if not self.divisible:
+                if not tried:
+                    check_whole(light.mesh)
                 return self._answer(tried)
         failed: GSOError | None = None
         for division in self._divisions(light):
@@ -250,15 +264,16 @@ class _Task:
         yield lambda: found_pieces(light, asked, JOINT)
 
     def _answer(self, tried: Sequence[_Tried]) -> Result:
-        best = min(tried, key=lambda one: (not one.holds, one.far))
+        best = min(tried, key=lambda one: one.order)
         if self.request.verdict:
             add_reasons(best.result, best.reasons)
         return best.result
 
-    def _as_a_whole(self, light: LightDesign) -> _Tried:
+    def _as_a_whole(self, light: LightDesign) -> list[_Tried]:
         asked = self.request
+        if not _is_whole(light.mesh):
+            return []
         asked.say("as a whole")
-        check_whole(light.mesh)
         result = light.whole(of_surface(light.mesh, asked, light.allowed), asked)
         clock = time.perf_counter()
         reasons: tuple[Reason, ...] = ()
@@ -267,7 +282,19 @@ class _Task:
             own = judge(result, asked.limits, violation)
             reasons = ordered([*own, *_against_sheet(result, asked)])
         result.seconds["verdict"] = time.perf_counter() - clock
-        return _Tried(result, reasons)
+        return [_Tried(result, reasons)]
+
+    def _along_lines(self, light: LightDesign) -> list[_Tried]:
+        """Return strips along the design's own lines, if it has any."""
+        asked, design = self.request, self.design
+        if asked.constraints or len(np.unique(design.components[design.used])) > 1:
+            return []
+        asked.say("along its lines")
+        result = along_lines(design, asked)
+        if result is None:
+            return []
+        own = judge(result, asked.limits) if asked.verdict or self.divisible else ()
+        return [_Tried(result, ordered([*own, *_against_sheet(result, asked)]))]
 
     def _in_pieces(self, light: LightDesign, division: Pieces) -> _Tried:
         asked = self.request
@@ -293,6 +320,27 @@ class _Tried:
     def holds(self) -> bool:
         """Whether it is what was asked for."""
         return not (self.reasons or self.result.status.is_failure)
+
+    @property
+    def order(self) -> tuple[bool, float]:
+        """Sort key: what was asked for first, then by distance.
+
+        Of results that hold, those without smooth surfaces for CAD have to be clearly nearer.
+        """
+        surface = self.result.ruled
+        plain = surface is None or surface.untrimmed is None
+        return not self.holds, self.far / (_NEARER if self.holds and plain else 1.0)
+
+    @property
+    def is_close(self) -> bool:
+        """Whether it is so close to the design that nothing nearer is looked for."""
+        return self.holds and self.far <= _CLOSE * self.result.design.diagonal
+
+    @property
+    def is_near(self) -> bool:
+        """Whether only the sheet is too small for its parts, so that these are to be divided."""
+        small = {Code.TOO_LONG, Code.TOO_WIDE}
+        return {why.code for why in self.reasons} <= small
 
     @property
     def far(self) -> float:

@@ -16,6 +16,7 @@ from gso.pipeline.user_result import pack, record_violations
 from gso.result import Result, StripsResult
 from gso.ruled.conditions import Conditions
 from gso.ruled.domain import Domain
+from gso.ruled.lines import LineStrips
 from gso.ruled.paneling.options import RULED, Options
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.ruled_surface import RuledSurface
@@ -153,6 +154,53 @@ def of_surface(design: Mesh, request: StripsRequest, bound: float | None) -> Res
     )
     record_violations(case, moved, result)
     return result
+
+
+def along_lines(design: Mesh, request: StripsRequest) -> Result | None:
+    """Make strips along the design's own lines, without a verdict; None where there are none.
+
+    Parameters
+    ----------
+    design : Mesh
+        One surface of quads, with a boundary, possibly with holes or closed around.
+    request : StripsRequest
+        Without constraints.
+    """
+    options, clock = request.options, time.perf_counter()
+    aim = wanted(options, request.max_deviation, design.diagonal)
+    if design.has_triangles or not design.boundary_loops or aim.strips == 1 or options.flats:
+        return None
+    size, frame = design.diagonal, design.frame
+
+    def told(count: int) -> bool:
+        progress = Progress(0, 1, 0, 1, 0.0, {}, 1.0, f"strips along lines: {count}")
+        return request.callback is None or not says_no(request.callback(progress))
+
+    lines = LineStrips(design.replaced((design.vertices - frame.centre) / size), told)
+    found = lines.within(aim) if aim.strips is None else lines.strips(aim.strips)
+    if found is None:
+        return None
+    surface = found.surface.transformed(
+        lambda points: size * points + frame.centre, size, lambda rows: rows
+    )
+    met = not aim.bounded or aim.met(found.surface)
+    status = Status.CONVERGED if met else Status.TARGET_MISSED
+    tried = {k: one.surface.farthest for k, one in lines.results.items()}
+    return StripsResult(
+        task="developable",
+        formulation=RULED,
+        design=design,
+        status=Status.CANCELLED if lines.stopped else status,
+        iterations=0,
+        energy={"distance": found.mean},
+        history=[],
+        seconds={"strips": time.perf_counter() - clock},
+        backend="",
+        warm_start="cold",
+        notes=design.notes,
+        details={"strips": surface.strips, "rulings_from": found.start, "tried": _said(tried)},
+        **StripsResult.attributes(surface),
+    )
 
 
 def case_of(design: Mesh, request: StripsRequest) -> Case:

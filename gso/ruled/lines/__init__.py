@@ -1,0 +1,27 @@
+"""Strips along the lines of a quad mesh.
+
+A family of lines (:mod:`~gso.ruled.lines.line_families`) gives the creases: which of its lines, the
+sagittas decide (:mod:`~gso.ruled.lines.line_choice`). Faces between two creases become planar
+polygons (:mod:`~gso.ruled.lines.strip_cells`), with the mesh's own rulings or with conjugate ones
+(:mod:`~gso.ruled.lines.free_rulings`). The package's solver moves their corners
+(:mod:`~gso.ruled.lines.line_fit`), and :mod:`~gso.ruled.lines.line_surface` unrolls them. Lines may
+end at irregular vertices, close around, and surround holes.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gso.first_use import at_first_use
+
+if TYPE_CHECKING:
+    from gso.ruled.lines.line_families import Family, families
+    from gso.ruled.lines.line_search import LineStrips
+
+__all__ = ["Family", "LineStrips", "families"]
+
+# These import SciPy.
+__getattr__, __dir__ = at_first_use(
+    __name__,
+    {"line_families": "Family families", "line_search": "LineStrips"},
+)

@@ -1,0 +1,144 @@
+"""Strips along lines of a quad mesh, for one number of strips after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from gso.errors import MeshError
+from gso.mesh import Mesh
+from gso.ruled.lines.free_rulings import free_rulings
+from gso.ruled.lines.line_choice import Choice
+from gso.ruled.lines.line_families import families
+from gso.ruled.lines.line_fit import LineFitter
+from gso.ruled.lines.line_surface import line_surface
+from gso.ruled.lines.polygons import Polygons
+from gso.ruled.lines.strip_cells import Cells
+from gso.ruled.solve import Found, Wanted
+from gso.typing import Array, Ints
+
+#: Name of this way in results.
+LINES = "lines"
+#: Families that are tried, and the ratio of their predicted distance to the smallest up to which.
+_FAMILIES, _RATIO = 2, 2.0
+#: Share of the predicted distance up to which the mesh's own rulings give planar enough polygons.
+_PLANAR = 0.2
+#: Whether to take the other kind of rulings, and fairness, one after the other until nothing folds;
+#: half of them for the second family.
+_SETTINGS = ((False, 0.03), (True, 0.03), (False, 0.5), (True, 0.5))
+#: Ratio of numbers of strips in the search for a bound, and largest number of solves.
+_MORE, _SOLVES = 1.3, 10
+
+
+class LineStrips:
+    """Strips along lines of a quad mesh whose diagonal is one.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    tell : callable
+        Told the number of strips before each solve; returning False ends the search.
+    """
+
+    def __init__(self, mesh: Mesh, tell: Callable[[int], bool] = lambda count: True):
+        self.mesh, self.tell = mesh, tell
+        self.stopped = False
+        self.results: dict[int, Found] = {}
+        try:
+            self.choices = [Choice(family) for family in families(mesh)]
+        except MeshError:
+            self.choices = []
+        self._fitter = LineFitter(mesh)
+
+    def predicted(self, count: int) -> float:
+        """Return the distance that is predicted for a number of strips."""
+        found = (choice.lines(count) for choice in self.choices)
+        return min((f[1] for f in found if f is not None), default=np.inf)
+
+    def strips(self, count: int) -> Found | None:
+        """Return the best strips of at most a number, which is solved for; None if there are none.
+
+        More strips are never farther away: fewer that were solved before are returned where they
+        are nearer.
+        """
+        if count not in self.results and not self.stopped:
+            tried: list[Found] = []
+            for place, candidate in enumerate(self._candidates(count)):
+                for settings in _SETTINGS[: len(_SETTINGS) >> place]:
+                    found = self._solved(*candidate, *settings)
+                    tried += [] if found is None else [found]
+                    if found is None or found.surface.sound:
+                        break
+            if tried:
+                self.results[count] = min(tried, key=lambda found: found.order)
+        known = [found for k, found in sorted(self.results.items(), reverse=True) if k <= count]
+        return min(known, key=_distance, default=None)
+
+    def within(self, wanted: Wanted) -> Found | None:
+        """Return as few strips as meet bounds, or else the best."""
+        least = min((choice.least for choice in self.choices), default=1)
+        most = min(wanted.most, max((choice.rows for choice in self.choices), default=0))
+        low, high = max(least, 2) - 1, None
+        aim = np.inf if wanted.max_deviation is None else wanted.max_deviation
+        count = next((k for k in range(low + 1, most + 1) if self.predicted(k) <= aim), most)
+        for _ in range(_SOLVES):
+            if not low < count <= most or self.stopped:
+                break
+            found = self.strips(count)
+            if found is not None and wanted.met(found.surface):
+                high = count
+                count = count - 1 if count - low <= 3 else (low + count) // 2
+            else:
+                low = count
+                more = max(count + 1, round(_MORE * count))
+                count = min(more, most) if high is None else (low + high) // 2
+        every = [self.results[k] for k in sorted(self.results)]
+        met = [found for found in every if wanted.met(found.surface)]
+        return met[0] if met else min(every, key=_distance, default=None)
+
+    def _candidates(self, count: int) -> list[tuple[Choice, Ints]]:
+        chosen = [(choice, choice.lines(count)) for choice in self.choices]
+        found = [(pick[1], choice, pick[0]) for choice, pick in chosen if pick is not None]
+        found.sort(key=lambda one: one[0])
+        return [
+            (choice, lines)
+            for far, choice, lines in found[:_FAMILIES]
+            if far <= _RATIO * found[0][0]
+        ]
+
+    def _solved(self, choice: Choice, lines: Ints, other: bool, fairness: float) -> Found | None:
+        """Solve for strips; with the other kind of rulings than the mesh calls for if asked."""
+        v = self.mesh.vertices
+        try:
+            cells = Cells(choice.family, lines)
+            polygons = cells.polygons
+        except MeshError:
+            return None
+        count = int(polygons.strip.max()) + 1
+        if self.stopped or not self.tell(count):
+            self.stopped = True
+            return None
+        if (_gaps(polygons, v) > _PLANAR * choice.predicted(lines)) != other:
+            polygons = free_rulings(cells, v, self._fitter.normals)
+        points = self._fitter.fit(polygons, v, fairness=fairness)
+        if not np.isfinite(points).all():
+            return None
+        surface = line_surface(self.mesh, polygons, points)
+        far = surface.distances(self.mesh)
+        return Found(replace(surface, deviation=far), max(far.there_mean, far.back_mean), LINES)
+
+
+def _distance(found: Found) -> tuple[bool, float]:
+    """Sort key: sound surfaces first, then by the largest distance."""
+    return not found.surface.sound, found.surface.farthest
+
+
+def _gaps(polygons: Polygons, points: Array) -> float:
+    """Return the root mean square distance of corners from the planes of others."""
+    a, b, c, p = points[polygons.planes(points)].transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    size = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
+    gap = np.einsum("kd,kd->k", normal, p - a) / size
+    return float(np.sqrt((gap**2).mean())) if len(gap) else 0.0

@@ -1,0 +1,251 @@
+"""Ruled surfaces of planar polygons: faces, folds, and the exact unrolling."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gso.mesh import Mesh, Nearest, topology
+from gso.parametrization import beside, upright
+from gso.pattern import Pattern
+from gso.ruled.fold_lines import Folds
+from gso.ruled.lines.ears import ears
+from gso.ruled.lines.polygons import Polygons
+from gso.ruled.ruled_surface import RuledSurface
+from gso.ruled.sheet import seam_pairs
+from gso.ruled.vectors import cross, lengths, unit
+from gso.typing import Array, Flags, Ints
+
+
+def line_surface(design: Mesh, polygons: Polygons, points: Array) -> RuledSurface:
+    """Make a ruled surface of planar polygons, and unroll it.
+
+    Parameters
+    ----------
+    design : Mesh
+        What the surface is near.
+    polygons : Polygons
+    points : ndarray, (n, 3)
+        Positions of the design's vertices, some of which are corners of the polygons.
+    """
+    used = np.unique(np.concatenate(polygons.rings))
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
+    vertices, rings = points[used], [number[ring] for ring in polygons.rings]
+    faces, owner = _faces(rings, vertices)
+    mesh = Mesh(vertices, faces)
+    planes = _Planes.of(rings, vertices)
+    hinges, creases = _edges(rings, number[polygons.rulings])
+    tree = _tree(hinges, vertices, len(rings))
+    table, flat, part = _unrolled(planes, rings, vertices, hinges, tree, faces, owner)
+    vertex = np.empty(len(flat), np.int64)
+    inside = table >= 0
+    vertex[table[inside]] = faces[inside]
+    closing = hinges[~tree]
+    return RuledSurface(
+        mesh=mesh,
+        strip=part[owner],
+        flat=np.zeros(len(faces), bool),
+        rulings=_folds(hinges[tree], planes, rings, vertices),
+        creases=_sharp(np.concatenate([creases, closing]), planes),
+        pattern=Pattern(flat, table, vertex, seam_pairs(mesh, table)),
+        moved=Nearest(mesh).locate(design.vertices)[2],
+        crossed=int(_tangled(rings, planes, vertices).sum()),
+    )
+
+
+@dataclass(frozen=True)
+class _Planes:
+    """Planes of polygons.
+
+    Attributes
+    ----------
+    origin, normal : ndarray, (p, 3)
+    axes : ndarray, (p, 2, 3)
+    """
+
+    origin: Array
+    normal: Array
+    axes: Array
+
+    @classmethod
+    def of(cls, rings: list[Ints], vertices: Array) -> _Planes:
+        """Return the planes of polygons, seen from where these are anticlockwise."""
+        size = np.array([len(ring) for ring in rings])
+        owner, ids = np.repeat(np.arange(len(rings)), size), np.concatenate(rings)
+        after = np.concatenate([np.roll(ring, -1) for ring in rings])
+        origin = _summed(owner, vertices[ids], len(rings)) / size[:, None]
+        p, q = vertices[ids] - origin[owner], vertices[after] - origin[owner]
+        normal = unit(_summed(owner, cross(p, q), len(rings)))
+        # The longest side is along the first axis.
+        long = lengths(q - p)
+        order = np.lexsort((-long, owner))
+        first = order[np.r_[0, np.cumsum(size)[:-1]]]
+        way = (q - p)[first]
+        way = unit(way - np.einsum("pd,pd->p", way, normal)[:, None] * normal)
+        return cls(origin, normal, np.stack([way, cross(normal, way)], axis=1))
+
+    def local(self, polygon: Ints, points: Array) -> Array:
+        """Return complex coordinates (k,) of points (k, 3) in the planes of polygons (k,)."""
+        both = np.einsum("kid,kd->ki", self.axes[polygon], points - self.origin[polygon])
+        return np.asarray(both @ np.array([1.0, 1j]))
+
+
+def _summed(owner: Ints, values: Array, count: int) -> Array:
+    return np.stack([np.bincount(owner, column, count) for column in values.T], axis=1)
+
+
+def _faces(rings: list[Ints], vertices: Array) -> tuple[Ints, Ints]:
+    """Return quads and triangles, and the polygon of each: convex quads stay whole."""
+    faces: list[Ints] = []
+    owner = []
+    for k, ring in enumerate(rings):
+        corner = vertices[ring]
+        if len(ring) == 4:
+            turns = cross(corner - np.roll(corner, 1, axis=0), np.roll(corner, -1, axis=0) - corner)
+            if (turns @ turns.sum(axis=0) > 0).all():
+                faces.append(ring[None])
+                owner.append(k)
+                continue
+        triangles = ears([ring], vertices)
+        faces.append(np.column_stack([triangles, np.full(len(triangles), -1)]))
+        owner += [k] * len(triangles)
+    return np.concatenate(faces), np.array(owner)
+
+
+def _edges(rings: list[Ints], rulings: Ints) -> tuple[Ints, Ints]:
+    """Return the rulings and the other inner edges, (k, 4) each: two polygons and two ends."""
+    size = np.array([len(ring) for ring in rings])
+    owner, a = np.repeat(np.arange(len(rings)), size), np.concatenate(rings)
+    b = np.concatenate([np.roll(ring, -1) for ring in rings])
+    count = int(a.max()) + 1
+    key = topology.edge_keys(a, b, count)
+    order = np.argsort(key, kind="stable")
+    i = np.flatnonzero(key[order][1:] == key[order][:-1])
+    one, two = order[i], order[i + 1]
+    inner = np.stack([owner[one], owner[two], a[one], b[one]], axis=1)
+    is_ruling = np.isin(key[one], topology.edge_keys(rulings[:, 0], rulings[:, 1], count))
+    return inner[is_ruling], inner[~is_ruling]
+
+
+def _tree(hinges: Ints, vertices: Array, count: int) -> Flags:
+    """Mask over rulings: those that stay joined; closed strips are cut at a short one."""
+    from scipy.sparse.csgraph import minimum_spanning_tree
+
+    size = lengths(vertices[hinges[:, 2]] - vertices[hinges[:, 3]])
+    order = np.empty(len(size))
+    order[np.argsort(-size, kind="stable")] = np.arange(1.0, len(size) + 1)
+    low, high = hinges[:, :2].min(axis=1), hinges[:, :2].max(axis=1)
+    # Of two rulings between the same polygons the longer one stays.
+    by = np.lexsort((order, high, low))
+    new = np.ones(len(by), bool)
+    new[1:] = (low[by][1:] != low[by][:-1]) | (high[by][1:] != high[by][:-1])
+    kept = by[new]
+    graph = topology.edge_graph(count, low[kept], high[kept], order[kept])
+    return np.isin(order, minimum_spanning_tree(graph).data)
+
+
+def _unrolled(
+    planes: _Planes,
+    rings: list[Ints],
+    vertices: Array,
+    hinges: Ints,
+    tree: Flags,
+    faces: Ints,
+    owner: Ints,
+) -> tuple[Ints, Array, Ints]:
+    """Return the pattern's faces, its vertices (k, 2), and the part of each polygon."""
+    from scipy.sparse.csgraph import breadth_first_order
+
+    count = len(rings)
+    joined = hinges[tree]
+    graph = topology.edge_graph(count, joined[:, 0], joined[:, 1], np.arange(1.0, len(joined) + 1))
+    graph = graph + graph.T
+    part = topology.label_components(count, joined[:, 0], joined[:, 1])
+    turn, shift = np.ones(count, complex), np.zeros(count, complex)
+    for k in np.unique(part, return_index=True)[1]:
+        order, before = breadth_first_order(graph, int(k), directed=False)
+        for cell in order[1:].tolist():
+            last = int(before[cell])
+            ends = vertices[joined[int(graph[cell, last]) - 1, 2:]]
+            p, q = turn[last] * planes.local(np.array([last, last]), ends) + shift[last]
+            a, b = planes.local(np.array([cell, cell]), ends)
+            turn[cell] = (q - p) / (b - a)
+            turn[cell] /= abs(turn[cell])
+            shift[cell] = 0.5 * (p + q) - turn[cell] * 0.5 * (a + b)
+    # Corners of polygons are one vertex where rulings join them.
+    size = np.array([len(ring) for ring in rings])
+    cell, ids = np.repeat(np.arange(count), size), np.concatenate(rings)
+    key = cell * len(vertices) + ids
+    order = np.argsort(key)
+
+    def corner(of: Ints, at: Ints) -> Ints:
+        return order[np.searchsorted(key[order], of * len(vertices) + at)]
+
+    one, two = (
+        np.concatenate([corner(joined[:, k], joined[:, end]) for end in (2, 3)]) for k in (0, 1)
+    )
+    label = topology.label_components(len(ids), one, two)
+    z = turn[cell] * planes.local(cell, vertices[ids]) + shift[cell]
+    number = np.bincount(label)
+    flat = np.stack([np.bincount(label, x) / number for x in (z.real, z.imag)], axis=1)
+    of = np.empty(len(flat), np.int64)
+    of[label] = part[cell]
+    pieces = [upright(flat[of == k]) for k in range(int(part.max()) + 1)]
+    for k, piece in enumerate(beside([p[:, ::-1] * [1.0, -1.0] for p in pieces])):
+        flat[of == k] = piece
+    table = np.full(faces.shape, -1)
+    row, place = np.nonzero(faces >= 0)
+    table[row, place] = label[corner(owner[row], faces[row, place])]
+    return table, flat, part
+
+
+def _turns(edges: Ints, planes: _Planes) -> Array:
+    """Return the angles at edges between polygons, negative for valley folds."""
+    one, two = edges[:, 0], edges[:, 1]
+    n = planes.normal
+    angle = 2.0 * np.arcsin(np.clip(0.5 * lengths(n[one] - n[two]), 0.0, 1.0))
+    away = planes.origin[two] - planes.origin[one]
+    return np.where(np.einsum("kd,kd->k", n[two] - n[one], away) < 0, -angle, angle)
+
+
+def _sharp(edges: Ints, planes: _Planes) -> Folds:
+    return Folds(edges[:, 2:], _turns(edges, planes), np.zeros(len(edges)))
+
+
+def _folds(hinges: Ints, planes: _Planes, rings: list[Ints], vertices: Array) -> Folds:
+    """Return the rulings, with radii from the distances of the next rulings."""
+    angle = _turns(hinges, planes)
+    width = np.zeros((len(hinges), 2))
+    own: list[list[int]] = [[] for _ in rings]
+    for k, (one, two, _, _) in enumerate(hinges.tolist()):
+        own[one].append(k)
+        own[two].append(k)
+    for k, hinge in enumerate(hinges):
+        ends = vertices[hinge[2:]]
+        for cell in hinge[:2].tolist():
+            others = [i for i in own[cell] if i != k]
+            if others:
+                a, b = vertices[hinges[others[0], 2:]]
+                width[k] += 0.5 * lengths(cross(ends - a, np.broadcast_to(unit(b - a), (2, 3))))
+            else:
+                corner = vertices[rings[cell]]
+                way = np.broadcast_to(unit(ends[1] - ends[0]), corner.shape)
+                width[k] += 0.5 * lengths(cross(corner - ends[0], way)).max()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radius = width.min(axis=1) / (2.0 * np.sin(0.5 * np.abs(angle)))
+    radius[angle == 0.0] = np.inf
+    return Folds(hinges[:, 2:], angle, radius)
+
+
+def _tangled(rings: list[Ints], planes: _Planes, vertices: Array) -> Flags:
+    """Return whether quads cross themselves: two of their corners are reflex."""
+    out = np.zeros(len(rings), bool)
+    where = np.flatnonzero([len(ring) == 4 for ring in rings])
+    if len(where):
+        corner = vertices[np.array([rings[k] for k in where])]
+        before, after = corner - np.roll(corner, 1, axis=1), np.roll(corner, -1, axis=1) - corner
+        turns = np.einsum("kcd,kd->kc", cross(before, after), planes.normal[where])
+        out[where] = (turns < 0).sum(axis=1) > 1
+    return out

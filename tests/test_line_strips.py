@@ -1,0 +1,223 @@
+"""Strips along a design's own lines: planar designs are met, others approached."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gso
+from gso.mesh import Mesh
+from gso.ruled.lines import LineStrips, families
+
+
+def scaled(points) -> Mesh:
+    mesh = points if isinstance(points, Mesh) else gso.as_mesh(points)
+    return mesh.replaced((mesh.vertices - mesh.vertices.mean(axis=0)) / mesh.diagonal)
+
+
+def translational(rows=6, columns=11):
+    """A profile moved along another: every quad is a parallelogram."""
+    u, v = np.linspace(-1, 1, rows + 1)[:, None], np.linspace(-1.5, 1.5, columns + 1)[None]
+    return np.stack(np.broadcast_arrays(u, v, 0.3 * u**2 + 0.2 * np.sin(v)), axis=-1)
+
+
+def scale_translational(rows=6, columns=9):
+    """A profile scaled and moved: every quad is a trapezoid."""
+    u, v = np.linspace(-1, 1, rows + 1)[:, None], np.linspace(0, 2, columns + 1)[None]
+    size = 1.0 + 0.3 * np.sin(v)
+    return np.stack(np.broadcast_arrays(size * u, v, 0.4 * size * u**2 - 0.1 * v**2), axis=-1)
+
+
+def revolved(rows=6, around=24):
+    """A barrel, closed around: every quad is a trapezoid."""
+    h, t = np.linspace(-1, 1, rows + 1)[:, None], 2 * np.pi * np.arange(around)[None] / around
+    r = 1.0 - 0.3 * h**2
+    points = np.stack(np.broadcast_arrays(r * np.cos(t), r * np.sin(t), h), axis=-1)
+    i, j = np.arange(rows)[:, None] * around, np.arange(around)[None]
+    k = (j + 1) % around
+    faces = np.stack([i + j, i + k, i + around + k, i + around + j], axis=-1)
+    return Mesh(points.reshape(-1, 3), faces.reshape(-1, 4))
+
+
+def dome(count=17, height=0.5):
+    u, v = np.meshgrid(*[np.linspace(-1, 1, count)] * 2, indexing="ij")
+    return np.stack([u, v, height * (1 - 0.6 * u * u - 0.4 * v * v + 0.2 * u * v)], axis=-1)
+
+
+def three_patches(count=8):
+    """A paraboloid over a hexagon of three rhombi, whose middle has three quads."""
+    corner = np.exp(1j * np.pi * np.arange(6) / 3)
+    t = np.linspace(0, 1, count + 1)
+    z, faces = [], []
+    for k in range(3):
+        a, b = corner[2 * k], corner[(2 * k + 2) % 6]
+        first = sum(len(x) for x in z)
+        z.append((t[:, None] * a + t[None] * b).ravel())
+        i = np.arange(count)
+        at = first + (i[:, None] * (count + 1) + i[None]).ravel()
+        faces.append(np.stack([at, at + count + 1, at + count + 2, at + 1], axis=1))
+    z = np.concatenate(z)
+    _, kept, number = np.unique(
+        np.round([z.real, z.imag], 9), axis=1, return_index=True, return_inverse=True
+    )
+    points = np.stack([z.real, z.imag, 0.4 * np.abs(z) ** 2], axis=1)[kept]
+    return Mesh(points, number.ravel()[np.concatenate(faces)])
+
+
+def gaps(surface):
+    """Largest distance of the corners of a strip's faces from planes, face by face."""
+    mesh = surface.mesh
+    quads = mesh.vertices[mesh.faces[mesh.faces[:, 3] >= 0]]
+    edges = quads[:, 1:] - quads[:, :1]
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    return float((np.abs(np.linalg.det(edges)) / area).max(initial=0.0))
+
+
+def stretched(surface):
+    """Largest difference of the lengths of edges and diagonals in pattern and surface."""
+    pattern, mesh = surface.pattern, surface.mesh
+    faces, flat = mesh.triangles, pattern.flat
+    table = pattern.mesh.triangles if len(pattern.mesh.triangles) == len(faces) else None
+    table = pattern.faces if table is None else table
+    worst = 0.0
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        there = flat[table[:, a]] - flat[table[:, b]]
+        here = (
+            mesh.vertices[pattern.vertex[table[:, a]]] - mesh.vertices[pattern.vertex[table[:, b]]]
+        )
+        worst = max(
+            worst, float(np.abs(np.linalg.norm(there, axis=1) - np.linalg.norm(here, axis=1)).max())
+        )
+    return worst
+
+
+def checked(surface):
+    assert surface.sound
+    assert gaps(surface) < 1e-12
+    assert stretched(surface) < 1e-11
+
+
+@pytest.mark.parametrize("make", [translational, scale_translational, revolved])
+def test_planar_quads_with_all_rows_are_the_design(make):
+    mesh = scaled(make())
+    # Strips run along the longer side: six rows.
+    found = LineStrips(mesh).strips(6)
+    assert found.surface.strips == 6
+    assert found.surface.farthest < 1e-6
+    checked(found.surface)
+    away = np.linalg.norm(found.surface.mesh.vertices[:, None] - mesh.vertices, axis=2).min(axis=0)
+    assert away.max() < 1e-6
+
+
+def test_rings_are_cut_open_once():
+    mesh = scaled(revolved())
+    assert len(mesh.boundary_loops) == 2
+    surface = LineStrips(mesh).strips(6).surface
+    loops = surface.pattern.mesh.boundary_loops
+    # Each ring of trapezoids is a piece of a cone's surface, one sheet with one outline.
+    assert len(loops) == surface.strips == 6
+    assert len(surface.rulings.edges) == 6 * 23
+
+
+def test_more_strips_are_nearer():
+    mesh = scaled(dome())
+    lines = LineStrips(mesh)
+    far = []
+    for count in (2, 4, 8, 16):
+        surface = lines.strips(count).surface
+        checked(surface)
+        assert surface.strips == count
+        far.append(surface.farthest)
+    assert (np.diff(far) < 0).all()
+    # The sagitta of strips of a width is that of a parabola: it goes with the square.
+    assert far[2] < far[0] / 8
+
+
+def test_distances_are_those_of_samples():
+    mesh = scaled(dome())
+    surface = LineStrips(mesh).strips(4).surface
+    rng = np.random.default_rng(0)
+    triangles = surface.mesh.vertices[surface.mesh.triangles]
+    points = np.einsum("kc,tcd->ktd", rng.dirichlet(np.ones(3), 5), triangles).reshape(-1, 3)
+    there = gso.metrics.point_to_surface(points, mesh).max()
+    back = gso.metrics.point_to_surface(mesh.vertices, surface.mesh).max()
+    assert max(there, back) <= surface.farthest * (1 + 1e-9)
+    assert surface.farthest < 0.02
+
+
+def test_lines_end_at_irregular_vertices():
+    mesh = scaled(three_patches())
+    assert len(mesh.boundary_loops) == 1 and mesh.grid_index is None
+    for family in families(mesh):
+        # The bands have every row once.
+        rows = np.concatenate([band.rows for band in family.bands])
+        assert np.sort(rows).tolist() == list(range(int(family.row.max()) + 1))
+    few, many = (LineStrips(mesh).strips(k).surface for k in (4, 12))
+    checked(few)
+    checked(many)
+    assert many.farthest < few.farthest
+
+
+def test_designs_with_holes():
+    mesh = gso.as_mesh(dome(13))
+    middle = np.abs(mesh.vertices[mesh.faces].mean(axis=1)[:, :2]).max(axis=1) < 0.2
+    open_ = scaled(gso.as_mesh((mesh.vertices, mesh.faces[~middle])))
+    used = open_.used
+    assert used.sum() < len(used) or len(open_.boundary_loops) == 2
+    surface = LineStrips(open_).strips(8).surface
+    checked(surface)
+    assert len(surface.mesh.boundary_loops) == 2
+
+
+def test_named_numbers_and_bounds():
+    mesh = scaled(dome())
+    lines = LineStrips(mesh)
+    assert lines.strips(10_000) is None
+    triangles = Mesh(mesh.vertices, mesh.triangles)
+    assert LineStrips(triangles).strips(4) is None
+
+
+def test_a_callback_ends_the_search():
+    seen = []
+
+    def tell(count):
+        seen.append(count)
+        return len(seen) < 2
+
+    lines = LineStrips(scaled(dome()), tell)
+    assert lines.strips(2) is not None
+    lines.strips(4)
+    assert lines.stopped and len(seen) <= 2
+
+
+def test_a_tube_becomes_strips():
+    tube = revolved(rows=12, around=32)
+    result = gso.strips(tube, strips=6)
+    assert result.usable, result.reasons
+    assert result.details["rulings_from"] == "lines"
+    assert result.ruled.strips == 6
+    assert result.metrics["strain_max"] < 1e-9
+    with pytest.raises(gso.MeshError, match="close around"):
+        gso.strips(tube, strips=1)
+
+
+def test_files_keep_strips_along_lines(tmp_path):
+    result = gso.strips(revolved(), strips=6)
+    result.save(tmp_path / "a.npz")
+    again = gso.Result.load(tmp_path / "a.npz")
+    np.testing.assert_array_equal(again.pattern.flat, result.pattern.flat)
+    assert again.metrics == pytest.approx(result.metrics)
+    result.save(tmp_path / "a.obj")
+    assert len(gso.as_mesh(tmp_path / "a.obj").vertices) == len(result.mesh.vertices)
+
+
+def test_as_few_strips_as_hold_a_distance():
+    tube = revolved(rows=16, around=32)
+    allowed = 0.01 * tube.diagonal
+    result = gso.strips(tube, max_deviation=allowed)
+    assert result.usable, result.reasons
+    assert result.pieces is None and result.ruled.farthest <= allowed
+    fewer = gso.strips(tube, strips=result.ruled.strips - 1)
+    assert fewer.ruled.farthest > allowed
+    # The profile bends by 0.6 / (2 * 0.6) of the height in all: its sagitta is 0.3 / strips^2.
+    assert result.ruled.strips <= np.ceil(np.sqrt(0.3 / allowed))
