@@ -26,7 +26,7 @@ from OCP.IGESControl import IGESControl_Writer
 from OCP.IGESData import IGESData_IGESWriter
 from OCP.IGESSelect import IGESSelect_WorkLibrary
 from OCP.Interface import Interface_Protocol, Interface_Static
-from OCP.Message import Message, Message_Gravity
+from OCP.Message import Message
 from OCP.STEPControl import (
     STEPControl_Controller,
     STEPControl_StepModelType,
@@ -68,6 +68,9 @@ def write(
     """
     scale, name = (1.0, _UNITS[unit]) if unit in _UNITS else (MILLIMETRES[unit], "MM")
     step = suffix in (".step", ".stp")
+    if not step and not isinstance(content, BSplineSurface):
+        # The writer of shapes converts them from millimetres itself.
+        scale = MILLIMETRES[unit]
     small = f"shorter than {_TOLERANCE:g} {unit}, which OpenCASCADE takes for a point"
     if isinstance(content, Mesh):
         shape = _shell(scale * content.vertices, content.faces, small)
@@ -88,7 +91,7 @@ def write(
 def _step(shape: TopoDS_Shape, name: str) -> bytes:
     """Return the contents of a STEP file of a shape in a unit."""
     kind = STEPControl_StepModelType.STEPControl_ShellBasedSurfaceModel
-    with _quiet(), _settings({"write.step.unit": name, "xstep.cascade.unit": name}):
+    with quiet(), settings({"write.step.unit": name, "xstep.cascade.unit": name}):
         session = STEPControl_Writer()
         session.Transfer(shape, kind)
         writer = StepData_StepWriter(session.Model())
@@ -97,7 +100,7 @@ def _step(shape: TopoDS_Shape, name: str) -> bytes:
 
 def _iges(shape: TopoDS_Shape, name: str, whole: bool) -> bytes:
     """Return the contents of an IGES file of a shape, or of a whole surface, in a unit."""
-    with _quiet():
+    with quiet():
         session = IGESControl_Writer("IN" if name == "INCH" else name, 0 if whole else 1)
         if whole:
             maker = GeomToIGES_GeomSurface()
@@ -215,7 +218,7 @@ def _printed(
 
 
 @contextmanager
-def _settings(wanted: dict[str, str]) -> Iterator[None]:
+def settings(wanted: dict[str, str]) -> Iterator[None]:
     """Set global parameters of OpenCASCADE inside a block and restore them after it."""
     STEPControl_Controller.Init_s()
     before = {name: Interface_Static.CVal_s(name) for name in wanted}
@@ -229,14 +232,14 @@ def _settings(wanted: dict[str, str]) -> Iterator[None]:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
-    """Suppress OpenCASCADE's messages of success on standard output."""
-    printers = list(Message.DefaultMessenger_s().Printers())
-    levels = [printer.GetTraceLevel() for printer in printers]
+def quiet() -> Iterator[None]:
+    """Suppress OpenCASCADE's messages on standard output."""
+    messenger = Message.DefaultMessenger_s()
+    printers = list(messenger.Printers())
     try:
         for printer in printers:
-            printer.SetTraceLevel(Message_Gravity.Message_Fail)
+            messenger.RemovePrinter(printer)
         yield
     finally:
-        for printer, level in zip(printers, levels, strict=True):
-            printer.SetTraceLevel(level)
+        for printer in printers:
+            messenger.AddPrinter(printer)
