@@ -65,6 +65,7 @@ def folded_pattern(
     cut: ArrayLike = (),
     sheet: tuple[float, float] | None = None,
     bend_step: float | None = None,
+    press_radius: tuple[float, float] | None = None,
 ) -> FoldedPattern | None:
     """Unfold a design that consists of flat, rolled and conical faces.
 
@@ -82,6 +83,10 @@ def folded_pattern(
         Length and width that a part may have, in the mesh's unit.
     bend_step : float, optional
         Largest angle between neighbouring bend lines, in degrees.
+    press_radius : (float, float), optional
+        Largest radii of cylinders that are bent by a press, at one line in the middle, where the
+        surface is convex and where it is concave. Cylinders that turn by more than 180 degrees
+        are rolled in any case.
 
     Returns
     -------
@@ -102,6 +107,7 @@ def folded_pattern(
         if not _is_low_poly(shape):
             return None
         shape = _facets(shape)
+    pressed = set() if press_radius is None else _pressed(shape, press_radius)
     flat = shape.flat()
     joined = join_patches(
         shape.vertices,
@@ -114,7 +120,9 @@ def folded_pattern(
     sliced = _Sliced.of(shape, joined)
     found: list[tuple[Ints, float, float]] = []
     for number, face in enumerate(shape.faces):
-        found += _bent(sliced, number, face, flat)
+        if number in pressed:
+            face = replace(face, bend_lines=(_middle_line(face),))
+        found += _bent(sliced, number, face, flat, rolled=number not in pressed)
     found += _folds(sliced, shape)
     surface = Mesh(sliced.points, sliced.vertex[sliced.faces])
     # In the order of the surface's vertices, as patterns that are not cut have it.
@@ -289,13 +297,35 @@ def _row(flat: Array, part: Ints, gap: float) -> Array:
     return np.asarray(np.cumsum(wide) - wide - low)
 
 
+def _pressed(shape: Recognised, largest: tuple[float, float]) -> set[int]:
+    """Return the numbers of the cylinders that are bent at one line."""
+    found = set()
+    for number, face in enumerate(shape.faces):
+        radius = face.radius
+        if radius is None or face.flat is None or not face.bend_lines:
+            continue
+        turn = float(np.ptp(face.flat[..., 0])) / radius
+        if radius <= largest[int(face.bend_lines[0].up)] and turn <= np.pi + _TANGENT:
+            found.add(number)
+    return found
+
+
+def _middle_line(face: ShapeFace) -> BendLine:
+    """Return the ruling in the middle of a cylinder, with the whole angle."""
+    assert face.flat is not None and face.radius is not None
+    across, along = face.flat[..., 0], face.flat[..., 1]
+    middle, angle = 0.5 * (across.min() + across.max()), float(np.ptp(across)) / face.radius
+    start, end = (np.array([middle, y]) for y in (along.min(), along.max()))
+    return BendLine(start, end, face.radius, face.radius, angle, face.bend_lines[0].up)
+
+
 def _bent(
-    sliced: _Sliced, number: int, face: ShapeFace, flat: Array
+    sliced: _Sliced, number: int, face: ShapeFace, flat: Array, rolled: bool = True
 ) -> list[tuple[Ints, float, float]]:
     """Divide a face along its bend lines; return the edges on them, with angles and radii."""
     if not face.bend_lines:
         return []
-    rows = _rows(sliced, number, face, flat)
+    rows = _rows(sliced, number, face, flat) if rolled else None
     if rows is not None:
         return rows
     turn, shift = _motion(sliced, face, flat)

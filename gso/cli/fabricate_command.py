@@ -158,7 +158,7 @@ def fabricate(
         **taken("kerf", "allowance", "notches", "tabs", "labels", "grain"),
         registration=given.pop("holes"),
         face="inside" if given.pop("inside_up") else "outside",
-        thickness=_thickness(**taken("thickness", *_NEEDED["thickness"])),
+        **_thickness(**taken("thickness", "k_factor", "face", "bend_radius", "bend_table")),
     )
     meshes = [file_options.source(name, weld) for name in inputs]
     if rotations != "any" and not rotations.isdecimal():
@@ -209,7 +209,7 @@ def text(done: Fabrication) -> list[str]:
 
 #: Options that say something only together with another one.
 _NEEDED = {
-    "thickness": ("k_factor", "face", "bend_radius", "bend_table"),
+    "thickness": ("face", "bend_radius"),
     "sheet": ("spacing", "rotations", "seconds"),
 }
 
@@ -234,13 +234,15 @@ def _thickness(
     face: str,
     bend_radius: float | None,
     bend_table: str | None,
-) -> Thickness | None:
+) -> dict[str, Any]:
+    """Return how sheets bend; solids have a thickness of their own."""
     from gso.workshop.thickness import Thickness
 
-    if thickness is None:
-        return None
     table = None if bend_table is None else _table(bend_table)
-    return Thickness(thickness, k_factor, face, bend_radius, table)
+    out: dict[str, Any] = {"k_factor": k_factor, "bend_table": table}
+    if thickness is not None:
+        out["thickness"] = Thickness(thickness, k_factor, face, bend_radius, table)
+    return out
 
 
 def _table(name: str) -> Array:

@@ -10,8 +10,10 @@ import numpy as np
 
 from gso import io
 from gso.components import split
+from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.seams.kinds import Labels
+from gso.sheet_metal import sheet_solid
 from gso.typing import Ints, MeshLike
 from gso.workshop.job_folder import path_of
 from gso.workshop.names import different, spelled
@@ -32,22 +34,29 @@ class Design:
     ----------
     name : str
     mesh : Mesh
+        One side of a solid of sheet metal.
     kept : ndarray of int, (k, 2)
         Edges that are cut in any case.
+    sheet : float or None
+        Thickness of a solid of sheet metal, in the unit of the mesh.
     """
 
     name: str
     mesh: Mesh
     kept: Ints = field(default_factory=_no_edges)
+    sheet: float | None = None
 
 
 def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
     """Read designs, and divide them into components.
 
+    Solids of sheet metal in CAD files become one of their sides.
+
     Raises
     ------
     MeshError
-        A design cannot be read, or has no groups to cut between.
+        A design cannot be read, has no groups to cut between, or is a sheet whose thickness is not
+        the same everywhere.
     """
     many = several(given)
     out: list[Design] = []
@@ -64,7 +73,16 @@ def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
             local[part.vertices] = np.arange(len(part.vertices))
             own = local[kept]
             name = f"{stem}-{k}" if len(components) > 1 else stem
-            out.append(Design(spelled(name), part.mesh, own[(own >= 0).all(axis=1)]))
+            solid = None
+            if path is not None and io.suffix_of(path) in io.SPLINE_SUFFIXES:
+                try:
+                    solid = sheet_solid(part.mesh)
+                except MeshError as error:
+                    raise MeshError(f"{path}: {error}") from None
+            if solid is None:
+                out.append(Design(spelled(name), part.mesh, own[(own >= 0).all(axis=1)]))
+            else:
+                out.append(Design(spelled(name), solid.side, sheet=solid.thickness))
     names = different(design.name for design in out)
     return [replace(design, name=name) for design, name in zip(out, names, strict=True)]
 

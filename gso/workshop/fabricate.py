@@ -208,6 +208,7 @@ def fabricate(
     earlier = opened(place, several(designs))
     # Marks are on one of several copies, so that these differ.
     alone = len(marks) or len(holes) or any(len(design.kept) for design in every)
+    alone = alone or len({design.sheet for design in every}) > 1
     first = list(range(len(meshes))) if alone else origins(meshes)
     chosen = sorted(set(first))
     found, failed = made_all(every, chosen, settings, place / WORK, workers, scheduler, say)
@@ -225,10 +226,12 @@ def fabricate(
             continue
         one = found[k]
         lines = ([x for x, n in zip(given, on, strict=True) if n == k] for given, on in drawn)
-        fit = fitted(one, scale, finish, *lines)
-        own = [replace(part, count=len(copies)) for part in parts_from(fit, finish)]
+        thick = every[k].sheet
+        asked = finish if thick is None else finish.of_solid(scale * thick)
+        fit = fitted(one, scale, asked, *lines)
+        own = [replace(part, count=len(copies)) for part in parts_from(fit, asked)]
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
-        why = (*(r.scaled(scale) for r in one.reasons), *judge_sheet(fit, settings, finish))
+        why = (*(r.scaled(scale) for r in one.reasons), *judge_sheet(fit, settings, asked))
         record["reasons"] = _words(why)
         records.append(record)
         reasons += [reason.within(one.name) for reason in why]

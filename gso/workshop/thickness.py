@@ -40,6 +40,9 @@ class Thickness:
         Bend deductions of sharp bends: angles of bending in radians (0 is flat), increasing, and
         how much shorter the pattern is than both flanges outside, to the apex. Between them it
         is interpolated, and below the first one it falls to 0 at no bend.
+    arcs : bool
+        Whether the pattern has the arcs of round bends: that of a solid has. Otherwise it has
+        the tangents to the apex, and the radii of its bends count for nothing.
 
     Examples
     --------
@@ -55,6 +58,7 @@ class Thickness:
     face: str = "middle"
     radius: float | None = None
     table: ArrayLike | None = None
+    arcs: bool = False
 
     def __post_init__(self) -> None:
         as_positive(self.sheet, "the thickness")
@@ -78,24 +82,38 @@ class Thickness:
                     "a bend radius and a bend table exclude each other; leave one of them out"
                 )
 
-    def change(self, angle: ArrayLike) -> Array:
+    def change(self, angle: ArrayLike, radius: ArrayLike = 0.0) -> Array:
         """Return how much longer the pattern is across bends of some angles than the surface.
 
         Parameters
         ----------
         angle : array_like
             In radians, positive for mountain folds.
+        radius : array_like
+            Radii of the surface's bends, where the pattern has their arcs.
+
+        Examples
+        --------
+        A solid of thickness 2, bent by 90 degrees about an inner radius of 3, seen from outside:
+
+        >>> sheet = Thickness(2.0, k=0.4, face="outside", arcs=True)
+        >>> arc = 5.0 * np.pi / 2
+        >>> round(float(arc + sheet.change(np.pi / 2, 5.0)) / (np.pi / 2), 9)
+        3.8
         """
         turn = np.asarray(angle, float)
         size, thick, design = np.abs(turn), self.sheet, self.depth(turn)
+        arc = np.asarray(radius, float) if self.arcs else np.zeros(1)
         if self.table is not None:
             rows = np.asarray(self.table, float)
             deduction = np.interp(size, *np.pad(rows, ((int(rows[0, 0] > 0), 0), (0, 0))).T)
-            return np.asarray(2.0 * (thick - design) * np.tan(0.5 * size) - deduction)
+            apex = 2.0 * (arc + thick - design) * np.tan(0.5 * size)
+            return np.asarray((apex - deduction - size * arc).reshape(turn.shape))
         if self.radius is None:
             return np.asarray(size * (self.k * thick - design))
         around = size * (self.radius + self.k * thick)
-        return np.asarray(around - 2.0 * (self.radius + design) * np.tan(0.5 * size))
+        apex = 2.0 * (self.radius + design - arc) * np.tan(0.5 * size)
+        return np.asarray((around - apex - size * arc).reshape(turn.shape))
 
     def depth(self, angle: ArrayLike) -> Array:
         """Return how far the design's surface is from the inner face of bends of some angles."""
@@ -113,7 +131,7 @@ class Thickness:
             Of the bends of the design's surface.
         """
         angles, radii = np.broadcast_arrays(np.asarray(angle, float), np.asarray(radius, float))
-        if self.table is not None:
+        if self.table is not None and not self.arcs:
             return np.full(angles.shape, np.inf)
         if self.radius is not None:
             return np.full(angles.shape, float(self.radius))
@@ -144,7 +162,7 @@ def thickened(panel: Panel, thickness: Thickness) -> Panel:
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     count = int(plate.max()) + 1
     # The normal points from the first plate of each pair to the second.
-    step = thickness.change(panel.angles)[:, None] * normal
+    step = thickness.change(panel.angles, panel.radii)[:, None] * normal
     shift = _solved(count, pairs, step)
     total, often = np.zeros((len(panel.flat), 2)), np.zeros(len(panel.flat))
     faces = panel.surface.faces
