@@ -148,9 +148,7 @@ def _opposite(shape: Recognised, triangles: Ints, areas: Array, normals: Array) 
     return _Opposite(one, apart, exact)
 
 
-def _distance(
-    shape: Recognised, triangles: Ints, normals: Array, i: int, j: int
-) -> float | None:
+def _distance(shape: Recognised, triangles: Ints, normals: Array, i: int, j: int) -> float | None:
     """Return the distance of two faces that have equations, if it is the same everywhere."""
     one, other = shape.faces[i], shape.faces[j]
     points = shape.vertices[np.unique(triangles[other.triangles])]
@@ -207,9 +205,7 @@ def _most(distance: Array, weight: Array) -> float:
     return float(np.median(distance[order][group == total.argmax()]))
 
 
-def _two_sides(
-    points: Array, triangles: Ints, own: Flags, areas: Array, normals: Array
-) -> Ints:
+def _two_sides(points: Array, triangles: Ints, own: Flags, areas: Array, normals: Array) -> Ints:
     """Return 0 or 1 for the triangles of the larger and the smaller side, -1 for the others."""
     count = len(points)
     keys = edge_keys(triangles, np.roll(triangles, -1, axis=1), count).ravel()

@@ -171,8 +171,37 @@ def thickened(panel: Panel, thickness: Thickness) -> Panel:
     both = np.unique(np.stack([faces[rows, corner], plate[rows]], axis=1), axis=0)
     np.add.at(total, both[:, 0], shift[both[:, 1]])
     np.add.at(often, both[:, 0], 1.0)
-    flat = panel.flat + total / np.maximum(often, 1.0)[:, None]
-    return replace(panel, flat=flat, radii=radii)
+    move = total / np.maximum(often, 1.0)[:, None]
+    if thickness.arcs:
+        _stretch(panel, plate, pairs, normal, shift, move)
+    return replace(panel, flat=panel.flat + move, radii=radii)
+
+
+def _stretch(
+    panel: Panel, plate: Ints, pairs: Ints, normal: Array, shift: Array, move: Array
+) -> None:
+    """Spread the step between two plates evenly over the zone of their bend; change `move`."""
+    faces = panel.surface.faces
+    arc = np.abs(panel.angles) * panel.radii
+    # How far a vertex lies beyond the ends of the bend that it was last counted to.
+    closest = np.full(len(move), np.inf)
+    for pair in np.unique(pairs[arc > 0], axis=0):
+        own = np.flatnonzero((pairs == pair).all(axis=1) & (arc > 0))
+        ends, half = panel.flat[panel.bends[own]].reshape(-1, 2), 0.5 * float(arc[own[0]])
+        across = normal[own[0]]
+        vertices = np.unique(faces[np.isin(plate, pair)])
+        vertices = vertices[vertices >= 0]
+        points = panel.flat[vertices]
+        level = np.clip((points - ends[0]) @ across / half, -1.0, 1.0)
+        way = np.array([-across[1], across[0]])
+        along, reach = points @ way, ends @ way
+        beyond = np.maximum(np.maximum(reach.min() - along, along - reach.max()), 0.0)
+        # Zones may become wider towards their limits.
+        zone = (np.abs(level) < 1.0) & (beyond < half) & (beyond < closest[vertices])
+        closest[vertices[zone]] = beyond[zone]
+        one, two = shift[pair]
+        inside = 0.5 * (one + two) + 0.5 * level[zone, None] * (two - one)
+        move[vertices[zone]] = inside
 
 
 def _plates(panel: Panel) -> tuple[Ints, Ints, Ints]:
