@@ -312,7 +312,8 @@ def _pressed(shape: Recognised, largest: tuple[float, float]) -> set[int]:
 
 def _middle_line(face: ShapeFace) -> BendLine:
     """Return the ruling in the middle of a cylinder, with the whole angle."""
-    assert face.flat is not None and face.radius is not None
+    if face.flat is None or face.radius is None:
+        raise AssertionError("only a cylinder has a ruling in the middle")
     across, along = face.flat[..., 0], face.flat[..., 1]
     middle, angle = 0.5 * (across.min() + across.max()), float(np.ptp(across)) / face.radius
     start, end = (np.array([middle, y]) for y in (along.min(), along.max()))

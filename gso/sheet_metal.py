@@ -84,7 +84,7 @@ def sheet_solid(mesh: Mesh) -> SheetSolid | None:
     found = _opposite(shape, triangles, areas, normals)
     if not len(found.face):
         return None
-    weight = np.bincount(shape.face, areas, len(shape.faces))
+    weight: Array = np.bincount(shape.face, areas, len(shape.faces)).astype(float)
     thickness = _most(found.distance, weight[found.face])
     near = np.abs(found.distance - thickness) <= np.where(found.exact, _SAME, _ABOUT) * thickness
     skin = np.zeros(len(shape.faces), bool)
@@ -97,13 +97,7 @@ def sheet_solid(mesh: Mesh) -> SheetSolid | None:
     if exact.any():
         thickness = float(np.median(found.distance[exact]))
     sides = _two_sides(points, triangles, own, areas, normals)
-    _check_rims(shape, triangles, sides, own, thickness)
-    free = np.flatnonzero(~shape.developable & (sides >= 0))
-    if len(free):
-        raise MeshError(
-            f"{_place(points[triangles[free[0]]])}: the sheet of {thickness:.6g} is curved in two "
-            "directions there; it cannot be unfolded, only pressed"
-        )
+    _check_faces(shape, triangles, sides, thickness)
     chosen = triangles[sides == 0]
     used, compact = np.unique(chosen, return_inverse=True)
     return SheetSolid(Mesh(points[used], compact.reshape(-1, 3)), thickness)
@@ -228,10 +222,11 @@ def _two_sides(points: Array, triangles: Ints, own: Flags, areas: Array, normals
     )
 
 
-def _check_rims(
-    shape: Recognised, triangles: Ints, sides: Ints, own: Flags, thickness: float
-) -> None:
-    """Raise an error if a face is neither on a side nor reaches from one to the other."""
+def _check_faces(shape: Recognised, triangles: Ints, sides: Ints, thickness: float) -> None:
+    """Raise an error if a face is neither on a side nor reaches from one to the other.
+
+    Or if it is curved in two directions.
+    """
     count = len(shape.vertices)
     on = [np.isin(np.arange(count), triangles[sides == k]) for k in (0, 1)]
     rim = np.unique(shape.face[sides < 0])
@@ -240,10 +235,22 @@ def _check_rims(
         odd = corners[~(on[0] | on[1])[corners]]
         if len(odd) or not all(some[corners].any() for some in on):
             place = shape.vertices[odd if len(odd) else corners]
+            if shape.faces[number].kind == "free":
+                raise MeshError(_curved(place, thickness))
             raise MeshError(
                 f"{_place(place)}: the sheet is not {thickness:.6g} thick there, as it is "
                 "elsewhere; leave out ribs, pockets, chamfers and countersinks"
             )
+    free = np.flatnonzero(~shape.developable & (sides >= 0))
+    if len(free):
+        raise MeshError(_curved(shape.vertices[triangles[free]], thickness))
+
+
+def _curved(points: Array, thickness: float) -> str:
+    return (
+        f"{_place(points)}: the sheet of {thickness:.6g} is curved in two directions there, like "
+        "a sphere; it cannot be unfolded, only pressed"
+    )
 
 
 def _place(points: Array) -> str:

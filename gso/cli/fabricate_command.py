@@ -15,7 +15,6 @@ from gso.errors import OptionError
 if TYPE_CHECKING:
     from gso.typing import Array
     from gso.workshop.fabricate import Fabrication
-    from gso.workshop.thickness import Thickness
 
 
 @click.command(short_help="Make designs of flat parts, for the cutter.")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
+from gso.io import SPLINE_SUFFIXES, suffix_of
 from gso.io.json_file import plain, write_json
 from gso.mesh import Mesh
 from gso.quantities import Length, Strain, as_length, as_strain, millimetres
@@ -24,7 +25,7 @@ from gso.workshop.congruent import origins, united
 from gso.workshop.designs import Designs, designs_of, several
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
-from gso.workshop.job_folder import CERTIFICATE, WORK, opened
+from gso.workshop.job_folder import CERTIFICATE, WORK, opened, path_of
 from gso.workshop.marks import check_lines
 from gso.workshop.names import different
 from gso.workshop.nesting import Rotations, checked_options, nest
@@ -109,7 +110,7 @@ def fabricate(
     folder : path
         A new or empty folder, or that of an earlier run, whose drawings are replaced.
     unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
-        Unit of the coordinates.
+        Unit of the coordinates; CAD files are read in millimetres.
     formulation : {"ruled", "curvature", "isometry", "flatten"}
         "ruled": exactly developable strips, with bend lines; pieces that no strips follow are
         only nearly developable. "curvature", "isometry": all of them are nearly developable.
@@ -188,6 +189,12 @@ def fabricate(
         checked_options(size, spacing, 0.0, rotations, seconds)
         most = finish.room(size, scale)
     say = callback or (lambda said: None)
+    for path in filter(None, map(path_of, several(designs))):
+        if unit != "mm" and suffix_of(path) in SPLINE_SUFFIXES:
+            raise OptionError(
+                f"{path}: CAD files have a unit of their own, and are read in millimetres; leave "
+                "out the unit"
+            )
     place = Path(os.fsdecode(folder))
     every = designs_of(designs, keep_groups=keep_groups)
     meshes = [design.mesh for design in every]

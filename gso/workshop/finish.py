@@ -103,7 +103,8 @@ class Finish:
             asked = Thickness(sheet, self.k_factor, table=self.bend_table)
         if abs(asked.sheet - sheet) > _SAME * sheet:
             raise OptionError(
-                f"the solid is {sheet:.6g} mm thick, not {asked.sheet:g} mm; leave out the thickness"
+                f"the solid is {sheet:.6g} mm thick, not {asked.sheet:g} mm; leave out the "
+                "thickness"
             )
         return replace(self, thickness=replace(asked, sheet=sheet, face="outside", arcs=True))
 

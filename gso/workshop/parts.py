@@ -277,7 +277,8 @@ def _name(part: Part, height: float) -> Label:
     """Place the name where there is most room, no larger than fits."""
     import shapely
 
-    shape = shapely.make_valid(shapely.Polygon(part.outline, part.holes))
+    valid = shapely.make_valid(shapely.Polygon(part.outline, part.holes))
+    shape = max(shapely.get_parts(valid), key=shapely.area)
     radius = shapely.maximum_inscribed_circle(shape)
     middle, rim = np.asarray(radius.coords)
     room = float(np.linalg.norm(rim - middle))
