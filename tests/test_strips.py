@@ -9,10 +9,10 @@ from click.testing import CliRunner
 import gso
 from gso.cli import main
 from gso.components import split
-from gso.geometry.polygon import rectangle
 from gso.mesh import Mesh
 from gso.result import StripsResult
 from gso.ruled.paneling import LightDesign
+from gso.geometry.polygon import rectangle
 from gso.workshop import Design, FabricationSettings
 from gso.workshop import made as workshop_made
 from tests.conftest import cylinder, saddle
