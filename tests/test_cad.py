@@ -19,6 +19,7 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeFace,
     BRepBuilderAPI_MakeWire,
 )
+from OCP.BRepGProp import BRepGProp
 from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
 from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeBox,
@@ -29,6 +30,8 @@ from OCP.BRepPrimAPI import (
 )
 from OCP.GC import GC_MakeArcOfCircle
 from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt, gp_Vec
+from OCP.GProp import GProp_GProps
+from OCP.STEPControl import STEPControl_Reader
 
 from gso.io import opencascade
 
@@ -109,10 +112,20 @@ def area(mesh):
     return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
 
 
-def made(path, **finish):
+def made(path, *, step=False, **finish):
     return gso.fabricate(
-        path, path.with_suffix(""), finish=Finish(**BARE, **finish), workers=0, formats=("svg",)
+        path,
+        path.with_suffix(""),
+        finish=Finish(**BARE, **finish),
+        workers=0,
+        formats=("svg",),
+        step=step,
     )
+
+
+def volume(mesh):
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    return np.einsum("td,td->", a, np.cross(b, c)) / 6
 
 
 class TestReading:
@@ -251,3 +264,40 @@ class TestSheetMetal:
         (part,) = made(saved(loft.Shape(), tmp_path / "a.step")).parts
         side = np.hypot(60, 20)
         assert part.area == pytest.approx(np.pi * (40 + 20) * side, rel=2e-3)
+
+
+class TestFoldedSolids:
+    def test_the_folded_part_is_the_solid_that_it_was_made_of(self, tmp_path):
+        done = made(saved(bracket(), tmp_path / "part.step"), step=True, k_factor=0.4)
+        assert "folded.step" in done.files
+        again = gso.load(done.folder / "folded.step")
+        assert again.attributes.labels["o"].names == ("part",) and not again.boundary_loops
+        section = THICK * sum(FLANGES) + np.pi / 4 * ((INNER + THICK) ** 2 - INNER**2)
+        # Facets are inside of the outer circle: by 1 - sin(a)/a for facets of 7.5 degrees.
+        assert volume(again) == pytest.approx(WIDTH * section, rel=1e-3)
+        np.testing.assert_allclose(
+            np.ptp(again.vertices, axis=0),
+            [FLANGES[0] + INNER + THICK, WIDTH, FLANGES[1] + INNER + THICK],
+            atol=1e-9,
+        )
+
+    def test_a_box_of_sheets_has_the_thickness_asked_for(self, tmp_path):
+        from gso.workshop import Thickness
+
+        path = saved(box((0, 0, 0), (100, 60, 40)), tmp_path / "a.step")
+        done = made(path, step=True, thickness=Thickness(1.0, face="inside"))
+        reader = STEPControl_Reader()
+        reader.ReadFile(str(done.folder / "folded.step"))
+        reader.TransferRoots()
+        found = GProp_GProps()
+        BRepGProp.VolumeProperties_s(reader.OneShape(), found)
+        # Walls outside of the box, mitres of 1 x 1 along the five folds, and something of them
+        # along the seams, whose ends are mitred.
+        walls = 2 * (100 * 60 + 100 * 40 + 60 * 40)
+        folds, edges = 2 * 100 + 2 * 60 + 40, 4 * (100 + 60 + 40)
+        assert walls + folds < found.Mass() < walls + edges
+
+    def test_a_design_without_thickness_is_refused(self, tmp_path):
+        path = saved(box((0, 0, 0), (100, 60, 40)), tmp_path / "a.step")
+        with pytest.raises(gso.OptionError, match="give the thickness"):
+            made(path, step=True)

@@ -121,6 +121,11 @@ if TYPE_CHECKING:
     help="Names of layers: CUT, BEND_UP and so on, or the numbers of ASTM D6673.",
 )
 @click.option("--bend-text", is_flag=True, help="Write angle and radius beside each bend.")
+@click.option(
+    "--step",
+    is_flag=True,
+    help="Also write the folded parts as solids of the sheet's thickness: folded.step.",
+)
 @click.option("--paper", metavar="A4", help="Also write all parts as a PDF on pages of this size.")
 @shared.workers
 @shared.scheduler

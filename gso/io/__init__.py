@@ -22,10 +22,12 @@ from gso.io import arrays, glb, obj, off, ply, stl
 from gso.io.atomic import check_writable, replacing, suffix_of
 from gso.io.cad import (
     SPLINE_SUFFIXES,
+    check_package,
     check_spline,
     read_faces,
     save_faces,
     save_patches,
+    save_solids,
     save_spline,
 )
 from gso.io.convert import as_mesh
@@ -44,6 +46,7 @@ __all__ = [
     "Unwelded",
     "add_format",
     "as_mesh",
+    "check_package",
     "check_spline",
     "check_writable",
     "checked_weld",
@@ -55,6 +58,7 @@ __all__ = [
     "save_flat",
     "save_lines",
     "save_patches",
+    "save_solids",
     "save_spline",
     "suffix_of",
     "welded",

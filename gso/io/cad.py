@@ -57,7 +57,7 @@ def read_faces(data: bytes, suffix: str, chord: float | None = None) -> Surface:
     """
     if chord is not None:
         chord = as_positive(chord, "chord")
-    _require(suffix)
+    check_package(suffix)
     module = importlib.import_module(f"gso.io.{_KITS[suffix].reader}")
     found: Surface = module.read(data, suffix, chord)
     return found
@@ -79,13 +79,13 @@ def check_spline(path: AnyPath, unit: str = "mm") -> None:
     check_writable(path, SPLINE_SUFFIXES)
     millimetres(unit)
     try:
-        _require(suffix_of(path))
+        check_package(suffix_of(path))
     except GSOError as error:
         raise GSOError(f"{os.fsdecode(path)}: {error}") from None
 
 
-def _require(suffix: str) -> None:
-    """Raise an error if the package for a format cannot be used."""
+def check_package(suffix: str) -> None:
+    """Raise an error if the package for a CAD format, by its suffix, cannot be used."""
     kit = _KITS[suffix]
     try:
         importlib.import_module(kit.package)
@@ -194,6 +194,38 @@ def save_patches(patches: Sequence[TrimmedSpline], path: AnyPath, *, unit: str =
     if not any(patch.faces for patch in patches):
         raise MeshError(f"{os.fsdecode(path)}: there are no surfaces to write")
     _write(path, unit, patches)
+
+
+def save_solids(solids: Sequence[tuple[str, Mesh]], path: AnyPath) -> None:
+    """Write closed meshes in millimetres to one STEP file, as solids with names.
+
+    Triangles in one plane become one face. An existing file is replaced only when the new one is
+    complete.
+
+    Parameters
+    ----------
+    solids : sequence of (str, Mesh)
+        Names and closed meshes.
+    path : str or PathLike
+        A .step or .stp file.
+
+    Raises
+    ------
+    MeshError
+        Another suffix, a path that cannot be written, or faces that are not joined. The message
+        names the file.
+    GSOError
+        OpenCASCADE is not installed: ``pip install ".[cad]"`` in the folder of gso.
+    """
+    check_writable(path, (".step", ".stp"))
+    check_package(suffix_of(path))
+    from gso.io.opencascade import write_solids
+
+    with replacing(path) as file:
+        try:
+            file.write(write_solids(solids))
+        except MeshError as error:
+            raise MeshError(f"{os.fsdecode(path)}: {error}") from None
 
 
 def _write(

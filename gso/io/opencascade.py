@@ -9,10 +9,13 @@ from itertools import pairwise
 
 import numpy as np
 from OCP import collections
+from OCP.BRep import BRep_Builder
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeEdge,
     BRepBuilderAPI_MakeFace,
     BRepBuilderAPI_MakePolygon,
+    BRepBuilderAPI_MakeSolid,
+    BRepBuilderAPI_MakeVertex,
     BRepBuilderAPI_MakeWire,
     BRepBuilderAPI_Sewing,
 )
@@ -21,19 +24,27 @@ from OCP.BRepLib import BRepLib
 from OCP.Geom import Geom_BSplineSurface
 from OCP.Geom2d import Geom2d_BSplineCurve
 from OCP.GeomToIGES import GeomToIGES_GeomSurface
-from OCP.gp import gp_Pnt, gp_Pnt2d
+from OCP.gp import gp_Dir, gp_Pln, gp_Pnt, gp_Pnt2d
 from OCP.IGESControl import IGESControl_Writer
 from OCP.IGESData import IGESData_IGESWriter
 from OCP.IGESSelect import IGESSelect_WorkLibrary
 from OCP.Interface import Interface_Protocol, Interface_Static
 from OCP.Message import Message
+from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
+from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPControl import (
     STEPControl_Controller,
     STEPControl_StepModelType,
     STEPControl_Writer,
 )
 from OCP.StepData import StepData_StepWriter
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Wire
+from OCP.TCollection import TCollection_ExtendedString
+from OCP.TDataStd import TDataStd_Name
+from OCP.TDocStd import TDocStd_Document
+from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Wire
+from OCP.XCAFDoc import XCAFDoc_DocumentTool
 from scipy.interpolate import make_interp_spline
 
 from gso.errors import MeshError
@@ -52,6 +63,9 @@ _FORMAT = "%.16E"
 
 #: OpenCASCADE's smallest distance between points, in the unit of the file.
 _TOLERANCE = 1e-7
+
+#: Distance, relative to the size, and angle in radians within which triangles are in one plane.
+_FLAT, _LEVEL = 1e-9, 1e-6
 
 #: Distance, relative to the size of the largest patch, within which edges are joined.
 _SEWN = 1e-5
@@ -86,6 +100,67 @@ def write(
     if isinstance(content, BSplineSurface) and b"B_SPLINE_SURFACE_WITH_KNOTS" not in written:
         raise MeshError(f"the surface has a side {small}; is the unit right?")
     return written
+
+
+def write_solids(solids: Sequence[tuple[str, Mesh]]) -> bytes:
+    """Return the contents of a STEP file of named solids, from closed meshes in millimetres.
+
+    Triangles in one plane become one face.
+    """
+    document = TDocStd_Document(TCollection_ExtendedString("gso"))
+    XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
+    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    text = io.BytesIO()
+    with quiet(), settings({"write.step.unit": "MM", "xstep.cascade.unit": "MM"}):
+        for name, mesh in solids:
+            label = shapes.AddShape(_solid(mesh, name), False)
+            TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
+        writer = STEPCAFControl_Writer()
+        writer.SetNameMode(True)
+        if not writer.Transfer(document):
+            raise MeshError("OpenCASCADE could not write the solids")
+        writer.WriteStream(text)
+    return text.getvalue()
+
+
+def _solid(mesh: Mesh, name: str) -> TopoDS_Shape:
+    """Return the solid inside a closed mesh."""
+    merged = ShapeUpgrade_UnifySameDomain(_joined(mesh.vertices, mesh.triangles, name))
+    merged.SetLinearTolerance(_FLAT * mesh.diagonal)
+    merged.SetAngularTolerance(_LEVEL)
+    merged.Build()
+    shells = TopExp_Explorer(merged.Shape(), TopAbs_ShapeEnum.TopAbs_SHELL)
+    solid = BRepBuilderAPI_MakeSolid(TopoDS.Shell(shells.Current())).Solid()
+    BRepLib.OrientClosedSolid_s(solid)
+    return solid
+
+
+def _joined(points: Array, triangles: Ints, name: str) -> TopoDS_Shape:
+    """Return a shell of triangles that share edges as the mesh does, wherever points coincide."""
+    corners = [BRepBuilderAPI_MakeVertex(gp_Pnt(*p)).Vertex() for p in points.tolist()]
+    normals = np.cross(*(points[triangles[:, k]] - points[triangles[:, 0]] for k in (1, 2)))
+    edges: dict[tuple[int, int], TopoDS_Edge] = {}
+    builder, shell = BRep_Builder(), TopoDS_Shell()
+    builder.MakeShell(shell)
+    for k, (face, normal) in enumerate(zip(triangles.tolist(), normals.tolist(), strict=True)):
+        wire = BRepBuilderAPI_MakeWire()
+        for a, b in pairwise([*face, face[0]]):
+            ends = min(a, b), max(a, b)
+            if ends not in edges:
+                made = BRepBuilderAPI_MakeEdge(*(corners[end] for end in ends))
+                if not made.IsDone():
+                    raise MeshError(
+                        f"{name} has a side shorter than {_TOLERANCE:g} mm; is the unit right?"
+                    )
+                edges[ends] = made.Edge()
+            wire.Add(edges[ends])
+        plane = gp_Pln(gp_Pnt(*points[face[0]].tolist()), gp_Dir(*normal))
+        flat = BRepBuilderAPI_MakeFace(plane, wire.Wire(), True) if wire.IsDone() else None
+        if flat is None or not flat.IsDone():
+            raise MeshError(f"triangle {k} of {name} is no face to OpenCASCADE")
+        builder.Add(shell, flat.Face())
+    shell.Closed(True)
+    return shell
 
 
 def _step(shape: TopoDS_Shape, name: str) -> bytes:

@@ -33,6 +33,7 @@ from gso.workshop.output_files import Drawings, written
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.parts import fitted, parts_from
+from gso.workshop.solids import folded_solids
 from gso.workshop.work import made_all
 
 
@@ -93,6 +94,7 @@ def fabricate(
     layers: str = "operations",
     paper: str | None = None,
     bend_text: bool = False,
+    step: bool = False,
     workers: int | None = None,
     scheduler: str | None = None,
     callback: Callable[[str], None] | None = None,
@@ -151,6 +153,9 @@ def fabricate(
         Also write all parts as a PDF on pages of this size, such as "A4".
     bend_text : bool
         Also write the direction, angle and radius beside each bend.
+    step : bool
+        Also write the folded parts as solids of the sheet's thickness to one STEP file,
+        ``folded.step``. Their bends have flat facets as the designs have them.
     workers : int, optional
         Number of processes; one for each processor when not given, 0 for none.
     scheduler : str, optional
@@ -182,7 +187,7 @@ def fabricate(
     scale = millimetres(unit)
     if not isinstance(finish, Finish):
         raise OptionError(f"finish is {finish!r}; it must be a gso.workshop.finish.Finish")
-    drawings = Drawings(tuple(dict.fromkeys(formats)), layers, paper, bend_text)
+    drawings = Drawings(tuple(dict.fromkeys(formats)), layers, paper, bend_text, step)
     most = None
     size = as_sheet(sheet, "mm")
     if size is not None:
@@ -197,6 +202,12 @@ def fabricate(
             )
     place = Path(os.fsdecode(folder))
     every = designs_of(designs, keep_groups=keep_groups)
+    thin = [design.name for design in every if step and design.sheet is None]
+    if thin and finish.thickness is None:
+        raise OptionError(
+            f"{thin[0]} is no solid of sheet metal, so that its parts have no thickness as solids; "
+            "give the thickness, or leave out step"
+        )
     meshes = [design.mesh for design in every]
     settings = FabricationSettings(
         formulation,
@@ -222,6 +233,7 @@ def fabricate(
     found = _named(found)
     say("parts")
     parts: list[Part] = []
+    solids: list[tuple[str, Mesh]] = []
     records: list[Json] = []
     reasons: list[Reason] = []
     for k in chosen:
@@ -236,6 +248,8 @@ def fabricate(
         thick = every[k].sheet
         asked = finish if thick is None else finish.of_solid(scale * thick)
         fit = fitted(one, scale, asked, *lines)
+        if step and asked.thickness is not None:
+            solids += folded_solids(one.panels, scale, asked.thickness)
         own = [replace(part, count=len(copies)) for part in parts_from(fit, asked)]
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
         why = (*(r.scaled(scale) for r in one.reasons), *judge_sheet(fit, settings, asked))
@@ -284,7 +298,7 @@ def fabricate(
     certificate["reasons"], certificate["usable"] = _words(reasons), not reasons
     certificate["parts"] = sum(part.count for part in parts)
     say("files")
-    files = written(place, parts, sheets, found.values(), certificate, drawings, earlier)
+    files = written(place, parts, sheets, found.values(), certificate, drawings, earlier, solids)
     certificate["files"] = files
     certificate["seconds"] = time.perf_counter() - clock
     write_json(place / CERTIFICATE, certificate)
