@@ -31,7 +31,8 @@ from gso.errors import MeshError
 from gso.io.opencascade import quiet, settings
 from gso.io.raw_surface import Surface
 from gso.mesh.attributes import Attributes, Labels
-from gso.mesh.welding import collapse, near
+from gso.mesh.topology import label_components
+from gso.mesh.welding import collapse
 from gso.typing import Array, Ints
 
 #: Chord tolerance by default, relative to the size, and the largest angle between neighbouring
@@ -227,6 +228,7 @@ def _meshed(shape: TopoDS_Shape, chord: float | None) -> _Meshed | None:
     triangles: list[Ints] = []
     owner: list[Ints] = []
     count = missing = 0
+    starts = np.full(len(faces), -1)
     for number, face in enumerate(faces):
         place = TopLoc_Location()
         net = BRep_Tool.Triangulation_s(TopoDS.Face(face), place)
@@ -242,15 +244,58 @@ def _meshed(shape: TopoDS_Shape, chord: float | None) -> _Meshed | None:
         points.append(np.array([[p.X(), p.Y(), p.Z()] for p in nodes]))
         triangles.append(own)
         owner.append(np.full(len(own), number))
+        starts[number] = count
         count += len(nodes)
     if not points:
         return None
     every, corner = np.concatenate(points), np.concatenate(triangles)
-    target = near(every, _SAME * size, np.arange(len(every)))
+    target = _joined(every, faces, starts, _SAME * size)
     done = collapse(corner, target)
     used, compact = np.unique(done.faces, return_inverse=True)
     face_of = np.concatenate(owner)[done.kept]
     return _Meshed(every[used], compact.reshape(-1, 3), face_of, faces, missing)
+
+
+def _joined(points: Array, faces: list[TopoDS_Shape], starts: Ints, near: float) -> Ints:
+    """Return the first of the nodes that are one, for each: those of an edge that faces share.
+
+    Nodes that only have the same place stay apart, so that bodies may touch themselves.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 3)
+        Nodes of all faces.
+    faces : list of TopoDS_Shape
+    starts : ndarray of int
+        First node of each face; -1 for faces without triangles.
+    near : float
+        Distance within which nodes of one edge of one face are the same, as at a pole.
+    """
+    seen = collections.IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher()
+    first: dict[int, Ints] = {}
+    one: list[Ints] = []
+    other: list[Ints] = []
+    for face, start in zip(faces, starts.tolist(), strict=True):
+        if start < 0:
+            continue
+        place = TopLoc_Location()
+        net = BRep_Tool.Triangulation_s(TopoDS.Face(face), place)
+        for shape in _inside(face, TopAbs_ShapeEnum.TopAbs_EDGE):
+            edge = TopoDS.Edge(shape)
+            line = BRep_Tool.PolygonOnTriangulation_s(edge, net, place)
+            if line is None:
+                continue
+            nodes = start - 1 + np.array([line.Node(k) for k in range(1, line.NbNodes() + 1)])
+            same = first.setdefault(seen.Add(edge), nodes)
+            if len(same) == len(nodes):
+                one.append(same)
+                other.append(nodes)
+            ends = np.linalg.norm(np.diff(points[nodes], axis=0), axis=1) <= near
+            one.append(nodes[:-1][ends])
+            other.append(nodes[1:][ends])
+    label = label_components(len(points), np.concatenate(one), np.concatenate(other))
+    _, least, index = np.unique(label, return_index=True, return_inverse=True)
+    return np.asarray(least[index.ravel()])
 
 
 def _labels(row: list[str]) -> Labels | None:

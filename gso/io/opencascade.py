@@ -138,7 +138,8 @@ def _solid(mesh: Mesh, name: str) -> TopoDS_Shape:
 def _joined(points: Array, triangles: Ints, name: str) -> TopoDS_Shape:
     """Return a shell of triangles that share edges as the mesh does, wherever points coincide."""
     corners = [BRepBuilderAPI_MakeVertex(gp_Pnt(*p)).Vertex() for p in points.tolist()]
-    normals = np.cross(*(points[triangles[:, k]] - points[triangles[:, 0]] for k in (1, 2)))
+    p, q, r = points[triangles].transpose(1, 0, 2)
+    normals = np.cross(q - p, r - p)
     edges: dict[tuple[int, int], TopoDS_Edge] = {}
     builder, shell = BRep_Builder(), TopoDS_Shell()
     builder.MakeShell(shell)
