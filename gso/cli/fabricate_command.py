@@ -150,7 +150,7 @@ def fabricate(
     from gso.workshop import fabricate as make
     from gso.workshop.finish import Finish
 
-    _check_together()
+    _check_together(inputs)
     for name in ("notches", "labels"):
         if given.pop(f"no_{name}"):
             given[name] = None
@@ -213,13 +213,20 @@ def text(done: Fabrication) -> list[str]:
 
 #: Options that say something only together with another one.
 _NEEDED = {
-    "thickness": ("face", "bend_radius"),
+    "thickness": ("k_factor", "face", "bend_radius", "bend_table"),
     "sheet": ("spacing", "rotations", "seconds"),
 }
 
 
-def _check_together() -> None:
+#: Options that say something about solids, too, which have a thickness of their own.
+_OF_SOLIDS = ("k_factor", "bend_table")
+
+
+def _check_together(inputs: tuple[str, ...]) -> None:
     """Raise an error if an option would be ignored."""
+    from gso.io import SPLINE_SUFFIXES, suffix_of
+
+    solids = any(suffix_of(name) in SPLINE_SUFFIXES for name in inputs)
     context = click.get_current_context()
 
     def is_given(name: str) -> bool:
@@ -227,7 +234,7 @@ def _check_together() -> None:
 
     for needed, names in _NEEDED.items():
         for name in filter(is_given, names):
-            if not is_given(needed):
+            if not is_given(needed) and not (solids and name in _OF_SOLIDS):
                 option = name.replace("_", "-")
                 raise OptionError(f"--{option} needs --{needed}; give both or none")
 
