@@ -17,8 +17,8 @@ from gso.typing import Array, Flags, Ints
 _THIN, _SIDES = 0.125, 0.5
 #: How much the thickness may vary, relative to it: by equations, and where there is none.
 _SAME, _ABOUT = 1e-3, 2e-2
-#: Number of triangles of a face from which the opposite face is looked for.
-_SAMPLES = 4
+#: Number of triangles of a face from which the opposite face is looked for, and of all faces.
+_SAMPLES, _RAYS = 4, 4_000
 #: Number of pairs of rays and triangles that are intersected at once.
 _BLOCK = 2_000_000
 
@@ -125,7 +125,7 @@ def _opposite(shape: Recognised, triangles: Ints, areas: Array, normals: Array) 
     order = np.lexsort((-areas, shape.face))
     first = np.flatnonzero(np.diff(shape.face[order], prepend=-1))
     rank = np.arange(len(order)) - np.repeat(first, np.diff(np.append(first, len(order))))
-    chosen = order[rank < _SAMPLES]
+    chosen = order[rank < np.clip(_RAYS // len(shape.faces), 1, _SAMPLES)]
     hit, far = _inwards(shape, triangles, chosen, normals)
     keep = hit >= 0
     # The face opposite is seen from inside.

@@ -308,3 +308,32 @@ class TestFoldedSolids:
         path = saved(box((0, 0, 0), (100, 60, 40)), tmp_path / "a.step")
         with pytest.raises(gso.OptionError, match="give the thickness"):
             made(path, step=True)
+
+    def test_several_solids_of_a_file_keep_their_names(self, tmp_path):
+        one = gso.load(saved(bracket(), tmp_path / "a.step"))
+        two = one.replaced(one.vertices + np.array([0.0, 100.0, 0.0]))
+        other = gso.load(saved(plate(), tmp_path / "b.step"))
+        other = other.replaced(other.vertices - np.array([0.0, 0.0, 50.0]))
+        solids = [("left", one), ("right", two), ("cover", other)]
+        io.save_solids(solids, tmp_path / "all.step")
+        done = made(tmp_path / "all.step", k_factor=0.44)
+        assert done.usable
+        sheets = {x["name"]: x["thickness"] for x in done.certificate["designs"]}
+        assert {name: round(t, 6) for name, t in sheets.items()} == {
+            "left": 2.0,
+            "right": 2.0,
+            "cover": 3.0,
+        }
+        flat = sum(FLANGES) + np.pi / 2 * (INNER + 0.44 * THICK)
+        long = {part.name: part.size[0] for part in done.parts}
+        assert long["cover"] == pytest.approx(120)
+        assert max(v for k, v in long.items() if k != "cover") == pytest.approx(flat, abs=1e-3)
+
+    def test_plates_of_different_thickness_are_different_parts(self, tmp_path):
+        solids = []
+        for name, z, thick in (("thin", 0.0, 2.0), ("thick", 50.0, 3.0)):
+            shape = box((0, 0, z), (120, 80, z + thick))
+            solids.append((name, gso.load(saved(shape, tmp_path / f"{name}.step"))))
+        io.save_solids(solids, tmp_path / "all.step")
+        done = made(tmp_path / "all.step")
+        assert sorted((part.name, part.count) for part in done.parts) == [("thick", 1), ("thin", 1)]

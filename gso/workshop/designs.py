@@ -50,7 +50,8 @@ class Design:
 def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
     """Read designs, and divide them into components.
 
-    Solids of sheet metal in CAD files become one of their sides.
+    Solids of sheet metal in CAD files become one of their sides, and several have the names that
+    the file gives them.
 
     Raises
     ------
@@ -75,6 +76,10 @@ def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
             name = f"{stem}-{k}" if len(components) > 1 else stem
             solid = None
             if path is not None and io.suffix_of(path) in io.SPLINE_SUFFIXES:
+                said = None if mesh.attributes is None else mesh.attributes.labels.get("o")
+                if said is not None and len(components) > 1:
+                    index = int(said.of_face[part.faces[0]])
+                    name = said.names[index] if index >= 0 else name
                 try:
                     solid = sheet_solid(part.mesh)
                 except MeshError as error:

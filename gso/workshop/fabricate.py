@@ -232,7 +232,8 @@ def fabricate(
     found, failed = made_all(every, chosen, settings, place / WORK, workers, scheduler, say)
     found = _named(found)
     say("parts")
-    parts: list[Part] = []
+    # Parts are the same only if their sheets are.
+    of_sheet: dict[float | None, list[Part]] = {}
     solids: list[tuple[str, Mesh]] = []
     records: list[Json] = []
     reasons: list[Reason] = []
@@ -256,8 +257,13 @@ def fabricate(
         record["reasons"] = _words(why)
         records.append(record)
         reasons += [reason.within(one.name) for reason in why]
-        parts += own
-    parts, same = united(parts)
+        of_sheet.setdefault(thick, []).extend(own)
+    parts: list[Part] = []
+    same: dict[str, str] = {}
+    for some in of_sheet.values():
+        different_parts, also = united(some)
+        parts += different_parts
+        same |= also
     for record in records:
         for entry in record.get("parts", ()):
             entry["same_as"] = same.get(entry["name"])
