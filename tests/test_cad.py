@@ -31,6 +31,7 @@ from OCP.BRepPrimAPI import (
 from OCP.GC import GC_MakeArcOfCircle
 from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt, gp_Vec
 from OCP.GProp import GProp_GProps
+from OCP.IGESControl import IGESControl_Writer
 from OCP.Interface import Interface_Static
 from OCP.STEPControl import STEPControl_Reader, STEPControl_StepModelType, STEPControl_Writer
 
@@ -268,6 +269,42 @@ class TestSheetMetal:
         (part,) = made(saved(loft.Shape(), tmp_path / "a.step")).parts
         side = np.hypot(60, 20)
         assert part.area == pytest.approx(np.pi * (40 + 20) * side, rel=2e-3)
+
+    @pytest.mark.parametrize("mode", [0, 1])
+    def test_an_iges_file_has_the_same_solid(self, tmp_path, mode):
+        # Faces, or a shell.
+        writer = IGESControl_Writer("MM", mode)
+        writer.AddShape(bracket())
+        writer.Write(str(tmp_path / "a.igs"))
+        (part,) = made(tmp_path / "a.igs", k_factor=0.44).parts
+        flat = sum(FLANGES) + np.pi / 2 * (INNER + 0.44 * THICK)
+        np.testing.assert_allclose(part.size, [flat, WIDTH], atol=1e-5)
+
+    def test_a_mesh_in_a_3dm_file_has_its_name_and_unit(self, tmp_path):
+        rhino3dm = pytest.importorskip("rhino3dm")
+        mesh = gso.load(saved(bracket(), tmp_path / "a.step"))
+        given = rhino3dm.Mesh()
+        for point in (0.1 * mesh.vertices).tolist():
+            given.Vertices.Add(*point)
+        for face in mesh.triangles.tolist():
+            given.Faces.AddFace(*face)
+        model, said = rhino3dm.File3dm(), rhino3dm.ObjectAttributes()
+        model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Centimeters
+        said.Name = "bracket"
+        model.Objects.AddMesh(given, said)
+        assert model.Write(str(tmp_path / "a.3dm"), 7)
+        again = gso.load(tmp_path / "a.3dm")
+        assert again.attributes.labels["o"].names == ("bracket",) and not again.boundary_loops
+        assert volume(again) == pytest.approx(volume(mesh), rel=1e-5)
+
+    def test_a_trimmed_face_without_triangles_is_named(self, tmp_path):
+        rhino3dm = pytest.importorskip("rhino3dm")
+        model = rhino3dm.File3dm()
+        rod = rhino3dm.Cylinder(rhino3dm.Circle(10.0), 30.0)
+        model.Objects.AddBrep(rhino3dm.Brep.CreateFromCylinder(rod, True, True))
+        assert model.Write(str(tmp_path / "a.3dm"), 7)
+        with pytest.raises(gso.MeshError, match="face 0 of object 0 is trimmed"):
+            gso.load(tmp_path / "a.3dm")
 
 
 class TestFoldedSolids:
