@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gso
-from gso import io
+from gso import io, recognition
 from gso.workshop import Finish
 
 pytest.importorskip("OCP", exc_type=ImportError)
@@ -168,15 +168,13 @@ class TestReading:
         assert len(mesh.vertices) - len(mesh.edges) + len(mesh.triangles) == -2
 
     def test_an_elbow_of_cylinders_and_a_cone_are_developable(self, tmp_path):
-        from gso.recognition import recognise
-
         elbow = BRepPrimAPI_MakeCylinder(20.0, 60.0).Shape()
         cone = BRepPrimAPI_MakeCone(40.0, 20.0, 60.0).Shape()
         for name, shape, kind, value in (
             ("elbow", elbow, "cylinder", 20.0),
             ("cone", cone, "cone", np.arctan(20 / 60)),
         ):
-            found = recognise(gso.load(saved(shape, tmp_path / f"{name}.step")))
+            found = recognition.recognise(gso.load(saved(shape, tmp_path / f"{name}.step")))
             (face,) = (f for f in found.faces if f.kind == kind)
             got = face.radius if kind == "cylinder" else face.half_angle
             assert got == pytest.approx(value, rel=1e-6)
