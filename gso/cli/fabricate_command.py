@@ -15,7 +15,6 @@ from gso.errors import OptionError
 if TYPE_CHECKING:
     from gso.typing import Array
     from gso.workshop.fabricate import Fabrication
-    from gso.workshop.thickness import Thickness
 
 
 @click.command(short_help="Make designs of flat parts, for the cutter.")
@@ -122,6 +121,11 @@ if TYPE_CHECKING:
     help="Names of layers: CUT, BEND_UP and so on, or the numbers of ASTM D6673.",
 )
 @click.option("--bend-text", is_flag=True, help="Write angle and radius beside each bend.")
+@click.option(
+    "--step",
+    is_flag=True,
+    help="Also write the folded parts as solids of the sheet's thickness: folded.step.",
+)
 @click.option("--paper", metavar="A4", help="Also write all parts as a PDF on pages of this size.")
 @shared.workers
 @shared.scheduler
@@ -147,7 +151,7 @@ def fabricate(
     from gso.workshop import fabricate as make
     from gso.workshop.finish import Finish
 
-    _check_together()
+    _check_together(inputs)
     for name in ("notches", "labels"):
         if given.pop(f"no_{name}"):
             given[name] = None
@@ -159,7 +163,7 @@ def fabricate(
         **taken("kerf", "allowance", "notches", "tabs", "labels", "grain"),
         registration=given.pop("holes"),
         face="inside" if given.pop("inside_up") else "outside",
-        thickness=_thickness(**taken("thickness", *_NEEDED["thickness"])),
+        **_thickness(**taken("thickness", "k_factor", "face", "bend_radius", "bend_table")),
     )
     meshes = [file_options.source(name, weld) for name in inputs]
     if rotations != "any" and not rotations.isdecimal():
@@ -215,8 +219,15 @@ _NEEDED = {
 }
 
 
-def _check_together() -> None:
+#: Options that say something about solids, too, which have a thickness of their own.
+_OF_SOLIDS = ("k_factor", "bend_table")
+
+
+def _check_together(inputs: tuple[str, ...]) -> None:
     """Raise an error if an option would be ignored."""
+    from gso.io import SPLINE_SUFFIXES, suffix_of
+
+    solids = any(suffix_of(name) in SPLINE_SUFFIXES for name in inputs)
     context = click.get_current_context()
 
     def is_given(name: str) -> bool:
@@ -224,7 +235,7 @@ def _check_together() -> None:
 
     for needed, names in _NEEDED.items():
         for name in filter(is_given, names):
-            if not is_given(needed):
+            if not is_given(needed) and not (solids and name in _OF_SOLIDS):
                 option = name.replace("_", "-")
                 raise OptionError(f"--{option} needs --{needed}; give both or none")
 
@@ -235,13 +246,15 @@ def _thickness(
     face: str,
     bend_radius: float | None,
     bend_table: str | None,
-) -> Thickness | None:
+) -> dict[str, Any]:
+    """Return how sheets bend; solids have a thickness of their own."""
     from gso.workshop.thickness import Thickness
 
-    if thickness is None:
-        return None
     table = None if bend_table is None else _table(bend_table)
-    return Thickness(thickness, k_factor, face, bend_radius, table)
+    out: dict[str, Any] = {"k_factor": k_factor, "bend_table": table}
+    if thickness is not None:
+        out["thickness"] = Thickness(thickness, k_factor, face, bend_radius, table)
+    return out
 
 
 def _table(name: str) -> Array:

@@ -59,6 +59,7 @@ def folded_pattern(
     cut: ArrayLike = (),
     sheet: tuple[float, float] | None = None,
     bend_step: float | None = None,
+    press_radius: tuple[float, float] | None = None,
 ) -> FoldedPattern | None:
     """Unfold a design that consists of flat, rolled and conical faces.
 
@@ -76,6 +77,10 @@ def folded_pattern(
         Length and width that a part may have, in the mesh's unit.
     bend_step : float, optional
         Largest angle between neighbouring bend lines, in degrees.
+    press_radius : (float, float), optional
+        Largest radii of cylinders that are bent by a press, at one line in the middle, where the
+        surface is convex and where it is concave. Cylinders that turn by more than 180 degrees
+        are rolled in any case.
 
     Returns
     -------
@@ -106,7 +111,7 @@ def folded_pattern(
         sheet=sheet,
     )
     sliced = SlicedPattern.of(shape, joined)
-    bends = [ruled_bends(sliced, k, face, flat) for k, face in enumerate(shape.faces)]
+    bends = [ruled_bends(sliced, k, face, flat, press_radius) for k, face in enumerate(shape.faces)]
     edges, angles, radii = joined_bends([*bends, fold_edges(sliced, shape)])
     surface = Mesh(sliced.points, sliced.vertex[sliced.faces])
     # In the order of the surface's vertices, as patterns that are not cut have it.

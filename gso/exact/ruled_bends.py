@@ -15,9 +15,17 @@ from gso.typing import Array, Flags
 
 #: Distance, relative to the size, within which points are on a line.
 _SAME = 1e-7
+#: Largest angle in radians by which a press bends.
+_HALF_TURN = np.pi + np.radians(1.0)
 
 
-def ruled_bends(sliced: SlicedPattern, number: int, face: ShapeFace, flat: Array) -> Folded:
+def ruled_bends(
+    sliced: SlicedPattern,
+    number: int,
+    face: ShapeFace,
+    flat: Array,
+    press_radius: tuple[float, float] | None = None,
+) -> Folded:
     """Return the edges of a face to bend along, with angles and radii.
 
     They are rows of edges along rulings where there are enough. Otherwise triangles are divided
@@ -31,13 +39,18 @@ def ruled_bends(sliced: SlicedPattern, number: int, face: ShapeFace, flat: Array
     face : ShapeFace
     flat : ndarray, (t, 3, 2)
         Flat corners of the shape's triangles, each face in its own place.
+    press_radius : (float, float), optional
+        As of :func:`gso.exact.folded_pattern`.
     """
     if not face.bend_lines:
         return Folded()
-    bends = _rulings(face)
-    rows = ruling_rows(sliced, face, flat, max(3, len(bends)))
-    if rows is not None:
-        return rows
+    if press_radius is not None and _is_pressed(face, press_radius):
+        bends = [_middle_line(face)]
+    else:
+        bends = _rulings(face)
+        rows = ruling_rows(sliced, face, flat, max(3, len(bends)))
+        if rows is not None:
+            return rows
     turn, shift = _motion(sliced, face, flat)
     near = _SAME * float(np.linalg.norm(np.ptp(sliced.points, axis=0)))
     lines = [_Line.of(np.stack([b.start, b.end]) @ turn + shift, face, shift, near) for b in bends]
@@ -62,6 +75,24 @@ def ruled_bends(sliced: SlicedPattern, number: int, face: ShapeFace, flat: Array
         angle = -bend.angle if bend.up else bend.angle
         found.append(Folded(edges[own], np.full(len(radii), angle), radii))
     return joined_bends(found)
+
+
+def _is_pressed(face: ShapeFace, largest: tuple[float, float]) -> bool:
+    """Tell whether a face is a cylinder that is bent at one line."""
+    if face.radius is None or face.flat is None:
+        return False
+    turn = float(np.ptp(face.flat[..., 0])) / face.radius
+    return face.radius <= largest[int(face.bend_lines[0].up)] and turn <= _HALF_TURN
+
+
+def _middle_line(face: ShapeFace) -> BendLine:
+    """Return the ruling in the middle of a cylinder, with the whole angle."""
+    if face.flat is None or face.radius is None:
+        raise AssertionError("only a cylinder has a ruling in the middle")
+    across, along = face.flat[..., 0], face.flat[..., 1]
+    middle, angle = 0.5 * (across.min() + across.max()), float(np.ptp(across)) / face.radius
+    start, end = (np.array([middle, y]) for y in (along.min(), along.max()))
+    return BendLine(start, end, face.radius, face.radius, angle, face.bend_lines[0].up)
 
 
 def joined_bends(some: list[Folded]) -> Folded:

@@ -1,4 +1,4 @@
-"""Readers and writers of mesh files; writers of flat patterns, polylines and CAD surfaces.
+"""Readers and writers of mesh and CAD files; writers of flat patterns and polylines.
 
 >>> import tempfile, os
 >>> import numpy as np
@@ -20,7 +20,16 @@ from typing import BinaryIO, TypeVar
 from gso.errors import MeshError, OptionError
 from gso.io import arrays, glb, obj, off, ply, stl
 from gso.io.atomic import check_writable, replacing, suffix_of
-from gso.io.cad import SPLINE_SUFFIXES, check_spline, save_faces, save_patches, save_spline
+from gso.io.cad import (
+    SPLINE_SUFFIXES,
+    check_package,
+    check_spline,
+    read_faces,
+    save_faces,
+    save_patches,
+    save_solids,
+    save_spline,
+)
 from gso.io.convert import as_mesh
 from gso.io.flat_svg import save_flat
 from gso.io.lines import save_lines
@@ -37,6 +46,7 @@ __all__ = [
     "Unwelded",
     "add_format",
     "as_mesh",
+    "check_package",
     "check_spline",
     "check_writable",
     "checked_weld",
@@ -49,6 +59,7 @@ __all__ = [
     "save_flat",
     "save_lines",
     "save_patches",
+    "save_solids",
     "save_spline",
     "suffix_of",
     "welded",
@@ -93,26 +104,30 @@ def add_format(suffix: str, module: ModuleType) -> None:
     _FORMATS[suffix.lower()] = (module.read, module.write)
 
 
-def load(path: AnyPath, *, weld: float | None = None) -> Mesh:
-    """Read a mesh file; its suffix selects the format.
+def load(path: AnyPath, *, weld: float | None = None, chord: float | None = None) -> Mesh:
+    """Read a mesh or CAD file; its suffix selects the format.
 
     Parameters
     ----------
     path : str or PathLike
         An .obj, .ply or .off file (quads are kept), .stl or .glb (triangles, single
         precision, equal vertices merged), .npy (a grid of points (H, W, 3)) or .npz
-        (`vertices` and `faces`, or one grid).
+        (`vertices` and `faces`, or one grid). Or a CAD file, whose faces become triangles:
+        .step, .stp, .iges, .igs (needs OpenCASCADE) or .3dm (needs rhino3dm).
     weld : float, optional
         Merge vertices that lie within this distance of each other, in the file's unit of
         length (see :func:`welded`). Use it for files in which each face has its own copies
         of its vertices, at seams or everywhere. 0 merges equal vertices.
+    chord : float, optional
+        Largest distance between the triangles and the faces of a CAD file, in millimetres; 1e-4
+        of the size when not given.
 
     Returns
     -------
     Mesh
-        In the file's own unit and order of vertices. `notes` list what was changed or left
-        out. `attributes` hold the face names and texture coordinates of an OBJ file;
-        :func:`save` writes them again.
+        In the file's own unit and order of vertices; in millimetres from a CAD file. `notes` list
+        what was changed or left out. `attributes` hold the face names and texture coordinates of
+        an OBJ file, or the names and colours in a CAD file; :func:`save` writes them again.
 
     Raises
     ------
@@ -120,9 +135,13 @@ def load(path: AnyPath, *, weld: float | None = None) -> Mesh:
         The file is missing, of an unknown format or damaged, or :class:`gso.Mesh` rejects
         its geometry. The message names the file and, in a text file, the line.
     OptionError
-        `weld` is not a finite number of 0 or more.
+        `weld` is not a finite number of 0 or more; `chord` is not a positive number, or the file
+        is no CAD file.
+    GSOError
+        The package that reads the CAD file is not installed: ``pip install ".[cad]"`` in the
+        folder of gso.
     """
-    return _read(path, lambda surface: surface.mesh(weld))
+    return _read(path, lambda surface: surface.mesh(weld), chord)
 
 
 def read_surface(path: AnyPath) -> Surface:
@@ -136,15 +155,22 @@ def read_surface(path: AnyPath) -> Surface:
     return _read(path, lambda surface: surface)
 
 
-def _read(path: AnyPath, made: Callable[[Surface], _Made]) -> _Made:
+def _read(
+    path: AnyPath, made: Callable[[Surface], _Made], chord: float | None = None
+) -> _Made:
     """Make something of the content of a file; errors name the file."""
     name = os.fsdecode(path)
     suffix = suffix_of(name)
+    if chord is not None and suffix not in SPLINE_SUFFIXES:
+        raise OptionError(f"{name} is no CAD file, and has triangles already; leave out chord")
     try:
-        if suffix not in _FORMATS and not os.path.isdir(name):
+        readable = (*_FORMATS, *SPLINE_SUFFIXES)
+        if suffix not in readable and not os.path.isdir(name):
             what = f"a {suffix!r} file" if suffix else "a file without a suffix"
-            raise MeshError(f"cannot read {what}; use {', '.join(_FORMATS)}")
+            raise MeshError(f"cannot read {what}; use {', '.join(readable)}")
         data = read_bytes(name)
+        if suffix in SPLINE_SUFFIXES:
+            return made(read_faces(data, suffix, chord))
         return made(_FORMATS[suffix][0](data))
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from error.__cause__

@@ -1,4 +1,4 @@
-"""Writers of CAD files: B-spline surfaces, whole and trimmed, and planar faces."""
+"""CAD files: faces are read as triangles; splines, whole and trimmed, and planar faces written."""
 
 from __future__ import annotations
 
@@ -9,26 +9,58 @@ from typing import NamedTuple
 
 from gso.errors import GSOError, MeshError, OptionError
 from gso.io.atomic import check_writable, replacing, suffix_of
+from gso.io.raw_surface import Surface
 from gso.mesh import Mesh
-from gso.quantities import millimetres
+from gso.quantities import as_positive, millimetres
 from gso.spline import BSplineSurface, TrimmedSpline
 from gso.typing import AnyPath
 
 
-class _Writer(NamedTuple):
-    """Module with a function ``write(content, unit, suffix)``, and the package that it needs."""
+class _Kit(NamedTuple):
+    """Modules with ``write(content, unit, suffix)`` and ``read(data, suffix, chord)``.
 
-    module: str
+    And the package that they need.
+    """
+
+    writer: str
+    reader: str
     package: str
     name: str
 
 
-_CASCADE = _Writer("opencascade", "OCP", "OpenCASCADE (cadquery-ocp-novtk)")
-_WRITERS = dict.fromkeys((".step", ".stp", ".iges", ".igs"), _CASCADE)
-_WRITERS[".3dm"] = _Writer("rhino", "rhino3dm", "rhino3dm")
+_CASCADE = _Kit("opencascade", "brep", "OCP", "OpenCASCADE (cadquery-ocp-novtk)")
+_KITS = dict.fromkeys((".step", ".stp", ".iges", ".igs"), _CASCADE)
+_KITS[".3dm"] = _Kit("rhino", "rhino", "rhino3dm", "rhino3dm")
 
-SPLINE_SUFFIXES = tuple(_WRITERS)
-"""Suffixes of the CAD files that are written."""
+SPLINE_SUFFIXES = tuple(_KITS)
+"""Suffixes of the CAD files that are read and written."""
+
+
+def read_faces(data: bytes, suffix: str, chord: float | None = None) -> Surface:
+    """Read the faces in a CAD file as triangles, in millimetres.
+
+    Parameters
+    ----------
+    data : bytes
+    suffix : str
+        One of :data:`SPLINE_SUFFIXES`.
+    chord : float, optional
+        Largest distance between triangles and faces, in millimetres; 1e-4 of the size when not
+        given.
+
+    Raises
+    ------
+    MeshError
+        The file is damaged, or has no faces.
+    GSOError
+        The package that reads the format is not installed.
+    """
+    if chord is not None:
+        chord = as_positive(chord, "chord")
+    check_package(suffix)
+    module = importlib.import_module(f"gso.io.{_KITS[suffix].reader}")
+    found: Surface = module.read(data, suffix, chord)
+    return found
 
 
 def check_spline(path: AnyPath, unit: str = "mm") -> None:
@@ -46,15 +78,23 @@ def check_spline(path: AnyPath, unit: str = "mm") -> None:
     """
     check_writable(path, SPLINE_SUFFIXES)
     millimetres(unit)
-    writer = _WRITERS[suffix_of(path)]
     try:
-        importlib.import_module(writer.package)
+        check_package(suffix_of(path))
+    except GSOError as error:
+        raise GSOError(f"{os.fsdecode(path)}: {error}") from None
+
+
+def check_package(suffix: str) -> None:
+    """Raise an error if the package for a CAD format, by its suffix, cannot be used."""
+    kit = _KITS[suffix]
+    try:
+        importlib.import_module(kit.package)
         return
     except ModuleNotFoundError:
         what = 'pip install ".[cad]" in the folder of gso'
     except ImportError as error:
         what = f"it is there but cannot be loaded: {error}"
-    raise GSOError(f"{os.fsdecode(path)}: {suffix_of(path)} files need {writer.name}: {what}")
+    raise GSOError(f"{suffix} files need {kit.name}: {what}")
 
 
 def save_spline(spline: BSplineSurface, path: AnyPath, *, unit: str = "mm") -> None:
@@ -156,11 +196,43 @@ def save_patches(patches: Sequence[TrimmedSpline], path: AnyPath, *, unit: str =
     _write(path, unit, patches)
 
 
+def save_solids(solids: Sequence[tuple[str, Mesh]], path: AnyPath) -> None:
+    """Write closed meshes in millimetres to one STEP file, as solids with names.
+
+    Triangles in one plane become one face. An existing file is replaced only when the new one is
+    complete.
+
+    Parameters
+    ----------
+    solids : sequence of (str, Mesh)
+        Names and closed meshes.
+    path : str or PathLike
+        A .step or .stp file.
+
+    Raises
+    ------
+    MeshError
+        Another suffix, a path that cannot be written, or faces that are not joined. The message
+        names the file.
+    GSOError
+        OpenCASCADE is not installed: ``pip install ".[cad]"`` in the folder of gso.
+    """
+    check_writable(path, (".step", ".stp"))
+    check_package(suffix_of(path))
+    from gso.io.opencascade import write_solids
+
+    with replacing(path) as file:
+        try:
+            file.write(write_solids(solids))
+        except MeshError as error:
+            raise MeshError(f"{os.fsdecode(path)}: {error}") from None
+
+
 def _write(
     path: AnyPath, unit: str, content: BSplineSurface | Mesh | Sequence[TrimmedSpline]
 ) -> None:
     check_spline(path, unit)
-    module = importlib.import_module(f"gso.io.{_WRITERS[suffix_of(path)].module}")
+    module = importlib.import_module(f"gso.io.{_KITS[suffix_of(path)].writer}")
     with replacing(path) as file:
         try:
             file.write(module.write(content, unit, suffix_of(path)))

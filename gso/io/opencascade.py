@@ -9,10 +9,13 @@ from itertools import pairwise
 
 import numpy as np
 from OCP import collections
+from OCP.BRep import BRep_Builder
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeEdge,
     BRepBuilderAPI_MakeFace,
     BRepBuilderAPI_MakePolygon,
+    BRepBuilderAPI_MakeSolid,
+    BRepBuilderAPI_MakeVertex,
     BRepBuilderAPI_MakeWire,
     BRepBuilderAPI_Sewing,
 )
@@ -21,19 +24,27 @@ from OCP.BRepLib import BRepLib
 from OCP.Geom import Geom_BSplineSurface
 from OCP.Geom2d import Geom2d_BSplineCurve
 from OCP.GeomToIGES import GeomToIGES_GeomSurface
-from OCP.gp import gp_Pnt, gp_Pnt2d
+from OCP.gp import gp_Dir, gp_Pln, gp_Pnt, gp_Pnt2d
 from OCP.IGESControl import IGESControl_Writer
 from OCP.IGESData import IGESData_IGESWriter
 from OCP.IGESSelect import IGESSelect_WorkLibrary
 from OCP.Interface import Interface_Protocol, Interface_Static
-from OCP.Message import Message, Message_Gravity
+from OCP.Message import Message
+from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
+from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPControl import (
     STEPControl_Controller,
     STEPControl_StepModelType,
     STEPControl_Writer,
 )
 from OCP.StepData import StepData_StepWriter
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Wire
+from OCP.TCollection import TCollection_ExtendedString
+from OCP.TDataStd import TDataStd_Name
+from OCP.TDocStd import TDocStd_Document
+from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Wire
+from OCP.XCAFDoc import XCAFDoc_DocumentTool
 from scipy.interpolate import make_interp_spline
 
 from gso.errors import MeshError
@@ -53,6 +64,9 @@ _FORMAT = "%.16E"
 #: OpenCASCADE's smallest distance between points, in the unit of the file.
 _TOLERANCE = 1e-7
 
+#: Distance, relative to the size, and angle in radians within which triangles are in one plane.
+_FLAT, _LEVEL = 1e-9, 1e-6
+
 #: Distance, relative to the size of the largest patch, within which edges are joined.
 _SEWN = 1e-5
 
@@ -68,6 +82,9 @@ def write(
     """
     scale, name = (1.0, _UNITS[unit]) if unit in _UNITS else (MILLIMETRES[unit], "MM")
     step = suffix in (".step", ".stp")
+    if not step and not isinstance(content, BSplineSurface):
+        # The writer of shapes converts them from millimetres itself.
+        scale = MILLIMETRES[unit]
     small = f"shorter than {_TOLERANCE:g} {unit}, which OpenCASCADE takes for a point"
     if isinstance(content, Mesh):
         shape = _shell(scale * content.vertices, content.faces, small)
@@ -85,10 +102,72 @@ def write(
     return written
 
 
+def write_solids(solids: Sequence[tuple[str, Mesh]]) -> bytes:
+    """Return the contents of a STEP file of named solids, from closed meshes in millimetres.
+
+    Triangles in one plane become one face.
+    """
+    document = TDocStd_Document(TCollection_ExtendedString("gso"))
+    XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
+    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    text = io.BytesIO()
+    with quiet(), settings({"write.step.unit": "MM", "xstep.cascade.unit": "MM"}):
+        for name, mesh in solids:
+            label = shapes.AddShape(_solid(mesh, name), False)
+            TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
+        writer = STEPCAFControl_Writer()
+        writer.SetNameMode(True)
+        if not writer.Transfer(document):
+            raise MeshError("OpenCASCADE could not write the solids")
+        writer.WriteStream(text)
+    return text.getvalue()
+
+
+def _solid(mesh: Mesh, name: str) -> TopoDS_Shape:
+    """Return the solid inside a closed mesh."""
+    merged = ShapeUpgrade_UnifySameDomain(_joined(mesh.vertices, mesh.triangles, name))
+    merged.SetLinearTolerance(_FLAT * mesh.diagonal)
+    merged.SetAngularTolerance(_LEVEL)
+    merged.Build()
+    shells = TopExp_Explorer(merged.Shape(), TopAbs_ShapeEnum.TopAbs_SHELL)
+    solid = BRepBuilderAPI_MakeSolid(TopoDS.Shell(shells.Current())).Solid()
+    BRepLib.OrientClosedSolid_s(solid)
+    return solid
+
+
+def _joined(points: Array, triangles: Ints, name: str) -> TopoDS_Shape:
+    """Return a shell of triangles that share edges as the mesh does, wherever points coincide."""
+    corners = [BRepBuilderAPI_MakeVertex(gp_Pnt(*p)).Vertex() for p in points.tolist()]
+    p, q, r = points[triangles].transpose(1, 0, 2)
+    normals = np.cross(q - p, r - p)
+    edges: dict[tuple[int, int], TopoDS_Edge] = {}
+    builder, shell = BRep_Builder(), TopoDS_Shell()
+    builder.MakeShell(shell)
+    for k, (face, normal) in enumerate(zip(triangles.tolist(), normals.tolist(), strict=True)):
+        wire = BRepBuilderAPI_MakeWire()
+        for a, b in pairwise([*face, face[0]]):
+            ends = min(a, b), max(a, b)
+            if ends not in edges:
+                made = BRepBuilderAPI_MakeEdge(*(corners[end] for end in ends))
+                if not made.IsDone():
+                    raise MeshError(
+                        f"{name} has a side shorter than {_TOLERANCE:g} mm; is the unit right?"
+                    )
+                edges[ends] = made.Edge()
+            wire.Add(edges[ends])
+        plane = gp_Pln(gp_Pnt(*points[face[0]].tolist()), gp_Dir(*normal))
+        flat = BRepBuilderAPI_MakeFace(plane, wire.Wire(), True) if wire.IsDone() else None
+        if flat is None or not flat.IsDone():
+            raise MeshError(f"triangle {k} of {name} is no face to OpenCASCADE")
+        builder.Add(shell, flat.Face())
+    shell.Closed(True)
+    return shell
+
+
 def _step(shape: TopoDS_Shape, name: str) -> bytes:
     """Return the contents of a STEP file of a shape in a unit."""
     kind = STEPControl_StepModelType.STEPControl_ShellBasedSurfaceModel
-    with _quiet(), _settings({"write.step.unit": name, "xstep.cascade.unit": name}):
+    with quiet(), settings({"write.step.unit": name, "xstep.cascade.unit": name}):
         session = STEPControl_Writer()
         session.Transfer(shape, kind)
         writer = StepData_StepWriter(session.Model())
@@ -97,7 +176,7 @@ def _step(shape: TopoDS_Shape, name: str) -> bytes:
 
 def _iges(shape: TopoDS_Shape, name: str, whole: bool) -> bytes:
     """Return the contents of an IGES file of a shape, or of a whole surface, in a unit."""
-    with _quiet():
+    with quiet():
         session = IGESControl_Writer("IN" if name == "INCH" else name, 0 if whole else 1)
         if whole:
             maker = GeomToIGES_GeomSurface()
@@ -215,7 +294,7 @@ def _printed(
 
 
 @contextmanager
-def _settings(wanted: dict[str, str]) -> Iterator[None]:
+def settings(wanted: dict[str, str]) -> Iterator[None]:
     """Set global parameters of OpenCASCADE inside a block and restore them after it."""
     STEPControl_Controller.Init_s()
     before = {name: Interface_Static.CVal_s(name) for name in wanted}
@@ -229,14 +308,14 @@ def _settings(wanted: dict[str, str]) -> Iterator[None]:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
-    """Suppress OpenCASCADE's messages of success on standard output."""
-    printers = list(Message.DefaultMessenger_s().Printers())
-    levels = [printer.GetTraceLevel() for printer in printers]
+def quiet() -> Iterator[None]:
+    """Suppress OpenCASCADE's messages on standard output."""
+    messenger = Message.DefaultMessenger_s()
+    printers = list(messenger.Printers())
     try:
         for printer in printers:
-            printer.SetTraceLevel(Message_Gravity.Message_Fail)
+            messenger.RemovePrinter(printer)
         yield
     finally:
-        for printer, level in zip(printers, levels, strict=True):
-            printer.SetTraceLevel(level)
+        for printer in printers:
+            messenger.AddPrinter(printer)

@@ -1,16 +1,21 @@
-"""3DM (Rhino, openNURBS) through rhino3dm."""
+"""3DM (Rhino, openNURBS) through rhino3dm: meshes and surfaces read, surfaces written."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import rhino3dm
 
 from gso.errors import MeshError
+from gso.io.raw_surface import Surface
 from gso.mesh import Mesh, topology
+from gso.mesh.attributes import Attributes, Labels
+from gso.mesh.welding import collapse, near
+from gso.quantities import MILLIMETRES
 from gso.spline import BSplineSurface, TrimmedSpline
+from gso.typing import Array, Ints
 
 _UNITS = {
     "um": "Microns",
@@ -28,6 +33,11 @@ _ENDS = np.array([0.0, 0.0, 1.0, 1.0])
 
 #: Absolute tolerance of the model in the file, as a fraction of the spline's size.
 _TOLERANCE = 1e-5
+
+#: Chord tolerance by default, and distance within which points are one, relative to the size.
+_CHORD, _SAME = 1e-4, 1e-6
+#: Largest number of divisions of a surface along one direction.
+_MOST = 1024
 
 
 def write(
@@ -88,3 +98,139 @@ def _surface(spline: BSplineSurface, what: str) -> rhino3dm.NurbsSurface:
     if not surface.IsValid:
         raise MeshError(f"{what} is no valid surface to openNURBS: {surface.IsValidWithLog[1]}")
     return surface
+
+
+def read(data: bytes, suffix: str, chord: float | None = None) -> Surface:
+    """Read meshes and surfaces in a .3dm file, in millimetres.
+
+    Trimmed faces have the triangles that Rhino saved with them (its render meshes): rhino3dm makes
+    none. Whole surfaces are divided evenly. Names of objects are labels "o", names of layers "g".
+
+    Parameters
+    ----------
+    data : bytes
+    suffix : str
+    chord : float, optional
+        Largest distance between the faces of the mesh and a whole surface, in millimetres; 1e-4 of
+        its size when not given.
+
+    Raises
+    ------
+    MeshError
+        The file is damaged, has no faces, or has a trimmed face without a render mesh.
+    """
+    model = rhino3dm.File3dm.FromByteArray(data)
+    if model is None:
+        raise MeshError("rhino3dm finds no .3dm file in it; is it cut off?")
+    unit = str(model.Settings.ModelUnitSystem).rpartition(".")[2]
+    known = {name: key for key, name in _UNITS.items()}
+    if unit not in known:
+        raise MeshError(f"its unit is {unit}; save it in millimetres")
+    scale = MILLIMETRES[known[unit]]
+    layers = {layer.Index: layer.FullPath for layer in model.Layers}
+    points: list[Array] = []
+    faces: list[Ints] = []
+    labels: tuple[list[str], list[str]] = ([], [])
+    of_face: list[Ints] = []
+    count = left_out = 0
+    for number, thing in enumerate(model.Objects):
+        name = thing.Attributes.Name or f"object {number}"
+        found = list(_pieces(thing.Geometry, name, None if chord is None else chord / scale))
+        if not found:
+            left_out += 1
+            continue
+        own_points = scale * np.concatenate([p for p, _ in found])
+        starts = np.cumsum([0, *(len(p) for p, _ in found)])
+        own = np.concatenate(
+            [np.where(f < 0, -1, f + k) for (_, f), k in zip(found, starts, strict=False)]
+        )
+        size = float(np.linalg.norm(np.ptp(own_points, axis=0)))
+        done = collapse(own, near(own_points, _SAME * size, np.arange(len(own_points))))
+        points.append(own_points)
+        faces.append(np.where(done.faces < 0, -1, done.faces + count))
+        count += len(own_points)
+        of_face.append(np.full(len(done.faces), len(labels[0])))
+        labels[0].append(name)
+        labels[1].append(layers.get(thing.Attributes.LayerIndex, ""))
+    if not faces:
+        raise MeshError("it has no surfaces and no meshes; curves and points are not read")
+    table, place, which = np.concatenate(faces), np.concatenate(points), np.concatenate(of_face)
+    used = np.unique(table[table >= 0])
+    compact = np.where(table < 0, -1, np.searchsorted(used, table))
+    attributes = Attributes(
+        labels={k: Labels(tuple(row), which) for k, row in zip(("o", "g"), labels, strict=True)}
+    )
+    notes = (f"{left_out} objects without faces were left out",) if left_out else ()
+    if (compact[:, 3] < 0).all():
+        compact = compact[:, :3]
+    return Surface(place[used], compact, notes, attributes)
+
+
+def _pieces(
+    thing: rhino3dm.GeometryBase, name: str, chord: float | None
+) -> Iterator[tuple[Array, Ints]]:
+    """Yield vertices and faces (m, 4) of the faces of an object, -1 in triangles."""
+    if isinstance(thing, rhino3dm.Mesh):
+        yield _of_mesh(thing)
+    elif isinstance(thing, rhino3dm.Extrusion):
+        mesh = thing.GetMesh(rhino3dm.MeshType.Any)
+        if mesh is not None:
+            yield _of_mesh(mesh)
+        else:
+            yield from _pieces(thing.ToBrep(True), name, chord)
+    elif isinstance(thing, rhino3dm.Brep):
+        whole = len(thing.Faces) == 1 and thing.IsSurface
+        for k in range(len(thing.Faces)):
+            face = thing.Faces[k]
+            mesh = face.GetMesh(rhino3dm.MeshType.Any)
+            if mesh is not None and len(mesh.Faces):
+                yield _of_mesh(mesh)
+            elif whole:
+                yield _of_surface(face, chord)
+            else:
+                raise MeshError(
+                    f"face {k} of {name} is trimmed and has no render mesh; in Rhino, shade the "
+                    "model before saving it and do not save it small, or export it as STEP"
+                )
+    elif isinstance(thing, rhino3dm.Surface):
+        yield _of_surface(thing, chord)
+
+
+def _of_mesh(mesh: rhino3dm.Mesh) -> tuple[Array, Ints]:
+    count = len(mesh.Vertices)
+    points = [mesh.Vertices.Point3dAt(k) for k in range(count)]
+    faces = np.array([mesh.Faces[k] for k in range(len(mesh.Faces))], np.int64).reshape(-1, 4)
+    faces[faces[:, 2] == faces[:, 3], 3] = -1
+    return np.array([[p.X, p.Y, p.Z] for p in points]).reshape(-1, 3), faces
+
+
+def _of_surface(surface: rhino3dm.Surface, chord: float | None) -> tuple[Array, Ints]:
+    """Divide a whole surface evenly in both directions, within a chord tolerance."""
+    divisions = [1, 1]
+    grid = _grid(surface, divisions)
+    size = float(np.linalg.norm(np.ptp(grid.reshape(-1, 3), axis=0)))
+    divisions = [max(1, 2 * int(surface.SpanCount(k))) for k in (0, 1)]
+    grid = _grid(surface, divisions)
+    size = max(size, float(np.linalg.norm(np.ptp(grid.reshape(-1, 3), axis=0))))
+    allowed = _CHORD * size if chord is None else chord
+    for k in (0, 1):
+        while divisions[k] < _MOST:
+            finer = list(divisions)
+            finer[k] *= 2
+            fine = np.moveaxis(_grid(surface, finer), k, 0)
+            off = np.linalg.norm(fine[1::2] - 0.5 * (fine[:-1:2] + fine[2::2]), axis=-1)
+            if off.max() <= allowed:
+                break
+            divisions = finer
+    grid = _grid(surface, divisions)
+    n, m = grid.shape[:2]
+    index = np.arange(n * m).reshape(n, m)
+    corners = [index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]]
+    return grid.reshape(-1, 3), np.stack(corners, axis=-1).reshape(-1, 4)
+
+
+def _grid(surface: rhino3dm.Surface, divisions: Sequence[int]) -> Array:
+    domains = [surface.Domain(k) for k in (0, 1)]
+    rows = [np.linspace(d.T0, d.T1, n + 1) for d, n in zip(domains, divisions, strict=True)]
+    places = [[surface.PointAt(u, v) for v in rows[1].tolist()] for u in rows[0].tolist()]
+    return np.array([[[p.X, p.Y, p.Z] for p in row] for row in places])

@@ -25,6 +25,7 @@ _LENGTHS = (
     "deviation_max",
     "bend_radius_min",
     "seam_gap",
+    "thickness",
 )
 _PACKAGES = ("gso", "numpy", "scipy", "shapely", "ezdxf", "spyrrow")
 

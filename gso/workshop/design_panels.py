@@ -31,6 +31,8 @@ from gso.workshop.pattern_panels import of_result, of_surface
 
 #: Length of edges whose ends are joined, relative to the diagonal.
 _SAME = 1e-9
+#: Inner radius, relative to the thickness, up to which bends of solids are bent by a press.
+_PRESSED = 5.0
 
 Say = Callable[[str], None]
 
@@ -58,8 +60,13 @@ def made(
         say(f"{given.name}: {said}")
 
     exact = _exact(given, settings)
-    if exact is not None and (not exact.reasons or _is_hopeless(exact)):
+    if exact is not None and (given.sheet is not None or not exact.reasons or _is_hopeless(exact)):
         return exact
+    if given.sheet is not None:
+        raise MeshError(
+            f"{given.name}: the sheet of {given.sheet:.6g} is not developable, or a face is larger "
+            "than the sheets to cut it from"
+        )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         if settings.formulation == RULED:
@@ -88,9 +95,14 @@ def _without_poles(given: Design) -> Design:
 
 def _exact(given: Design, settings: FabricationSettings) -> Made | None:
     """Unfold a design that is flat or developable as it is; None if it is not."""
+    thick = given.sheet
     try:
         found = folded_pattern(
-            given.mesh, max_strain=settings.strain, cut=given.kept, sheet=settings.max_size
+            given.mesh,
+            max_strain=settings.strain,
+            cut=given.kept,
+            sheet=settings.max_size,
+            press_radius=None if thick is None else ((_PRESSED + 1) * thick, _PRESSED * thick),
         )
     except OptionError:
         # A face is larger than the sheet.
@@ -111,6 +123,7 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
         "deviation_max": 0.0,
         "strain_max": found.strain,
         "strain_p99": found.strain,
+        "thickness": thick,
     }
     one = of_surface(given.name, found.surface, found.pattern, record, found.folded)
     one = replace(one, reasons=compare(crossed(given.mesh), {}))

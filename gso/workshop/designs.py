@@ -10,9 +10,11 @@ import numpy as np
 
 from gso import io
 from gso.components import split
+from gso.errors import MeshError
 from gso.faults import crossings
 from gso.mesh import Mesh
 from gso.seams.kinds import Groups
+from gso.sheet_metal import sheet_solid
 from gso.typing import Ints, MeshLike
 from gso.verdict import Code, Measurement, Reason, compare
 from gso.workshop.job_folder import path_of
@@ -34,12 +36,15 @@ class Design:
     ----------
     name : str
     mesh : Mesh
+        One side of a solid of sheet metal.
     kept : ndarray of int, (k, 2)
         Edges that are cut in any case.
     notes : tuple of str
         What was changed or found in the file.
     reasons : tuple of Reason
         Why what was given cannot be built: components of it pass through each other.
+    sheet : float or None
+        Thickness of a solid of sheet metal, in the unit of the mesh.
     """
 
     name: str
@@ -47,15 +52,20 @@ class Design:
     kept: Ints = field(default_factory=_no_edges)
     notes: tuple[str, ...] = ()
     reasons: tuple[Reason, ...] = ()
+    sheet: float | None = None
 
 
 def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
     """Read designs, and divide them into components.
 
+    Solids of sheet metal in CAD files become one of their sides, and several have the names that
+    the file gives them.
+
     Raises
     ------
     MeshError
-        A design cannot be read, is a heap of loose faces, or has no groups to cut between.
+        A design cannot be read, is a heap of loose faces, has no groups to cut between, or is a
+        sheet whose thickness is not the same everywhere.
     """
     many = several(given)
     out: list[Design] = []
@@ -81,8 +91,29 @@ def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
             name = f"{stem}-{k}" if len(components) > 1 else stem
             through = Measurement.count("face", part.faces[met[part.faces]])
             reasons = compare({Code.CROSSES_ITSELF: through}, {})
-            edges = own[(own >= 0).all(axis=1)]
-            out.append(Design(spelled(name), part.mesh, edges, notes, reasons))
+            solid = None
+            if path is not None and io.suffix_of(path) in io.SPLINE_SUFFIXES:
+                said = None if mesh.attributes is None else mesh.attributes.labels.get("o")
+                if said is not None and len(components) > 1:
+                    index = int(said.of_face[part.faces[0]])
+                    name = said.names[index] if index >= 0 else name
+                try:
+                    solid = sheet_solid(part.mesh)
+                except MeshError as error:
+                    raise MeshError(f"{path}: {error}") from None
+            if solid is None:
+                edges = own[(own >= 0).all(axis=1)]
+                out.append(Design(spelled(name), part.mesh, edges, notes, reasons))
+            else:
+                out.append(
+                    Design(
+                        spelled(name),
+                        solid.side,
+                        notes=notes,
+                        reasons=reasons,
+                        sheet=solid.thickness,
+                    )
+                )
     names = different(design.name for design in out)
     return [replace(design, name=name) for design, name in zip(out, names, strict=True)]
 

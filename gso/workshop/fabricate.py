@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
+from gso.io import SPLINE_SUFFIXES, suffix_of
 from gso.io.json_file import plain, write_json
 from gso.mesh import Mesh
 from gso.quantities import Length, Strain, as_length, as_sheet, as_strain, millimetres
@@ -23,7 +24,7 @@ from gso.workshop.congruent import origins, united
 from gso.workshop.designs import Designs, designs_of, several
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
-from gso.workshop.job_folder import CERTIFICATE, WORK, opened
+from gso.workshop.job_folder import CERTIFICATE, WORK, opened, path_of
 from gso.workshop.marks import check_lines
 from gso.workshop.names import different
 from gso.workshop.nesting import Rotations, checked_options, nest
@@ -31,6 +32,7 @@ from gso.workshop.output_files import Drawings, written
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.parts import fitted, parts_from
+from gso.workshop.solids import folded_solids
 from gso.workshop.work import made_all
 
 
@@ -91,6 +93,7 @@ def fabricate(
     layers: str = "operations",
     paper: str | None = None,
     bend_text: bool = False,
+    step: bool = False,
     workers: int | None = None,
     scheduler: str | None = None,
     callback: Callable[[str], None] | None = None,
@@ -109,7 +112,7 @@ def fabricate(
     folder : path
         A new or empty folder, or that of an earlier run, whose drawings are replaced.
     unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
-        Unit of the coordinates.
+        Unit of the coordinates; CAD files are read in millimetres.
     formulation : {"ruled", "curvature", "isometry", "flatten"}
         "ruled": exactly developable strips, with bend lines; pieces that no strips follow are
         only nearly developable. "curvature", "isometry": all of them are nearly developable.
@@ -151,6 +154,9 @@ def fabricate(
         Also write all parts as a PDF on pages of this size, such as "A4".
     bend_text : bool
         Also write the direction, angle and radius beside each bend.
+    step : bool
+        Also write the folded parts as solids of the sheet's thickness to one STEP file,
+        ``folded.step``. Their bends have flat facets as the designs have them.
     workers : int, optional
         Number of processes; one for each processor when not given, 0 for none.
     scheduler : str, optional
@@ -182,15 +188,27 @@ def fabricate(
     scale = millimetres(unit)
     if not isinstance(finish, Finish):
         raise OptionError(f"finish is {finish!r}; it must be a gso.workshop.finish.Finish")
-    drawings = Drawings(tuple(dict.fromkeys(formats)), layers, paper, bend_text)
+    drawings = Drawings(tuple(dict.fromkeys(formats)), layers, paper, bend_text, step)
     most = None
     size = as_sheet(sheet, "mm")
     if size is not None:
         checked_options(size, spacing, 0.0, rotations, seconds)
         most = finish.room(size, scale)
     say = callback or (lambda said: None)
+    for path in filter(None, map(path_of, several(designs))):
+        if unit != "mm" and suffix_of(path) in SPLINE_SUFFIXES:
+            raise OptionError(
+                f"{path}: CAD files have a unit of their own, and are read in millimetres; leave "
+                "out the unit"
+            )
     place = Path(os.fsdecode(folder))
     every = designs_of(designs, keep_groups=keep_groups)
+    thin = [design.name for design in every if step and design.sheet is None]
+    if thin and finish.thickness is None:
+        raise OptionError(
+            f"{thin[0]} is no solid of sheet metal, so that its parts have no thickness as solids; "
+            "give the thickness, or leave out step"
+        )
     meshes = [design.mesh for design in every]
     settings = FabricationSettings(
         formulation,
@@ -209,12 +227,15 @@ def fabricate(
     earlier = opened(place, several(designs))
     # Marks are on one of several copies, so that these differ.
     alone = len(marks) or len(holes) or any(len(design.kept) for design in every)
+    alone = alone or len({design.sheet for design in every}) > 1
     first = list(range(len(meshes))) if alone else origins(meshes)
     chosen = sorted(set(first))
     found, failed = made_all(every, chosen, settings, place / WORK, workers, scheduler, say)
     found = _named(found)
     say("parts")
-    parts: list[Part] = []
+    # Parts are the same only if their sheets are.
+    of_sheet: dict[float | None, list[Part]] = {}
+    solids: list[tuple[str, Mesh]] = []
     records: list[Json] = []
     reasons: list[Reason] = []
     for k in chosen:
@@ -227,16 +248,25 @@ def fabricate(
             continue
         one = found[k]
         lines = ([x for x, n in zip(given, on, strict=True) if n == k] for given, on in drawn)
-        fit = fitted(one, scale, finish, *lines)
-        own = [replace(part, count=len(copies)) for part in parts_from(fit, finish)]
+        thick = every[k].sheet
+        asked = finish if thick is None else finish.of_solid(scale * thick)
+        fit = fitted(one, scale, asked, *lines)
+        if step and asked.thickness is not None:
+            solids += folded_solids(one.panels, scale, asked.thickness)
+        own = [replace(part, count=len(copies)) for part in parts_from(fit, asked)]
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
-        why = (*(r.scaled(scale) for r in one.reasons), *judge_sheet(fit, settings, finish))
+        why = (*(r.scaled(scale) for r in one.reasons), *judge_sheet(fit, settings, asked))
         why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
         record["reasons"] = _words(why)
         records.append(record)
         reasons += [reason.within(one.name) for reason in why]
-        parts += own
-    parts, same = united(parts)
+        of_sheet.setdefault(thick, []).extend(own)
+    parts: list[Part] = []
+    same: dict[str, str] = {}
+    for some in of_sheet.values():
+        different_parts, also = united(some)
+        parts += different_parts
+        same |= also
     for record in records:
         for entry in record.get("parts", ()):
             entry["same_as"] = same.get(entry["name"])
@@ -280,7 +310,7 @@ def fabricate(
     certificate["reasons"], certificate["usable"] = _words(reasons), not reasons
     certificate["parts"] = sum(part.count for part in parts)
     say("files")
-    files = written(place, parts, sheets, found.values(), certificate, drawings, earlier)
+    files = written(place, parts, sheets, found.values(), certificate, drawings, earlier, solids)
     certificate["files"] = files
     certificate["seconds"] = time.perf_counter() - clock
     write_json(place / CERTIFICATE, certificate)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
 from gso.quantities import as_positive
@@ -13,6 +14,8 @@ from gso.typing import Json
 from gso.workshop.thickness import Thickness
 
 SIDES = ("outside", "inside")
+#: Difference of thicknesses that are the same, relative to them.
+_SAME = 0.01
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,11 @@ class Finish:
     face : {"outside", "inside"}
         The face that is up; patterns of the inside are mirrored.
     thickness : Thickness or None
-        The sheet's thickness, in millimetres.
+        The sheet's thickness, in millimetres. Solids of sheet metal have their own.
+    k_factor : float
+        K-factor of solids, unless there is a thickness.
+    bend_table : array_like, (k, 2), or None
+        Bend deductions of solids, unless there is a thickness; as those of :class:`Thickness`.
     """
 
     kerf: float = 0.0
@@ -50,6 +57,8 @@ class Finish:
     grain: bool = False
     face: str = "outside"
     thickness: Thickness | None = None
+    k_factor: float = 0.5
+    bend_table: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         for name in ("kerf", "allowance", "notches", "tabs", "labels"):
@@ -68,10 +77,36 @@ class Finish:
                     f"registration holes of {pair[0]:g} mm are no wider than the kerf of "
                     f"{self.kerf:g} mm; take a larger diameter"
                 )
+        Thickness(1.0, self.k_factor, table=self.bend_table)
         if self.face not in SIDES:
             raise OptionError(f"no face {self.face!r}; {choices(self.face, SIDES)}")
         if self.tabs is not None and self.allowance:
             raise OptionError("tabs and allowance exclude each other; leave one of them out")
+
+    def of_solid(self, sheet: float) -> Finish:
+        """Return the finish of a solid of some thickness in millimetres.
+
+        Its surface is one side of the sheet, seen from outside.
+
+        Raises
+        ------
+        OptionError
+            Another thickness is asked for.
+
+        Examples
+        --------
+        >>> Finish(k_factor=0.4).of_solid(2.0).thickness.k
+        0.4
+        """
+        asked = self.thickness
+        if asked is None:
+            asked = Thickness(sheet, self.k_factor, table=self.bend_table)
+        if abs(asked.sheet - sheet) > _SAME * sheet:
+            raise OptionError(
+                f"the solid is {sheet:.6g} mm thick, not {asked.sheet:g} mm; leave out the "
+                "thickness"
+            )
+        return replace(self, thickness=replace(asked, sheet=sheet, face="outside", arcs=True))
 
     def room(self, sheet: tuple[float, float], scale: float) -> tuple[float, float]:
         """Return how large patterns may be for a sheet in millimetres, in the design's unit.
@@ -95,4 +130,6 @@ class Finish:
         out = asdict(self)
         if self.thickness is not None and self.thickness.table is not None:
             out["thickness"]["table"] = np.asarray(self.thickness.table, float).tolist()
+        if self.bend_table is not None:
+            out["bend_table"] = np.asarray(self.bend_table, float).tolist()
         return out

@@ -13,12 +13,13 @@ from gso.typing import Unwelded
 from gso.verdict import Code, failure
 
 #: Folders of drawings and surfaces, the folder of what was made, and files.
-FOLDERS, WORK, CERTIFICATE, PAGE, PAPER = (
+FOLDERS, WORK, CERTIFICATE, PAGE, PAPER, SOLIDS = (
     ("parts", "sheets", "surfaces"),
     "work",
     "certificate.json",
     "index.html",
     "parts.pdf",
+    "folded.step",
 )
 
 
@@ -57,7 +58,9 @@ def opened(place: Path, inputs: Iterable[object]) -> set[str]:
     try:
         place.mkdir(parents=True, exist_ok=True)
         ours = (place / WORK).is_dir() or _certificate(place) is not None
-        theirs = [n for n in (*FOLDERS, PAGE, PAPER, CERTIFICATE, WORK) if (place / n).exists()]
+        theirs = [
+            n for n in (*FOLDERS, PAGE, PAPER, SOLIDS, CERTIFICATE, WORK) if (place / n).exists()
+        ]
         if theirs and not ours:
             raise OptionError(
                 f"{place} has {theirs[0]}, which gso fabricate did not write; name another folder"

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from gso import io
 from gso.io.atomic import write_bytes
+from gso.mesh import Mesh
 from gso.typing import Json, Keywords
 from gso.workshop import writers
-from gso.workshop.job_folder import CERTIFICATE, PAGE, PAPER
+from gso.workshop.job_folder import CERTIFICATE, PAGE, PAPER, SOLIDS
 from gso.workshop.page import page
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
@@ -33,6 +34,8 @@ class Drawings:
     paper : str or None
         Of the PDF with all parts; None for none.
     bend_text : bool
+    step : bool
+        Whether the folded parts are written as solids.
 
     Raises
     ------
@@ -46,10 +49,13 @@ class Drawings:
     layers: str = "operations"
     paper: str | None = None
     bend_text: bool = False
+    step: bool = False
 
     def __post_init__(self) -> None:
         for name in (*self.formats, *(() if self.paper is None else ("pdf",))):
             writers.require_package(writers.get(name))
+        if self.step:
+            io.check_package(".step")
         layer_set(self.layers)
         if self.paper is not None:
             check_paper(self.paper)
@@ -68,6 +74,7 @@ def written(
     certificate: Json,
     drawings: Drawings,
     earlier: Set[str],
+    solids: Sequence[tuple[str, Mesh]] = (),
 ) -> list[str]:
     """Write all files but the certificate; delete earlier ones that are not written again."""
     files: list[str] = []
@@ -91,6 +98,9 @@ def written(
             (place / name).parent.mkdir(exist_ok=True)
             io.write(panel.surface, place / name)
             files.append(name)
+    if solids:
+        io.save_solids(solids, place / SOLIDS)
+        files.append(SOLIDS)
     write_bytes(place / PAGE, page(certificate, parts, sheets).encode())
     files += [PAGE, CERTIFICATE]
     for name in earlier - set(files):

@@ -40,6 +40,9 @@ class Thickness:
         Bend deductions of sharp bends: angles of bending in radians (0 is flat), increasing, and
         how much shorter the pattern is than both flanges outside, to the apex. Between them it
         is interpolated, and below the first one it falls to 0 at no bend.
+    arcs : bool
+        Whether the pattern has the arcs of round bends: that of a solid has. Otherwise it has
+        the tangents to the apex, and the radii of its bends count for nothing.
 
     Examples
     --------
@@ -55,6 +58,7 @@ class Thickness:
     face: str = "middle"
     radius: float | None = None
     table: ArrayLike | None = None
+    arcs: bool = False
 
     def __post_init__(self) -> None:
         as_positive(self.sheet, "the thickness")
@@ -78,24 +82,38 @@ class Thickness:
                     "a bend radius and a bend table exclude each other; leave one of them out"
                 )
 
-    def change(self, angle: ArrayLike) -> Array:
+    def change(self, angle: ArrayLike, radius: ArrayLike = 0.0) -> Array:
         """Return how much longer the pattern is across bends of some angles than the surface.
 
         Parameters
         ----------
         angle : array_like
             In radians, positive for mountain folds.
+        radius : array_like
+            Radii of the surface's bends, where the pattern has their arcs.
+
+        Examples
+        --------
+        A solid of thickness 2, bent by 90 degrees about an inner radius of 3, seen from outside:
+
+        >>> sheet = Thickness(2.0, k=0.4, face="outside", arcs=True)
+        >>> arc = 5.0 * np.pi / 2
+        >>> round(float(arc + sheet.change(np.pi / 2, 5.0)) / (np.pi / 2), 9)
+        3.8
         """
         turn = np.asarray(angle, float)
         size, thick, design = np.abs(turn), self.sheet, self.depth(turn)
+        arc = np.asarray(radius, float) if self.arcs else np.zeros(1)
         if self.table is not None:
             rows = np.asarray(self.table, float)
             deduction = np.interp(size, *np.pad(rows, ((int(rows[0, 0] > 0), 0), (0, 0))).T)
-            return np.asarray(2.0 * (thick - design) * np.tan(0.5 * size) - deduction)
+            apex = 2.0 * (arc + thick - design) * np.tan(0.5 * size)
+            return np.asarray((apex - deduction - size * arc).reshape(turn.shape))
         if self.radius is None:
             return np.asarray(size * (self.k * thick - design))
         around = size * (self.radius + self.k * thick)
-        return np.asarray(around - 2.0 * (self.radius + design) * np.tan(0.5 * size))
+        apex = 2.0 * (self.radius + design - arc) * np.tan(0.5 * size)
+        return np.asarray((around - apex - size * arc).reshape(turn.shape))
 
     def depth(self, angle: ArrayLike) -> Array:
         """Return how far the design's surface is from the inner face of bends of some angles."""
@@ -113,7 +131,7 @@ class Thickness:
             Of the bends of the design's surface.
         """
         angles, radii = np.broadcast_arrays(np.asarray(angle, float), np.asarray(radius, float))
-        if self.table is not None:
+        if self.table is not None and not self.arcs:
             return np.full(angles.shape, np.inf)
         if self.radius is not None:
             return np.full(angles.shape, float(self.radius))
@@ -155,7 +173,10 @@ def thickened(panel: Panel, thickness: Thickness) -> Panel:
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     count = int(plate.max()) + 1
     # The normal points from the first plate of each pair to the second.
-    change = np.where(rolled, thickness.rolled.change(angles), thickness.change(angles))
+    if thickness.arcs:
+        change = thickness.change(angles, panel.radii)
+    else:
+        change = np.where(rolled, thickness.rolled.change(angles), thickness.change(angles))
     step = change[:, None] * normal
     shift = _solved(count, pairs, step)
     total, often = np.zeros((len(panel.flat), 2)), np.zeros(len(panel.flat))
@@ -165,8 +186,37 @@ def thickened(panel: Panel, thickness: Thickness) -> Panel:
     both = np.unique(np.stack([faces[rows, corner], plate[rows]], axis=1), axis=0)
     np.add.at(total, both[:, 0], shift[both[:, 1]])
     np.add.at(often, both[:, 0], 1.0)
-    flat = panel.flat + total / np.maximum(often, 1.0)[:, None]
-    return replace(panel, flat=flat, radii=radii)
+    move = total / np.maximum(often, 1.0)[:, None]
+    if thickness.arcs:
+        _stretch(panel, plate, pairs, normal, shift, move)
+    return replace(panel, flat=panel.flat + move, radii=radii)
+
+
+def _stretch(
+    panel: Panel, plate: Ints, pairs: Ints, normal: Array, shift: Array, move: Array
+) -> None:
+    """Spread the step between two plates evenly over the zone of their bend; change `move`."""
+    faces = panel.surface.faces
+    arc = np.abs(panel.angles) * panel.radii
+    # How far a vertex lies beyond the ends of the bend that it was last counted to.
+    closest = np.full(len(move), np.inf)
+    for pair in np.unique(pairs[arc > 0], axis=0):
+        own = np.flatnonzero((pairs == pair).all(axis=1) & (arc > 0))
+        ends, half = panel.flat[panel.bends[own]].reshape(-1, 2), 0.5 * float(arc[own[0]])
+        across = normal[own[0]]
+        vertices = np.unique(faces[np.isin(plate, pair)])
+        vertices = vertices[vertices >= 0]
+        points = panel.flat[vertices]
+        level = np.clip((points - ends[0]) @ across / half, -1.0, 1.0)
+        way = np.array([-across[1], across[0]])
+        along, reach = points @ way, ends @ way
+        beyond = np.maximum(np.maximum(reach.min() - along, along - reach.max()), 0.0)
+        # Zones may become wider towards their limits.
+        zone = (np.abs(level) < 1.0) & (beyond < half) & (beyond < closest[vertices])
+        closest[vertices[zone]] = beyond[zone]
+        one, two = shift[pair]
+        inside = 0.5 * (one + two) + 0.5 * level[zone, None] * (two - one)
+        move[vertices[zone]] = inside
 
 
 def _plates(panel: Panel) -> tuple[Ints, Ints, Ints]:
