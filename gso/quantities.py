@@ -134,7 +134,7 @@ def as_sheet(sheet: Sequence[Length] | None, unit: str) -> tuple[float, float] |
     """
     if sheet is None:
         return None
-    if isinstance(sheet, str) or len(sheet) != 2:
+    if isinstance(sheet, str) or not hasattr(sheet, "__len__") or len(sheet) != 2:
         raise OptionError(f"sheet is {sheet!r}; it must be length and width of a sheet")
     long, wide = (as_length(side, "sheet", diagonal=math.nan) / millimetres(unit) for side in sheet)
     return long, wide

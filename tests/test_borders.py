@@ -51,7 +51,9 @@ def test_free_vertices_do_not_close_an_oculus(design, solve):
 @pytest.mark.parametrize("design", named(designs.symmetric))
 def test_symmetric_designs_give_symmetric_results(design):
     first = gso.tno.optimize(design.mesh, verdict=False)
-    assert design.asymmetry(first.mesh.vertices) < 1e-6
+    # Holes are closed to first order, which depends a little on where their outlines begin.
+    holes = len(design.mesh.boundary_loops) > 1
+    assert design.asymmetry(first.mesh.vertices) < (1e-5 if holes else 1e-6)
     # Other solves, by isometry too, have more iterations, over which rounding grows.
     result = gso.tno.optimize(design.mesh)
     assert design.asymmetry(result.mesh.vertices) < 1e-4

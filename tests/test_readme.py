@@ -52,6 +52,8 @@ def workshop(tmp_path, monkeypatch):
     panel = ROOT / "examples" / "panel.obj"
     for target in ("examples/panel.obj", "panel.obj", "panels/a.obj"):
         shutil.copy(panel, tmp_path / target)
+    for name in ("bracket.obj", "house.obj"):
+        shutil.copy(ROOT / "examples" / name, tmp_path / "examples")
     mesh = gso.load(panel)
     noise = np.random.default_rng(0).normal(scale=0.005, size=mesh.vertices.shape)
     gso.save(mesh.replaced(mesh.vertices + noise), tmp_path / "scan.obj")

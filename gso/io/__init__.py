@@ -155,9 +155,7 @@ def read_surface(path: AnyPath) -> Surface:
     return _read(path, lambda surface: surface)
 
 
-def _read(
-    path: AnyPath, made: Callable[[Surface], _Made], chord: float | None = None
-) -> _Made:
+def _read(path: AnyPath, made: Callable[[Surface], _Made], chord: float | None = None) -> _Made:
     """Make something of the content of a file; errors name the file."""
     name = os.fsdecode(path)
     suffix = suffix_of(name)

@@ -65,7 +65,8 @@ def packed(
     if result is None:
         measured |= crossed(own.design)
     else:
-        measured |= of_surface(result.design, result.mesh)
+        # Both sides of a seam touch, which is no crossing where they are sewn.
+        measured |= of_surface(result.design, result.mesh) | crossed(own.design)
         away = metrics.surface_distance(ground.mesh, own.design)
         numbers["deviation_mean"] = away.there_mean
         numbers["deviation_max"] = max(away.there_max, away.back_max)
