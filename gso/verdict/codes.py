@@ -232,7 +232,7 @@ class Code(str, enum.Enum):
         "Angle between two faces of a part at an edge that no bend line lies on.",
         "parts are folded by {value} where no bend line is drawn, more than {bound}",
         "cut the design there (keep), or smooth it",
-        limit=45.0,
+        limit=60.0,
     )
     BENDS_NEAR = _limit(
         "bends_near",
