@@ -370,7 +370,7 @@ class TestParts:
 class TestMaking:
     def test_a_strongly_curved_design_is_cut_into_pieces(self):
         # Triangles, which have no lines for strips to follow.
-        grid = dome(17, height=1.0)
+        grid = dome(11, height=1.0)
         triangles = Mesh(grid.vertices, grid.triangles)
         whole = made(Design("dome", triangles), FabricationSettings())
         assert not whole.reasons
