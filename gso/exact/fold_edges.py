@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gso.exact.sliced_pattern import SlicedPattern
+from gso.geometry import area_vectors
+from gso.geometry.vectors import fold_angles, unit
 from gso.pattern import Folded
 from gso.recognition import Recognised
 from gso.typing import Array, Flags, Ints
@@ -12,7 +14,7 @@ from gso.unfolding.dual_edges import dual_edges
 
 #: Angles in radians from which on an edge between two faces is a fold: between facets, and where
 #: one of them is a round surface, which meets its neighbour in the tessellation's accuracy.
-_FOLD, _TANGENT = np.radians(0.05), np.radians(1.0)
+FOLD, _TANGENT = np.radians(0.05), np.radians(1.0)
 
 
 def fold_edges(sliced: SlicedPattern, shape: Recognised) -> Folded:
@@ -26,10 +28,8 @@ def fold_edges(sliced: SlicedPattern, shape: Recognised) -> Folded:
         _normals(sliced, shape, pair[:, side], middle) for side in (0, 1)
     )
     way = sliced.points[sliced.vertex[ends[:, 1]]] - sliced.points[sliced.vertex[ends[:, 0]]]
-    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
-    sine = np.einsum("kd,kd->k", np.cross(first, second), way)
-    angle = np.arctan2(sine, np.einsum("kd,kd->k", first, second))
-    folded = np.abs(angle) > np.where(round_one | round_two, _TANGENT, _FOLD)
+    angle = fold_angles(first, second, way)
+    folded = np.abs(angle) > np.where(round_one | round_two, _TANGENT, FOLD)
     return Folded(ends[folded], angle[folded], np.zeros(int(folded.sum())))
 
 
@@ -37,9 +37,7 @@ def _normals(
     sliced: SlicedPattern, shape: Recognised, triangles: Ints, points: Array
 ) -> tuple[Array, Flags]:
     """Return normals of triangles, of their round surface at a point where they have one."""
-    own = sliced.points[sliced.vertex[sliced.faces[triangles]]]
-    normal = np.cross(own[:, 1] - own[:, 0], own[:, 2] - own[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normal = unit(area_vectors(sliced.points, sliced.vertex[sliced.faces[triangles]]))
     number, is_round = sliced.label[triangles], np.zeros(len(triangles), bool)
     for k in np.unique(number).tolist():
         surface = shape.faces[k].surface

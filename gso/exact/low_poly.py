@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from gso.exact.fold_edges import FOLD
 from gso.recognition import Recognised, ShapeFace
 from gso.unfolding.dual_edges import dual_edges
 
-#: Number of triangles up to which a design may be a polyhedron. The angles, in radians, from which
-#: on an edge is a fold and a sharp one, and the share of the folds' length that is sharp.
-_FEW, _FOLD, _SHARP, _SHARE = 1_000, np.radians(0.05), np.radians(20.0), 0.25
+#: Number of triangles up to which a design may be a polyhedron. The angle, in radians, from which
+#: on an edge is sharp, and the share of the folds' length that is.
+_FEW, _SHARP, _SHARE = 1_000, np.radians(20.0), 0.25
 
 
 def is_low_poly(shape: Recognised) -> bool:
@@ -21,7 +22,7 @@ def is_low_poly(shape: Recognised) -> bool:
     edges = dual_edges(shape.triangles, shape.vertices)
     a, b = shape.vertices[edges.ends].transpose(1, 0, 2)
     angle, length = np.abs(edges.angles), np.linalg.norm(b - a, axis=1)
-    folded = angle > _FOLD
+    folded = angle > FOLD
     return bool(length[folded & (angle > _SHARP)].sum() >= _SHARE * length[folded].sum() > 0)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso.geometry import area_vectors
+from gso.geometry.vectors import cross, unit
 from gso.mesh.topology import half_edges
 from gso.typing import Array, Flags, Ints
 
@@ -29,8 +31,7 @@ def cross_along_edges(points: Array, triangles: Ints, pairs: Ints, depth: Array)
     """
     out = np.zeros(len(pairs), bool)
     corner = points[triangles]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normal = unit(area_vectors(points, triangles))
     one, two = pairs.T
     height = np.einsum("pkd,pd->pk", corner[one] - corner[two, :1], normal[two])
     on = np.abs(height) <= depth[:, None]
@@ -48,7 +49,7 @@ def cross_along_edges(points: Array, triangles: Ints, pairs: Ints, depth: Array)
     )
     start, end = corner[one, edge], corner[one, (edge + 1) % 3]
     border, long = _met(start, end, corner[two], normal[two], depth)
-    axis = (end - start) / np.maximum(np.linalg.norm(end - start, axis=1, keepdims=True), 1e-300)
+    axis = unit(end - start)
     first = points[triangles[one, lone]] - start
     second = points[he.dest[he.next[twin]]] - start
     # In a triangle the other sheet goes on in its plane, at its border in the next triangle.
@@ -73,8 +74,7 @@ def _met(start: Array, end: Array, other: Array, normal: Array, depth: Array) ->
     border = np.full(len(start), -1)
     for k in range(3):
         p, q = other[:, k], other[:, (k + 1) % 3]
-        inwards = np.cross(normal, q - p)
-        inwards /= np.maximum(np.linalg.norm(inwards, axis=1, keepdims=True), 1e-300)
+        inwards = unit(cross(normal, q - p))
         a, b = (((x - p) * inwards).sum(axis=1) for x in (start, end))
         border[np.maximum(np.abs(a), np.abs(b)) <= 2.0 * depth] = k
         slope = b - a

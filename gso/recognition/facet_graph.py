@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gso import geometry
+from gso.geometry.vectors import fold_angles
 from gso.mesh import Mesh, topology
 from gso.typing import Array, Flags, Ints
 
@@ -129,9 +130,7 @@ class FacetGraph:
         """Angle at each interior edge, in radians, positive where the surface is convex; (e,)."""
         a, b = self.normals[self.pairs[:, 0]], self.normals[self.pairs[:, 1]]
         along = self.points[self.ends[:, 1]] - self.points[self.ends[:, 0]]
-        along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-        sine = np.einsum("ed,ed->e", np.cross(a, b), along)
-        return np.asarray(np.arctan2(sine, np.einsum("ed,ed->e", a, b)))
+        return fold_angles(a, b, along)
 
     @cached_property
     def facet(self) -> Ints:

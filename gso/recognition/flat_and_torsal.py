@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso.geometry.vectors import unit
 from gso.mesh import topology
 from gso.recognition.facet_graph import FacetGraph
 from gso.recognition.region_growing import SMOOTH
@@ -137,8 +138,7 @@ def _straight_parts(graph: FacetGraph, label: Ints, folded: Flags, count: int) -
     off = middle - graph.points[two]
     order = np.argsort(at, kind="stable")
     start = np.searchsorted(at[order], two)
-    along = graph.points[other[order][start]] - graph.points[other[order][start + 1]]
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    along = unit(graph.points[other[order][start]] - graph.points[other[order][start + 1]])
     height = np.linalg.norm(off - np.einsum("vd,vd->v", off, along)[:, None] * along, axis=1)
     bent = height > 4 * graph.tolerance + 1e-6 * np.sqrt(half2)
     # A fold that turns back at a vertex is not straight either.

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from gso.geometry.vectors import fold_angles
 from gso.io import as_mesh
 from gso.quantities import Length, Strain, as_length, as_positive, as_strain
 from gso.recognition.bend_lines import default_step, lines_of_round, lines_of_strip
@@ -224,6 +225,4 @@ def _folds(graph: FacetGraph, part: Part, ids: Ints) -> Array:
     """Fold angles at the pairs of a part, positive where the surface is convex."""
     a, b = graph.normals[ids[part.pairs[:, 0]]], graph.normals[ids[part.pairs[:, 1]]]
     along = part.points[part.ends[:, 1]] - part.points[part.ends[:, 0]]
-    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-    sine = np.einsum("ed,ed->e", np.cross(a, b), along)
-    return np.asarray(np.arctan2(sine, np.einsum("ed,ed->e", a, b)))
+    return fold_angles(a, b, along)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso.geometry.vectors import lengths, unit
 from gso.ruled.strip_layout import Strips
 from gso.ruled.strip_mirror import Mirror
-from gso.ruled.vectors import lengths, unit
 from gso.typing import Array, Ints
 
 

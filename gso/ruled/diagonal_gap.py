@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.ruled.vectors import cross, lengths
+from gso.geometry.vectors import cross, lengths
 from gso.typing import Array
 
 

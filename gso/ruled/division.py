@@ -9,11 +9,11 @@ import numpy as np
 from gso import geometry
 from gso.errors import MeshError
 from gso.geometry.polygon import signed_area
+from gso.geometry.vectors import lengths
 from gso.mesh import topology
 from gso.ruled.copies import with_copies
 from gso.ruled.nodes import Nodes
 from gso.ruled.unroll import Unrolled
-from gso.ruled.vectors import lengths
 from gso.typing import Array, Flags, Ints
 
 #: Distance of outline points from the simplified outline, relative to the diagonal.

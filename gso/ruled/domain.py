@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from gso.geometry.polygon import anticlockwise, signed_area
+from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh, Nearest, vertex_normals
 from gso.ruled.polygon import resampled, turning
-from gso.ruled.vectors import lengths, unit
 from gso.typing import Array, Flags, Ints
 
 #: Width of the continuation, relative to the length of the outline.

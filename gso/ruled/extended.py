@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from gso import geometry
+from gso.geometry.vectors import lengths, unit
 from gso.mesh import Nearest
 from gso.ruled.domain import Domain
 from gso.ruled.polygon import resampled
-from gso.ruled.vectors import lengths, unit
 from gso.typing import Array
 
 #: Points around the outline in each ring of the continuation; rings, in margins.

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh
 from gso.ruled.strip_layout import Strips
 from gso.ruled.unroll import Unrolled
-from gso.ruled.vectors import lengths, unit
 from gso.typing import Array, Ints
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import MeshError, OptionError
+from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Mesh, Nearest
 from gso.ruled.descent import planarised
 from gso.ruled.diagonal_gap import planarity
@@ -16,7 +17,6 @@ from gso.ruled.strip_layout import Strips
 from gso.ruled.system import System
 from gso.ruled.unroll import Unrolled
 from gso.ruled.untrimmed import Untrimmed
-from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Ints
 
 #: Points on each curve between which first rulings are found.

@@ -11,6 +11,7 @@ import numpy as np
 
 from gso import faults, metrics
 from gso.errors import MeshError
+from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Mesh, Nearest
 from gso.pattern import Bend, Folded, Pattern
 from gso.ruled.fold_lines import Folds, folds
@@ -19,7 +20,6 @@ from gso.ruled.strip_fit import Fit, Job
 from gso.ruled.trim import trimmed
 from gso.ruled.unroll import Unrolled
 from gso.ruled.untrimmed import Untrimmed
-from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Flags, Ints
 
 _Map: TypeAlias = Callable[[Array], Array]

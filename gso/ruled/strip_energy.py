@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Nearest
 from gso.ruled.conditions import Conditions, Radius, on_lines
 from gso.ruled.diagonal_gap import planarity
@@ -12,7 +13,6 @@ from gso.ruled.second_differences import Differences
 from gso.ruled.strip_layout import Strips
 from gso.ruled.strip_weights import Measured, Weights
 from gso.ruled.system import System
-from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Ints
 
 #: Samples across a strip, and at least across each of several.

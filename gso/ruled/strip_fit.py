@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gso.geometry.vectors import lengths
 from gso.ruled.conditions import Conditions
 from gso.ruled.descent import Tell, descend, planarised
 from gso.ruled.extended import Extended
 from gso.ruled.strip_energy import Energy
 from gso.ruled.strip_layout import Strips
 from gso.ruled.strip_weights import Weights
-from gso.ruled.vectors import lengths
 from gso.typing import Array, Ints
 
 #: Phases of a single strip: weights of `moved` and `planar`.

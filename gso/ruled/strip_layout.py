@@ -10,8 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
+from gso.geometry.vectors import cross
 from gso.mesh.topology import label_components
-from gso.ruled.vectors import cross
 from gso.typing import Array, Flags, Ints
 
 

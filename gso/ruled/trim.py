@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Nearest
 from gso.ruled.division import Trimmed, meshed
 from gso.ruled.extended import Extended
@@ -18,7 +19,6 @@ from gso.ruled.nodes import Nodes
 from gso.ruled.strip_embedding import plane
 from gso.ruled.strip_layout import Strips
 from gso.ruled.unroll import Unrolled
-from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Ints
 
 if TYPE_CHECKING:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso.geometry.vectors import cross, unit
 from gso.mesh.topology import edge_graph
 from gso.ruled.strip_layout import Strips
-from gso.ruled.vectors import cross, unit
 from gso.typing import Array, Ints
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso.geometry import area_vectors
+from gso.geometry.vectors import fold_angles, unit
 from gso.mesh.topology import edge_keys
 from gso.typing import Array, Ints
 
@@ -60,11 +62,6 @@ def dual_edges(triangles: Ints, points: Array) -> DualEdges:
     pair = np.flatnonzero(key[order][1:] == key[order][:-1])
     halves = np.stack([order[pair], order[pair + 1]], axis=1)
     ends = np.stack([origin[halves[:, 0]], dest[halves[:, 0]]], axis=1)
-    p = points[triangles]
-    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    one, other = normal[halves // 3].transpose(1, 0, 2)
+    one, other = unit(area_vectors(points, triangles))[halves // 3].transpose(1, 0, 2)
     way = points[ends[:, 1]] - points[ends[:, 0]]
-    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
-    sine = (np.cross(one, other) * way).sum(axis=1)
-    return DualEdges(halves, ends, np.arctan2(sine, (one * other).sum(axis=1)))
+    return DualEdges(halves, ends, fold_angles(one, other, way))

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import MeshError, OptionError
+from gso.geometry import area_vectors
+from gso.geometry.vectors import unit
 from gso.mesh.topology import edge_keys, label_components
 from gso.typing import Array, Flags, Ints
 from gso.unfolding.canonical_order import canonical_order, classes
@@ -189,9 +191,9 @@ def _planes(points: Array, triangles: Ints, edges: DualEdges, smooth: Flags) -> 
     pair = edges.triangles[smooth]
     patch = label_components(len(triangles), pair[:, 0], pair[:, 1])
     p = points[triangles]
-    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    normal = area_vectors(points, triangles)
     total = np.stack([np.bincount(patch, normal[:, d]) for d in range(3)], axis=1)[patch]
-    mean = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+    mean = unit(np.asarray(total, float))
     _, first = np.unique(patch, return_index=True)
     away = np.einsum("tkd,td->tk", p - p[first[patch], 0][:, None], mean)
     far = np.zeros(int(patch.max()) + 1)

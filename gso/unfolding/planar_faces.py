@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gso.errors import MeshError
+from gso.geometry import area_vectors
 from gso.geometry.ears import ears, in_plane
+from gso.geometry.vectors import unit
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys, label_components
 from gso.typing import Array, Ints
@@ -125,10 +127,10 @@ def _halves(points: Array, first: Ints, corners: Ints) -> tuple[Ints, Ints]:
 def _bent(points: Array, triangles: Ints, face: Ints) -> Ints:
     """Return the polygons whose triangles lie in different planes."""
     p = points[triangles]
-    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    normal = area_vectors(points, triangles)
     count = int(face.max(initial=-1)) + 1
     total = np.stack([np.bincount(face, normal[:, d], count) for d in range(3)], axis=1)
-    mean = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+    mean = unit(np.asarray(total, float))
     _, first = np.unique(face, return_index=True)
     start = np.zeros((count, 3))
     start[face[first]] = p[first, 0]

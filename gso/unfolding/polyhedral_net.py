@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from gso.geometry import closest_motion
+from gso.geometry.vectors import unit
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
 from gso.pattern import Folded, Pattern
@@ -154,8 +155,7 @@ def _motions(flat: Array, pairs: Ints, ends: Ints, angle: Array, count: int) -> 
     by = np.asarray(graph[below, above[below]]).ravel().astype(np.int64) - 1
     edge = np.full(count, -1)
     edge[below] = by
-    way = flat[ends[:, 1]] - flat[ends[:, 0]]
-    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+    way = unit(flat[ends[:, 1]] - flat[ends[:, 0]])
     for level in range(1, int(depth.max(initial=0)) + 1):
         own = np.flatnonzero(depth == level)
         e, up = edge[own], above[own]

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gso.geometry import area_vectors
+from gso.geometry.vectors import unit
 from gso.mesh import Mesh
 from gso.typing import Array
 from gso.workshop.panels import Panel
@@ -79,9 +81,7 @@ def _mitres(points: Array, triangles: np.ndarray) -> Array:
 
     It is the shortest vector x with n x = 1 for the normals n of the faces of a vertex.
     """
-    a, b, c = points[triangles].transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normal = unit(area_vectors(points, triangles))
     squares = np.zeros((len(points), 3, 3))
     sums = np.zeros((len(points), 3))
     for corner in range(3):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gso.ruled.vectors import cross, unit
+from gso.geometry.vectors import cross, unit
 from gso.typing import Array, Ints
 
 

@@ -13,9 +13,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from gso.geometry.vectors import cross, lengths, unit
 from gso.ruled.lines.polygons import Polygons
 from gso.ruled.lines.strip_cells import Cells
-from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Flags, Ints
 
 #: Cost of a triangle's area, and of that of a slanted quad, relative to squared errors of normals.

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso.geometry.vectors import lengths
 from gso.mesh import topology
 from gso.ruled.lines.line_families import Band, Family
-from gso.ruled.vectors import lengths
 from gso.typing import Array, Flags, Ints
 
 #: Largest number of lines across a strip that sagittas are measured on.

@@ -12,8 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
+from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh, topology
-from gso.ruled.vectors import lengths, unit
 from gso.typing import Array, Flags, Ints
 
 #: Largest number of patches for which all combinations of directions are compared.

@@ -15,11 +15,11 @@ from gso.energy.fairness import residual as fairness_residual
 from gso.energy.multipliers import Shifts
 from gso.energy.position import build as position
 from gso.energy.proximity import residual as proximity_residual
+from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Mesh, Nearest, Polylines, vertex_normals
 from gso.mesh.polyline import turns
 from gso.ruled.lines.ears import ears
 from gso.ruled.lines.polygons import Polygons
-from gso.ruled.vectors import cross, lengths, unit
 from gso.solver import Problem, minimise
 from gso.typing import Array, Ints
 from gso.unknowns import Layout, free

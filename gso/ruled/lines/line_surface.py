@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Mesh, Nearest, topology
 from gso.parametrization import beside, upright
 from gso.pattern import Pattern
@@ -14,7 +15,6 @@ from gso.ruled.lines.ears import ears
 from gso.ruled.lines.polygons import Polygons
 from gso.ruled.ruled_surface import RuledSurface
 from gso.ruled.sheet import seam_pairs
-from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Flags, Ints
 
 

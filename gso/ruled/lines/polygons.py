@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gso.ruled.vectors import cross, lengths
+from gso.geometry.vectors import cross, lengths
 from gso.typing import Array, Ints
 
 

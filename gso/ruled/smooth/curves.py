@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gso.geometry.vectors import lengths
 from gso.ruled.strip_layout import Strips
-from gso.ruled.vectors import lengths
 from gso.typing import Array, Flags, Ints
 
 

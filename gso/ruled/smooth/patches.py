@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gso.geometry.polygon import signed_area
+from gso.geometry.vectors import cross, lengths
 from gso.ruled.smooth.curves import Curves
-from gso.ruled.vectors import cross, lengths
 from gso.spline import BSplineSurface, TrimmedSpline
 from gso.spline.trimmed import Loop
 from gso.typing import Array, Ints

@@ -9,11 +9,11 @@ import numpy as np
 
 from gso.energy import Weighted, mean_weights
 from gso.energy.position import build as position
+from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Mesh, Nearest
 from gso.ruled.smooth.curves import Curves
 from gso.ruled.smooth.smooth_terms import Terms
 from gso.ruled.untrimmed import Untrimmed
-from gso.ruled.vectors import cross, lengths, unit
 from gso.solver import Problem, minimise
 from gso.typing import Array, Ints
 from gso.unknowns import Layout, Variables

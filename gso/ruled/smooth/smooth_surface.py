@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from gso.errors import MeshError
+from gso.geometry.vectors import cross, lengths
 from gso.mesh import Mesh, Nearest
 from gso.ruled.ruled_surface import RuledSurface
 from gso.ruled.smooth.patches import Patch, bends, patches
 from gso.ruled.smooth.smooth_fit import Fitter, Smooth
 from gso.ruled.smooth.smooth_trim import trimmed
-from gso.ruled.vectors import cross, lengths
 from gso.spline import TrimmedSpline
 from gso.spline.trimmed import Loop
 from gso.typing import Array

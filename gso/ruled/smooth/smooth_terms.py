@@ -8,6 +8,7 @@ import numpy as np
 
 from gso.energy import Term, mean_weights
 from gso.energy.base import Residual
+from gso.geometry.vectors import cross, lengths, unit
 from gso.ruled.smooth.curves import Curves, hermite
 from gso.ruled.smooth.residuals import (
     bend_residual,
@@ -19,7 +20,6 @@ from gso.ruled.smooth.residuals import (
     speed_residual,
     turn_residual,
 )
-from gso.ruled.vectors import cross, lengths, unit
 from gso.typing import Array, Flags, Ints
 
 #: Positions in a span where its normals are compared.

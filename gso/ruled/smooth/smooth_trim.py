@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh, Nearest
 from gso.ruled.polygon import turning
 from gso.ruled.smooth.patches import Patch
-from gso.ruled.vectors import lengths, unit
 from gso.spline.trimmed import Loop
 from gso.typing import Array, Flags, Ints
 
