@@ -19,15 +19,11 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Make designs of flat parts, for the cutter.")
 @click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=click.Path())
-@click.option(
-    "-o",
-    "--output",
-    "folder",
-    metavar="DIR",
-    required=True,
-    type=click.Path(),
-    help="Folder to write to: parts, sheets, surfaces, certificate.json, index.html. Started "
+@shared.output(
+    "Folder to write to: parts, sheets, surfaces, certificate.json, index.html. Started "
     "again, the command goes on where it was.",
+    "folder",
+    "DIR",
 )
 @shared.unit
 @click.option(

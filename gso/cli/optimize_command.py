@@ -18,14 +18,8 @@ from gso.errors import OptionError
 
 @click.command(short_help="Make surfaces developable, flatten or denoise them.")
 @click.argument("names", metavar="IN...", nargs=-1, required=True, type=click.Path())
-@click.option(
-    "-o",
-    "--output",
-    "out",
-    metavar="OUT",
-    required=True,
-    type=click.Path(),
-    help="File to write; a folder when there are several inputs. The suffix says the format: "
+@shared.output(
+    "File to write; a folder when there are several inputs. The suffix says the format: "
     ".npz is the full result, .svg the flat pattern at 1:1; .step, .iges and .3dm are the "
     "surface as a B-spline, which is then what is optimised (fitted to the result where something "
     "bounds or constrains it).",

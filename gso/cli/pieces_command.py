@@ -17,15 +17,11 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Cut a design into pieces that can be laid flat.")
 @click.argument("name", metavar="IN", type=click.Path())
-@click.option(
-    "-o",
-    "--output",
-    "folder",
-    metavar="DIR",
-    required=True,
-    type=click.Path(),
-    help="Folder to write to: the pieces as groups of an OBJ file, their patterns at 1:1 (SVG), a "
+@shared.output(
+    "Folder to write to: the pieces as groups of an OBJ file, their patterns at 1:1 (SVG), a "
     "picture, and the table (JSON).",
+    "folder",
+    "DIR",
 )
 @shared.max_strain
 @shared.max_deviation

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeVar
+
 import click
 
 from gso.errors import OptionError
 from gso.quantities import MILLIMETRES, as_length, as_strain
+
+_Command = TypeVar("_Command", bound=Callable[..., object])
 
 
 class _Length(click.ParamType):  # type: ignore[type-arg]
@@ -61,6 +66,14 @@ class _Strain(click.ParamType):  # type: ignore[type-arg]
 
 
 LENGTH, MM, STRAIN = _Length(), _Millimetres(), _Strain()
+
+
+def output(help: str, name: str = "out", metavar: str = "OUT") -> Callable[[_Command], _Command]:
+    """Return the option for what a command writes."""
+    return click.option(
+        "-o", "--output", name, metavar=metavar, required=True, type=click.Path(), help=help
+    )
+
 
 max_deviation = click.option(
     "--max-deviation",

@@ -31,14 +31,8 @@ class _StripsJob(Job):
 
 @click.command(short_help="Make strips that are exactly developable.")
 @click.argument("name", metavar="IN", type=click.Path())
-@click.option(
-    "-o",
-    "--output",
-    "out",
-    metavar="OUT",
-    required=True,
-    type=click.Path(),
-    help="File to write. The suffix says the format: .npz is the full result, .svg the patterns at "
+@shared.output(
+    "File to write. The suffix says the format: .npz is the full result, .svg the patterns at "
     "1:1 with their bend lines; .step, .iges and .3dm are smooth surfaces.",
 )
 @click.option(

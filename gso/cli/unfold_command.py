@@ -20,14 +20,8 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Make the net of a surface of flat faces.")
 @click.argument("name", metavar="IN", type=click.Path())
-@click.option(
-    "-o",
-    "--output",
-    "out",
-    metavar="OUT",
-    required=True,
-    type=click.Path(),
-    help="Drawing to write, .svg, .dxf or .pdf: the parts at 1:1 with layers to cut and to fold.",
+@shared.output(
+    "Drawing to write, .svg, .dxf or .pdf: the parts at 1:1 with layers to cut and to fold.",
 )
 @click.option(
     "--cut", metavar="A-B", multiple=True, help="Edge to cut, by its vertices, the first being 0."
