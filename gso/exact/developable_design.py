@@ -111,8 +111,8 @@ def folded_pattern(
         sheet=sheet,
     )
     sliced = SlicedPattern.of(shape, joined)
-    bends = [ruled_bends(sliced, k, face, flat, press_radius) for k, face in enumerate(shape.faces)]
-    edges, angles, radii = joined_bends([*bends, fold_edges(sliced, shape)])
+    bends = ruled_bends(sliced, shape.faces, flat, press_radius)
+    edges, angles, radii = joined_bends([bends, fold_edges(sliced, shape)])
     surface = Mesh(sliced.points, sliced.vertex[sliced.faces])
     # In the order of the surface's vertices, as patterns that are not cut have it.
     order = np.argsort(sliced.vertex, kind="stable")

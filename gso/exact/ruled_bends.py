@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,39 +22,51 @@ _HALF_TURN = np.pi + np.radians(1.0)
 
 def ruled_bends(
     sliced: SlicedPattern,
-    number: int,
-    face: ShapeFace,
+    faces: Sequence[ShapeFace],
     flat: Array,
     press_radius: tuple[float, float] | None = None,
 ) -> Folded:
-    """Return the edges of a face to bend along, with angles and radii.
+    """Return the edges to bend faces along, with angles and radii.
 
-    They are rows of edges along rulings where there are enough. Otherwise triangles are divided
-    along rulings.
+    They are rows of edges along rulings where a face has enough. Otherwise triangles are divided
+    along rulings, and those of neighbouring faces where rulings end at them.
 
     Parameters
     ----------
     sliced : SlicedPattern
-    number : int
-        Number of the face in the shape.
-    face : ShapeFace
+        The pattern, whose triangles are not divided yet.
+    faces : sequence of ShapeFace
+        The faces of the shape.
     flat : ndarray, (t, 3, 2)
         Flat corners of the shape's triangles, each face in its own place.
     press_radius : (float, float), optional
         As of :func:`gso.exact.folded_pattern`.
     """
-    if not face.bend_lines:
-        return Folded()
-    if press_radius is not None and _is_pressed(face, press_radius):
-        bends = [_middle_line(face)]
-    else:
-        bends = _rulings(face)
-        rows = ruling_rows(sliced, face, flat, max(3, len(bends)))
-        if rows is not None:
-            return rows
-    turn, shift = _motion(sliced, face, flat)
     near = _SAME * float(np.linalg.norm(np.ptp(sliced.points, axis=0)))
-    lines = [_Line.of(np.stack([b.start, b.end]) @ turn + shift, face, shift, near) for b in bends]
+    found, ruled = [Folded()], []
+    for number, face in enumerate(faces):
+        if not face.bend_lines:
+            continue
+        if press_radius is not None and _is_pressed(face, press_radius):
+            bends = [_middle_line(face)]
+        else:
+            bends = _rulings(face)
+            rows = ruling_rows(sliced, face, flat, max(3, len(bends)))
+            if rows is not None:
+                found.append(rows)
+                continue
+        turn, shift = _motion(sliced, face, flat)
+        ends = [np.stack([bend.start, bend.end]) @ turn + shift for bend in bends]
+        lines = [_Line.of(line, face, shift, near) for line in ends]
+        ruled.append((number, bends, lines))
+    for number, _, lines in ruled:
+        _slice(sliced, number, lines, near)
+    found += [_on_lines(sliced, *one, near) for one in ruled]
+    return joined_bends(found)
+
+
+def _slice(sliced: SlicedPattern, number: int, lines: list[_Line], near: float) -> None:
+    """Divide the triangles of a face along lines."""
     for line in lines:
         edges = sliced.edges_of(number)
         away = line.away(sliced.flat[edges])
@@ -64,6 +77,12 @@ def ruled_bends(
         inside = line.reaches(p + share[:, None] * (q - p))
         if inside.any():
             sliced.insert(edges[hit][inside], share[inside])
+
+
+def _on_lines(
+    sliced: SlicedPattern, number: int, bends: list[BendLine], lines: list[_Line], near: float
+) -> Folded:
+    """Return the edges of a face on its lines, with the angles and radii of its bends."""
     edges = sliced.edges_of(number)
     inner = np.isin(edge_keys(edges[:, 0], edges[:, 1], len(sliced.flat)), sliced.inner())
     on = [inner & line.carries(sliced.flat[edges], near) for line in lines]
@@ -155,17 +174,10 @@ class _Line:
 
 def _motion(sliced: SlicedPattern, face: ShapeFace, flat: Array) -> tuple[Array, Array]:
     """Return how the flat image of a face was moved: p @ turn + shift."""
-    rows = np.flatnonzero(np.isin(sliced.source, face.triangles))
-    k = int(face.triangles[0])
-    whole = rows[sliced.source[rows] == k]
-    if len(whole) == 1:
-        ends = sliced.flat[sliced.faces[whole[0]]]
-    else:
-        raise AssertionError("a triangle was divided before its face was placed")
-    here = flat[k]
-    one, two = here[1:] - here[0], ends[1:] - ends[0]
-    turn = np.linalg.solve(one, two)
-    return turn, ends[0] - here[0] @ turn
+    first = int(face.triangles[0])
+    here, there = flat[first], sliced.flat[sliced.faces[first]]
+    turn = np.linalg.solve(here[1:] - here[0], there[1:] - there[0])
+    return turn, there[0] - here[0] @ turn
 
 
 def _weighted(bends: list[BendLine], lines: list[_Line], on: list[Flags]) -> list[BendLine]:

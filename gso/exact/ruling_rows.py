@@ -85,7 +85,7 @@ def ruling_rows(sliced: SlicedPattern, face: ShapeFace, flat: Array, count: int)
     """
     surface = face.surface
     corners = flat[face.triangles]
-    if surface is None or len(sliced.faces) != len(flat):
+    if surface is None:
         return None
     far = np.hypot(corners[..., 0], corners[..., 1])
     if surface.slope > 0 and far.min() < _SAME * far.max():

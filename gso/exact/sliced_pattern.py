@@ -31,8 +31,6 @@ class SlicedPattern:
     label : ndarray of int, (t,)
         Number of the shape's face of each triangle.
     seams : ndarray of int, (s, 2, 2)
-    source : ndarray of int, (t,)
-        Triangle of the shape that each is a part of.
     """
 
     points: Array
@@ -41,7 +39,6 @@ class SlicedPattern:
     faces: Ints
     label: Ints
     seams: Ints
-    source: Ints
 
     @classmethod
     def of(cls, shape: Recognised, joined: Joined) -> SlicedPattern:
@@ -65,7 +62,6 @@ class SlicedPattern:
             corner.reshape(-1, 3),
             shape.face,
             np.stack([corner[one[~whole]], corner[other[~whole]]], axis=1),
-            np.arange(len(shape.triangles)),
         )
 
     def insert(self, edges: Ints, shares: Array) -> None:
@@ -87,7 +83,7 @@ class SlicedPattern:
         self.points = np.concatenate([self.points, new])
         self.flat = np.concatenate([self.flat, p + every[:, None] * (q - p)])
         self.vertex = np.concatenate([self.vertex, number])
-        self.label, self.source = self.label[owner], self.source[owner]
+        self.label = self.label[owner]
 
     def _copies(self, edges: Ints) -> Ints:
         """Return the other copy (k, 2) of edges at seams, in their direction; -1 for others."""
