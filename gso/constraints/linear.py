@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gso.constraints.equations import OnPlane, Part, Pins, Relations
-from gso.mesh.topology import edge_graph, label_components
+from gso.mesh.topology import edge_graph, edge_keys, label_components
 from gso.typing import Array, Ints
 
 if TYPE_CHECKING:
@@ -200,10 +200,8 @@ def _forest(count: int, joints: _Joints) -> tuple[Ints, Ints, Ints]:
     order, before = breadth_first_order(tied, count, directed=False)
     child = order[1:][before[order[1:]] != count].astype(np.int64)
     above = before[child].astype(np.int64)
-    low, high = np.minimum(a, b), np.maximum(a, b)
-    key, at = np.unique(low * count + high, return_index=True)
-    wanted = np.minimum(child, above) * count + np.maximum(child, above)
-    return child, above, at[np.searchsorted(key, wanted)]
+    key, at = np.unique(edge_keys(a, b, count), return_index=True)
+    return child, above, at[np.searchsorted(key, edge_keys(child, above, count))]
 
 
 def _equations(

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gso import geometry
+from gso.mesh.topology import edge_keys
 from gso.typing import Array, Flags, Ints
 
 #: Largest number of rounds. Shapes may become worse after a round that removes less than this
@@ -132,7 +133,7 @@ def flipped(points: Array, faces: Ints) -> Ints:
         fine &= _dot(new, normal) > _FLIP_TURN * np.sqrt(_dot(new, new)) * whole
     for old in (left[wanted], right[wanted]):
         fine &= _dot(old, normal) > _FLIP_TURN * np.sqrt(_dot(old, old)) * whole
-    made = np.minimum(c, d)[wanted] * n + np.maximum(c, d)[wanted]
+    made = edge_keys(c[wanted], d[wanted], n)
     fine &= ~_among(ranked, made)
     wanted, made = wanted[fine], made[fine]
     # Each triangle, and each new edge, goes to the flip that gains most.

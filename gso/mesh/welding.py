@@ -8,6 +8,7 @@ import numpy as np
 
 from gso.errors import MeshError
 from gso.mesh.topology.graph import label_components
+from gso.mesh.topology.half_edges import edge_keys
 from gso.typing import Array, Flags, Ints
 
 # With more pairs per vertex than this the tolerance is larger than the edges.
@@ -139,6 +140,5 @@ def seams(points: Array, origin: Ints, dest: Ints) -> Flags:
     ends, index = np.unique(np.r_[origin, dest], return_inverse=True)
     place = equal(points[ends])[index.ravel()]
     a, b = place[: len(origin)], place[len(origin) :]
-    keys = np.minimum(a, b) * np.int64(len(ends)) + np.maximum(a, b)
-    _, which, count = np.unique(keys, return_inverse=True, return_counts=True)
+    _, which, count = np.unique(edge_keys(a, b, len(ends)), return_inverse=True, return_counts=True)
     return count[which.ravel()] > 1

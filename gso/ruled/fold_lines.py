@@ -8,6 +8,7 @@ import numpy as np
 
 from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh
+from gso.mesh.topology import edge_keys
 from gso.ruled.strip_layout import Strips
 from gso.ruled.unroll import Unrolled
 from gso.typing import Array, Ints
@@ -81,10 +82,7 @@ def folds(
     radius[angle == 0.0] = np.inf
     a, b, _ = strips.creases
     size = len(strips.corners)
-    crease = np.isin(
-        np.minimum(one, two) * size + np.maximum(one, two),
-        np.minimum(a, b) * size + np.maximum(a, b),
-    )
+    crease = np.isin(edge_keys(one, two, size), edge_keys(a, b, size))
     every = [Folds(edges[at], angle[at], radius[at]) for at in (~crease, crease)]
     return every[0], replace(every[1], radii=np.zeros(int(crease.sum())))
 

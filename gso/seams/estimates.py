@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.mesh import Mesh
+from gso.mesh.topology import edge_keys
 from gso.seams.potential import Potential
 from gso.typing import Flags, Ints
 
@@ -63,8 +64,7 @@ def _rim(faces: Ints, count: int) -> tuple[Flags, bool]:
     after = np.where(place + 1 < size[:, None], np.roll(faces, -1, axis=1), faces[:, :1])
     real = faces >= 0
     a, b = faces[real], after[real]
-    key = np.minimum(a, b) * count + np.maximum(a, b)
-    edges, often = np.unique(key, return_counts=True)
+    edges, often = np.unique(edge_keys(a, b, count), return_counts=True)
     rim_edges = edges[often == 1]
     rim = np.zeros(count, bool)
     rim[rim_edges // count] = True

@@ -6,6 +6,7 @@ import heapq
 
 import numpy as np
 
+from gso.mesh.topology import edge_keys
 from gso.seams.tree import Ground
 from gso.typing import Ints
 
@@ -39,8 +40,8 @@ class Merging:
         #: What an edge costs as a part of a seam.
         self._cost = self._length if factor is None else self._length * factor
         n = len(mesh.vertices)
-        kept = np.sort(ground.kept, axis=1) @ np.array([n, 1])
-        self._kept = np.isin(np.sort(self._ends, axis=1) @ np.array([n, 1]), kept)
+        kept = edge_keys(*ground.kept.T, n)
+        self._kept = np.isin(edge_keys(*self._ends.T, n), kept)
         rim = np.flatnonzero(he.twin < 0)
         self._rim = np.bincount(
             he.face[rim],

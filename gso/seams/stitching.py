@@ -15,6 +15,7 @@ from gso.errors import MeshError
 from gso.geometry.polygon import arc_lengths
 from gso.mesh import Mesh
 from gso.mesh.cut import cut
+from gso.mesh.topology import edge_keys
 from gso.seams.chains import chains
 from gso.seams.sheets import Sheet, flattened
 from gso.seams.tree import Ground
@@ -70,13 +71,13 @@ def stitched(
     """
     mesh = ground.mesh
     n = len(mesh.vertices)
-    kept = set((np.sort(ground.kept, axis=1) @ np.array([n, 1])).tolist())
+    kept = set(edge_keys(*ground.kept.T, n).tolist())
     members = {k: piece.faces for k, piece in enumerate(pieces)}
     known = dict(enumerate(sheets))
     # Small pieces may be joined along seams shorter than a neck: they are not wider.
     size = {k: _wide(sheet, least) for k, sheet in known.items()}
     root = list(range(len(members)))
-    every = (np.sort(pieces.edges, axis=1) @ np.array([n, 1])).tolist()
+    every = edge_keys(*pieces.edges.T, n).tolist()
     sides = dict(zip(every, pieces.sides.tolist(), strict=True))
     cut_keys = set(every)
     spans = chains(pieces.edges, pieces.sides)
@@ -86,7 +87,7 @@ def stitched(
         a, b = _root(root, a), _root(root, b)
         if a == b or lengths[k][-1] < min(neck, min(size[a], size[b])):
             continue
-        keys = np.sort(np.stack([line[:-1], line[1:]], 1), axis=1) @ np.array([n, 1])
+        keys = edge_keys(line[:-1], line[1:], n)
         if whole:
             if min(size[a], size[b]) > 0:
                 continue
@@ -179,7 +180,7 @@ def _flat(mesh: Mesh, keys: set[int], faces: Ints) -> Sheet | None:
     he = part.half_edges
     k = he.interior
     ends = np.stack([he.origin[k], he.dest[k]], axis=1)
-    own = np.sort(ids[ends], axis=1) @ np.array([n, 1])
+    own = edge_keys(*ids[ends].T, n)
     opened = cut(part, ends[np.isin(own, np.array(sorted(keys), np.int64))])
     if len(opened.mesh.boundary_loops) != 1 or opened.mesh.euler_characteristic != 1:
         return None

@@ -10,6 +10,7 @@ import numpy as np
 from gso.components import split
 from gso.errors import MeshError
 from gso.mesh import Mesh
+from gso.mesh.topology import edge_keys
 from gso.pattern import Folded, Pattern
 from gso.result import Result
 from gso.typing import Array, Ints, Json
@@ -97,7 +98,7 @@ def _rims(panels: list[Panel], pattern: Pattern, label: Ints, local: Ints) -> li
         rim = np.concatenate(
             [np.stack([loop, np.roll(loop, -1)], axis=1) for loop in panel.surface.boundary_loops]
         )
-        own = np.sort(local[ends[label[ends[:, 0]] == number]], axis=1) @ np.array([n, 1])
-        keys = np.sort(rim, axis=1) @ np.array([n, 1])
+        own = edge_keys(*local[ends[label[ends[:, 0]] == number]].T, n)
+        keys = edge_keys(*rim.T, n)
         out.append(rim[~np.isin(keys, own)])
     return out
