@@ -234,6 +234,8 @@ def energies(results):
     ],
 )
 def test_results_are_those_of_single_solves(task, options, designs):
+    if options == "accurate":
+        designs = designs[:2]
     batch = gso.tno.optimize_batch(designs, task=task, options=options, workers=0)
     for design, found in zip(designs, batch, strict=True):
         one = gso.tno.optimize(design, task=task, options=options, verdict=False)

@@ -127,5 +127,5 @@ def test_results_say_what_became_of_their_borders():
     found = gso.tno.optimize(design.mesh).metrics
     assert found["loop_ratio_min"] <= found["loop_ratio_max"]
     assert 0.0 < found["edge_ratio_min"] <= 1.01
-    assert found["distance_max"] >= found["deviation_max"]
+    assert found["distance_max"] >= found["distance_mean"]
     assert found["fold_max_before"] > 0.0

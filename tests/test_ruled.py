@@ -229,7 +229,7 @@ def test_unreachable_bounds_are_said():
     assert found[0] is Code.TARGET_MISSED
     # A single strip so far from its design may be folded, too.
     assert found[-1] is Code.DEVIATION
-    assert result.reasons[-1].value == result.details["verdict"]["deviation"] > 1e-4
+    assert result.reasons[-1].value == result.deviation > 1e-4
 
 
 def test_triangles_holes_and_numbering():

@@ -231,7 +231,7 @@ def test_holes_and_slots_are_cut_out(size):
     result = gso.tno.optimize(mesh, options=gso.RuledOptions(starts=("design",)))
     # Rulings cross the slot: the strip does not turn around its end.
     assert result.usable
-    assert result.metrics["deviation_max"] < 0.5
+    assert result.metrics["distance_max"] < 0.5
     strips = gso.smooth_strips(result.ruled, result.design)
     assert strips.is_torsal
     assert strips.distances[1] < 0.02 * mesh.diagonal

@@ -129,7 +129,7 @@ def test_a_bound_asks_for_half_a_percent_of_strain(bound):
         assert (why.code, why.bound) == (Code.STRAIN, 5e-3)
         assert why.value == result.details["verdict"]["strain_max"] == pytest.approx(strain)
         assert headline(result).endswith(": not developable within 0.05")
-        assert result.details["verdict"]["deviation"] <= 0.05 * (1 + 1e-6)
+        assert result.deviation <= 0.05 * (1 + 1e-6)
 
 
 def test_strain_is_judged_as_it_was_asked_for(good):
@@ -161,7 +161,7 @@ def test_a_distance_that_is_passed():
 def test_a_result_that_has_left_its_design():
     far = tried(saddle(9), FLAT + 40.0)
     assert codes(far.reasons) == [Code.FAR]
-    assert far.reasons[0].value == far.details["verdict"]["deviation"] / far.design.size
+    assert far.reasons[0].value == far.deviation / far.design.size
     # A handle that took it there asked for it.
     assert tried(saddle(9), FLAT + 40.0, violation=100.0).usable
 

@@ -23,7 +23,7 @@ def _figures(design: designs.Design, after: gso.Mesh) -> dict[str, Any]:
     loops = metrics.loop_ratios(before, after)
     true = metrics.surface_distance(before, after)
     percent = 100.0 / before.diagonal
-    both = max(true.there_max, true.back_max)
+    both = true.largest
     return {
         "loops": loops.min(),
         "to": loops.max(),
@@ -31,7 +31,7 @@ def _figures(design: designs.Design, after: gso.Mesh) -> dict[str, Any]:
         "asymmetry": design.asymmetry(after.vertices) if design.symmetries else "",
         "one way %": percent * true.there_max,
         "both ways %": percent * both,
-        "mean %": percent * 0.5 * (true.there_mean + true.back_mean),
+        "mean %": percent * true.mean,
         "fold in": metrics.dihedral_angles(before).max(),
         "fold": metrics.dihedral_angles(after).max(),
         "|K| in": metrics.loss_gc_worst(before),

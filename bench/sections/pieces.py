@@ -64,7 +64,7 @@ def ruled(shapes: str = "") -> dict[str, Any]:
             "pieces": len(found),
             "strips": result.ruled.strips,
             "mean %": percent * away.there_mean,
-            "max %": percent * max(away.there_max, away.back_max),
+            "max %": percent * away.largest,
             "gap at seams %": percent * result.details["seam_gap"],
             "strain": result.metrics["strain_max"],
             "usable": result.usable,

@@ -88,7 +88,7 @@ def _figures(design: gso.Mesh, result: gso.Result) -> dict[str, Any]:
         "why": ", ".join(reason.code.value for reason in result.reasons),
         "strain": 100.0 * float(said),
         "own strain": strain,
-        "distance": percent * max(far.there_max, far.back_max),
+        "distance": percent * far.largest,
         "sampled": sampled,
         "|K| in": metrics.loss_gc_worst(design),
         "|K|": worst,

@@ -23,6 +23,16 @@ class Distances(NamedTuple):
     back_mean: float
     back_max: float
 
+    @property
+    def mean(self) -> float:
+        """The larger one of both means."""
+        return max(self.there_mean, self.back_mean)
+
+    @property
+    def largest(self) -> float:
+        """The largest distance, both ways: the deviation."""
+        return max(self.there_max, self.back_max)
+
 
 def d_H(before: SurfaceLike, after: SurfaceLike) -> float:
     """Return the published proximity, percent of the input's bounding-box diagonal.

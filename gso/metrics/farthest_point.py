@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.geometry.vectors import cross, lengths
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.typing import Array, Ints
@@ -128,15 +129,15 @@ def _upper(points: Array, corner: Array, which: Ints) -> Array:
 def _from_triangle(points: Array, triangles: Array) -> Array:
     """Return the distances (k,) of points (k, 3) from one triangle each (k, 3, 3)."""
     a, b, c = triangles.transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
-    size = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
+    normal = cross(b - a, c - a)
+    size = np.maximum(lengths(normal), 1e-300)
     inside = np.ones(len(points), bool)
     beside = np.full(len(points), np.inf)
     for one, two in ((a, b), (b, c), (c, a)):
         way, off = two - one, points - one
-        inside &= np.einsum("kd,kd->k", np.cross(way, off), normal) >= 0
-        length = np.maximum(np.einsum("kd,kd->k", way, way), 1e-300)
-        share = np.clip(np.einsum("kd,kd->k", off, way) / length, 0.0, 1.0)
-        beside = np.minimum(beside, np.linalg.norm(off - share[:, None] * way, axis=1))
+        inside &= np.einsum("kd,kd->k", cross(way, off), normal) >= 0
+        long = np.maximum(np.einsum("kd,kd->k", way, way), 1e-300)
+        share = np.clip(np.einsum("kd,kd->k", off, way) / long, 0.0, 1.0)
+        beside = np.minimum(beside, lengths(off - share[:, None] * way))
     height = np.abs(np.einsum("kd,kd->k", points - a, normal)) / size
     return np.where(inside & (size > 1e-300), np.minimum(height, beside), beside)

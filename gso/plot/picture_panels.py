@@ -47,7 +47,7 @@ def strips(design: Mesh, surface: RuledSurface) -> list[Panel]:
     before = Panel(view.project(design.vertices), design.faces, "design", light=GRAZING)
     tint = np.where(surface.flat[:, None], _FLAT, _STRIPS[surface.strip % len(_STRIPS)])
     far = surface.distances(design)
-    share = 100.0 * max(far.there_max, far.back_max) / design.diagonal
+    share = 100.0 * far.largest / design.diagonal
     after = Panel(view.project(mesh.vertices), mesh.faces, tint=tint)
     parts = surface.strips
     after.title = f"{parts} strip{'s' if parts > 1 else ''}, largest distance {share:.2g} %"

@@ -31,10 +31,10 @@ def headline(result: Result, unit: str = "") -> str:
     >>> headline(optimize(bowl, max_deviation=0.5), "mm")
     'largest strain 0... %, deviation 0... mm: developable within 0.5 mm'
     """
-    found = result.details.get("verdict", {})
-    if "deviation" not in found:
+    found = result.details.get("verdict")
+    if found is None:
         return ""
-    said = f"deviation {length(found['deviation'], unit)}"
+    said = f"deviation {length(result.deviation, unit)}"
     if "strain_max" not in found:
         return said
     said = f"largest strain {percent(found['strain_max'])}, {said}"

@@ -76,7 +76,7 @@ class Result:
         degrees of freedom of each coordinate after smoothing; "order" and "weight". With
         constraints, "constraints": the largest violation of each, in the input's unit. With a
         spline, "spline": its curvature and distances, see :func:`gso.spline.fit.describe_spline`.
-        For `developable`, "verdict": largest strain and deviation, and the given limits.
+        For `developable`, "verdict": the largest strain and the given limits.
     spline : BSplineSurface or None
         The spline that `mesh` samples, with the option ``variables="surface"``; with several
         components, each has its own.
@@ -176,6 +176,13 @@ class Result:
         from gso.metrics import surface_distance
 
         return surface_distance(self.design, self.mesh)
+
+    @cached_property
+    def deviation(self) -> float:
+        """The largest distance between design and result, both ways, in the mesh's unit."""
+        from gso.metrics import largest_distance
+
+        return largest_distance(self.design, self.mesh)
 
     def on_design(self) -> Mesh:
         """Return the design with its vertices moved onto the result."""

@@ -63,6 +63,11 @@ class StripsResult(Result):
         """Distances all over both surfaces, in both directions, in the mesh's unit."""
         return self.ruled.deviation or self.ruled.distances(self.design)
 
+    @cached_property
+    def deviation(self) -> float:
+        """The largest of :attr:`distances`."""
+        return self.distances.largest
+
     def on_design(self) -> Mesh:
         """Return the design with its vertices moved onto the strips."""
         return self.design.replaced(self.ruled.moved)

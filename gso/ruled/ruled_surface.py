@@ -80,7 +80,7 @@ class RuledSurface:
     def farthest(self) -> float:
         """The largest distance from the design, both ways; 0 where it is not known."""
         far = self.deviation
-        return 0.0 if far is None else max(far.there_max, far.back_max)
+        return 0.0 if far is None else far.largest
 
     @cached_property
     def sound(self) -> bool:

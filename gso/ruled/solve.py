@@ -216,7 +216,7 @@ class _Search:
         far = surface.distances(job.target.domain.mesh)
         return Found(
             replace(surface, deviation=far),
-            max(far.there_mean, far.back_mean),
+            far.mean,
             start,
         )
 

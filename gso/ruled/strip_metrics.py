@@ -20,9 +20,8 @@ def strip_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
     flat, sheet = surface.pattern.flat, surface.pattern.surface(surface.mesh)
     turns = surface.creases.turns(surface.mesh.vertices)
     return metrics.strains(sheet, flat) | {
-        "distance_mean": percent * max(true.there_mean, true.back_mean),
-        "distance_max": percent * max(true.there_max, true.back_max),
-        "deviation_max": percent * true.there_max,
+        "distance_mean": percent * true.mean,
+        "distance_max": percent * true.largest,
         "d_H": metrics.d_H(design, design.replaced(surface.moved)),
         "fold_max": float(metrics.dihedral_angles(surface.mesh).max(initial=0.0)),
         "flipped_cells": float(metrics.flips(sheet, flat)),

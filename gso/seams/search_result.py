@@ -68,8 +68,8 @@ def packed(
         # Both sides of a seam touch, which is no crossing where they are sewn.
         measured |= of_surface(result.design, result.mesh) | crossed(own.design)
         away = metrics.surface_distance(ground.mesh, own.design)
-        numbers["deviation_mean"] = away.there_mean
-        numbers["deviation_max"] = max(away.there_max, away.back_max)
+        numbers["deviation_mean"] = away.mean
+        numbers["deviation_max"] = away.largest
         measured[Code.DEVIATION] = Measurement(numbers["deviation_max"])
         numbers["dihedral_mean_before"] = mean_angle(result.design)
         numbers["dihedral_mean"] = mean_angle(result.mesh)

@@ -25,8 +25,8 @@ _STRETCHED = ("conformal",)
 def judge(result: Result, limits: Limits, violation: float = 0.0) -> tuple[Reason, ...]:
     """List the reasons why a result is not usable, the most severe first; empty if it is usable.
 
-    For developable surfaces the largest strain, the deviation and the given limits are stored in
-    the result's details under "verdict".
+    For developable surfaces the largest strain and the given limits are stored in the result's
+    details under "verdict".
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def developable(result: Result, limits: Limits, violation: float) -> tuple[Measu
     from gso.tasks.developable.options import DEVELOPABLE, SHEET, Options
 
     design, mesh = result.design, result.mesh
-    measured, bounds = _away(result, metrics.largest_distance(design, mesh), limits, violation)
+    measured, bounds = _away(result, limits, violation)
     strain, allowed = np.inf, limits.max_strain
     if allowed is None and limits.target_curvature is None:
         allowed = SHEET if limits.max_deviation is None else DEVELOPABLE
@@ -67,9 +67,7 @@ def strips(result: Result, limits: Limits, violation: float) -> tuple[Measured, 
     surface = result.ruled
     if surface is None:
         return {}, {}
-    far = result.distances
-    deviation = max(far.there_max, far.back_max)
-    measured, bounds = _away(result, deviation, limits, violation)
+    measured, bounds = _away(result, limits, violation)
     measured[Code.RULINGS_CROSS] = Measurement(float(surface.crossed))
     measured[Code.STRAIN] = Measurement(_strains(result.mesh, surface.pattern).max())
     bounds[Code.STRAIN] = limits.max_strain
@@ -84,23 +82,27 @@ def denoise(result: Result, limits: Limits, violation: float) -> tuple[Measured,
     return {Code.ROUGHER: Measurement(metrics.fairness_ratio(result.design, result.mesh))}, {}
 
 
-def _away(
-    result: Result, deviation: float, limits: Limits, violation: float
-) -> tuple[Measured, Bounds]:
-    """Measure the distance to the design, also as a share of its size."""
+def _away(result: Result, limits: Limits, violation: float) -> tuple[Measured, Bounds]:
+    """Measure the distance to the design, also as a share of its size.
+
+    Nothing is measured where no vertex has moved farther than the distance may be.
+    """
     from gso.tasks.developable.options import NEAR
 
-    size = result.design.size
+    design, mesh = result.design, result.mesh
+    size = design.size
     free = limits.max_deviation is None and limits.target_curvature is None
-    share = NEAR if free else _FAR
+    share = (NEAR if free else _FAR) + violation / size
+    most = share * size if limits.max_deviation is None else min(share * size, limits.max_deviation)
+    if np.array_equal(design.triangles, mesh.triangles) and (
+        np.linalg.norm(mesh.vertices - design.vertices, axis=1).max(initial=0.0) <= most
+    ):
+        return {}, {}
     # Far from the origin, distances are only known up to the rounding of the coordinates.
     return {
-        Code.DEVIATION: Measurement(deviation, slack=1e-12 * size),
-        Code.FAR: Measurement(deviation / size),
-    }, {
-        Code.DEVIATION: limits.max_deviation,
-        Code.FAR: share + violation / size,
-    }
+        Code.DEVIATION: Measurement(result.deviation, slack=1e-12 * size),
+        Code.FAR: Measurement(result.deviation / size),
+    }, {Code.DEVIATION: limits.max_deviation, Code.FAR: share}
 
 
 def _strains(surface: Mesh, pattern: Pattern) -> Array:
@@ -109,9 +111,8 @@ def _strains(surface: Mesh, pattern: Pattern) -> Array:
 
 def _remember(result: Result, measured: Measured, limits: Limits) -> None:
     """Store the numbers of a verdict in the details of a result."""
-    names = {Code.DEVIATION: "deviation", Code.STRAIN: "strain_max"}
-    found = {name: float(measured[code].value) for code, name in names.items() if code in measured}
-    result.details = {**result.details, "verdict": found | limits.given}
+    strain = {"strain_max": measured[Code.STRAIN].value} if Code.STRAIN in measured else {}
+    result.details = {**result.details, "verdict": strain | limits.given}
 
 
 #: Checks by task, or by kind of result; others only have the checks of surface and pattern.

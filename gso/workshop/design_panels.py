@@ -152,8 +152,7 @@ def _strips(given: Design, settings: FabricationSettings, say: Say, workers: int
     if "seam_gap" in result.details:
         record["seam_gap"] = result.details["seam_gap"]
     far = result.distances
-    record["deviation_mean"] = max(far.there_mean, far.back_mean)
-    record["deviation_max"] = max(far.there_max, far.back_max)
+    record |= {"deviation_mean": far.mean, "deviation_max": far.largest}
     one = replace(of_result(given.name, result, record), reasons=result.reasons)
     return _checked(_bent(one), settings)
 

@@ -34,7 +34,6 @@ def of_pattern(
     away = metrics.surface_distance(design, surface)
     sheet = pattern.surface(surface)
     strains = metrics.strains(sheet, pattern.flat)
-    far = max(away.there_max, away.back_max)
     overlaps = len(faults.overlaps(sheet, pattern.flat))
     flips = int(metrics.flips(sheet, pattern.flat))
     return {
@@ -43,8 +42,8 @@ def of_pattern(
         "diagonal": design.diagonal,
         "size": design.size,
         "allowed": allowed,
-        "deviation_mean": max(away.there_mean, away.back_mean),
-        "deviation_max": far,
+        "deviation_mean": away.mean,
+        "deviation_max": away.largest,
         "deviation_at": _worst(design, surface),
         "strain_max": strains["strain_max"],
         "strain_p99": strains["strain_p99"],

@@ -127,7 +127,7 @@ class LineStrips:
             return None
         surface = line_surface(self.mesh, polygons, points)
         far = surface.distances(self.mesh)
-        return Found(replace(surface, deviation=far), max(far.there_mean, far.back_mean), LINES)
+        return Found(replace(surface, deviation=far), far.mean, LINES)
 
 
 def _distance(found: Found) -> tuple[bool, float]:
