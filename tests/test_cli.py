@@ -89,6 +89,9 @@ def test_optimises_one_file(run):
 def test_quiet_says_nothing(run, small):
     done = run("optimize", small, "-o", "out.obj", "-q")
     assert (done.exit_code, done.stdout, done.stderr) == (0, "", "")
+    done = run("optimize", small, "-o", "out.obj", "-q", "--max-deviation", 1e-9)
+    assert (done.exit_code, done.stdout) == (1, "")
+    assert done.stderr.startswith("not usable: ")
 
 
 def test_notes_are_printed(run):

@@ -260,6 +260,13 @@ class TestLines:
         assert len(outer) == len(ends) == 2 and (holes > 0).all()
         assert holes[outer].sum() == holes[middle]
 
+    def test_a_part_narrower_than_the_kerf_is_refused(self, tmp_path):
+        wide = gso.fabricate(small(), tmp_path, workers=0, formats=("svg",), finish=Finish(kerf=4))
+        (why,) = wide.reasons
+        flat = wide.parts[0].outline
+        assert (why.code, why.bound) == (Code.NECK, 4.0)
+        assert why.value == pytest.approx(np.ptp(flat, axis=0).min() - 4.0, abs=0.01)
+
     def test_a_hole_that_the_kerf_deletes_is_refused(self):
         with pytest.raises(OptionError, match="kerf"):
             Finish(kerf=1.0, registration=(1.0, 3.0))

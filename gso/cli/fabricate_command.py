@@ -167,8 +167,7 @@ def fabricate(
     turns = rotations if rotations == "any" else int(rotations)
     with words() as say:
         done = make.fabricate(meshes, folder, finish=finish, rotations=turns, callback=say, **given)
-    if not quiet:
-        click.echo("\n".join(text(done)))
+    shared.tell(text(done), quiet=quiet)
     click.get_current_context().exit(0 if done.usable else 1)
 
 

@@ -50,8 +50,8 @@ def many(
                     raise MeshError(item.error or "failed")
                 job.write(item.result, out, pictures[item.index])
                 done = report.record(file, out, item.result, job.named)
-                if not job.quiet:
-                    bar.write(report.line(done), file=sys.stdout)
+                if not (job.quiet and done["usable"]):
+                    bar.write(report.line(done), file=sys.stderr if job.quiet else sys.stdout)
             except GSOError as error:
                 done = {"input": file, "usable": False, "error": str(error)}
                 bar.write(f"gso: error: {_named(file, str(error))}", file=sys.stderr)

@@ -78,8 +78,7 @@ def pieces(
             plot.plot_pieces(found, os.path.join(folder, "pieces.png"))
         except ImportError as error:
             click.echo(f"note: no picture, as Matplotlib cannot be imported: {error}", err=True)
-    if not quiet:
-        click.echo("\n".join(text(found, given["unit"])))
+    shared.tell(text(found, given["unit"]), quiet=quiet)
     click.get_current_context().exit(0 if found.usable else 1)
 
 

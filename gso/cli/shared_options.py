@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 import click
@@ -127,7 +127,9 @@ workers = click.option(
 scheduler = click.option(
     "--scheduler", metavar="ADDRESS", help="Dask cluster that does the work instead."
 )
-quiet = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+quiet = click.option(
+    "-q", "--quiet", is_flag=True, help="Print only errors and why a result is not usable."
+)
 constraints = click.option(
     "--constraints",
     metavar="JSON",
@@ -165,3 +167,12 @@ def named_unit(unit: str) -> str:
     """Return the unit if the user gave ``--unit``, else ""."""
     source = click.get_current_context().get_parameter_source("unit")
     return unit if source is click.core.ParameterSource.COMMANDLINE else ""
+
+
+def tell(lines: Iterable[str], *, quiet: bool) -> None:
+    """Print lines; quietly only those that say why a result is not usable, as errors."""
+    for line in lines:
+        if not quiet:
+            click.echo(line)
+        elif line.startswith("not usable"):
+            click.echo(line, err=True)

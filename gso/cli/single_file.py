@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import click
-
 from gso.cli import file_options
+from gso.cli import shared_options as shared
 from gso.errors import MeshError
 
 if TYPE_CHECKING:
@@ -36,6 +35,5 @@ def single(job: Job, file: str, out: str, plot: str | None, table: str | None) -
     record = report.record(file, out, result, job.named)
     if table is not None:
         write_json(table, record)
-    if not job.quiet:
-        click.echo(report.text(record))
+    shared.tell(report.text(record).splitlines(), quiet=job.quiet)
     return bool(record["usable"])

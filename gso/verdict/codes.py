@@ -366,7 +366,7 @@ class Code(str, enum.Enum):
         Kind.LENGTH,
         "Width of a piece at its narrowest place.",
         "necks are {value} wide, less than {bound}",
-        "allow narrower necks (min_neck) or more strain (max_strain)",
+        "allow more strain (max_strain), narrower necks (min_neck), or cut elsewhere",
         least=True,
     )
     SMALL = _limit(

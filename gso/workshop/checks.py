@@ -14,6 +14,7 @@ from gso.workshop.finish import Finish
 from gso.workshop.measurements import bend_radius
 from gso.workshop.panels import Panel
 from gso.workshop.parts import Fitted
+from gso.workshop.polygons import neck, region
 from gso.workshop.thickness import Thickness
 
 #: Largest difference of the two sides of a seam that the thickness may add, in sheet thicknesses.
@@ -28,15 +29,16 @@ Row = tuple[Code, float, float]
 def judge_sheet(own: Fitted, settings: FabricationSettings, finish: Finish) -> tuple[Reason, ...]:
     """Return why fitted panels cannot be made, in millimetres; nothing if they can."""
     sheet = finish.thickness
+    known = [*own.reasons, *_necks(own, finish.kerf)]
     if sheet is None:
-        return own.reasons
+        return ordered(known)
     parts: list[tuple[str, Row]] = []
     for panel, before in zip(own.panels, own.made.panels, strict=True):
         radius = own.scale * bend_radius(before)
         rows = _bends(panel, sheet) if len(panel.bends) else _rolled(radius, settings, sheet)
         parts += [(panel.name, row) for row in rows]
     reasons = [
-        *own.reasons,
+        *known,
         *_compared("part", parts),
         *_compared("seam", _seams(own, settings, sheet)),
     ]
@@ -44,6 +46,20 @@ def judge_sheet(own: Fitted, settings: FabricationSettings, finish: Finish) -> t
     named = {name for reason in reasons for name in reason.places.ids}
     bad = [p.name for p in own.panels if p.name not in named and _overlaps(p)]
     return ordered([*reasons, *compare({Code.BENDS_OVERLAP: Measurement.count("part", bad)}, {})])
+
+
+def _necks(own: Fitted, kerf: float) -> tuple[Reason, ...]:
+    """Return the parts that are narrower than the kerf, or, with seams, than a share of the size."""
+    pairs = [(seam.one.panel, seam.two.panel) for seam in own.made.matings]
+    joined = {k for one, two in pairs if one != two for k in (one, two)}
+    share = (Code.NARROW.info.limit or 0.0) * own.made.record["size"] * own.scale
+    rows = []
+    for number, panel in enumerate(own.panels):
+        least = max(kerf, share if number in joined else 0.0)
+        if least > 0:
+            outline, *holes = (panel.flat[loop] for loop in panel.loops)
+            rows.append((panel.name, (Code.NECK, neck(region(outline, holes), least), least)))
+    return _compared("part", rows)
 
 
 def _compared(kind: str, rows: list[tuple[str, Row]]) -> tuple[Reason, ...]:

@@ -24,6 +24,8 @@ _REPEATED = 1e-6
 #: Largest width of a hole that is a rounding error of a union, in millimetres, and the largest
 #: share of the area by which a union may miss what it unites.
 _SLIVER, _LOST = 1e-3, 1e-6
+#: Share of the area that a neck must hold, and steps by which its width is found.
+_PART, _HALVINGS = 0.01, 12
 
 
 def region(outline: Array, holes: Sequence[Array] = ()) -> Geometry:
@@ -120,6 +122,34 @@ def roomiest(shape: Geometry) -> tuple[Array, float]:
         point = polygon.representative_point()
         return np.array([point.x, point.y]), float(polygon.exterior.distance(point))
     return middle, float(np.linalg.norm(rim - middle))
+
+
+def neck(shape: Geometry, least: float) -> float:
+    """Return the width of a shape at its narrowest neck if it is less than `least`, else `least`.
+
+    At a neck a shape falls apart, or vanishes, when its outline moves inwards by half of the width.
+    Corners, and what is smaller than 1 % of the area, do not count.
+
+    Examples
+    --------
+    >>> halves = [[0, 0], [4, 0], [4, 4], [2.1, 4], [2.1, 4.5], [4, 4.5], [4, 9], [0, 9],
+    ...           [0, 4.5], [1.9, 4.5], [1.9, 4], [0, 4]]
+    >>> [round(neck(region(np.array(halves)), least), 2) for least in (1.0, 0.1)]
+    [0.2, 0.1]
+    """
+
+    def falls_apart(width: float) -> bool:
+        left = moved(shape, -0.5 * width, 2.0)
+        core = largest(left)
+        return core is None or left.area - core.area > _PART * shape.area
+
+    if not falls_apart(least):
+        return least
+    low, high = 0.0, least
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if falls_apart(middle) else (middle, high)
+    return high
 
 
 def _steady(operation: Callable[..., Geometry], *shapes: Geometry) -> Geometry:
