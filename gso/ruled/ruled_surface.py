@@ -104,7 +104,9 @@ class RuledSurface:
         k = np.flatnonzero((inner.twin >= 0) & (inner.origin < inner.dest))
         ends = np.stack([inner.origin[k], inner.dest[k]], axis=1)
         count = len(self.mesh.vertices)
-        key, rulings = (edge_keys(*e.T, count) for e in (pattern.vertex[ends], self.rulings.edges))
+        key, rulings = (
+            edge_keys(e[:, 0], e[:, 1], count) for e in (pattern.vertex[ends], self.rulings.edges)
+        )
         order = np.argsort(rulings)
         at = order[np.minimum(np.searchsorted(rulings[order], key), len(order) - 1)]
         found = np.isin(key, rulings)

@@ -69,7 +69,7 @@ class Net:
     def folds(self) -> Folded:
         """The folds that are drawn: edges that do not count as flat."""
         bent = np.abs(self.folded.angles) > np.radians(self.flat_angle)
-        return Folded(*(values[bent] for values in self.folded))
+        return Folded(*(values[bent] for values in self.folded[:3]))
 
     @property
     def angles(self) -> Array:

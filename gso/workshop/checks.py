@@ -49,7 +49,7 @@ def judge_sheet(own: Fitted, settings: FabricationSettings, finish: Finish) -> t
 
 
 def _necks(own: Fitted, kerf: float) -> tuple[Reason, ...]:
-    """Return the parts that are narrower than the kerf, or, with seams, than a share of the size."""
+    """Return why parts are too narrow: less than the kerf or, with seams, a share of the size."""
     pairs = [(seam.one.panel, seam.two.panel) for seam in own.made.matings]
     joined = {k for one, two in pairs if one != two for k in (one, two)}
     share = (Code.NARROW.info.limit or 0.0) * own.made.record["size"] * own.scale

@@ -93,6 +93,7 @@ def fabricate(
     layers: str = "operations",
     paper: str | None = None,
     bend_text: bool = False,
+    bend_step: Length | None = None,
     step: bool = False,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -154,6 +155,10 @@ def fabricate(
         Also write all parts as a PDF on pages of this size, such as "A4".
     bend_text : bool
         Also write the direction, angle and radius beside each bend.
+    bend_step : float or str, optional
+        Angle between the bend lines of cylinders and cones, in degrees (15 or "15deg"), or how far
+        chords between them may be from the surface ("0.5mm"); by default 2 to 15 degrees, by the
+        radius.
     step : bool
         Also write the folded parts as solids of the sheet's thickness to one STEP file,
         ``folded.step``. Their bends have flat facets as the designs have them.
@@ -219,6 +224,8 @@ def fabricate(
         most,
         None if min_radius is None else _radius(min_radius, meshes, unit),
         unit,
+        bend_step,
+        finish.pressed(scale),
     )
     drawn = [
         (given, check_lines(given, meshes, what, closed=what == "hole"))
