@@ -120,21 +120,20 @@ class Thickness:
             self.sheet * np.where(np.asarray(angle, float) >= 0, outside, 1.0 - outside)
         )
 
-    def inner(self, angle: ArrayLike, radius: ArrayLike, arcs: ArrayLike = False) -> Array:
+    def inner(self, angle: ArrayLike, radius: ArrayLike) -> Array:
         """Return the inner radii of bends, infinite where a bend table leaves them to the tool.
 
         Parameters
         ----------
         angle, radius : array_like
             Of the bends of the design's surface.
-        arcs : array_like of bool
-            Whether the pattern has the arcs of the bends.
         """
         angles, radii = np.broadcast_arrays(np.asarray(angle, float), np.asarray(radius, float))
+        if self.table is not None:
+            return np.full(angles.shape, np.inf)
         if self.radius is not None:
             return np.full(angles.shape, float(self.radius))
-        own = radii - self.depth(angles)
-        return np.asarray(own if self.table is None else np.where(arcs, own, np.inf))
+        return np.asarray(radii - self.depth(angles))
 
     def strain(self, curvature: float) -> float:
         """Return how far the neutral surface of a rolled sheet is strained against the design's.
@@ -150,20 +149,25 @@ class Thickness:
         """The same sheet, rolled to the radii of the surface."""
         return replace(self, radius=None, table=None)
 
+    @property
+    def pressed(self) -> Thickness:
+        """The same sheet, bent by a press to the radii of the surface."""
+        return replace(self, radius=None)
+
 
 def thickened(panel: Panel, thickness: Thickness) -> Panel:
     """Return a panel with the pattern of a sheet of some thickness, and inner radii of bends.
 
-    Plates between bends are moved apart or together along the normals of the bends. Bends that are
-    rolled have the radius of the surface, and others that of the tool.
+    Plates between bends are moved apart or together along the normals of the bends. Bends in zones
+    have the radius of the surface, and sharp ones that of the tool.
     """
     if not len(panel.bends):
         return panel
     rolled, pressed, angles = panel.rolled, panel.pressed, panel.angles
     radii = np.where(
-        rolled,
+        rolled | pressed,
         thickness.rolled.inner(angles, panel.radii),
-        thickness.inner(angles, panel.radii, pressed),
+        thickness.inner(angles, panel.radii),
     )
     plate, pairs, ends = _plates(panel)
     p, q = panel.flat[ends].transpose(1, 0, 2)
@@ -172,8 +176,9 @@ def thickened(panel: Panel, thickness: Thickness) -> Panel:
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     count = int(plate.max()) + 1
     # The normal points from the first plate of each pair to the second.
-    arcs = thickness.change(angles, np.where(pressed, panel.radii, 0.0))
-    change = np.where(rolled, thickness.rolled.change(angles), arcs)
+    change = np.where(rolled, thickness.rolled.change(angles), thickness.change(angles))
+    arcs = thickness.pressed.change(angles, np.where(pressed, panel.radii, 0.0))
+    change = np.where(pressed, arcs, change)
     step = change[:, None] * normal
     shift = _solved(count, pairs, step)
     total, often = np.zeros((len(panel.flat), 2)), np.zeros(len(panel.flat))
@@ -191,8 +196,7 @@ def thickened(panel: Panel, thickness: Thickness) -> Panel:
 
 def _inner_zone(zone: Zone, thickness: Thickness) -> Zone:
     """Return a zone with inner radii."""
-    own = thickness if zone.pressed else thickness.rolled
-    least, most = own.inner(zone.angle, [zone.least, zone.most], zone.pressed).tolist()
+    least, most = thickness.rolled.inner(zone.angle, [zone.least, zone.most]).tolist()
     return zone._replace(least=least, most=most)
 
 
