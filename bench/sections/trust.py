@@ -172,7 +172,7 @@ def _summary(rows: dict[str, dict[str, Any]]) -> None:
     print(f"\n{len(good)} of {len(rows)} usable")
     for name, bound in (("own strain", 2.0), ("own strain", 5.0), ("sampled", 5.0)):
         print(f"usable with {name} above {bound:g} %: {sum(row[name] > bound for row in good)}")
-    print(f"image above 1.5: {sum(row['image'] > 1.5 for row in rows.values())}")
+    print(f"usable with image above 1.5: {sum(row['image'] > 1.5 for row in good)}")
     print(f"folded: {sum(row['folds'] > 0 for row in rows.values())}")
     pairs = [
         (rows[key], rows[key.replace(" isometry", " balanced")])

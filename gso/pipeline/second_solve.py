@@ -49,8 +49,9 @@ def solve_and_judge(run: Run) -> Result:
     case, request = run.case, run.case.solver_request
     best = solves.usable(request)
     before = case.task.formulations[request.formulation].before
-    begun = None if before is None or not solves.may_go_on else before(request)
-    if begun is not None and request.verdict and case.constraints.empty:
+    judged = request.verdict and best.status is not Status.ALREADY_GOOD
+    begun = before(request) if before is not None and judged and solves.may_go_on else None
+    if begun is not None and case.constraints.empty:
         other = solves.usable(begun)
         if _is_worse(best, other):
             note = (
