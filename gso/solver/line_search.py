@@ -94,7 +94,7 @@ def falls(before: N, after: N, step: N, expected: N, tolerance: float) -> tuple[
     return before - after > least, stepped | (expected <= ops.maximum(least, _NOTHING))
 
 
-def ends_next(step: N, enough: N) -> N:
+def ends_next(step: Any, enough: Any) -> Any:
     """Return whether a solve may end with the next iteration, given this one's step and decrease.
 
     Not after a shortened step: it raises the damping, so that the next one is short whatever the
@@ -107,8 +107,7 @@ def ends_next(step: N, enough: N) -> N:
     enough : bool or tensor of bool
         Whether the energy fell enough to go on.
     """
-    full: Any = (step >= 1.0) | (step <= 0.0)
-    return full | (enough ^ True)
+    return (step >= 1.0) | (step <= 0.0) | (enough ^ True)
 
 
 def relative_decrease(
