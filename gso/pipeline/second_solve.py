@@ -110,8 +110,8 @@ class _Solves:
     def _result(self, request: Request[Options]) -> Result:
         """Return the judged result of a request."""
         run, own = self.run, self.run.case.solver_request
-        key = (request.formulation, request.options, request.max_displacement)
-        key = (*key, request.weight_factor)
+        asked = (request.formulation, request.options, request.max_displacement)
+        key = (*asked, request.weight_factor)
         if key not in self._found:
             result = conclude(run, run.solve() if request is own else run(request))
             if request is not own:
