@@ -9,7 +9,7 @@ import numpy as np
 
 from gso.errors import MeshError
 from gso.mesh import Mesh
-from gso.ruled.lines.free_rulings import free_rulings
+from gso.ruled.lines.free_rulings import free_rulings, single
 from gso.ruled.lines.line_choice import Choice
 from gso.ruled.lines.line_families import families
 from gso.ruled.lines.line_fit import LineFitter
@@ -28,6 +28,10 @@ _PLANAR = 0.2
 #: Whether to take the other kind of rulings, and fairness, one after the other until nothing folds;
 #: half of them for the second family.
 _SETTINGS = ((False, 0.03), (True, 0.03), (False, 0.5), (True, 0.5))
+#: Distance of samples from one another's surfaces at which strips are the mesh.
+_SAME = 1e-7
+#: Distance at which a mesh counts as developable as it is.
+EXACT = 1e-5
 #: Ratio of numbers of strips in the search for a bound, and largest number of solves.
 _MORE, _SOLVES = 1.3, 10
 
@@ -52,6 +56,11 @@ class LineStrips:
             self.choices = []
         self._fitter = LineFitter(mesh)
 
+    @property
+    def least(self) -> int:
+        """The smallest number of strips; 0 where there are no lines."""
+        return min((choice.least for choice in self.choices), default=0)
+
     def predicted(self, count: int) -> float:
         """Return the distance that is predicted for a number of strips."""
         found = (choice.lines(count) for choice in self.choices)
@@ -72,13 +81,23 @@ class LineStrips:
                     if found is None or found.surface.sound:
                         break
             if tried:
-                self.results[count] = min(tried, key=lambda found: found.order)
+                self.results[count] = self._measured(min(tried, key=lambda found: found.order))
         known = [found for k, found in sorted(self.results.items(), reverse=True) if k <= count]
         return min(known, key=_distance, default=None)
 
+    def as_it_is(self, wanted: Wanted) -> Found | None:
+        """Return strips that are the mesh itself: the wanted number, or one; else None."""
+        count = wanted.strips or 1
+        if self.predicted(count) > EXACT:
+            return None
+        found = self.strips(count)
+        if found is None or found.surface.farthest > EXACT or not wanted.met(found.surface):
+            return None
+        return found
+
     def within(self, wanted: Wanted) -> Found | None:
         """Return as few strips as meet bounds, or else the best."""
-        least = min((choice.least for choice in self.choices), default=1)
+        least = self.least
         most = min(wanted.most, max((choice.rows for choice in self.choices), default=0))
         low, high = max(least, 2) - 1, None
         aim = np.inf if wanted.max_deviation is None else wanted.max_deviation
@@ -120,14 +139,26 @@ class LineStrips:
         if self.stopped or not self.tell(count):
             self.stopped = True
             return None
-        if (_gaps(polygons, v) > _PLANAR * choice.predicted(lines)) != other:
+        ends = None
+        if count == 1:
+            one = single(cells, v)
+            polygons, ends = (polygons, None) if one is None else one
+        elif (_gaps(polygons, v) > _PLANAR * choice.predicted(lines)) != other:
             polygons = free_rulings(cells, v, self._fitter.normals)
         points = self._fitter.fit(polygons, v, fairness=fairness)
         if not np.isfinite(points).all():
             return None
-        surface = line_surface(self.mesh, polygons, points)
-        far = surface.distances(self.mesh)
-        return Found(replace(surface, deviation=far), far.mean, LINES)
+        surface = line_surface(self.mesh, polygons, points, ends)
+        return self._measured(Found(surface, 0.0, LINES), sampled=True)
+
+    def _measured(self, found: Found, *, sampled: bool = False) -> Found:
+        """Measure the distances of strips; samples do where they are exact."""
+        surface = found.surface
+        if surface.deviation is not None and surface.farthest <= _SAME:
+            return found
+        far = surface.distances(self.mesh, sampled=sampled)
+        surface = replace(surface, deviation=far)
+        return replace(found, surface=surface, mean=far.mean)
 
 
 def _distance(found: Found) -> tuple[bool, float]:
