@@ -17,11 +17,11 @@ from gso.first_use import at_first_use
 if TYPE_CHECKING:
     from gso.ruled.lines.line_families import Family, families
     from gso.ruled.lines.line_fit import planarised
-    from gso.ruled.lines.line_search import LineStrips
+    from gso.ruled.lines.line_search import EXACT, LineStrips
     from gso.ruled.lines.line_surface import line_surface
     from gso.ruled.lines.strip_cells import Cells
 
-__all__ = ["Cells", "Family", "LineStrips", "families", "line_surface", "planarised"]
+__all__ = ["EXACT", "Cells", "Family", "LineStrips", "families", "line_surface", "planarised"]
 
 # These import SciPy.
 __getattr__, __dir__ = at_first_use(
@@ -29,7 +29,7 @@ __getattr__, __dir__ = at_first_use(
     {
         "line_families": "Family families",
         "line_fit": "planarised",
-        "line_search": "LineStrips",
+        "line_search": "EXACT LineStrips",
         "line_surface": "line_surface",
         "strip_cells": "Cells",
     },

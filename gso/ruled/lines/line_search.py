@@ -97,9 +97,10 @@ class LineStrips:
 
     def within(self, wanted: Wanted) -> Found | None:
         """Return as few strips as meet bounds, or else the best."""
-        least = self.least
+        # A single strip is of use where the lines that become rulings are straight.
+        least = max(self.least, 1 if self.predicted(1) <= EXACT else 2)
         most = min(wanted.most, max((choice.rows for choice in self.choices), default=0))
-        low, high = max(least, 2) - 1, None
+        low, high = least - 1, None
         aim = np.inf if wanted.max_deviation is None else wanted.max_deviation
         count = next((k for k in range(low + 1, most + 1) if self.predicted(k) <= aim), most)
         for _ in range(_SOLVES):

@@ -11,7 +11,7 @@ from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Mesh, Nearest, topology
 from gso.parametrization import beside, upright
 from gso.pattern import Pattern
-from gso.ruled.fold_lines import Folds
+from gso.ruled.fold_lines import Folds, bend_radii
 from gso.ruled.lines.polygons import Polygons
 from gso.ruled.ruled_surface import RuledSurface
 from gso.ruled.sheet import seam_pairs
@@ -225,11 +225,7 @@ def _sharp(edges: Ints, planes: _Planes) -> Folds:
 
 
 def _folds(hinges: Ints, strip: Ints, planes: _Planes, rings: list[Ints], vertices: Array) -> Folds:
-    """Return the rulings of strips (r,), with radii from the distances of the next rulings.
-
-    Where several rulings of a strip meet in a vertex, the sheet turns there by all of their angles,
-    on the way from the ruling before them to the one after them.
-    """
+    """Return the rulings of strips (r,), with radii from the distances of the next rulings."""
     angle, count = _turns(hinges, planes), len(hinges)
     cell, own = hinges[:, :2].T.ravel(), np.tile(np.arange(count), 2)
     order = np.lexsort((own, cell))
@@ -245,13 +241,8 @@ def _folds(hinges: Ints, strip: Ints, planes: _Planes, rings: list[Ints], vertic
         corner = vertices[rings[cell[k]]]
         way = np.broadcast_to(unit(ends[k, 1] - ends[k, 0]), corner.shape)
         off[k] = lengths(cross(corner - ends[k, 0], way)).max()
-    key = strip[:, None] * len(vertices) + hinges[:, 2:]
-    _, at = np.unique(key, return_inverse=True)
-    width = np.bincount(at.ravel(), 0.5 * (off[:count] + off[count:]).ravel())
-    turn = np.minimum(np.bincount(at.ravel(), np.repeat(np.abs(angle), 2)), np.pi)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        radius = (width / (2.0 * np.sin(0.5 * turn)))[at.reshape(-1, 2)].min(axis=1)
-    radius[angle == 0.0] = np.inf
+    meeting = strip[:, None] * len(vertices) + hinges[:, 2:]
+    radius = bend_radii(meeting, 0.5 * (off[:count] + off[count:]), angle)
     return Folds(hinges[:, 2:], angle, radius)
 
 

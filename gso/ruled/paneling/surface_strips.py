@@ -16,7 +16,7 @@ from gso.pipeline.user_result import pack, record_violations
 from gso.result import Result, StripsResult
 from gso.ruled.conditions import Conditions
 from gso.ruled.domain import Domain
-from gso.ruled.lines import LineStrips
+from gso.ruled.lines import EXACT, LineStrips
 from gso.ruled.paneling.options import RULED, Options
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.ruled_surface import RuledSurface
@@ -195,7 +195,7 @@ def along_lines(
     aim = wanted(options, request.max_deviation, design.diagonal)
     if most == 0:
         found = lines.as_it_is(aim)
-    elif aim.strips == 1 or options.flats:
+    elif options.flats or (aim.strips == 1 and lines.predicted(1) > EXACT):
         found = None
     elif aim.strips is None:
         found = lines.within(aim if most is None else replace(aim, most=min(most, aim.most)))
