@@ -133,6 +133,18 @@ def test_more_strips_are_nearer():
     assert far[2] < far[0] / 8
 
 
+@pytest.mark.parametrize("kind", ["hypar", "pillow"])
+def test_twice_as_many_strips_are_not_farther(kind):
+    x, y = np.meshgrid(*[np.linspace(-1, 1, 7)] * 2, indexing="ij")
+    z = 0.4 * (x * y if kind == "hypar" else np.cos(1.5 * x) * np.cos(1.5 * y))
+    mesh = scaled(np.stack([x, y, z], axis=-1))
+    # Each number is solved for on its own.
+    found = [LineStrips(mesh).strips(count).surface for count in (3, 6)]
+    assert all(surface.sound for surface in found)
+    far = np.array([surface.farthest for surface in found])
+    assert (np.diff(far) <= 0).all()
+
+
 def test_distances_are_those_of_samples():
     mesh = scaled(dome())
     surface = LineStrips(mesh).strips(4).surface
@@ -260,7 +272,7 @@ def test_radii_are_those_of_the_surface_where_rulings_meet():
 
 
 def test_the_nearer_strips_are_returned():
-    design = gso.as_mesh(dome())
-    lines = LineStrips(scaled(dome())).strips(3).surface
+    design = gso.as_mesh(dome(9))
+    lines = LineStrips(scaled(design)).strips(3).surface
     result = gso.strips(design, strips=3)
     assert result.ruled.farthest <= lines.farthest * design.diagonal * (1 + 1e-6)

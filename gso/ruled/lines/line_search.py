@@ -28,6 +28,8 @@ _PLANAR = 0.2
 #: Whether to take the other kind of rulings, and fairness, one after the other until nothing folds;
 #: half of them for the second family.
 _SETTINGS = ((False, 0.03), (True, 0.03), (False, 0.5), (True, 0.5))
+#: Ratio to the distance that is predicted for half as many strips from which others are tried.
+_WORSE = 3.0
 #: Distance of samples from one another's surfaces at which strips are the mesh.
 _SAME = 1e-7
 #: Distance at which a mesh counts as developable as it is.
@@ -50,6 +52,7 @@ class LineStrips:
         self.mesh, self.tell = mesh, tell
         self.stopped = False
         self.results: dict[int, Found] = {}
+        self._measured: set[int] = set()
         try:
             self.choices = [Choice(family) for family in families(mesh)]
         except MeshError:
@@ -70,20 +73,42 @@ class LineStrips:
         """Return the best strips of at most a number, which is solved for; None if there are none.
 
         More strips are never farther away: fewer that were solved before are returned where they
-        are nearer.
+        are nearer. Half as many are solved for where the distance is much larger than predicted.
         """
-        if count not in self.results and not self.stopped:
-            tried: list[Found] = []
-            for place, candidate in enumerate(self._candidates(count)):
-                for settings in _SETTINGS[: len(_SETTINGS) >> place]:
-                    found = self._solved(*candidate, *settings)
-                    tried += [] if found is None else [found]
-                    if found is None or found.surface.sound:
-                        break
-            if tried:
-                self.results[count] = self._measured(min(tried, key=lambda found: found.order))
-        known = [found for k, found in sorted(self.results.items(), reverse=True) if k <= count]
-        return min(known, key=_distance, default=None)
+        self._solve(count)
+        known = [k for k in sorted(self.results, reverse=True) if k <= count]
+        best = min(known, key=lambda k: _distance(self.results[k]), default=None)
+        return None if best is None else self._certain(best)
+
+    def _solve(self, count: int) -> None:
+        """Solve for a number of strips; their largest distance is that of samples."""
+        if count in self.results or self.stopped:
+            return
+        half = max(count // 2, 1)
+        limit = _WORSE * self.predicted(half)
+        tried: list[Found] = []
+        for place, candidate in enumerate(self._candidates(count)):
+            for turn, settings in enumerate(_SETTINGS[: len(_SETTINGS) >> place]):
+                found = self._solved(*candidate, *settings)
+                tried += [] if found is None else [found]
+                near = found is None or turn > 0 or found.surface.farthest <= limit
+                if found is None or (near and found.surface.sound):
+                    break
+        if tried:
+            best = self.results[count] = min(tried, key=lambda found: found.order)
+            if half >= max(self.least, 2) and _distance(best) > (False, limit):
+                self._solve(half)
+
+    def _certain(self, count: int) -> Found:
+        """Return solved strips with the largest distance of all points."""
+        found = self.results[count]
+        # Samples do where strips are the mesh.
+        if count not in self._measured and found.surface.farthest > _SAME:
+            far = found.surface.distances(self.mesh)
+            surface = replace(found.surface, deviation=far)
+            found = self.results[count] = replace(found, surface=surface, mean=far.mean)
+        self._measured.add(count)
+        return found
 
     def as_it_is(self, wanted: Wanted) -> Found | None:
         """Return strips that are the mesh itself: the wanted number, or one; else None."""
@@ -106,17 +131,28 @@ class LineStrips:
         for _ in range(_SOLVES):
             if not low < count <= most or self.stopped:
                 break
-            found = self.strips(count)
-            if found is not None and wanted.met(found.surface):
+            self._solve(count)
+            if self._meets(wanted, count):
                 high = count
                 count = count - 1 if count - low <= 3 else (low + count) // 2
             else:
                 low = count
                 more = max(count + 1, round(_MORE * count))
                 count = min(more, most) if high is None else (low + high) // 2
-        every = [self.results[k] for k in sorted(self.results)]
-        met = [found for found in every if wanted.met(found.surface)]
-        return met[0] if met else min(every, key=_distance, default=None)
+        every = sorted(k for k in self.results if k <= most)
+        met = next((k for k in every if self._meets(wanted, k)), None)
+        best = min(every, key=lambda k: _distance(self.results[k]), default=met)
+        best = best if met is None else met
+        return None if best is None else self._certain(best)
+
+    def _meets(self, wanted: Wanted, count: int) -> bool:
+        """Return whether a number of strips was solved for and meets bounds."""
+        found = self.results.get(count)
+        return (
+            found is not None
+            and wanted.met(found.surface)
+            and wanted.met(self._certain(count).surface)
+        )
 
     def _candidates(self, count: int) -> list[tuple[Choice, Ints]]:
         chosen = [(choice, choice.lines(count)) for choice in self.choices]
@@ -150,16 +186,8 @@ class LineStrips:
         if not np.isfinite(points).all():
             return None
         surface = line_surface(self.mesh, polygons, points, ends)
-        return self._measured(Found(surface, 0.0, LINES), sampled=True)
-
-    def _measured(self, found: Found, *, sampled: bool = False) -> Found:
-        """Measure the distances of strips; samples do where they are exact."""
-        surface = found.surface
-        if surface.deviation is not None and surface.farthest <= _SAME:
-            return found
-        far = surface.distances(self.mesh, sampled=sampled)
-        surface = replace(surface, deviation=far)
-        return replace(found, surface=surface, mean=far.mean)
+        far = surface.distances(self.mesh, sampled=True)
+        return Found(replace(surface, deviation=far), far.mean, LINES)
 
 
 def _distance(found: Found) -> tuple[bool, float]:
