@@ -58,7 +58,7 @@ def solve_and_judge(run: Run) -> Result:
                 f"the solve by {request.formulation!r} is less developable than its start: this is "
                 f"the result of {begun.formulation!r}"
             )
-            best = replace(other, notes=(*other.notes, note))
+            best = replace(other, notes=(*dict.fromkeys([*best.notes, *other.notes]), note))
     return solves.summed(best)
 
 
