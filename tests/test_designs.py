@@ -124,3 +124,11 @@ def test_isometry_is_no_worse_than_its_start():
         [metrics.loss_gc_worst(r.mesh, scale=1.0) for r in (start, result)],
     )
     assert flatter <= 1.5 * curved or less < 0.5 * strain
+
+
+def test_noise_of_rounding_errors_changes_the_energy_of_results_little():
+    (mesh,) = (d.mesh for d in KINDS["irregular"](0) if "inset" in d.name)
+    noise = 1e-9 * mesh.size * np.random.default_rng(0).standard_normal(mesh.vertices.shape)
+    copies = (mesh, mesh.replaced(mesh.vertices + noise))
+    one, two = (sum(gso.tno.optimize(m, verdict=False).energy.values()) for m in copies)
+    assert abs(one - two) < 3e-3 * one

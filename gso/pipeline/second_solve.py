@@ -58,7 +58,7 @@ def solve_and_judge(run: Run) -> Result:
                 f"the solve by {request.formulation!r} is less developable than its start: this is "
                 f"the result of {begun.formulation!r}"
             )
-            best = replace(other, notes=(*other.notes, note))
+            best = replace(other, notes=(*dict.fromkeys([*best.notes, *other.notes]), note))
     return solves.summed(best)
 
 
@@ -135,14 +135,14 @@ def _is_worse(result: Result, other: Result) -> bool:
     """Return whether a result is worse than another one.
 
     It is if only the other is usable, or if it has more than one and a half times the other's
-    curvature and no less than half of its strain. Of two that are not usable, it is too if it
-    misses its limits by more.
+    curvature and no less than half of its strain. Of two that are not usable, it is too if only it
+    has faults.
     """
     if result.usable != other.usable:
         return other.usable
     one, two = (loss_gc_worst(r.mesh, scale=1.0) for r in (result, other))
     curved = one > _RISE * two and not _strain(result) < _GAIN * _strain(other)
-    return curved or excess(other) < excess(result)
+    return curved or excess(other) < np.inf == excess(result)
 
 
 def _strain(result: Result) -> float:
