@@ -108,6 +108,29 @@ sheet = click.option(
     nargs=2,
     help="Length and width of a sheet, in mm: every part must fit on one.",
 )
+scale = click.option(
+    "--scale",
+    metavar="X",
+    type=float,
+    help="Factor of the design's size; all other options are about the scaled design.",
+)
+height = click.option(
+    "--height",
+    metavar="LENGTH",
+    type=LENGTH,
+    help="The same by the height that the design gets, such as 200mm.",
+)
+up = click.option(
+    "--up", type=click.Choice("xyz"), default="z", help="The axis that --height is along."
+)
+tabs = click.option(
+    "--tabs", metavar="MM", type=float, help="Width of tabs along seams, for paper."
+)
+numbers = click.option(
+    "--numbers",
+    type=click.Choice(("inside", "outside")),
+    help="Where the numbers of seams stand: in the parts, or on tabs and outside the outlines.",
+)
 darts = click.option("--darts/--no-darts", default=False, help="Whether cuts may end in a piece.")
 keep_groups = click.option(
     "--keep-groups",

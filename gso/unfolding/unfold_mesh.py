@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -38,6 +39,7 @@ def unfold(
     cut: ArrayLike | None = None,
     sheet: tuple[Length, Length] | None = None,
     unit: str = "mm",
+    scale: float = 1.0,
     flat_angle: float = 0.01,
     effort: float = 1.0,
     seed: int = 0,
@@ -64,6 +66,8 @@ def unfold(
         "3m".
     unit : str
         Unit of the coordinates.
+    scale : float
+        Factor by which the surface is scaled before anything else.
     flat_angle : float
         Angle in degrees up to which an edge is no fold, and is not cut where that can be avoided.
     effort : float
@@ -98,7 +102,10 @@ def unfold(
     as_positive(effort, "effort", zero=True)
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise OptionError(f"seed is {seed!r}; it must be a whole number of 0 or more")
+    as_positive(scale, "scale")
     faces = _faces(mesh)
+    if scale != 1.0:
+        faces = replace(faces, mesh=faces.mesh.replaced(scale * faces.mesh.vertices))
     size = as_sheet(sheet, unit)
     joined = join_patches(
         faces.mesh.vertices,

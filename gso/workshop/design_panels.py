@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -96,17 +97,18 @@ def _without_poles(given: Design) -> Design:
 def _exact(given: Design, settings: FabricationSettings) -> Made | None:
     """Unfold a design that is flat or developable as it is; None if it is not."""
     thick = given.sheet
-    try:
-        found = folded_pattern(
-            given.mesh,
-            max_strain=settings.strain,
-            cut=given.kept,
-            sheet=settings.max_size,
-            press_radius=None if thick is None else ((_PRESSED + 1) * thick, _PRESSED * thick),
-        )
-    except OptionError:
-        # A face is larger than the sheet.
-        return None
+    found = None
+    for sheet in dict.fromkeys((settings.max_size or settings.page, settings.max_size)):
+        # Where a face is larger than the sheet or the page there is an error.
+        with suppress(OptionError):
+            found = folded_pattern(
+                given.mesh,
+                max_strain=settings.strain,
+                cut=given.kept,
+                sheet=sheet,
+                press_radius=None if thick is None else ((_PRESSED + 1) * thick, _PRESSED * thick),
+            )
+            break
     if found is None:
         return None
     record = measurements.of_pattern(

@@ -55,11 +55,11 @@ class Design:
     sheet: float | None = None
 
 
-def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
+def designs_of(given: Designs, *, keep_groups: bool = False, scale: float = 1.0) -> list[Design]:
     """Read designs, and divide them into components.
 
-    Solids of sheet metal in CAD files become one of their sides, and several have the names that
-    the file gives them.
+    They are scaled first. Solids of sheet metal in CAD files become one of their sides, and
+    several have the names that the file gives them.
 
     Raises
     ------
@@ -75,6 +75,8 @@ def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
         stem = f"design{suffix}" if path is None else path.stem
         mesh = io.as_mesh(one)
         mesh.check_joined()
+        if scale != 1.0:
+            mesh = mesh.replaced(scale * mesh.vertices)
         kept = Groups().edges(mesh) if keep_groups else _no_edges()
         components = split(mesh)
         notes = tuple(f"{stem}: {note}" for note in mesh.notes)

@@ -36,6 +36,9 @@ class FabricationSettings:
         Smallest radius of a bend, in the unit of the files.
     unit : str
         Unit of the files.
+    page : (float, float) or None
+        Length and width of a page that parts of designs that keep their shape fit if they can, in
+        the unit of the files.
     """
 
     formulation: str = "ruled"
@@ -46,6 +49,7 @@ class FabricationSettings:
     max_size: tuple[float, float] | None = None
     min_radius: float | None = None
     unit: str = "mm"
+    page: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.formulation not in FORMULATIONS:

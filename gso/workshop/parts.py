@@ -181,9 +181,10 @@ def _finished(
     if finish.notches is not None:
         spacing = finish.notches
         part = replace(part, notches=tuple(n for j in joints for n in _notches(j, spacing)))
-    if finish.tabs is not None:
-        numbers = (finish.labels or _NUMBERS) if finish.notches is None else None
-        part = with_tabs(part, seams, finish.tabs, numbers=numbers)
+    if finish.tabs is not None or finish.numbers is not None:
+        numbered = finish.notches is None or finish.numbers is not None
+        numbers = (finish.labels or _NUMBERS) if numbered else None
+        part = with_tabs(part, seams, finish.tabs, numbers=numbers, place=finish.numbers)
     part = part.turned(-rectangle(part.outline)[0])
     part = offset(with_allowance(part, finish.allowance), 0.5 * finish.kerf)
     if finish.face == "inside":

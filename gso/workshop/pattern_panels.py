@@ -44,7 +44,8 @@ def of_surface(
     """
     panels, label, local = _divided(surface.vertices, pattern, folded)
     panels = [replace(panel, rolled=panel.radii > 0) for panel in panels]
-    matings = of_pattern(surface.vertices, pattern, label, local)
+    corners = len(folded.edges) > 0
+    matings = of_pattern(surface.vertices, pattern, label, local, corners)
     return Made(name, _named(panels, [name] * len(panels)), numbered(matings), record)
 
 

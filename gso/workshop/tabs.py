@@ -54,7 +54,12 @@ class TabSeam:
 
 
 def with_tabs(
-    part: Part, seams: Sequence[TabSeam], width: float, *, numbers: float | None = None
+    part: Part,
+    seams: Sequence[TabSeam],
+    width: float | None,
+    *,
+    numbers: float | None = None,
+    place: str | None = None,
 ) -> Part:
     """Add trapezoidal tabs along seams, and the seams' numbers.
 
@@ -67,10 +72,13 @@ def with_tabs(
     ----------
     part : Part
     seams : sequence of TabSeam
-    width : float
-        Width of the tabs, in millimetres.
+    width : float or None
+        Width of the tabs, in millimetres; None for none.
     numbers : float, optional
-        Height of the numbers of seams, which stand on their longest tab and beside the other side.
+        Height of the numbers of seams; they are no higher than half of their seam is long.
+    place : {"inside", "outside"}, optional
+        Where numbers stand: beside seams in the part, or on the longest tab of a seam, otherwise
+        outside the part. When not given, on the longest tab, otherwise in the part.
     """
     whole = region(part.outline, part.holes)
     creases: list[Array] = []
@@ -79,21 +87,23 @@ def with_tabs(
         return part
     for seam in seams:
         added: list[tuple[Array, float]] = []
-        for piece, there in _divided(seam.line, seam.other, width) if seam.tabs else ():
+        pieces = [] if width is None else _divided(seam.line, seam.other, width)
+        for piece, there in pieces if seam.tabs else ():
             room = _room(seam.glued, piece, there)
             for share in _SHARES:
-                corners = _tab(piece, share * width, _angles(seam.glued, there))
+                high = share * (width or 0.0)
+                corners = _tab(piece, high, _angles(seam.glued, there))
                 tab = region(corners)
                 if tab.area <= 0 or without(tab, room).area > _ON * tab.area:
                     continue
                 joined = united(whole, tab) if common(whole, tab).area <= _ON * tab.area else None
                 if joined is not None:
                     whole = joined
-                    added.append((piece, share * width))
+                    added.append((piece, high))
                     break
         creases += [piece for piece, _ in added]
         if numbers is not None:
-            labels.append(_number(seam, added, numbers))
+            labels.append(_number(seam, added, numbers, place))
     outline, holes = rings(whole)
     return replace(
         part,
@@ -198,14 +208,18 @@ def _inner(line: Array) -> Array:
     return np.stack([np.interp(at, along, c) for c in line.T], axis=1)
 
 
-def _number(seam: TabSeam, added: Sequence[tuple[Array, float]], height: float) -> Label:
-    """Place the number of a seam on its longest tab, otherwise beside its middle in the part."""
-    if added:
+def _number(
+    seam: TabSeam, added: Sequence[tuple[Array, float]], height: float, place: str | None
+) -> Label:
+    """Place the number of a seam on its longest tab, or beside its middle."""
+    if added and place != "inside":
         piece, width = max(added, key=lambda one: float(np.linalg.norm(one[0][-1] - one[0][0])))
         away = -0.5 * width
         height = min(height, 0.6 * width)
     else:
-        piece, away = _inner(seam.line), height
+        piece = _inner(seam.line)
+        height = min(height, float(np.linalg.norm(piece[-1] - piece[0])))
+        away = -height if place == "outside" else height
     way = piece[-1] - piece[0]
     along = way / max(float(np.linalg.norm(way)), 1e-300)
     middle = 0.5 * (piece[0] + piece[-1]) + away * np.array([-along[1], along[0]])
