@@ -152,3 +152,73 @@ def test_a_paper_model_may_pass_through_itself(tmp_path):
     )
     assert paper.usable and len(paper.parts) == 1
     assert any("passes through itself at faces" in note for note in paper.certificate["notes"])
+
+
+def cubes(*corners) -> tuple[np.ndarray, list[list[int]]]:
+    """Unit cubes at integer corners, with common vertices; a common face is there once."""
+    places: dict[tuple[int, ...], int] = {}
+    faces: dict[tuple[int, ...], list[int]] = {}
+    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    for corner in corners:
+        own = [
+            places.setdefault((corner[0] + x, corner[1] + y, corner[2] + z), len(places))
+            for x in (0, 1)
+            for y in (0, 1)
+            for z in (0, 1)
+        ]
+        for side in sides:
+            face = [own[k] for k in side]
+            faces.setdefault(tuple(sorted(face)), face)
+    return np.array(list(places), float), list(faces.values())
+
+
+@pytest.mark.parametrize("other", [(1, 1, 1), (1, 1, 0)])
+def test_bodies_that_touch_stay_closed(tmp_path, other):
+    points, faces = cubes((0, 0, 0), other)
+    net = gso.unfold((points, faces))
+    # Two cubes with all of their folds.
+    assert len(net) == 2 and len(net.angles) == 10
+    job = gso.fabricate((points, faces), tmp_path, formats=("svg",), workers=0)
+    assert job.usable and sum(part.count for part in job.parts) == 2
+    assert sum(len(part.bends) * part.count for part in job.parts) == 10
+    said = job.certificate["notes"]
+    assert any("divided" in note for note in said) and not any("weld" in note for note in said)
+
+
+def test_faces_inside_bodies_are_named(tmp_path):
+    points, faces = cubes((0, 0, 0), (1, 0, 0), (1, 1, 0))
+    middle = np.array([points[face].mean(axis=0) for face in faces])
+    inner = [[1.0, 0.5, 0.5], [1.5, 1.0, 0.5]]
+    with pytest.raises(
+        gso.MeshError, match=r"face \d+ at \(1, .*inside a body.*2 such faces"
+    ) as it:
+        gso.unfold((points, faces))
+    assert middle[int(str(it.value).split()[1])].tolist() in inner
+    with pytest.raises(gso.MeshError, match="inside a body"):
+        gso.fabricate((points, faces), tmp_path)
+    # A wall between two of the sides of a body that is open at the top is no such face.
+    above = [f for f in faces if not (points[f, 2] == 1).all()]
+    assert gso.unfold((points, above)).areas.sum() == pytest.approx(len(above))
+    points, faces = cubes((0, 0, 0))
+    with pytest.raises(gso.MeshError, match="face 6 has the corners of face 2"):
+        gso.unfold((points, [*faces, faces[2]]))
+
+
+def test_seams_are_named_by_edges(tmp_path):
+    job = gso.fabricate(
+        house(), tmp_path, formats=("svg",), cut=[[0, 4], [1, 5]], keep=[[2, 6], [8, 9]], workers=0
+    )
+    lengths = sorted(
+        round(float(np.linalg.norm(bend.line[1] - bend.line[0])), 6) for bend in job.parts[0].bends
+    )
+    # The upright edge and the ridge are folds; of the other upright ones at most one is.
+    assert len(job.parts) == 1 and 6.0 in lengths and 1 <= lengths.count(3.0) <= 2
+    name = write(house(), tmp_path / "house.obj")
+    words = ["fabricate", name, "-o", str(tmp_path / "a"), "--format", "svg", "--workers", "0"]
+    done = CliRunner().invoke(main, [*words, "--cut", "0-4", "--keep", "8-9"])
+    assert done.exit_code == 0, done.output
+    for more, said in ((["--cut", "0-9"], "0-9 is no edge"), (["--keep", "x"], "'x' is no edge")):
+        done = CliRunner().invoke(main, [*words, *more])
+        assert done.exit_code != 0 and said in done.output
+    job = gso.fabricate(house(), tmp_path / "b", cut=[[0, 4]], keep=[[4, 0]], workers=0)
+    assert "is in keep and in cut" in str(job.reasons[0])

@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 @shared.max_strain
 @shared.max_strips
 @shared.darts
+@shared.cut
+@shared.keep
 @shared.keep_groups
 @shared.min_radius
 @click.option("--thickness", metavar="MM", type=shared.MM, help="Thickness of the sheet.")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,6 @@ from gso.cli import shared_options as shared
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
-    from gso.typing import Ints
     from gso.unfolding import Net
     from gso.workshop import Drawing, Finish
 
@@ -24,10 +22,8 @@ if TYPE_CHECKING:
     "Drawing to write, .svg, .dxf or .pdf: the parts at 1:1 with layers to cut and to fold. In a "
     "PDF each part that fits has a page of its own.",
 )
-@click.option(
-    "--cut", metavar="A-B", multiple=True, help="Edge to cut, by its vertices, the first being 0."
-)
-@click.option("--keep", metavar="A-B", multiple=True, help="Edge that is not cut in any case.")
+@shared.cut
+@shared.keep
 @shared.keep_groups
 @shared.sheet
 @click.option(
@@ -56,8 +52,8 @@ if TYPE_CHECKING:
 def unfold(
     name: str,
     out: str,
-    cut: tuple[str, ...],
-    keep: tuple[str, ...],
+    cut: tuple[tuple[int, int], ...],
+    keep: tuple[tuple[int, int], ...],
     keep_groups: bool,
     sheet: tuple[float, float] | None,
     flat_angle: float,
@@ -91,7 +87,7 @@ def unfold(
         raise OptionError(f"--paper {paper} needs an output whose name ends in {SUFFIX}")
     file_options.spare([name], [out], force)
     finish = Finish(notches=None, tabs=tabs, numbers=numbers)
-    edges = _edges(cut, "cut")
+    edges = np.array(cut, np.int64).reshape(-1, 2)
     mesh = file_options.load(name, weld) if keep_groups or weld is not None else name
     if keep_groups and not isinstance(mesh, str):
         edges = np.concatenate([edges, Labels("g").edges(mesh)])
@@ -101,7 +97,7 @@ def unfold(
         return make(
             mesh,
             cut=edges,
-            keep=_edges(keep, "keep"),
+            keep=np.array(keep, np.int64).reshape(-1, 2),
             sheet=sheet and finish.room(sheet, 1.0),
             unit=unit,
             scale=factor,
@@ -122,19 +118,6 @@ def unfold(
     writers.write(drawn(net, Path(name).stem, unit, finish), out, **options)
     if not quiet:
         click.echo("\n".join(text(net, unit)))
-
-
-def _edges(given: tuple[str, ...], name: str) -> Ints:
-    """Return edges, given as texts, as an array (k, 2)."""
-    import numpy as np
-
-    out = []
-    for word in given:
-        found = re.fullmatch(r"\s*(\d+)\s*-\s*(\d+)\s*", word)
-        if found is None:
-            raise OptionError(f"--{name} is {word!r}; it must be two vertices such as 0-7")
-        out.append([int(found[1]), int(found[2])])
-    return np.array(out, np.int64).reshape(-1, 2)
 
 
 def drawn(net: Net, name: str, unit: str, finish: Finish) -> Drawing:

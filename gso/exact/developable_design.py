@@ -57,6 +57,7 @@ def folded_pattern(
     max_strain: Strain = 1e-3,
     max_deviation: Length | None = None,
     cut: ArrayLike = (),
+    keep: ArrayLike = (),
     sheet: tuple[float, float] | None = None,
     bend_step: float | None = None,
     press_radius: tuple[float, float] | None = None,
@@ -71,8 +72,8 @@ def folded_pattern(
     max_deviation : float or str, optional
         Largest distance of vertices from the cylinder or cone that they are counted to; the
         accuracy of the coordinates when not given.
-    cut : array_like of int, (k, 2)
-        Edges that are cut in any case.
+    cut, keep : array_like of int, (k, 2)
+        Edges that are cut in any case, and that are not.
     sheet : (float, float), optional
         Length and width that a part may have, in the mesh's unit.
     bend_step : float, optional
@@ -108,6 +109,7 @@ def folded_pattern(
         shape.face,
         flat,
         cut=np.concatenate([np.reshape(cut, (-1, 2)).astype(int), _unequal(shape, flat)]),
+        keep=keep,
         sheet=sheet,
     )
     sliced = SlicedPattern.of(shape, joined)

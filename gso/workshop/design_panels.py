@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -63,6 +62,11 @@ def made(
     exact = _exact(given, settings)
     if exact is not None and (given.sheet is not None or not exact.reasons or _is_hopeless(exact)):
         return exact
+    if len(given.uncut):
+        raise OptionError(
+            f"{given.name} is not flat or developable as it is, and only then edges can be kept; "
+            "leave out keep"
+        )
     if given.sheet is not None:
         raise MeshError(
             f"{given.name}: the sheet of {given.sheet:.6g} is not developable, or a face is larger "
@@ -90,8 +94,8 @@ def _without_poles(given: Design) -> Design:
     rank[order] = np.arange(len(order))
     new = rank[number]
     joined = Mesh(mesh.vertices[first[order]], collapse(mesh.faces, new).faces)
-    ids = new[given.kept]
-    return replace(given, mesh=joined, kept=ids[ids[:, 0] != ids[:, 1]])
+    kept, uncut = (ids[ids[:, 0] != ids[:, 1]] for ids in (new[given.kept], new[given.uncut]))
+    return replace(given, mesh=joined, kept=kept, uncut=uncut)
 
 
 def _exact(given: Design, settings: FabricationSettings) -> Made | None:
@@ -99,16 +103,20 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
     thick = given.sheet
     found = None
     for sheet in dict.fromkeys((settings.max_size or settings.page, settings.max_size)):
-        # Where a face is larger than the sheet or the page there is an error.
-        with suppress(OptionError):
+        try:
             found = folded_pattern(
                 given.mesh,
                 max_strain=settings.strain,
                 cut=given.kept,
+                keep=given.uncut,
                 sheet=sheet,
                 press_radius=None if thick is None else ((_PRESSED + 1) * thick, _PRESSED * thick),
             )
             break
+        except OptionError:
+            # A face is larger than the sheet or the page.
+            if len(given.uncut) and sheet == settings.max_size:
+                raise
     if found is None:
         return None
     record = measurements.of_pattern(

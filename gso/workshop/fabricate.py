@@ -90,6 +90,8 @@ def fabricate(
     max_strain: Strain | None = None,
     max_strips: int = 64,
     darts: bool = False,
+    cut: ArrayLike | None = None,
+    keep: ArrayLike | None = None,
     keep_groups: bool = False,
     min_radius: Length | None = None,
     finish: Finish = Finish(),  # noqa: B008
@@ -139,6 +141,9 @@ def fabricate(
         Largest number of strips side by side of one piece.
     darts : bool
         Whether cuts may end inside a piece.
+    cut, keep : array_like of int, (k, 2), optional
+        Edges of the design, by their vertices, that are cut in any case, and that are not: these
+        only for designs that keep their shape.
     keep_groups : bool
         Whether to cut between the groups of faces (``g``) of an OBJ file in any case; without
         two of them, between its objects (``o``) or materials (``usemtl``).
@@ -219,7 +224,7 @@ def fabricate(
                 "out the unit"
             )
     place = Path(os.fsdecode(folder))
-    every = designs_of(designs, keep_groups=keep_groups, scale=scale)
+    every = designs_of(designs, cut=cut, keep=keep, keep_groups=keep_groups, scale=scale)
     thin = [design.name for design in every if step and design.sheet is None]
     if thin and finish.thickness is None:
         raise OptionError(

@@ -30,7 +30,7 @@ _FORMAT = 5
 
 def key(design: Design, settings: FabricationSettings) -> str:
     """Return what identifies the work on a design: its digest and what was asked."""
-    own = [digest(design.mesh), design.kept.tolist(), design.sheet]
+    own = [digest(design.mesh), design.kept.tolist(), design.uncut.tolist(), design.sheet]
     said = json.dumps([_FORMAT, version("gso"), *own, plain(settings.record())], sort_keys=True)
     return hashlib.sha256(said.encode()).hexdigest()
 
