@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.exact.fold_edges import fold_edges
+from gso.exact.fold_edges import FOLD, fold_edges
 from gso.exact.low_poly import facets, is_low_poly
+from gso.exact.rolled_faces import fold
 from gso.exact.ruled_bends import joined_bends, ruled_bends
 from gso.exact.sliced_pattern import SlicedPattern, shape_size
 from gso.mesh import Mesh
@@ -18,6 +19,7 @@ from gso.recognition import Recognised, recognise
 from gso.typing import Array, Ints
 from gso.unfolding import join_patches
 from gso.unfolding.dual_edges import dual_edges
+from gso.unfolding.folding import misfit
 
 #: Difference of lengths, relative to the size, up to which edges are equally long.
 _SAME = 1e-7
@@ -34,13 +36,16 @@ class FoldedPattern:
     pattern : Pattern
         Its pattern. On cylinders and cones lengths are those of the round surface.
     folded : Folded
-        Edges of the pattern on bend lines; the radius of a fold is 0.
+        Edges of the pattern on bend lines; the radius of a fold is 0. There are very small ones
+        between facets that are nearly in one plane, see :attr:`bends`.
     recognised : Recognised
         The faces of the design.
     parts : int
         Number of parts.
     strain : float
         Largest strain of a face that has no equation.
+    face : ndarray of int, (t,)
+        The face in `recognised` of each triangle.
     """
 
     surface: Mesh
@@ -49,6 +54,32 @@ class FoldedPattern:
     recognised: Recognised
     parts: int
     strain: float
+    face: Ints
+
+    @property
+    def bends(self) -> Folded:
+        """The bends that are drawn: not folds of less than 0.05 degrees."""
+        kept = (self.folded.radii > 0) | (np.abs(self.folded.angles) > FOLD)
+        return Folded(*(values[kept] for values in self.folded))
+
+    def fold(self) -> Array:
+        """Fold and roll the parts by their bends alone.
+
+        Returns
+        -------
+        ndarray, (p, 3)
+            Positions of the pattern's vertices, each part in a place of its own: cylinders and
+            cones have the radii of their bends, and all other triangles stay flat.
+        """
+        is_round = np.array([face.surface is not None for face in self.recognised.faces])
+        return fold(self.pattern, self.folded, np.where(is_round[self.face], self.face, -1))
+
+    def misfit(self, design: Mesh) -> float:
+        """Return how far the folded parts are from the design's vertices at most."""
+        pattern, points = self.pattern, self.surface.vertices[self.pattern.vertex]
+        part = pattern.mesh.components
+        given = np.flatnonzero(pattern.vertex < len(design.vertices))
+        return misfit(self.fold()[given], points[given], part[given])
 
 
 def folded_pattern(
@@ -129,6 +160,7 @@ def folded_pattern(
         shape,
         int(joined.part.max()) + 1,
         max(face.strain for face in shape.faces),
+        sliced.label,
     )
 
 

@@ -135,7 +135,7 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
         "strain_p99": found.strain,
         "thickness": thick,
     }
-    one = of_surface(given.name, found.surface, found.pattern, record, found.folded)
+    one = of_surface(given.name, found.surface, found.pattern, record, found.bends)
     one = replace(one, reasons=compare(crossed(given.mesh), {}))
     return _checked(_bent(one), settings)
 
