@@ -45,11 +45,12 @@ def unfold(
     effort: float = 1.0,
     seed: int = 0,
 ) -> Net:
-    """Unfold a surface of flat faces: few flat parts that do not overlap, then short cuts.
+    """Unfold a surface of flat faces: few parts that do not overlap, short cuts, small outlines.
 
     The shape stays as it is, and no length changes. Faces in one plane are one. They are joined
     along the longest edges first wherever nothing overlaps; then a search (simulated annealing)
-    takes subtrees of the parts off and joins them elsewhere, so that parts can be united. The
+    takes subtrees of the parts off and joins them elsewhere, so that parts can be united. At last,
+    cuts are exchanged for shorter ones, and for others as long with a smaller rectangle. The
     result does not depend on the numbering of the mesh or its place in space, but for symmetric
     ones, whose nets are then congruent.
 
