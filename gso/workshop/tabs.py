@@ -54,24 +54,25 @@ class TabSeam:
 
 
 def with_tabs(
-    part: Part,
-    seams: Sequence[TabSeam],
+    parts: Sequence[Part],
+    seams: Sequence[Sequence[TabSeam]],
     width: float | None,
     *,
     numbers: float | None = None,
     place: str | None = None,
-) -> Part:
-    """Add trapezoidal tabs along seams, and the seams' numbers.
+) -> list[Part]:
+    """Add trapezoidal tabs along the seams of parts, and the seams' numbers.
 
     A tab lies within the face of the other part that it is glued to, and takes at most half of
     that face's angle at a corner, so that tabs behind the same face do not meet there. A tab that
     would lie on the part or on another tab is made narrower, and left out if a quarter of the width
-    does not fit.
+    does not fit. Where a seam gets no tab on its side, the other side is tried.
 
     Parameters
     ----------
-    part : Part
-    seams : sequence of TabSeam
+    parts : sequence of Part
+    seams : sequence of sequences of TabSeam
+        The seams of each part.
     width : float or None
         Width of the tabs, in millimetres; None for none.
     numbers : float, optional
@@ -80,38 +81,51 @@ def with_tabs(
         Where numbers stand: beside seams in the part, or on the longest tab of a seam, otherwise
         outside the part. When not given, on the longest tab, otherwise in the part.
     """
+    first = [_with_tabs(*own, width) for own in zip(parts, seams, strict=True)]
+    both = [
+        (seam, tabs)
+        for (_, some), own in zip(first, seams, strict=True)
+        for seam, tabs in zip(own, some, strict=True)
+    ]
+    bare = {seam.number for seam, tabs in both if seam.tabs and not tabs}
+    out = []
+    for (part, some), own in zip(first, seams, strict=True):
+        others = [replace(x, tabs=x.number in bare and not x.tabs) for x in own]
+        made, more = _with_tabs(part, others, width)
+        if numbers is not None:
+            labels = (
+                _number(seam, [*one, *two], numbers, place)
+                for seam, one, two in zip(own, some, more, strict=True)
+            )
+            made = replace(made, labels=(*made.labels, *labels))
+        out.append(made)
+    return out
+
+
+def _with_tabs(
+    part: Part, seams: Sequence[TabSeam], width: float | None
+) -> tuple[Part, list[list[tuple[Array, float]]]]:
+    """Add tabs to a part; also return the line and the width of those of each seam."""
+    found: list[list[tuple[Array, float]]] = [[] for _ in seams]
     whole = region(part.outline, part.holes)
-    creases: list[Array] = []
-    labels: list[Label] = []
-    if whole.geom_type != "Polygon":
-        return part
-    for seam in seams:
-        added: list[tuple[Array, float]] = []
-        pieces = [] if width is None else _divided(seam.line, seam.other, width)
-        for piece, there in pieces if seam.tabs else ():
+    if width is None or whole.geom_type != "Polygon":
+        return part, found
+    for seam, added in zip(seams, found, strict=True):
+        for piece, there in _divided(seam.line, seam.other, width) if seam.tabs else ():
             room = _room(seam.glued, piece, there)
             for share in _SHARES:
-                high = share * (width or 0.0)
-                corners = _tab(piece, high, _angles(seam.glued, there))
+                corners = _tab(piece, share * width, _angles(seam.glued, there))
                 tab = region(corners)
                 if tab.area <= 0 or without(tab, room).area > _ON * tab.area:
                     continue
                 joined = united(whole, tab) if common(whole, tab).area <= _ON * tab.area else None
                 if joined is not None:
                     whole = joined
-                    added.append((piece, high))
+                    added.append((piece, share * width))
                     break
-        creases += [piece for piece, _ in added]
-        if numbers is not None:
-            labels.append(_number(seam, added, numbers, place))
     outline, holes = rings(whole)
-    return replace(
-        part,
-        outline=outline,
-        holes=holes,
-        creases=(*part.creases, *creases),
-        labels=(*part.labels, *labels),
-    )
+    creases = (piece for added in found for piece, _ in added)
+    return replace(part, outline=outline, holes=holes, creases=(*part.creases, *creases)), found
 
 
 def _divided(line: Array, other: Array, width: float) -> list[tuple[Array, Array]]:
