@@ -59,8 +59,7 @@ class FoldedPattern:
     @property
     def bends(self) -> Folded:
         """The bends that are drawn: not folds of less than 0.05 degrees."""
-        kept = (self.folded.radii > 0) | (np.abs(self.folded.angles) > FOLD)
-        return Folded(*(values[kept] for values in self.folded))
+        return self.folded.taken((self.folded.radii > 0) | (np.abs(self.folded.angles) > FOLD))
 
     def fold(self) -> Array:
         """Fold and roll the parts by their bends alone.

@@ -38,13 +38,12 @@ def fold(pattern: Pattern, folded: Folded, rolled: Ints) -> Array:
     one, other = edges.triangles.T
     inner = (rolled[one] == rolled[other]) & (rolled[one] >= 0)
     body = label_components(len(faces), one[inner], other[inner])
-    rows = folded.radii > 0
-    curved = Folded(folded.edges[rows], folded.angles[rows], folded.radii[rows])
+    curved = folded.taken(folded.radii > 0)
     angle = angles_at(edges, curved, len(flat))
     radius = angles_at(edges, curved._replace(angles=curved.radii), len(flat))
     # A limiting line of a rolled face is a part of its roll.
     sharp = angle * ((rolled[one] < 0) & (rolled[other] < 0))
-    sharp += angles_at(edges, Folded(*(values[~rows] for values in folded)), len(flat))
+    sharp += angles_at(edges, folded.taken(folded.radii == 0), len(flat))
     local = np.pad(flat[faces], ((0, 0), (0, 0), (0, 1)))
     border = np.flatnonzero(body[one] != body[other])
     sides = edges.triangles[border]

@@ -66,8 +66,7 @@ class Net:
     @cached_property
     def folds(self) -> Folded:
         """The folds that are drawn: edges that do not count as flat."""
-        bent = np.abs(self.folded.angles) > np.radians(self.flat_angle)
-        return Folded(*(values[bent] for values in self.folded))
+        return self.folded.taken(np.abs(self.folded.angles) > np.radians(self.flat_angle))
 
     @property
     def angles(self) -> Array:
