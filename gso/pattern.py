@@ -23,6 +23,48 @@ def _no_seams() -> Ints:
     return np.empty((0, 2, 2), np.int64)
 
 
+class Zone(NamedTuple):
+    """A round face of a pattern, which is bent as a whole.
+
+    Attributes
+    ----------
+    kind : str
+        "cylinder", "cone", or "torsal" for any other developable surface.
+    least, most : float
+        Smallest and largest radius.
+    angle : float
+        Angle by which it turns in all, in radians, positive for mountain folds.
+    pressed : bool
+        Whether a press bends it at one line in its middle; otherwise it is rolled.
+    """
+
+    kind: str
+    least: float
+    most: float
+    angle: float
+    pressed: bool = False
+
+    def scaled(self, scale: float) -> Zone:
+        """Return it in another unit."""
+        return self._replace(least=scale * self.least, most=scale * self.most)
+
+    def in_words(self) -> str:
+        """Say what to do, with radii in millimetres.
+
+        >>> Zone("cylinder", 1500.0, 1500.0, np.pi).in_words()
+        'roll R 1500, 180 deg down'
+        >>> Zone("cone", 40.0, 90.0, -np.pi / 2).in_words()
+        'roll cone R 40 to 90, 90 deg up'
+        """
+        radii = f"R {self.least:.4g}"
+        if self.most > self.least * (1.0 + _STRAIGHT):
+            radii += f" to {self.most:.4g}" if np.isfinite(self.most) else " or more"
+        name = "" if self.kind == "cylinder" else f" {self.kind}"
+        way = "down" if self.angle > 0 else "up"
+        turn = abs(np.degrees(self.angle))
+        return f"{'press' if self.pressed else 'roll'}{name} {radii}, {turn:.4g} deg {way}"
+
+
 class Bend(NamedTuple):
     """A straight line to bend along.
 
@@ -35,11 +77,14 @@ class Bend(NamedTuple):
         folds, zero where nothing is bent.
     radius : float
         Radius of the bend, in the mesh's unit; infinite where nothing is bent.
+    zone : int
+        Number of the zone that it is a line of; -1 for none.
     """
 
     line: Array
     angle: float
     radius: float
+    zone: int = -1
 
     def in_words(self) -> str:
         """Describe the bend, with a radius in millimetres.
@@ -60,15 +105,19 @@ class Folded(NamedTuple):
     edges : ndarray of int, (k, 2)
     angles, radii : ndarray, (k,)
         As of a :class:`Bend`.
+    zone : ndarray of int, (k,) or (0,)
+        Number of each edge's zone, -1 for none; empty without zones.
     """
 
     edges: Ints = np.empty((0, 2), np.int64)
     angles: Array = np.empty(0)
     radii: Array = np.empty(0)
+    zone: Ints = np.empty(0, np.int64)
 
     def taken(self, which: Flags) -> Folded:
         """Return the marked ones (k,)."""
-        return Folded(self.edges[which], self.angles[which], self.radii[which])
+        zone = self.zone[which] if len(self.zone) else self.zone
+        return Folded(self.edges[which], self.angles[which], self.radii[which], zone)
 
     def lines(self, flat: Array) -> list[Bend]:
         """Return them as lines, for positions (p, 2) of the pattern's vertices.
@@ -83,7 +132,8 @@ class Folded(NamedTuple):
             ends = flat[self.edges[own]].reshape(-1, 2)
             along = (ends - ends[0]) @ (ends[1] - ends[0])
             line = ends[[int(along.argmin()), int(along.argmax())]]
-            out.append(Bend(line, float(self.angles[own[0]]), float(self.radii[own].min())))
+            zone = int(self.zone[own[0]]) if len(self.zone) else -1
+            out.append(Bend(line, float(self.angles[own[0]]), float(self.radii[own].min()), zone))
         return out
 
     def _chains(self, flat: Array) -> Ints:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 
+import ezdxf
 import numpy as np
 import pytest
 import shapely
@@ -276,4 +277,35 @@ def test_rolled_bends_keep_their_radius_beside_folds(tmp_path):
     )
     (part,) = job.parts
     assert max(part.size) == pytest.approx(120.0 + 5.0 * np.pi / 2, abs=1e-6)
-    np.testing.assert_allclose([bend.radius for bend in part.bends], 5.0 - 0.75, rtol=1e-6)
+    # Narrow enough for a press: one line in the middle has the whole angle.
+    ((_, angle, inner, _),) = part.bends
+    assert (abs(angle), inner) == pytest.approx((np.pi / 2, 5.0 - 0.75), rel=1e-6)
+    (zone,) = job.certificate["designs"][0]["parts"][0]["zones"]
+    assert (zone["kind"], zone["bent_by"]) == ("cylinder", "press")
+
+
+def test_round_faces_are_zones_to_roll(tmp_path):
+    wanted = {
+        "half": (half_cylinder(), "roll R 1500, 180 deg"),
+        "shade": (frustum(), "roll cone R"),
+    }
+    for name, (design, text) in wanted.items():
+        folder = tmp_path / name
+        job = gso.fabricate(
+            design, folder, formats=("dxf", "svg"), workers=0, bend_step="20deg", bend_text=True
+        )
+        (zone,) = job.certificate["designs"][0]["parts"][0]["zones"]
+        assert zone["text"].startswith(text)
+        assert abs(zone["angle"]) == pytest.approx(np.degrees(total_angle(job.parts[0])), abs=1e-6)
+        # Rows of the design's edges serve as lines where they are near enough.
+        assert len(job.parts[0].bends) == pytest.approx(abs(zone["angle"]) / 20.0, abs=1.5)
+        (file,) = (folder / "parts").glob("*.dxf")
+        drawn = ezdxf.readfile(file).modelspace()
+        lines = [entity for entity in drawn if entity.dxf.layer == "ROLL"]
+        assert len(lines) == len(job.parts[0].bends)
+        assert all(zone["text"] in [v for _, v in e.get_xdata("GSO")] for e in lines)
+        assert zone["text"] in [entity.dxf.text for entity in drawn.query("TEXT")]
+
+
+def total_angle(part):
+    return abs(sum(bend.angle for bend in part.bends))

@@ -168,9 +168,14 @@ class TestJoint:
     def test_other_presets_start_from_the_curvature_solution(self, curved):
         result = gso.tno.optimize(curved, **JOINT)
         assert result.metrics["loss_gc"] < 0.2 * result.metrics["loss_gc_before"]
-        assert result.metrics["isometry_energy"] < 1e-5
+        assert metrics.isometry_energy(result.mesh, result.pattern.flat) < 1e-5
         stages = [p.name for p in result.history]
         assert "normal" in stages[: len(stages) // 2 + 1]
+        # It never has more curvature than the usual result, unless that halves the strain.
+        usual = gso.tno.optimize(curved)
+        one, two = (r.metrics for r in (result, usual))
+        curved_more = one["loss_gc_worst"] > 1.5 * two["loss_gc_worst"]
+        assert not curved_more or one["strain_max"] < 0.5 * two["strain_max"]
 
     def test_a_moved_scaled_and_renumbered_copy_gives_the_same_shape(self, curved):
         mesh = gso.Mesh.from_grid(curved)

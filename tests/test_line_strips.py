@@ -133,6 +133,18 @@ def test_more_strips_are_nearer():
     assert far[2] < far[0] / 8
 
 
+@pytest.mark.parametrize("kind", ["hypar", "pillow"])
+def test_twice_as_many_strips_are_not_farther(kind):
+    x, y = np.meshgrid(*[np.linspace(-1, 1, 7)] * 2, indexing="ij")
+    z = 0.4 * (x * y if kind == "hypar" else np.cos(1.5 * x) * np.cos(1.5 * y))
+    mesh = scaled(np.stack([x, y, z], axis=-1))
+    # Each number is solved for on its own.
+    found = [LineStrips(mesh).strips(count).surface for count in (3, 6)]
+    assert all(surface.sound for surface in found)
+    far = np.array([surface.farthest for surface in found])
+    assert (np.diff(far) <= 0).all()
+
+
 def test_distances_are_those_of_samples():
     mesh = scaled(dome())
     surface = LineStrips(mesh).strips(4).surface
@@ -221,3 +233,46 @@ def test_as_few_strips_as_hold_a_distance():
     assert fewer.ruled.farthest > allowed
     # The profile bends by 0.6 / (2 * 0.6) of the height in all: its sagitta is 0.3 / strips^2.
     assert result.ruled.strips <= np.ceil(np.sqrt(0.3 / allowed))
+
+
+def sheet(kind, count=13):
+    """Part of a cylinder or cone of radius one, with straight columns, and its rulings there."""
+    t, h = np.linspace(0, 1.5, count)[:, None], np.linspace(0, 2, 9)[None]
+    r = 1.0 + 0.5 * h if kind == "cone" else 1.0 + 0.0 * h
+    return np.stack(np.broadcast_arrays(r * np.cos(t), r * np.sin(t), h), axis=-1)
+
+
+@pytest.mark.parametrize("kind", ["cylinder", "cone"])
+def test_developable_designs_are_one_strip_with_their_own_rulings(kind, tmp_path):
+    points = sheet(kind)
+    result = gso.strips(points)
+    assert result.usable and result.ruled.strips == 1
+    assert result.ruled.farthest < 1e-12
+    a, b = result.mesh.vertices[result.rulings.edges].transpose(1, 0, 2)
+    way = (b - a) * np.sign(b - a)[:, 2:]
+    # Every inner column is a ruling, over its whole length.
+    own = points[1:-1, -1] - points[1:-1, 0]
+    order = np.argsort(np.arctan2(a[:, 1], a[:, 0]))
+    np.testing.assert_allclose(way[order], own, atol=1e-9)
+    if kind == "cylinder":
+        assert result.metrics["bend_radius_min"] == pytest.approx(1.0, rel=1e-9)
+    # The faces of the pattern are those of the surface, so that splines can be made of it.
+    smooth = gso.smooth_strips(result.ruled, result.design)
+    assert smooth.is_torsal and smooth.distances[1] < 0.002 * result.design.diagonal
+
+
+def test_radii_are_those_of_the_surface_where_rulings_meet():
+    mesh = scaled(dome())
+    surface = LineStrips(mesh).strips(4).surface
+    ends = surface.rulings.edges.ravel()
+    # Some rulings of a strip meet in a vertex of its crease.
+    assert len(np.unique(ends)) < len(ends)
+    # Curvatures of the dome are 0.6 and 0.4, a little more where it is steep.
+    assert surface.rulings.smallest_radius > 0.2 / gso.as_mesh(dome()).diagonal
+
+
+def test_the_nearer_strips_are_returned():
+    design = gso.as_mesh(dome(9))
+    lines = LineStrips(scaled(design)).strips(3).surface
+    result = gso.strips(design, strips=3)
+    assert result.ruled.farthest <= lines.farthest * design.diagonal * (1 + 1e-6)

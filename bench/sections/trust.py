@@ -3,11 +3,13 @@
 Each design is made developable by every formulation. Beside what the result says of itself stand
 figures that this file computes on its own: the largest strain from edge lengths, Gaussian
 curvature by the Gauss image of the faces' normals, distances of sampled points, and angles
-between faces. ``folder=PATH`` adds the meshes of a folder to the designs of the bench.
+between faces. ``folder=PATH`` takes the meshes of a folder in place of the designs of the bench.
+:func:`repeat` measures by how much results vary that should not.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +34,14 @@ _LARGE = 12_000
 _SAMPLES = 6
 #: Angle of a fold in degrees.
 _FOLD = 120.0
+#: Curvature in the unit ball below which a surface counts as developable: the option
+#: ``developable_below``. What quads hide is compared with that at least.
+_NONE = 1e-3
+#: Noise of the copies over the size, and the least strain, curvature and distance (in %, and in the
+#: unit ball) that differences are compared with.
+_NOISE, _LEAST = 1e-9, (0.1, _NONE, 0.1)
+#: Designs that are repeated.
+_REPEATED = "wavy+4 holes+oculus+square core+L-shaped+inset+of three+free"
 
 
 def trust(
@@ -92,7 +102,7 @@ def _figures(design: gso.Mesh, result: gso.Result) -> dict[str, Any]:
         "sampled": sampled,
         "|K| in": metrics.loss_gc_worst(design),
         "|K|": worst,
-        "image": gauss_image(after, unit) / max(worst, 1e-300),
+        "image": gauss_image(after, unit) / max(worst, _NONE),
         "folds": int((metrics.dihedral_angles(after) > _FOLD).sum())
         if len(after.faces) == len(design.faces)
         else -1,
@@ -162,7 +172,7 @@ def _summary(rows: dict[str, dict[str, Any]]) -> None:
     print(f"\n{len(good)} of {len(rows)} usable")
     for name, bound in (("own strain", 2.0), ("own strain", 5.0), ("sampled", 5.0)):
         print(f"usable with {name} above {bound:g} %: {sum(row[name] > bound for row in good)}")
-    print(f"image above 1.5: {sum(row['image'] > 1.5 for row in rows.values())}")
+    print(f"usable with image above 1.5: {sum(row['image'] > 1.5 for row in good)}")
     print(f"folded: {sum(row['folds'] > 0 for row in rows.values())}")
     pairs = [
         (rows[key], rows[key.replace(" isometry", " balanced")])
@@ -179,4 +189,52 @@ def _summary(rows: dict[str, dict[str, Any]]) -> None:
     print(f"sampled above the distance by at most {max(more, default=0.0):.2g}")
 
 
-SECTIONS = (trust,)
+def repeat(
+    kind: str = "", folder: str = "", ways: str = "", names: str = _REPEATED, noises: int = 3
+) -> dict[str, Any]:
+    """Compare results of a design, of copies with tiny noise, renumbered and mirrored.
+
+    The spread of a figure is its largest difference over its median.
+    """
+    out: dict[str, Any] = {}
+    for name, mesh in progress(list(_designs(kind, folder, 0).items()), "repeat"):
+        if names and not any(one in name for one in names.split("+")):
+            continue
+        for way in ways.split("+") if ways else [*WAYS, "strips"]:
+            found = np.array([_answer(copy, way) for copy in _copies(mesh, noises)])
+            spread = np.ptp(found, axis=0) / np.maximum(np.median(found, axis=0), _LEAST)
+            out[f"{name} {way}"] = dict(zip(("strain", "|K|", "distance"), spread, strict=True))
+    columns = ["strain", "|K|", "distance"]
+    rows = [[key, *(row[c] for c in columns)] for key, row in out.items()]
+    table("repeat: spread over the median", ["design", *columns], rows)
+    far = sum(max(row.values()) > 0.1 for row in out.values())
+    print(f"\n{far} of {len(out)} with a spread above 10 %")
+    return out
+
+
+def _copies(mesh: gso.Mesh, noises: int) -> Iterator[gso.Mesh]:
+    """Yield a design, and copies with noise, in another numbering, and mirrored."""
+    points, faces = mesh.vertices, mesh.faces
+    yield mesh
+    for seed in range(noises):
+        noise = np.random.default_rng(seed).standard_normal(points.shape)
+        yield gso.Mesh(points + _NOISE * mesh.size * noise, faces)
+    order, rows = (np.random.default_rng(9).permutation(len(x)) for x in (points, faces))
+    yield gso.Mesh(points[order], np.where(faces < 0, -1, np.argsort(order)[faces])[rows])
+    turned = np.where(faces[:, -1:] < 0, faces[:, [0, 2, 1, -1]], faces[:, ::-1])
+    yield gso.Mesh(points * [-1.0, 1.0, 1.0], turned if faces.shape[1] == 4 else faces[:, ::-1])
+
+
+def _answer(mesh: gso.Mesh, way: str) -> tuple[float, float, float]:
+    """Return strain, curvature and distance of the result; strips have no curvature to compare."""
+    if way == "strips":
+        far = quietly(gso.strips, mesh, strips=4).distances
+        return 0.0, 0.0, 100.0 / mesh.size * max(far.there_max, far.back_max)
+    result = quietly(gso.tno.optimize, mesh, **WAYS[way])
+    far = metrics.surface_distance(mesh, result.mesh)
+    strain = result.details.get("verdict", {}).get("strain_max", np.inf)
+    curved = metrics.loss_gc_worst(result.mesh, scale=metrics.unit(mesh))
+    return 100.0 * strain, curved, 100.0 / mesh.size * max(far.there_max, far.back_max)
+
+
+SECTIONS = (trust, repeat)

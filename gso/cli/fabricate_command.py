@@ -124,6 +124,12 @@ if TYPE_CHECKING:
 )
 @click.option("--bend-text", is_flag=True, help="Write angle and radius beside each bend.")
 @click.option(
+    "--bend-step",
+    metavar="ANGLE",
+    help="Angle between the bend lines of cylinders and cones, such as 15deg, or how far chords "
+    "between them may be from the surface, such as 0.5mm.",
+)
+@click.option(
     "--step",
     is_flag=True,
     help="Also write the folded parts as solids of the sheet's thickness: folded.step.",

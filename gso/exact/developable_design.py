@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 from gso.exact.fold_edges import FOLD, fold_edges
 from gso.exact.low_poly import facets, is_low_poly
 from gso.exact.rolled_faces import fold
-from gso.exact.ruled_bends import joined_bends, ruled_bends
+from gso.exact.ruled_bends import joined_bends, ruled_bends, zones_of
 from gso.exact.sliced_pattern import SlicedPattern, shape_size
 from gso.mesh import Mesh
-from gso.pattern import Folded, Pattern
+from gso.pattern import Folded, Pattern, Zone
 from gso.quantities import Length, Strain
 from gso.recognition import Recognised, recognise
 from gso.typing import Array, Ints
@@ -37,7 +37,9 @@ class FoldedPattern:
         Its pattern. On cylinders and cones lengths are those of the round surface.
     folded : Folded
         Edges of the pattern on bend lines; the radius of a fold is 0. There are very small ones
-        between facets that are nearly in one plane, see :attr:`bends`.
+        between facets that are nearly in one plane, see :attr:`bends`. Zones are numbers of faces.
+    zones : tuple of Zone
+        How each face is bent.
     recognised : Recognised
         The faces of the design.
     parts : int
@@ -51,6 +53,7 @@ class FoldedPattern:
     surface: Mesh
     pattern: Pattern
     folded: Folded
+    zones: tuple[Zone, ...]
     recognised: Recognised
     parts: int
     strain: float
@@ -89,7 +92,8 @@ def folded_pattern(
     cut: ArrayLike = (),
     keep: ArrayLike = (),
     sheet: tuple[float, float] | None = None,
-    bend_step: float | None = None,
+    bend_step: Length | None = None,
+    unit: str = "mm",
     press_radius: tuple[float, float] | None = None,
 ) -> FoldedPattern | None:
     """Unfold a design that consists of flat, rolled and conical faces.
@@ -106,8 +110,9 @@ def folded_pattern(
         Edges that are cut in any case, and that are not.
     sheet : (float, float), optional
         Length and width that a part may have, in the mesh's unit.
-    bend_step : float, optional
-        Largest angle between neighbouring bend lines, in degrees.
+    bend_step : float or str, optional
+        Largest angle between neighbouring bend lines, in degrees (a number, or "15deg"), or how
+        far chords between them may be from the surface, as a length ("0.5mm").
     press_radius : (float, float), optional
         Largest radii of cylinders that are bent by a press, at one line in the middle, where the
         surface is convex and where it is concave. Cylinders that turn by more than 180 degrees
@@ -127,7 +132,9 @@ def folded_pattern(
     >>> found.parts, len(found.folded.edges), float(np.degrees(found.folded.angles).round(6).max())
     (1, 5, 90.0)
     """
-    shape = recognise(mesh, max_deviation=max_deviation, max_strain=max_strain, bend_step=bend_step)
+    shape = recognise(
+        mesh, max_deviation=max_deviation, max_strain=max_strain, bend_step=bend_step, unit=unit
+    )
     if not shape.developable.all():
         if not is_low_poly(shape):
             return None
@@ -144,7 +151,7 @@ def folded_pattern(
     )
     sliced = SlicedPattern.of(shape, joined)
     bends = ruled_bends(sliced, shape.faces, flat, press_radius)
-    edges, angles, radii = joined_bends([bends, fold_edges(sliced, shape)])
+    folded = joined_bends([bends, fold_edges(sliced, shape)])
     surface = Mesh(sliced.points, sliced.vertex[sliced.faces])
     # In the order of the surface's vertices, as patterns that are not cut have it.
     order = np.argsort(sliced.vertex, kind="stable")
@@ -155,7 +162,8 @@ def folded_pattern(
     return FoldedPattern(
         surface,
         pattern,
-        Folded(rank[edges], angles, radii),
+        folded._replace(edges=rank[folded.edges]),
+        zones_of(shape.faces, press_radius),
         shape,
         int(joined.part.max()) + 1,
         max(face.strain for face in shape.faces),

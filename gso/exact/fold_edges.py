@@ -31,7 +31,8 @@ def fold_edges(sliced: SlicedPattern, shape: Recognised) -> Folded:
     way = sliced.points[sliced.vertex[ends[:, 1]]] - sliced.points[sliced.vertex[ends[:, 0]]]
     angle = fold_angles(first, second, way)
     folded = np.abs(angle) > np.where(round_one | round_two, _TANGENT, _LEVEL)
-    return Folded(ends[folded], angle[folded], np.zeros(int(folded.sum())))
+    count = int(folded.sum())
+    return Folded(ends[folded], angle[folded], np.zeros(count), np.full(count, -1))
 
 
 def _normals(

@@ -10,7 +10,7 @@ import numpy as np
 from gso.exact.ruling_rows import levels, ruling_rows
 from gso.exact.sliced_pattern import SlicedPattern
 from gso.mesh.topology import edge_keys
-from gso.pattern import Folded
+from gso.pattern import Folded, Zone
 from gso.recognition import BendLine, ShapeFace
 from gso.typing import Array, Flags
 
@@ -47,13 +47,13 @@ def ruled_bends(
     for number, face in enumerate(faces):
         if not face.bend_lines:
             continue
-        if press_radius is not None and _is_pressed(face, press_radius):
+        if is_pressed(face, press_radius):
             bends = [_middle_line(face)]
         else:
             bends = _rulings(face)
             rows = ruling_rows(sliced, face, flat, max(3, len(bends)))
             if rows is not None:
-                found.append(rows)
+                found.append(rows._replace(zone=np.full(len(rows.edges), number)))
                 continue
         turn, shift = _motion(sliced, face, flat)
         ends = [np.stack([bend.start, bend.end]) @ turn + shift for bend in bends]
@@ -92,16 +92,33 @@ def _on_lines(
         share = share / float(np.linalg.norm(bend.end - bend.start))
         radii = bend.radius_start + share * (bend.radius_end - bend.radius_start)
         angle = -bend.angle if bend.up else bend.angle
-        found.append(Folded(edges[own], np.full(len(radii), angle), radii))
+        zone = np.full(len(radii), number)
+        found.append(Folded(edges[own], np.full(len(radii), angle), radii, zone))
     return joined_bends(found)
 
 
-def _is_pressed(face: ShapeFace, largest: tuple[float, float]) -> bool:
-    """Tell whether a face is a cylinder that is bent at one line."""
-    if face.radius is None or face.flat is None:
+def zones_of(
+    faces: Sequence[ShapeFace], press_radius: tuple[float, float] | None
+) -> tuple[Zone, ...]:
+    """Return how each face is bent, planes as zones that do not turn."""
+    return tuple(_zone(face, is_pressed(face, press_radius)) for face in faces)
+
+
+def _zone(face: ShapeFace, pressed: bool) -> Zone:
+    lines = face.bend_lines
+    radii = [radius for line in lines for radius in (line.radius_start, line.radius_end)]
+    if face.radius is not None:
+        radii = [face.radius]
+    turn = -face.bend_angle if lines and lines[0].up else face.bend_angle
+    return Zone(face.kind, min(radii, default=np.inf), max(radii, default=np.inf), turn, pressed)
+
+
+def is_pressed(face: ShapeFace, largest: tuple[float, float] | None) -> bool:
+    """Tell whether a face is a cylinder that a press bends at one line."""
+    if largest is None or not face.bend_lines or face.radius is None or face.flat is None:
         return False
     turn = float(np.ptp(face.flat[..., 0])) / face.radius
-    return face.radius <= largest[int(face.bend_lines[0].up)] and turn <= _HALF_TURN
+    return bool(face.radius <= largest[int(face.bend_lines[0].up)] and turn <= _HALF_TURN)
 
 
 def _middle_line(face: ShapeFace) -> BendLine:

@@ -2,21 +2,74 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from gso.geometry.polygon import signed_area
+from gso.geometry.vectors import cross, unit
 from gso.typing import Array, Ints
 
 #: Area, relative to that of the bounding box, up to which a corner is straight.
 _STRAIGHT = 1e-12
 
 
-def ears(polygon: Array) -> Ints:
+def divided(rings: Sequence[Ints], points: Array) -> tuple[Ints, Ints]:
+    """Divide nearly planar polygons into triangles; they may cross themselves.
+
+    Parameters
+    ----------
+    rings : sequence of ndarray of int
+        Corners in order; a polygon with n corners has n - 2 triangles.
+    points : ndarray, (n, 3)
+
+    Returns
+    -------
+    triangles : ndarray of int, (t, 3)
+    owner : ndarray of int, (t,)
+        The polygon of each triangle, in order.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [2, 0, 0], [0.4, 0.4, 0], [0, 2, 0]])
+    >>> divided([np.arange(4)], corners)[0].tolist()
+    [[0, 1, 2], [0, 2, 3]]
+    """
+    size = np.array([len(ring) for ring in rings])
+    owner = [np.flatnonzero(size == 3)]
+    out = [np.array([rings[k] for k in owner[0].tolist()], np.int64).reshape(-1, 3)]
+    four = np.flatnonzero(size == 4)
+    if len(four):
+        owner.append(np.repeat(four, 2))
+        out.append(_halves(np.array([rings[k] for k in four.tolist()]), points).reshape(-1, 3))
+    for k in np.flatnonzero(size > 4).tolist():
+        out.append(rings[k][ears(in_plane(points[rings[k]]), simple=False)])
+        owner.append(np.full(size[k] - 2, k))
+    every = np.concatenate(owner)
+    order = np.argsort(every, kind="stable")
+    return np.concatenate(out)[order], every[order]
+
+
+def _halves(quads: Ints, points: Array) -> Ints:
+    """Return the triangles of quads (k, 2 x 3) on both sides of the better diagonal."""
+    corner = points[quads]
+    normal = unit(cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1]))
+    ways = np.array([[[0, 1, 2], [0, 2, 3]], [[1, 2, 3], [1, 3, 0]]])
+    a, b, c = np.moveaxis(corner[:, ways], 3, 0)
+    area = np.einsum("kwtd,kd->kwt", cross(b - a, c - a), normal)
+    sides = sum(((x - y) ** 2).sum(axis=3) for x, y in ((a, b), (b, c), (c, a)))
+    thin = (area / np.maximum(sides, 1e-300)).min(axis=2)
+    best = ways[thin.argmax(axis=1)].reshape(len(quads), 6)
+    return np.take_along_axis(quads, best, axis=1)
+
+
+def ears(polygon: Array, *, simple: bool = True) -> Ints:
     """Triangulate a simple polygon (k, 2), concave or not.
 
     Of the corners that can be cut off, the one whose triangle is the least thin comes first, so
     that points on straight sides give no triangles without area. Corners may repeat, as where a
-    hole is joined to the outline by a bridge.
+    hole is joined to the outline by a bridge. Polygons that cross themselves are divided, too, if
+    `simple` is false; some of their triangles are then turned over.
 
     Returns
     -------
@@ -37,7 +90,7 @@ def ears(polygon: Array) -> Ints:
     way = 1.0 if signed_area(polygon) > 0 else -1.0
     z = polygon @ np.array([1.0, 1j * way])
     least = _STRAIGHT * float(np.ptp(polygon, axis=0).max()) ** 2
-    if _crosses(z, least):
+    if simple and _crosses(z, least):
         raise ValueError("the polygon crosses itself")
     ring = np.arange(len(z))
     out = []
@@ -52,14 +105,14 @@ def ears(polygon: Array) -> Ints:
         ways = ((k, x) for x in (-least, least) for k in best)
         found = (k for k, x in ways if _free(z, ring, (a[k], b[k], c[k]), x))
         k = next(found, int(np.abs(area).argmin()))
-        if area[k] < -least:
+        if simple and area[k] < -least:
             raise ValueError("the polygon crosses itself, or has no area")
         out.append((a[k], b[k], c[k]))
         ring = np.delete(ring, k)
     table = np.array([*out, tuple(ring)], np.int64)
     for _ in range(4 * len(table)):
         area = _cross(z[table[:, 1]] - z[table[:, 0]], z[table[:, 2]] - z[table[:, 0]])
-        if area.min() > least:
+        if area.min() > least or not simple:
             return table
         _turn_side(z, table, int(area.argmin()))
     raise ValueError("the polygon crosses itself, or has no area")

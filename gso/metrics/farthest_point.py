@@ -88,6 +88,8 @@ def farthest(
         side = np.linalg.norm(points - np.roll(points, -1, axis=1), axis=2)
         enough = (1.0 + ERROR) * largest + slack
         keep = far.max(axis=1) + side.max(axis=1) / np.sqrt(3.0) > enough
+        # With one nearest triangle for all three corners, the bound is the largest distance there.
+        keep &= (which != np.roll(which, 1, axis=1)).any(axis=1)
         points, far, which = points[keep], far[keep], which[keep]
         upper = _upper(points, corner, which)
         keep = upper > enough

@@ -121,6 +121,10 @@ def loss_gc_image(surface: SurfaceLike, *, scale: float | None = None) -> float:
     lower the curvature of both triangulations, but not this one. On meshes of triangles it equals
     ``loss_gc``.
 
+    Its ratio to :func:`loss_gc_worst` says whether quads hide curvature, where the larger one is
+    above 1e-3 in the unit ball. Below, all of them count as none: a cap of radius 1 with that
+    curvature (``mean_abs_K`` is three times that) is flattened with a strain of K / 8, or 0.04 %.
+
     >>> u, v = np.mgrid[-1:1:33j, -1:1:33j]
     >>> saddle = np.dstack([u, v, 0.3 * u * v])
     >>> 0.98 < loss_gc_image(saddle) / loss_gc_worst(saddle) < 1.02

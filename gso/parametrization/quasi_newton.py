@@ -152,14 +152,15 @@ class QuasiNewton:
             Loss of the mean squared strains of triangles, and its slope, such as
             :meth:`gso.energy.stretch.TwoPowerLoss.of_squares`; by default the squares themselves.
         iterations, tolerance : int, float
-            Largest number of iterations, and relative decrease of the energy at which to stop.
+            Largest number of iterations, and relative decrease of the energy at which to stop;
+            after a shortened step it takes two such decreases.
         """
         x = np.ascontiguousarray(flat.T, np.float64)
         energy, gradient, good = self._strain.energy(x, loss)
         others = self._others
         sound = np.ones(0, bool) if others is None else geometry.signed_areas(flat, others) > 0
         memory: list[tuple[Array, Array, float]] = []
-        step = 1.0
+        step, ready = 1.0, True
         for _ in range(iterations):
             direction = _direction(gradient, memory, self._divide)
             expected = _dot(gradient, direction)
@@ -181,8 +182,11 @@ class QuasiNewton:
                 memory = [*memory[1 - _MEMORY :], (shift, change, curvature)]
             before, energy = energy, value
             x, gradient = moved, slope
-            if before - energy <= tolerance * before:
+            small = before - energy <= tolerance * before
+            if small and ready:
                 break
+            # Where a step was shortened, one small decrease may be one by chance.
+            ready = small or step >= 1.0
         return _relaxed(x, energy)
 
 

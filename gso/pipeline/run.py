@@ -184,7 +184,7 @@ class Run:
         """Solve the stages of a plan with at least one, the last one until hard terms hold."""
         coordinates, entered = plan.start, None
         least = 0.0 if plan.cold_start is None else self.case.request.start.tolerance
-        stages = list(plan.stages)
+        stages, further = list(plan.stages), 0
         # Coarser grids use the kernels of the finest, which are compiled if that one is large.
         counts = largest_counts((stage.items, stage.layout) for stage in stages)
         for number, stage in enumerate(stages):
@@ -206,14 +206,16 @@ class Run:
             if minimum.status is Status.CANCELLED:
                 break
             if stage.finished is not None and stage.finished(coordinates):
-                break
-            if last and plan.further is not None and self.case.request.verdict:
-                further = plan.further(number + 1 - len(plan.stages), coordinates)
-                stages += [] if further is None else [further]
+                del stages[number + 1 :]
+            whole = number == len(stages) - 1
+            if whole and plan.further is not None and self.case.request.verdict:
+                another = plan.further(further, coordinates)
+                stages += [] if another is None else [another]
+                further += 1
             # Stages of another mesh have another pattern.
             if number + 1 < len(stages) and stages[number + 1].layout != stage.layout:
                 self._problem = None
-        after = plan.stages[number + 1 :]
+        after = stages[number + 1 :]
         if minimum.status is Status.CANCELLED:
             # Transfer the coordinates to the last stage without solving.
             for stage in after:

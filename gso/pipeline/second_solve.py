@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from gso.faults import crossings
 from gso.metrics import loss_gc_worst
-from gso.pipeline.case import Case
 from gso.pipeline.judgement import conclude
 from gso.pipeline.run import Run
 from gso.result import Result
@@ -17,8 +17,8 @@ from gso.tasks.base import Options
 from gso.tasks.request import Request
 from gso.verdict import Code
 
-#: Factor by which a solve may raise the curvature of its start, and the share of the start's strain
-#: below which it may be anything.
+#: Factor by which a solve may raise the curvature of the one whose result it improves, and the
+#: share of the other's strain below which it may have any curvature.
 _RISE, _GAIN = 1.5, 0.5
 #: Reasons that a bound on the distance and more fairness may remove.
 _MENDED = {
@@ -41,72 +41,108 @@ def solve_and_judge(run: Run) -> Result:
     none, a result that strains too much, is too far away or folds is solved again with a bound on
     the distance, by the same formulation and, where the user did not name it, by others. The first
     usable result is returned, or else the one that misses its limits by the smallest factor
-    (:func:`excess`). A callback ends all solves, and a start with a budget of iterations has none
-    but the first.
+    (:func:`excess`). Where the formulation improves the result of another one, that one is solved
+    for in the same way, and returned where it is better (:func:`_is_worse`). A callback ends all
+    solves, and a start with a budget of iterations has none but the first.
     """
-    case = run.case
-    first = conclude(run, run.solve())
-    judged = [first, *_start_of(run, first)]
-    best = first = judged[-1]
-    for request in _others(case, first):
-        solution = run(request)
-        if solution.status is Status.CANCELLED:
-            best.status = Status.CANCELLED
-            break
-        result = conclude(run, solution)
-        result.warm_start = "cold"
-        judged.append(result)
-        if excess(result) < excess(best):
-            why = str(first.reasons[0]).partition(";")[0]
-            result.notes += (
-                f"this is another solve, by {result.formulation!r}, with a bound on the distance; "
-                f"of the first one {why}",
-            )
-            best = result
-        if best.usable:
-            break
-    best.iterations, best.history = run.iterations, run.history
-    best.seconds |= run.timings.as_dict()
-    for name in ("pattern", "verdict"):
-        if name in best.seconds:
-            best.seconds[name] = sum(r.seconds.get(name, 0.0) for r in judged)
-    return best
-
-
-def _start_of(run: Run, result: Result) -> list[Result]:
-    """Return the result that a solve started from, if it is better; else none.
-
-    More than one and a half times the curvature has to buy at least half of the strain.
-    """
-    case = run.case
-    request, scale = case.solver_request, case.frame.scale
+    solves = _Solves(run)
+    case, request = run.case, run.case.solver_request
+    best = solves.usable(request)
     before = case.task.formulations[request.formulation].before
-    begun = None if before is None or not _may_go_on(case, result) else before(request)
-    if begun is None or not request.verdict or not case.constraints.empty:
-        return []
-    start = run(begun)
-    if start.status is Status.CANCELLED:
-        result.status = Status.CANCELLED
-        return []
-    curved = loss_gc_worst(result.mesh, scale=1.0) * scale**2
-    there = loss_gc_worst(case.frame.mesh.replaced(start.points), scale=1.0)
-    if start.status.is_failure or curved <= _RISE * there:
-        return []
-    other = conclude(run, start)
-    if not _strain(other) * _GAIN < _strain(result) or excess(result) < excess(other):
-        return []
-    other.notes = (
-        *dict.fromkeys([*result.notes, *other.notes]),
-        f"the solve by {result.formulation!r} has more curvature than its start, and no less than "
-        "half of its strain: this is the start",
-    )
-    return [other]
+    judged = request.verdict and best.status is not Status.ALREADY_GOOD
+    begun = before(request) if before is not None and judged and solves.may_go_on else None
+    if begun is not None and case.constraints.empty:
+        other = solves.usable(begun)
+        if _is_worse(best, other):
+            note = (
+                f"the solve by {request.formulation!r} is less developable than its start: this is "
+                f"the result of {begun.formulation!r}"
+            )
+            best = replace(other, notes=(*other.notes, note))
+    return solves.summed(best)
 
 
-def _may_go_on(case: Case, result: Result) -> bool:
-    """Return whether limits, a budget of iterations and the callback allow other solves."""
-    free = not case.request.limits.given and case.request.start.iterations is None
-    return free and result.status is not Status.CANCELLED
+class _Solves:
+    """The judged results of a run by request: the first one of the case, and others."""
+
+    def __init__(self, run: Run):
+        self.run = run
+        self._found: dict[tuple[object, ...], Result] = {}
+        self._cancelled = False
+
+    def usable(self, request: Request[Options]) -> Result:
+        """Return the first usable result of a request and those near the design, or the best."""
+        best = first = self._result(request)
+        for other in self._others(request, first):
+            result = self._result(other)
+            if excess(result) < excess(best):
+                best = result
+            if best.usable or self._cancelled:
+                break
+        if best is first:
+            return first
+        why = str(first.reasons[0]).partition(";")[0]
+        note = (
+            f"this is another solve, by {best.formulation!r}, with a bound on the distance; "
+            f"of the first one {why}"
+        )
+        return replace(best, notes=(*best.notes, note))
+
+    @property
+    def may_go_on(self) -> bool:
+        """Whether limits, a budget of iterations and the callback allow other solves."""
+        request = self.run.case.request
+        free = not request.limits.given and request.start.iterations is None
+        return free and not self._cancelled
+
+    def summed(self, best: Result) -> Result:
+        """Return one of the results with the iterations and times of all."""
+        run, judged = self.run, self._found.values()
+        if self._cancelled:
+            best.status = Status.CANCELLED
+        best.iterations, best.history = run.iterations, run.history
+        best.seconds |= run.timings.as_dict()
+        for name in ("pattern", "verdict"):
+            if name in best.seconds:
+                best.seconds[name] = sum(r.seconds.get(name, 0.0) for r in judged)
+        return best
+
+    def _result(self, request: Request[Options]) -> Result:
+        """Return the judged result of a request."""
+        run, own = self.run, self.run.case.solver_request
+        asked = (request.formulation, request.options, request.max_displacement)
+        key = (*asked, request.weight_factor)
+        if key not in self._found:
+            result = conclude(run, run.solve() if request is own else run(request))
+            if request is not own:
+                result.warm_start = "cold"
+            self._cancelled |= result.status is Status.CANCELLED
+            self._found[key] = result
+        return self._found[key]
+
+    def _others(self, request: Request[Options], first: Result) -> Iterator[Request[Options]]:
+        """Return other requests, if they may remove the reasons against a result."""
+        case, missed = self.run.case, first.status is Status.CONSTRAINTS_MISSED
+        others, codes = case.task.others, {reason.code for reason in first.reasons}
+        if others is None or missed or not self.may_go_on or not codes or codes - _MENDED:
+            return
+        if Code.CROSSES_ITSELF in codes and crossings(case.design).size:
+            return
+        yield from others(case.analysis, request, bool(codes - {Code.FAR}))
+
+
+def _is_worse(result: Result, other: Result) -> bool:
+    """Return whether a result is worse than another one.
+
+    It is if only the other is usable, or if it has more than one and a half times the other's
+    curvature and no less than half of its strain. Of two that are not usable, it is too if it
+    misses its limits by more.
+    """
+    if result.usable != other.usable:
+        return other.usable
+    one, two = (loss_gc_worst(r.mesh, scale=1.0) for r in (result, other))
+    curved = one > _RISE * two and not _strain(result) < _GAIN * _strain(other)
+    return curved or excess(other) < excess(result)
 
 
 def _strain(result: Result) -> float:
@@ -128,14 +164,3 @@ def excess(result: Result) -> float:
         if reason.value is not None
     ]
     return max(factors, default=float("inf"))
-
-
-def _others(case: Case, first: Result) -> Iterator[Request[Options]]:
-    """Return other requests, if they may remove the reasons against a result."""
-    others, missed = case.task.others, first.status is Status.CONSTRAINTS_MISSED
-    codes = {reason.code for reason in first.reasons}
-    if others is None or missed or not _may_go_on(case, first) or not codes or codes - _MENDED:
-        return
-    if Code.CROSSES_ITSELF in codes and crossings(case.design).size:
-        return
-    yield from others(case.analysis, case.solver_request, bool(codes - {Code.FAR}))

@@ -7,7 +7,7 @@
 ['plane', 'plane']
 """
 
-from gso.recognition.bend_lines import BendLine
+from gso.recognition.bend_lines import BendLine, bend_step_of
 from gso.recognition.facet_graph import coordinate_step
 from gso.recognition.recognise import recognise
 from gso.recognition.round_surface import RoundSurface
@@ -18,6 +18,7 @@ __all__ = [
     "Recognised",
     "RoundSurface",
     "ShapeFace",
+    "bend_step_of",
     "coordinate_step",
     "recognise",
 ]

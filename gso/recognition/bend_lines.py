@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from gso.errors import OptionError
+from gso.quantities import Length, as_length
 from gso.recognition.flat_images import Part, RoundImage
 from gso.recognition.round_surface import RoundSurface
 from gso.typing import Array, Flags, Ints
@@ -41,6 +45,48 @@ class BendLine:
     angle: float
     up: bool
     limit: bool = False
+
+
+def bend_step_of(asked: Length | None, size: float, unit: str = "mm") -> Callable[[float], float]:
+    """Return the function that gives the angle between bend lines, in radians, for a radius.
+
+    Parameters
+    ----------
+    asked : float or str, optional
+        An angle in degrees, 15 or "15deg", or how far chords between bend lines may be from the
+        surface, such as "0.5mm" or "0.1%" of the size. By default :func:`default_step`.
+    size : float
+        Diagonal of the bounding box.
+    unit : str
+        Unit of the coordinates.
+
+    Raises
+    ------
+    OptionError
+        It is neither, or no angle between 0 and 180 degrees.
+
+    Examples
+    --------
+    >>> float(np.degrees(bend_step_of("0.5mm", 100.0)(20.0)).round(3))
+    25.681
+    """
+    if asked is None:
+        return partial(default_step, size=size)
+    word = asked.strip() if isinstance(asked, str) else f"{asked}"
+    degrees = word.removesuffix("deg")
+    if degrees != word or not isinstance(asked, str):
+        try:
+            angle = float(degrees)
+        except ValueError:
+            angle = np.nan
+        if not 0.0 < angle < 180.0:
+            raise OptionError(
+                f"bend_step is {asked!r}; it must be an angle such as 15 or '15deg', or a distance "
+                "of chords such as '0.5mm'"
+            )
+        return lambda radius: float(np.radians(angle))
+    chord = as_length(asked, "bend_step", diagonal=size, unit=unit)
+    return lambda radius: float(2 * np.arccos(np.clip(1.0 - chord / radius, 0.0, 1.0)))
 
 
 def default_step(radius: float, size: float) -> float:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
 from gso.geometry.vectors import fold_angles
 from gso.io import as_mesh
-from gso.quantities import Length, Strain, as_length, as_positive, as_strain
-from gso.recognition.bend_lines import default_step, lines_of_round, lines_of_strip
+from gso.quantities import Length, Strain, as_length, as_strain
+from gso.recognition.bend_lines import bend_step_of, lines_of_round, lines_of_strip
 from gso.recognition.facet_graph import FacetGraph
 from gso.recognition.flat_and_torsal import Patch, other_patches
 from gso.recognition.flat_images import Part, developed, plane_image, round_image
@@ -21,6 +23,9 @@ from gso.recognition.shape_face import Recognised, ShapeFace
 from gso.recognition.smooth_torsal import smooth_image
 from gso.typing import Array, Flags, Ints, MeshLike
 
+#: The angle between bend lines for a radius.
+Step: TypeAlias = Callable[[float], float]
+
 #: Triangles of a smooth face at least, where more than this share of the area is free.
 _FEW, _MOSTLY = 12, 0.5
 
@@ -30,7 +35,8 @@ def recognise(
     *,
     max_deviation: Length | None = None,
     max_strain: Strain = 2e-3,
-    bend_step: float | None = None,
+    bend_step: Length | None = None,
+    unit: str = "mm",
 ) -> Recognised:
     """Divide a mesh into planes, cylinders, cones, torsal surfaces and free surfaces.
 
@@ -44,9 +50,12 @@ def recognise(
     max_strain : float or str
         Largest strain of the flat image of a face whose edges do not follow its rulings, and of
         which no equation is known.
-    bend_step : float, optional
-        Largest angle between neighbouring bend lines of cylinders and cones, in degrees; by
-        default 2 to 15 degrees, by the radius.
+    bend_step : float or str, optional
+        Largest angle between neighbouring bend lines of cylinders and cones, in degrees (a number,
+        or "15deg"), or how far chords between them may be from the surface, as a length ("0.5mm").
+        By default 2 to 15 degrees, by the radius.
+    unit : str
+        Unit of the coordinates.
 
     Returns
     -------
@@ -80,11 +89,11 @@ def recognise(
     allowed = (
         0.0
         if max_deviation is None
-        else as_length(max_deviation, "max_deviation", diagonal=surface.diagonal)
+        else as_length(max_deviation, "max_deviation", diagonal=surface.diagonal, unit=unit)
     )
     limit = as_strain(max_strain, "max_strain")
-    step = None if bend_step is None else np.radians(as_positive(bend_step, "bend_step"))
     graph = FacetGraph.of(surface, allowed)
+    step = bend_step_of(bend_step, surface.diagonal, unit)
     regions = round_regions(graph)
     rest = np.ones(len(graph.triangles), bool)
     for region in regions:
@@ -122,14 +131,10 @@ def _opened(
 
 
 def _round_face(
-    graph: FacetGraph, ids: Ints, surface: RoundSurface, seam: float | None, step: float | None
+    graph: FacetGraph, ids: Ints, surface: RoundSurface, seam: float | None, step: Step
 ) -> ShapeFace:
     part = Part.of(graph.points, graph.triangles[ids])
     image = round_image(part, surface, seam)
-    size = float(np.linalg.norm(np.ptp(graph.points, axis=0)))
-    radius = surface.radius
-    if step is None:
-        step = default_step(radius, size)
     toward = np.abs(np.einsum("td,td->t", surface.normals(graph.middles[ids]), graph.normals[ids]))
     vertices = np.unique(part.triangles)
     return ShapeFace(
@@ -142,7 +147,7 @@ def _round_face(
         float(np.abs(surface.distances(graph.points[vertices])).max()),
         float(np.arccos(np.clip(toward, 0.0, 1.0)).max()),
         seam=part.ends[~image.together],
-        bend_lines=lines_of_round(part, surface, image, step),
+        bend_lines=lines_of_round(part, surface, image, step(surface.radius)),
         bend_angle=float(np.ptp(image.angle)) * float(np.cos(surface.half_angle)),
     )
 

@@ -231,7 +231,7 @@ class Result:
         pattern at scale 1:1, where `unit` is the unit of the mesh's coordinates. ``.step``,
         ``.iges`` and ``.3dm`` are the spline in that unit (see :func:`gso.save_spline`); for a
         ruled surface they are its smooth strips (:func:`gso.smooth_strips`), and where these
-        are not torsal its planar faces. The notes say which. Any other suffix of
+        are not torsal, or strips run along lines, its planar faces. The notes say which. Any other suffix of
         :func:`gso.save` is the surface (for `flatten` the pattern at z = 0).
         Labels, materials and texture coordinates that the format cannot store are listed in
         the notes.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -61,6 +61,30 @@ class Folds:
         return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
+def bend_radii(ends: Ints, widths: Array, angles: Array) -> Array:
+    """Return the radii (r,) of bends, at the ends where they are smaller; infinite for flat ones.
+
+    Where several rulings of a strip meet in a point, the sheet turns there by all of their angles,
+    on the way from the ruling before them to the one after them.
+
+    Parameters
+    ----------
+    ends : ndarray of int, (r, 2)
+        Labels of the ends of rulings, equal where rulings of one strip meet.
+    widths : ndarray, (r, 2)
+        Mean distances of the ends from the rulings before and after; zero where these meet.
+    angles : ndarray, (r,)
+        In radians, with any sign.
+    """
+    _, at = np.unique(ends, return_inverse=True)
+    width = np.bincount(at.ravel(), widths.ravel())
+    turn = np.minimum(np.bincount(at.ravel(), np.repeat(np.abs(angles), 2)), np.pi)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radius = (width / (2.0 * np.sin(0.5 * turn)))[at.reshape(-1, 2)].min(axis=1)
+    radius[angles == 0.0] = np.inf
+    return np.asarray(radius)
+
+
 def folds(
     strips: Strips, vertices: Array, unrolled: Unrolled, mesh: Mesh, owner: Ints
 ) -> tuple[Folds, Folds]:
@@ -77,14 +101,15 @@ def folds(
     away = middle[two] - middle[one]
     angle = np.where(np.einsum("kd,kd->k", n[two] - n[one], away) < 0, -angle, angle)
     width = 0.5 * sum(_widths(strips, vertices, mesh.vertices[edges], face) for face in (one, two))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        radius = np.asarray(width).min(axis=1) / (2.0 * np.sin(0.5 * np.abs(angle)))
-    radius[angle == 0.0] = np.inf
+    # Rulings of strips side by side share their ends, but not their bends.
+    ends = strips.column[one][:, None] * len(mesh.vertices) + edges
+    radius = np.zeros(len(edges))
     a, b, _ = strips.creases
     size = len(strips.corners)
     crease = np.isin(edge_keys(one, two, size), edge_keys(a, b, size))
-    every = [Folds(edges[at], angle[at], radius[at]) for at in (~crease, crease)]
-    return every[0], replace(every[1], radii=np.zeros(int(crease.sum())))
+    radius[~crease] = bend_radii(ends[~crease], np.asarray(width)[~crease], angle[~crease])
+    rulings, creases = (Folds(edges[at], angle[at], radius[at]) for at in (~crease, crease))
+    return rulings, creases
 
 
 def _widths(strips: Strips, vertices: Array, ends: Array, face: Ints) -> Array:

@@ -71,13 +71,13 @@ def stitched(
     """
     mesh = ground.mesh
     n = len(mesh.vertices)
-    kept = set(edge_keys(*ground.kept.T, n).tolist())
+    kept = set(edge_keys(ground.kept[:, 0], ground.kept[:, 1], n).tolist())
     members = {k: piece.faces for k, piece in enumerate(pieces)}
     known = dict(enumerate(sheets))
     # Small pieces may be joined along seams shorter than a neck: they are not wider.
     size = {k: _wide(sheet, least) for k, sheet in known.items()}
     root = list(range(len(members)))
-    every = edge_keys(*pieces.edges.T, n).tolist()
+    every = edge_keys(pieces.edges[:, 0], pieces.edges[:, 1], n).tolist()
     sides = dict(zip(every, pieces.sides.tolist(), strict=True))
     cut_keys = set(every)
     spans = chains(pieces.edges, pieces.sides)
@@ -180,7 +180,7 @@ def _flat(mesh: Mesh, keys: set[int], faces: Ints) -> Sheet | None:
     he = part.half_edges
     k = he.interior
     ends = np.stack([he.origin[k], he.dest[k]], axis=1)
-    own = edge_keys(*ids[ends].T, n)
+    own = edge_keys(ids[ends][:, 0], ids[ends][:, 1], n)
     opened = cut(part, ends[np.isin(own, np.array(sorted(keys), np.int64))])
     if len(opened.mesh.boundary_loops) != 1 or opened.mesh.euler_characteristic != 1:
         return None

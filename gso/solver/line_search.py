@@ -94,6 +94,22 @@ def falls(before: N, after: N, step: N, expected: N, tolerance: float) -> tuple[
     return before - after > least, stepped | (expected <= ops.maximum(least, _NOTHING))
 
 
+def ends_next(step: Any, enough: Any) -> Any:
+    """Return whether a solve may end with the next iteration, given this one's step and decrease.
+
+    Not after a shortened step: it raises the damping, so that the next one is short whatever the
+    surface. One small decrease would then end the solve or not by the last digits.
+
+    Parameters
+    ----------
+    step : float or tensor
+        The accepted step length.
+    enough : bool or tensor of bool
+        Whether the energy fell enough to go on.
+    """
+    return (step >= 1.0) | (step <= 0.0) | (enough ^ True)
+
+
 def relative_decrease(
     before: float, after: float, step: float, expected: float, tolerance: float
 ) -> Status | None:

@@ -13,7 +13,7 @@ from gso import linalg
 from gso.energy.losses import Loss
 from gso.linalg.base import Solver
 from gso.solver.directions import METHODS, GaussNewton
-from gso.solver.line_search import armijo, relative_decrease
+from gso.solver.line_search import armijo, ends_next, relative_decrease
 from gso.solver.problem import Problem
 from gso.status import Progress, Status
 from gso.typing import Array, Flags
@@ -91,7 +91,7 @@ def minimise(
         Largest number of iterations.
     tolerance : float
         Stop when an iteration with the last loss of `continuation` lowers the energy by less
-        than this share of it.
+        than this share of it; not the first such iteration after a shortened step.
     continuation : sequence of Loss
         Losses by iteration of the terms named `continued`. The last one holds for all later
         iterations and for the energy returned.
@@ -149,7 +149,7 @@ def minimise(
     if not len(x):
         # Constraints fix every vertex: there are no unknowns.
         status, iterations = Status.CONVERGED, 0
-    done = 0
+    done, ready = 0, True
     try:
         report(0, best_energy, 0.0)
         with linalg.blas_threads(threads):
@@ -178,9 +178,11 @@ def minimise(
                 timings.search += time.perf_counter() - t2
                 report(done, value, step)
                 expected = -0.5 * float(gradient @ d)
-                if settled and (end := relative_decrease(energy, value, step, expected, tolerance)):
+                end = relative_decrease(energy, value, step, expected, tolerance)
+                if settled and end and ready:
                     status = end
                     break
+                ready = ends_next(step, end is None)
     except Cancelled:
         status = Status.CANCELLED
     if done <= last:

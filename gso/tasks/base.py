@@ -282,8 +282,8 @@ class Formulation(Generic[O]):
     search : callable, optional
         Finds the solution for a request with limits.
     before : callable, optional
-        Returns the request, by another formulation, whose result a solve starts from; None where
-        it starts from something else.
+        Returns the request, by another formulation, whose result a solve improves; None where it
+        starts from something else.
     """
 
     options: type[O]

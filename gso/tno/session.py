@@ -37,7 +37,8 @@ _SETTLED = 100
 class Session:
     """A task that is solved repeatedly, from warm starts, while its handles move.
 
-    The first solve is that of :func:`gso.tno.optimize`. After it only the last stage of the
+    The first solve is that of :func:`gso.tno.optimize`, but nothing is solved again: a result that
+    strains too much, is too far away or folds is refused. After it only the last stage of the
     task is iterated, from the current surface. The session keeps the sparsity pattern of its
     equations and their symbolic factorisation, so a frame costs one or two iterations. Hard
     handles are at their positions after every :meth:`move`, up to rounding; the iterations

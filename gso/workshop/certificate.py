@@ -103,6 +103,17 @@ def part_record(panel: Panel, part: Part) -> Json:
         "bends": len(part.bends),
         "bend_angle_max": float(angles.max(initial=0.0)),
         "bend_radius_min": float(panel.radii.min(initial=np.inf)),
+        "zones": [
+            {
+                "kind": zone.kind,
+                "bent_by": "press" if zone.pressed else "roll",
+                "radius_min": zone.least,
+                "radius_max": zone.most,
+                "angle": float(np.degrees(zone.angle)),
+                "text": zone.in_words(),
+            }
+            for zone in panel.zones
+        ],
         "notches": len(part.notches),
         "chord": chord(part.outline),
     }

@@ -49,7 +49,7 @@ def judge_sheet(own: Fitted, settings: FabricationSettings, finish: Finish) -> t
 
 
 def _necks(own: Fitted, kerf: float) -> tuple[Reason, ...]:
-    """Return the parts that are narrower than the kerf, or, with seams, than a share of the size."""
+    """Return why parts are too narrow: less than the kerf or, with seams, a share of the size."""
     pairs = [(seam.one.panel, seam.two.panel) for seam in own.made.matings]
     joined = {k for one, two in pairs if one != two for k in (one, two)}
     share = (Code.NARROW.info.limit or 0.0) * own.made.record["size"] * own.scale
@@ -93,7 +93,7 @@ def _bends(panel: Panel, sheet: Thickness) -> Iterator[Row]:
         yield from _sharpest(panel, folded, sheet)
     else:
         yield Code.TOOL_RADIUS, sheet.radius, _SHARPEST * sheet.sheet
-        yield from _nearest(panel, folded, sheet)
+        yield from _nearest(panel, sheet)
 
 
 def _sharpest(panel: Panel, bends: Flags, sheet: Thickness) -> Iterator[Row]:
@@ -103,12 +103,13 @@ def _sharpest(panel: Panel, bends: Flags, sheet: Thickness) -> Iterator[Row]:
     yield Code.TOO_THICK, float(panel.radii[k]) + depth, max(depth, _SHARPEST * sheet.sheet)
 
 
-def _nearest(panel: Panel, bends: Flags, sheet: Thickness) -> Iterator[Row]:
+def _nearest(panel: Panel, sheet: Thickness) -> Iterator[Row]:
     """Measure the two neighbouring bends that lack most room."""
     import shapely
 
-    lines = panel.flat[panel.bends[bends]]
-    wide = np.abs(panel.angles[bends]) * (float(sheet.radius or 0.0) + sheet.k * sheet.sheet)
+    bends = [b for b in panel.lines if b.zone < 0 or panel.zones[b.zone].pressed]
+    lines = np.array([bend.line for bend in bends])
+    wide = np.array([abs(bend.angle) * (bend.radius + sheet.k * sheet.sheet) for bend in bends])
     segments = shapely.linestrings(lines)
     middle = shapely.points(lines.mean(axis=1))
     tree = shapely.STRtree(segments)

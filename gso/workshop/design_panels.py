@@ -31,7 +31,7 @@ from gso.workshop.pattern_panels import of_result, of_surface
 
 #: Length of edges whose ends are joined, relative to the diagonal.
 _SAME = 1e-9
-#: Inner radius, relative to the thickness, up to which bends of solids are bent by a press.
+#: Inner radius, relative to the thickness, up to which bends are bent by a press.
 _PRESSED = 5.0
 
 Say = Callable[[str], None]
@@ -110,7 +110,9 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
                 cut=given.kept,
                 keep=given.uncut,
                 sheet=sheet,
-                press_radius=None if thick is None else ((_PRESSED + 1) * thick, _PRESSED * thick),
+                bend_step=settings.bend_step,
+                unit=settings.unit,
+                press_radius=_press_radius(given, settings),
             )
             break
         except OptionError:
@@ -135,9 +137,16 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
         "strain_p99": found.strain,
         "thickness": thick,
     }
-    one = of_surface(given.name, found.surface, found.pattern, record, found.bends)
+    one = of_surface(given.name, found.surface, found.pattern, record, found.bends, found.zones)
     one = replace(one, reasons=compare(crossed(given.mesh), {}))
     return _checked(_bent(one), settings)
+
+
+def _press_radius(given: Design, settings: FabricationSettings) -> tuple[float, float] | None:
+    """Return the largest radii of mountain and valley bends that a press bends at one line."""
+    if given.sheet is not None:
+        return (_PRESSED + 1) * given.sheet, _PRESSED * given.sheet
+    return None if settings.press is None else (_PRESSED * settings.press,) * 2
 
 
 def _is_hopeless(exact: Made) -> bool:

@@ -105,6 +105,7 @@ def fabricate(
     layers: str = "operations",
     paper: str | None = None,
     bend_text: bool = False,
+    bend_step: Length | None = None,
     step: bool = False,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -173,6 +174,10 @@ def fabricate(
         that every part fits, where no face is larger than a page.
     bend_text : bool
         Also write the direction, angle and radius beside each bend.
+    bend_step : float or str, optional
+        Angle between the bend lines of cylinders and cones, in degrees (15 or "15deg"), or how far
+        chords between them may be from the surface ("0.5mm"); by default 2 to 15 degrees, by the
+        radius.
     step : bool
         Also write the folded parts as solids of the sheet's thickness to one STEP file,
         ``folded.step``. Their bends have flat facets as the designs have them.
@@ -241,6 +246,8 @@ def fabricate(
         most,
         None if min_radius is None else _radius(min_radius, meshes, unit),
         unit,
+        bend_step,
+        finish.pressed(per_unit),
         page,
     )
     marks, holes = ([scale * np.asarray(line, float) for line in x] for x in (marks, holes))

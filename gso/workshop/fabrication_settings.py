@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 
 from gso.errors import OptionError
 from gso.quantities import Length, as_length, millimetres
+from gso.recognition import bend_step_of
 from gso.seams.options import CHANGES, STAYS
 from gso.spelling import choices
 from gso.typing import Json
@@ -36,6 +37,12 @@ class FabricationSettings:
         Smallest radius of a bend, in the unit of the files.
     unit : str
         Unit of the files.
+    bend_step : float or str, optional
+        Angle between bend lines of round faces, or distance of chords between them from the face,
+        as for :func:`gso.recognition.recognise`.
+    press : float, optional
+        Thickness of a sheet that a tool folds, in the unit of the files: narrow cylinders are bent
+        at one line.
     page : (float, float) or None
         Length and width of a page that parts of designs that keep their shape fit if they can, in
         the unit of the files.
@@ -49,6 +56,8 @@ class FabricationSettings:
     max_size: tuple[float, float] | None = None
     min_radius: float | None = None
     unit: str = "mm"
+    bend_step: Length | None = None
+    press: float | None = None
     page: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
@@ -57,6 +66,7 @@ class FabricationSettings:
                 f"no formulation {self.formulation!r}; {choices(self.formulation, FORMULATIONS)}"
             )
         self.distance(1.0)
+        bend_step_of(self.bend_step, 1.0, self.unit)
         if not (isinstance(self.max_strips, int) and 1 <= self.max_strips <= 64):
             raise OptionError(f"max_strips is {self.max_strips!r}; it must be 1 to 64")
 

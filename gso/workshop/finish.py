@@ -111,7 +111,14 @@ class Finish:
                 f"the solid is {sheet:.6g} mm thick, not {asked.sheet:g} mm; leave out the "
                 "thickness"
             )
-        return replace(self, thickness=replace(asked, sheet=sheet, face="outside", arcs=True))
+        return replace(self, thickness=replace(asked, sheet=sheet, face="outside"))
+
+    def pressed(self, scale: float) -> float | None:
+        """Return the thickness of a sheet that a tool folds, in the design's unit; else None."""
+        sheet = self.thickness
+        if sheet is None or (sheet.radius is None and sheet.table is None):
+            return None
+        return sheet.sheet / scale
 
     def room(self, sheet: tuple[float, float], scale: float) -> tuple[float, float]:
         """Return how large patterns may be for a sheet in millimetres, in the design's unit.

@@ -109,8 +109,8 @@ def _unmarked_fold(panel: Panel) -> float:
 
 
 def _is_strip(panel: Panel) -> bool:
-    """Tell whether a panel has bends that are neither rolled nor sharp folds."""
-    return bool((~panel.rolled & (panel.radii > 0)).any())
+    """Tell whether a panel has bends that are neither lines of a zone nor sharp folds."""
+    return bool(((panel.zone < 0) & (panel.radii > 0)).any())
 
 
 def _worst(design: Mesh, surface: Mesh) -> list[float]:

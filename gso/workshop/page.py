@@ -35,6 +35,7 @@ border-top-style: solid; border-top-width: 3px; vertical-align: middle; margin-r
 #: Kinds of lines, what they mean, and how they are drawn beyond their colour in drawings.
 _KINDS = {
     "outline": ("cut", "fill: #f6f2ea;"),
+    "roll": ("roll, guide lines", "stroke-dasharray: 2 2;"),
     "mountain": ("bend down, away from you", ""),
     "valley": ("bend up, towards you", ""),
     "mark": ("engrave: marks, creases, notches", ""),
@@ -71,6 +72,7 @@ def page(certificate: Json, parts: Sequence[Part], sheets: Sequence[Drawing]) ->
         wide, high = part.size
         text = f"{part.name}: {wide:.1f} x {high:.1f} mm"
         text += f", {part.count} times" if part.count > 1 else ""
+        text += "".join(f"; {zone.in_words()}" for zone in part.zones)
         lines.append(_figure(Drawing((part,)), text, 240))
     if len(parts) > _SHOWN:
         lines.append(f"<p>and {len(parts) - _SHOWN} more</p>")
@@ -141,8 +143,8 @@ def _figure(drawing: Drawing, text: str, width: int) -> str:
         notches = [np.stack([n.at, n.at + 1.2 * room * n.inward]) for n in part.notches]
         draw([*part.marks, *part.creases, *notches], kind="mark")
         draw(part.seams, kind="seam")
-        for kind, sign in (("mountain", 1), ("valley", -1)):
-            draw([b.line for b in part.bends if sign * b.angle > 0], kind=kind)
+        for kind in ("roll", "mountain", "valley"):
+            draw([line.points for line in strokes.lines(part) if line.kind == kind], kind=kind)
         if drawing.sheet is not None:
             tall = min(1.1 * room, 0.8 * part.size[0] / max(len(part.name), 1))
             middle = 0.5 * (part.low + part.outline.max(axis=0))

@@ -12,11 +12,11 @@ import numpy as np
 from gso.errors import MeshError
 from gso.geometry.polygon import arc_lengths
 from gso.mesh import Mesh
-from gso.pattern import Bend, Folded
+from gso.pattern import Bend, Folded, Zone
 from gso.typing import Array, Flags, Ints, Json
 from gso.verdict import Places, Reason
 
-_ARRAYS = ("points", "faces", "flat", "bends", "angles", "radii", "rolled")
+_ARRAYS = ("points", "faces", "flat", "bends", "angles", "radii", "zone")
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +34,10 @@ class Panel:
         Edges to bend along.
     angles, radii : ndarray, (b,)
         Their angles in radians, positive for mountain folds, and the radii of the bends.
-    rolled : ndarray of bool, (b,)
-        Bends that are rulings of a round face, to be rolled to their radius; others are folded.
+    zone : ndarray of int, (b,)
+        Number of the zone that each bend is a line of; -1 for those of none, which are folded.
+    zones : tuple of Zone
+        Round faces, which are bent as a whole.
     """
 
     name: str
@@ -44,16 +46,31 @@ class Panel:
     bends: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
     angles: Array = field(default_factory=lambda: np.empty(0))
     radii: Array = field(default_factory=lambda: np.empty(0))
-    rolled: Flags = field(default_factory=lambda: np.empty(0, bool))
+    zone: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+    zones: tuple[Zone, ...] = ()
 
     def __post_init__(self) -> None:
-        if not len(self.rolled):
-            object.__setattr__(self, "rolled", np.zeros(len(self.bends), bool))
+        if not len(self.zone):
+            object.__setattr__(self, "zone", np.full(len(self.bends), -1))
+
+    @property
+    def rolled(self) -> Flags:
+        """Bends that are rulings of a zone to be rolled to its radius, (b,)."""
+        return self._in_zone(pressed=False)
+
+    @property
+    def pressed(self) -> Flags:
+        """Bends that are a zone each, whose arc the pattern has, (b,)."""
+        return self._in_zone(pressed=True)
+
+    def _in_zone(self, *, pressed: bool) -> Flags:
+        which = np.array([*(zone.pressed == pressed for zone in self.zones), False])
+        return np.asarray(which[self.zone])
 
     @property
     def lines(self) -> list[Bend]:
         """The bends as lines of the pattern."""
-        return Folded(self.bends, self.angles, self.radii).lines(self.flat)
+        return Folded(self.bends, self.angles, self.radii, self.zone).lines(self.flat)
 
     @cached_property
     def loops(self) -> list[Ints]:
@@ -157,11 +174,11 @@ class Made:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return panels and seams as arrays by name."""
-        said = json.dumps([panel.name for panel in self.panels]).encode()
+        said = json.dumps([[panel.name, panel.zones] for panel in self.panels]).encode()
         out: dict[str, np.ndarray] = {"names": np.frombuffer(said, np.uint8)}
         for k, panel in enumerate(self.panels):
             parts = (panel.surface.vertices, panel.surface.faces, panel.flat)
-            every = (*parts, panel.bends, panel.angles, panel.radii, panel.rolled.astype(np.int64))
+            every = (*parts, panel.bends, panel.angles, panel.radii, panel.zone)
             out |= {f"panel{k}_{name}": x for name, x in zip(_ARRAYS, every, strict=True)}
         for k, seam in enumerate(self.matings):
             out[f"seam{k}_along"] = seam.along
@@ -184,12 +201,13 @@ class Made:
         """
         try:
             panels = []
-            for k, own in enumerate(json.loads(data["names"].tobytes())):
-                points, faces, flat, bends, angles, radii, rolled = (
+            for k, (own, zones) in enumerate(json.loads(data["names"].tobytes())):
+                points, faces, flat, bends, angles, radii, zone = (
                     data[f"panel{k}_{part}"] for part in _ARRAYS
                 )
                 surface = Mesh(points, faces)
-                panels.append(Panel(str(own), surface, flat, bends, angles, radii, rolled > 0))
+                known = tuple(Zone(*row) for row in zones)
+                panels.append(Panel(str(own), surface, flat, bends, angles, radii, zone, known))
             matings: list[Mating] = []
             while f"seam{len(matings)}_along" in data:
                 k = len(matings)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from gso.geometry.polygon import signed_area
-from gso.pattern import Bend
+from gso.pattern import Bend, Zone
 from gso.typing import Array
 
 
@@ -72,6 +72,8 @@ class Part:
         Closed polygons, clockwise.
     bends : tuple of Bend
         Straight lines to bend along: angles in radians, positive for mountain folds.
+    zones : tuple of Zone
+        Round faces that are bent as a whole, by the numbers that bends have.
     creases : tuple of ndarray, (k, 2)
         Lines to fold along that are not bends of the sheet, such as those of tabs.
     marks : tuple of ndarray, (k, 2)
@@ -98,6 +100,7 @@ class Part:
     labels: tuple[Label, ...] = ()
     grain: Array | None = None
     count: int = 1
+    zones: tuple[Zone, ...] = ()
 
     @cached_property
     def area(self) -> float:

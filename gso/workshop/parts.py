@@ -132,7 +132,12 @@ def scaled(panels: Sequence[Panel], scale: float, finish: Finish) -> list[Panel]
     """Return panels whose patterns are in millimetres, for the thickness of the sheet."""
     out = []
     for panel in panels:
-        own = replace(panel, flat=scale * panel.flat, radii=scale * panel.radii)
+        own = replace(
+            panel,
+            flat=scale * panel.flat,
+            radii=scale * panel.radii,
+            zones=tuple(zone.scaled(scale) for zone in panel.zones),
+        )
         out.append(own if finish.thickness is None else thickened(own, finish.thickness))
     return out
 
@@ -142,7 +147,14 @@ def _bare(panel: Panel, marks: Sequence[Array], cut: Sequence[Array]) -> Part:
     loops = [panel.flat[loop] for loop in panel.loops]
     outline, *holes = map(anticlockwise, loops)
     holes = [hole[::-1] for hole in holes] + list(cut)
-    return Part(panel.name, outline, tuple(holes), drawn(panel.lines), marks=tuple(marks))
+    return Part(
+        panel.name,
+        outline,
+        tuple(holes),
+        drawn(panel.lines),
+        marks=tuple(marks),
+        zones=panel.zones,
+    )
 
 
 def drawn(bends: Sequence[Bend]) -> tuple[Bend, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from gso.components import split
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
-from gso.pattern import Folded, Pattern
+from gso.pattern import Folded, Pattern, Zone
 from gso.result import Result
 from gso.typing import Array, Ints, Json
 from gso.unfolding import Net
@@ -27,7 +28,12 @@ def of_net(name: str, net: Net) -> Made:
 
 
 def of_surface(
-    name: str, surface: Mesh, pattern: Pattern, record: Json, folded: Folded = _NO_FOLDS
+    name: str,
+    surface: Mesh,
+    pattern: Pattern,
+    record: Json,
+    folded: Folded = _NO_FOLDS,
+    zones: Sequence[Zone] = (),
 ) -> Made:
     """Divide a surface with a pattern into panels.
 
@@ -40,13 +46,22 @@ def of_surface(
     record : dict
         What was measured.
     folded : Folded, optional
-        Bend lines: rulings of round faces, which are rolled to their radius, and folds.
+        Bend lines: rulings of round faces, and folds.
+    zones : sequence of Zone, optional
+        Round faces, by the numbers that bend lines have.
     """
     panels, label, local = _divided(surface.vertices, pattern, folded)
-    panels = [replace(panel, rolled=panel.radii > 0) for panel in panels]
+    panels = [_with_zones(panel, zones) for panel in panels]
     corners = len(folded.edges) > 0
     matings = of_pattern(surface.vertices, pattern, label, local, corners)
     return Made(name, _named(panels, [name] * len(panels)), numbered(matings), record)
+
+
+def _with_zones(panel: Panel, zones: Sequence[Zone]) -> Panel:
+    """Number the zones that a panel has lines of."""
+    used = np.unique(panel.zone[panel.zone >= 0])
+    own = np.where(panel.zone >= 0, np.searchsorted(used, panel.zone), -1)
+    return replace(panel, zone=own, zones=tuple(zones[k] for k in used.tolist()))
 
 
 def of_result(name: str, result: Result, record: Json) -> Made:
@@ -85,7 +100,8 @@ def _divided(points: Array, pattern: Pattern, folded: Folded) -> tuple[list[Pane
     for number, part in enumerate(parts):
         own = label[folded.edges[:, 0]] == number
         surface = part.mesh.replaced(points[pattern.vertex[part.vertices]])
-        lines = local[folded.edges[own]], folded.angles[own], folded.radii[own]
+        lines = [local[folded.edges[own]], folded.angles[own], folded.radii[own]]
+        lines += [folded.zone[own]] if len(folded.zone) else []
         panels.append(Panel("", surface, pattern.flat[part.vertices], *lines))
     return panels, label, local
 
@@ -99,7 +115,11 @@ def _rims(panels: list[Panel], pattern: Pattern, label: Ints, local: Ints) -> li
         rim = np.concatenate(
             [np.stack([loop, np.roll(loop, -1)], axis=1) for loop in panel.surface.boundary_loops]
         )
-        own = edge_keys(*local[ends[label[ends[:, 0]] == number]].T, n)
-        keys = edge_keys(*rim.T, n)
+        own = _keys(local[ends[label[ends[:, 0]] == number]], n)
+        keys = _keys(rim, n)
         out.append(rim[~np.isin(keys, own)])
     return out
+
+
+def _keys(edges: Ints, count: int) -> Ints:
+    return edge_keys(edges[:, 0], edges[:, 1], count)

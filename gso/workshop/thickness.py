@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
 from gso.mesh.topology import label_components
+from gso.pattern import Zone
 from gso.quantities import as_positive
 from gso.spelling import choices
 from gso.typing import Array, Ints
@@ -40,9 +41,6 @@ class Thickness:
         Bend deductions of sharp bends: angles of bending in radians (0 is flat), increasing, and
         how much shorter the pattern is than both flanges outside, to the apex. Between them it
         is interpolated, and below the first one it falls to 0 at no bend.
-    arcs : bool
-        Whether the pattern has the arcs of round bends: that of a solid has. Otherwise it has
-        the tangents to the apex, and the radii of its bends count for nothing.
 
     Examples
     --------
@@ -58,7 +56,6 @@ class Thickness:
     face: str = "middle"
     radius: float | None = None
     table: ArrayLike | None = None
-    arcs: bool = False
 
     def __post_init__(self) -> None:
         as_positive(self.sheet, "the thickness")
@@ -90,30 +87,31 @@ class Thickness:
         angle : array_like
             In radians, positive for mountain folds.
         radius : array_like
-            Radii of the surface's bends, where the pattern has their arcs.
+            Radii of the surface's bends where the pattern has their arcs; 0 where it has the
+            tangents to the apex.
 
         Examples
         --------
         A solid of thickness 2, bent by 90 degrees about an inner radius of 3, seen from outside:
 
-        >>> sheet = Thickness(2.0, k=0.4, face="outside", arcs=True)
+        >>> sheet = Thickness(2.0, k=0.4, face="outside")
         >>> arc = 5.0 * np.pi / 2
         >>> round(float(arc + sheet.change(np.pi / 2, 5.0)) / (np.pi / 2), 9)
         3.8
         """
         turn = np.asarray(angle, float)
         size, thick, design = np.abs(turn), self.sheet, self.depth(turn)
-        arc = np.asarray(radius, float) if self.arcs else np.zeros(1)
+        arc = np.asarray(radius, float)
         if self.table is not None:
             rows = np.asarray(self.table, float)
             deduction = np.interp(size, *np.pad(rows, ((int(rows[0, 0] > 0), 0), (0, 0))).T)
             apex = 2.0 * (arc + thick - design) * np.tan(0.5 * size)
-            return np.asarray((apex - deduction - size * arc).reshape(turn.shape))
+            return np.asarray(apex - deduction - size * arc)
         if self.radius is None:
             return np.asarray(size * (self.k * thick - design))
         around = size * (self.radius + self.k * thick)
         apex = 2.0 * (self.radius + design - arc) * np.tan(0.5 * size)
-        return np.asarray((around - apex - size * arc).reshape(turn.shape))
+        return np.asarray(around - apex - size * arc)
 
     def depth(self, angle: ArrayLike) -> Array:
         """Return how far the design's surface is from the inner face of bends of some angles."""
@@ -131,7 +129,7 @@ class Thickness:
             Of the bends of the design's surface.
         """
         angles, radii = np.broadcast_arrays(np.asarray(angle, float), np.asarray(radius, float))
-        if self.table is not None and not self.arcs:
+        if self.table is not None:
             return np.full(angles.shape, np.inf)
         if self.radius is not None:
             return np.full(angles.shape, float(self.radius))
@@ -151,18 +149,23 @@ class Thickness:
         """The same sheet, rolled to the radii of the surface."""
         return replace(self, radius=None, table=None)
 
+    @property
+    def pressed(self) -> Thickness:
+        """The same sheet, bent by a press to the radii of the surface."""
+        return replace(self, radius=None)
+
 
 def thickened(panel: Panel, thickness: Thickness) -> Panel:
     """Return a panel with the pattern of a sheet of some thickness, and inner radii of bends.
 
-    Plates between bends are moved apart or together along the normals of the bends. Bends that are
-    rolled have the radius of the surface, and others that of the tool.
+    Plates between bends are moved apart or together along the normals of the bends. Bends in zones
+    have the radius of the surface, and sharp ones that of the tool.
     """
     if not len(panel.bends):
         return panel
-    rolled, angles = panel.rolled, panel.angles
+    rolled, pressed, angles = panel.rolled, panel.pressed, panel.angles
     radii = np.where(
-        rolled,
+        rolled | pressed,
         thickness.rolled.inner(angles, panel.radii),
         thickness.inner(angles, panel.radii),
     )
@@ -173,10 +176,9 @@ def thickened(panel: Panel, thickness: Thickness) -> Panel:
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     count = int(plate.max()) + 1
     # The normal points from the first plate of each pair to the second.
-    if thickness.arcs:
-        change = thickness.change(angles, panel.radii)
-    else:
-        change = np.where(rolled, thickness.rolled.change(angles), thickness.change(angles))
+    change = np.where(rolled, thickness.rolled.change(angles), thickness.change(angles))
+    arcs = thickness.pressed.change(angles, np.where(pressed, panel.radii, 0.0))
+    change = np.where(pressed, arcs, change)
     step = change[:, None] * normal
     shift = _solved(count, pairs, step)
     total, often = np.zeros((len(panel.flat), 2)), np.zeros(len(panel.flat))
@@ -187,17 +189,23 @@ def thickened(panel: Panel, thickness: Thickness) -> Panel:
     np.add.at(total, both[:, 0], shift[both[:, 1]])
     np.add.at(often, both[:, 0], 1.0)
     move = total / np.maximum(often, 1.0)[:, None]
-    if thickness.arcs:
-        _stretch(panel, plate, pairs, normal, shift, move)
-    return replace(panel, flat=panel.flat + move, radii=radii)
+    _stretch(panel, plate, pairs, normal, shift, move)
+    zones = tuple(_inner_zone(zone, thickness) for zone in panel.zones)
+    return replace(panel, flat=panel.flat + move, radii=radii, zones=zones)
+
+
+def _inner_zone(zone: Zone, thickness: Thickness) -> Zone:
+    """Return a zone with inner radii."""
+    least, most = thickness.rolled.inner(zone.angle, [zone.least, zone.most]).tolist()
+    return zone._replace(least=least, most=most)
 
 
 def _stretch(
     panel: Panel, plate: Ints, pairs: Ints, normal: Array, shift: Array, move: Array
 ) -> None:
-    """Spread the step between two plates evenly over the zone of their bend; change `move`."""
+    """Spread the step between two plates evenly over the arc of their bend; change `move`."""
     faces = panel.surface.faces
-    arc = np.abs(panel.angles) * panel.radii
+    arc = np.where(panel.pressed, np.abs(panel.angles) * panel.radii, 0.0)
     # How far a vertex lies beyond the ends of the bend that it was last counted to.
     closest = np.full(len(move), np.inf)
     for pair in np.unique(pairs[arc > 0], axis=0):

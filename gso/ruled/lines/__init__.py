@@ -16,12 +16,21 @@ from gso.first_use import at_first_use
 
 if TYPE_CHECKING:
     from gso.ruled.lines.line_families import Family, families
-    from gso.ruled.lines.line_search import LineStrips
+    from gso.ruled.lines.line_fit import planarised
+    from gso.ruled.lines.line_search import EXACT, LineStrips
+    from gso.ruled.lines.line_surface import line_surface
+    from gso.ruled.lines.strip_cells import Cells
 
-__all__ = ["Family", "LineStrips", "families"]
+__all__ = ["EXACT", "Cells", "Family", "LineStrips", "families", "line_surface", "planarised"]
 
 # These import SciPy.
 __getattr__, __dir__ = at_first_use(
     __name__,
-    {"line_families": "Family families", "line_search": "LineStrips"},
+    {
+        "line_families": "Family families",
+        "line_fit": "planarised",
+        "line_search": "EXACT LineStrips",
+        "line_surface": "line_surface",
+        "strip_cells": "Cells",
+    },
 )

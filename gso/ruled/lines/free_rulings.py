@@ -60,6 +60,36 @@ def free_rulings(cells: Cells, points: Array, normals: Array) -> Polygons:
     return own.with_rulings(rings, np.array(strip), np.concatenate(rulings))
 
 
+def single(cells: Cells, points: Array) -> tuple[Polygons, Ints] | None:
+    """Return a single strip between the rulings of a mesh, from its first to its last polygon.
+
+    Parameters
+    ----------
+    cells : Cells
+    points : ndarray, (n, 3)
+        The mesh's vertices.
+
+    Returns
+    -------
+    polygons : Polygons
+    ends : ndarray of int, (r, 2)
+        The ends of all rulings, those before the first and after the last polygon included.
+        None where the strip closes around or branches, or rulings are missing.
+    """
+    own, (owner, loops) = cells.polygons, cells.outlines
+    if owner.any() or own.strip.any():
+        return None
+    sides = _sides(loops, cells, 0, points)
+    if sides is None or sides.closed or len(sides.one) != len(sides.two):
+        return None
+    ends = np.stack([sides.one, sides.two], axis=1)
+    one, two = (np.unique(np.sort(e, axis=1), axis=0) for e in (ends[1:-1], own.rulings))
+    if not np.array_equal(one, two):
+        return None
+    rings, rulings = _cells(sides, [(k, k) for k in range(len(ends))])
+    return own.with_rulings(rings, np.zeros(len(rings), np.int64), rulings), ends
+
+
 @dataclass(frozen=True)
 class _Sides:
     """The vertices on both sides of a strip, in one direction.

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gso.geometry.vectors import lengths
 from gso.mesh import topology
 from gso.ruled.lines.line_families import Band, Family
 from gso.typing import Array, Flags, Ints
@@ -192,16 +191,19 @@ def _sagittas(places: Array) -> Array:
     Lines across that begin or end between two levels count with the part that is there.
     """
     n, columns = places.shape[:2]
-    every, there = np.arange(columns), np.isfinite(places[:, :, 0])
     out = np.zeros((n, n))
-    for i in range(n):
-        for j in range(i + 2, n):
-            own = there[i : j + 1]
-            first, last = own.argmax(axis=0), j - i - own[::-1].argmax(axis=0)
-            p, q = places[i + first, every], places[i + last, every]
-            way = q - p
-            size = np.maximum(np.einsum("cd,cd->c", way, way), 1e-300)
-            off = places[i + 1 : j] - p
-            share = np.clip(np.einsum("lcd,cd->lc", off, way) / size, 0.0, 1.0)
-            out[i, j] = np.nansum(lengths(off - share[:, :, None] * way) ** _POWER)
+    for i in range(n - 2):
+        own = places[i:]
+        there, level, every = np.isfinite(own[:, :, 0]), np.arange(n - i), np.arange(columns)
+        p = own[there.argmax(axis=0), every]
+        last = np.maximum.accumulate(np.where(there, level[:, None], 0), axis=0)
+        way, off = own[last, every] - p, own - p
+        # Axes: the second of two levels, a level between them, a line across.
+        dot = np.einsum("jcd,lcd->jlc", way, off)
+        size = np.maximum(np.einsum("jcd,jcd->jc", way, way), 1e-300)[:, None]
+        share = np.clip(dot / size, 0.0, 1.0)
+        square = np.einsum("lcd,lcd->lc", off, off) + share * (share * size - 2.0 * dot)
+        between = (level > 0) & (level < level[:, None])
+        square = np.where(between[:, :, None], np.maximum(square, 0.0), 0.0)
+        out[i, i:] = np.nansum(square ** (_POWER // 2), axis=(1, 2))
     return np.where(np.tri(n, dtype=bool), np.inf, out)

@@ -15,10 +15,10 @@ from gso.energy.fairness import residual as fairness_residual
 from gso.energy.multipliers import Shifts
 from gso.energy.position import build as position
 from gso.energy.proximity import residual as proximity_residual
+from gso.geometry.ears import divided
 from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Mesh, Nearest, Polylines, vertex_normals
 from gso.mesh.polyline import turns
-from gso.ruled.lines.ears import ears
 from gso.ruled.lines.polygons import Polygons
 from gso.solver import Problem, minimise
 from gso.typing import Array, Ints
@@ -79,7 +79,7 @@ class LineFitter:
         number = np.full(len(self.mesh.vertices), -1)
         number[used] = np.arange(len(used))
         variables = free(Layout.of(len(used), "surface"))
-        triangles = number[ears(polygons.rings, start)]
+        triangles = number[divided(polygons.rings, start)[0]]
         planes = number[polygons.planes(start)]
         fixed = self._fixed(polygons, used, number)
         smooth = self._smooth(polygons, number)
@@ -104,10 +104,9 @@ class LineFitter:
         soft = coplanarity(planes, weight=1.0 / count)
         for stiff, fair in _PHASES:
             x = solved(x, soft, stiff, max(fair, fairness))
-        x = _planar(polygons, used, number, x, start)
         out: Array = start.copy()
         out[used] = x.reshape(-1, 3)
-        return out
+        return planarised(polygons, out)
 
     def _distances(self, points: Array, triangles: Ints) -> list[Weighted]:
         """Return the distances from the design to the strips, and back."""
@@ -160,7 +159,7 @@ class LineFitter:
         quads = np.array(corners, np.int64).reshape(-1, 4)
         ids = np.concatenate(
             [
-                ears(polygons.rings, v),
+                divided(polygons.rings, v)[0],
                 quads[:, [0, 1, 3]],
                 quads[:, [1, 2, 3]],
                 quads[:, :3],
@@ -198,25 +197,35 @@ class LineFitter:
         return out
 
 
-def _planar(polygons: Polygons, used: Ints, number: Ints, x: Array, start: Array) -> Array:
-    """Make polygons planar with the smallest displacement of their corners."""
+def planarised(polygons: Polygons, points: Array) -> Array:
+    """Make polygons planar with the smallest displacement of their corners.
+
+    Parameters
+    ----------
+    polygons : Polygons
+    points : ndarray, (n, 3)
+        Positions of the mesh's vertices; those that are no corners stay.
+    """
+    used = np.unique(np.concatenate(polygons.rings))
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
     layout = Layout.of(len(used), "surface")
+    out: Array = points.copy()
     for _ in range(_ROUNDS):
-        points = start.copy()
-        points[used] = x.reshape(-1, 3)
-        planes = number[polygons.planes(points)]
-        hard = coplanarity(planes)
-        if _largest(hard, points[used]) <= _EXACT:
+        hard = coplanarity(number[polygons.planes(out)])
+        if _largest(hard, out[used]) <= _EXACT:
             break
         shifts = Shifts(hard)
         hard = replace(hard, refresh=shifts.constants)
-        hold = position(np.arange(len(used)), x.reshape(-1, 3), np.ones(len(used)))
+        hold = position(np.arange(len(used)), out[used], np.ones(len(used)))
         items = [Weighted(hold, 1.0), Weighted(hard, _STIFF)]
+        x = out[used].ravel()
         for _ in range(_SHIFTED):
             x = minimise(Problem(items, free(layout)), x, iterations=4, tolerance=1e-12).x
             if shifts.update(layout.split(x)) <= _EXACT:
                 break
-    return x
+        out[used] = x.reshape(-1, 3)
+    return out
 
 
 def _largest(term: Term, points: Array) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gso.errors import MeshError
 from gso.mesh import Mesh
-from gso.ruled.lines.free_rulings import free_rulings
+from gso.ruled.lines.free_rulings import free_rulings, single
 from gso.ruled.lines.line_choice import Choice
 from gso.ruled.lines.line_families import families
 from gso.ruled.lines.line_fit import LineFitter
@@ -28,6 +28,12 @@ _PLANAR = 0.2
 #: Whether to take the other kind of rulings, and fairness, one after the other until nothing folds;
 #: half of them for the second family.
 _SETTINGS = ((False, 0.03), (True, 0.03), (False, 0.5), (True, 0.5))
+#: Ratio to the distance that is predicted for half as many strips from which others are tried.
+_WORSE = 3.0
+#: Distance of samples from one another's surfaces at which strips are the mesh.
+_SAME = 1e-7
+#: Distance at which a mesh counts as developable as it is.
+EXACT = 1e-5
 #: Ratio of numbers of strips in the search for a bound, and largest number of solves.
 _MORE, _SOLVES = 1.3, 10
 
@@ -46,11 +52,17 @@ class LineStrips:
         self.mesh, self.tell = mesh, tell
         self.stopped = False
         self.results: dict[int, Found] = {}
+        self._measured: set[int] = set()
         try:
             self.choices = [Choice(family) for family in families(mesh)]
         except MeshError:
             self.choices = []
         self._fitter = LineFitter(mesh)
+
+    @property
+    def least(self) -> int:
+        """The smallest number of strips; 0 where there are no lines."""
+        return min((choice.least for choice in self.choices), default=0)
 
     def predicted(self, count: int) -> float:
         """Return the distance that is predicted for a number of strips."""
@@ -61,42 +73,86 @@ class LineStrips:
         """Return the best strips of at most a number, which is solved for; None if there are none.
 
         More strips are never farther away: fewer that were solved before are returned where they
-        are nearer.
+        are nearer. Half as many are solved for where the distance is much larger than predicted.
         """
-        if count not in self.results and not self.stopped:
-            tried: list[Found] = []
-            for place, candidate in enumerate(self._candidates(count)):
-                for settings in _SETTINGS[: len(_SETTINGS) >> place]:
-                    found = self._solved(*candidate, *settings)
-                    tried += [] if found is None else [found]
-                    if found is None or found.surface.sound:
-                        break
-            if tried:
-                self.results[count] = min(tried, key=lambda found: found.order)
-        known = [found for k, found in sorted(self.results.items(), reverse=True) if k <= count]
-        return min(known, key=_distance, default=None)
+        self._solve(count)
+        known = [k for k in sorted(self.results, reverse=True) if k <= count]
+        best = min(known, key=lambda k: _distance(self.results[k]), default=None)
+        return None if best is None else self._certain(best)
+
+    def _solve(self, count: int) -> None:
+        """Solve for a number of strips; their largest distance is that of samples."""
+        if count in self.results or self.stopped:
+            return
+        half = max(count // 2, 1)
+        limit = _WORSE * self.predicted(half)
+        tried: list[Found] = []
+        for place, candidate in enumerate(self._candidates(count)):
+            for turn, settings in enumerate(_SETTINGS[: len(_SETTINGS) >> place]):
+                found = self._solved(*candidate, *settings)
+                tried += [] if found is None else [found]
+                near = found is None or turn > 0 or found.surface.farthest <= limit
+                if found is None or (near and found.surface.sound):
+                    break
+        if tried:
+            best = self.results[count] = min(tried, key=lambda found: found.order)
+            if half >= max(self.least, 2) and _distance(best) > (False, limit):
+                self._solve(half)
+
+    def _certain(self, count: int) -> Found:
+        """Return solved strips with the largest distance of all points."""
+        found = self.results[count]
+        # Samples do where strips are the mesh.
+        if count not in self._measured and found.surface.farthest > _SAME:
+            far = found.surface.distances(self.mesh)
+            surface = replace(found.surface, deviation=far)
+            found = self.results[count] = replace(found, surface=surface, mean=far.mean)
+        self._measured.add(count)
+        return found
+
+    def as_it_is(self, wanted: Wanted) -> Found | None:
+        """Return strips that are the mesh itself: the wanted number, or one; else None."""
+        count = wanted.strips or 1
+        if self.predicted(count) > EXACT:
+            return None
+        found = self.strips(count)
+        if found is None or found.surface.farthest > EXACT or not wanted.met(found.surface):
+            return None
+        return found
 
     def within(self, wanted: Wanted) -> Found | None:
         """Return as few strips as meet bounds, or else the best."""
-        least = min((choice.least for choice in self.choices), default=1)
+        # A single strip is of use where the lines that become rulings are straight.
+        least = max(self.least, 1 if self.predicted(1) <= EXACT else 2)
         most = min(wanted.most, max((choice.rows for choice in self.choices), default=0))
-        low, high = max(least, 2) - 1, None
+        low, high = least - 1, None
         aim = np.inf if wanted.max_deviation is None else wanted.max_deviation
         count = next((k for k in range(low + 1, most + 1) if self.predicted(k) <= aim), most)
         for _ in range(_SOLVES):
             if not low < count <= most or self.stopped:
                 break
-            found = self.strips(count)
-            if found is not None and wanted.met(found.surface):
+            self._solve(count)
+            if self._meets(wanted, count):
                 high = count
                 count = count - 1 if count - low <= 3 else (low + count) // 2
             else:
                 low = count
                 more = max(count + 1, round(_MORE * count))
                 count = min(more, most) if high is None else (low + high) // 2
-        every = [self.results[k] for k in sorted(self.results)]
-        met = [found for found in every if wanted.met(found.surface)]
-        return met[0] if met else min(every, key=_distance, default=None)
+        every = sorted(k for k in self.results if k <= most)
+        met = next((k for k in every if self._meets(wanted, k)), None)
+        best = min(every, key=lambda k: _distance(self.results[k]), default=met)
+        best = best if met is None else met
+        return None if best is None else self._certain(best)
+
+    def _meets(self, wanted: Wanted, count: int) -> bool:
+        """Return whether a number of strips was solved for and meets bounds."""
+        found = self.results.get(count)
+        return (
+            found is not None
+            and wanted.met(found.surface)
+            and wanted.met(self._certain(count).surface)
+        )
 
     def _candidates(self, count: int) -> list[tuple[Choice, Ints]]:
         chosen = [(choice, choice.lines(count)) for choice in self.choices]
@@ -120,13 +176,17 @@ class LineStrips:
         if self.stopped or not self.tell(count):
             self.stopped = True
             return None
-        if (_gaps(polygons, v) > _PLANAR * choice.predicted(lines)) != other:
+        ends = None
+        if count == 1:
+            one = single(cells, v)
+            polygons, ends = (polygons, None) if one is None else one
+        elif (_gaps(polygons, v) > _PLANAR * choice.predicted(lines)) != other:
             polygons = free_rulings(cells, v, self._fitter.normals)
         points = self._fitter.fit(polygons, v, fairness=fairness)
         if not np.isfinite(points).all():
             return None
-        surface = line_surface(self.mesh, polygons, points)
-        far = surface.distances(self.mesh)
+        surface = line_surface(self.mesh, polygons, points, ends)
+        far = surface.distances(self.mesh, sampled=True)
         return Found(replace(surface, deviation=far), far.mean, LINES)
 
 

@@ -6,19 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso.geometry.ears import divided
 from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Mesh, Nearest, topology
 from gso.parametrization import beside, upright
 from gso.pattern import Pattern
-from gso.ruled.fold_lines import Folds
-from gso.ruled.lines.ears import ears
+from gso.ruled.fold_lines import Folds, bend_radii
 from gso.ruled.lines.polygons import Polygons
 from gso.ruled.ruled_surface import RuledSurface
 from gso.ruled.sheet import seam_pairs
+from gso.ruled.strip_layout import Strips
+from gso.ruled.untrimmed import Untrimmed
 from gso.typing import Array, Flags, Ints
 
 
-def line_surface(design: Mesh, polygons: Polygons, points: Array) -> RuledSurface:
+def line_surface(
+    design: Mesh, polygons: Polygons, points: Array, ends: Ints | None = None
+) -> RuledSurface:
     """Make a ruled surface of planar polygons, and unroll it.
 
     Parameters
@@ -28,6 +32,9 @@ def line_surface(design: Mesh, polygons: Polygons, points: Array) -> RuledSurfac
     polygons : Polygons
     points : ndarray, (n, 3)
         Positions of the design's vertices, some of which are corners of the polygons.
+    ends : ndarray of int, (p + 1, 2), optional
+        Of a single strip, the ends of the rulings before, between and after the polygons, with
+        which smooth surfaces can be made of it.
     """
     used = np.unique(np.concatenate(polygons.rings))
     number = np.full(len(points), -1)
@@ -42,16 +49,20 @@ def line_surface(design: Mesh, polygons: Polygons, points: Array) -> RuledSurfac
     vertex = np.empty(len(flat), np.int64)
     inside = table >= 0
     vertex[table[inside]] = faces[inside]
+    if len(flat) == len(vertices):
+        # Nothing is cut: the vertices are those of the surface, in their order.
+        table, flat, vertex = faces, flat[np.argsort(vertex)], np.arange(len(vertices))
     closing = hinges[~tree]
     return RuledSurface(
         mesh=mesh,
         strip=part[owner],
         flat=np.zeros(len(faces), bool),
-        rulings=_folds(hinges[tree], planes, rings, vertices),
+        rulings=_folds(hinges[tree], part[hinges[tree, 0]], planes, rings, vertices),
         creases=_sharp(np.concatenate([creases, closing]), planes),
         pattern=Pattern(flat, table, vertex, seam_pairs(mesh, table)),
         moved=Nearest(mesh).locate(design.vertices)[2],
         crossed=int(_tangled(rings, planes, vertices).sum()),
+        untrimmed=None if ends is None else Untrimmed(Strips((number[ends],)), vertices, owner),
     )
 
 
@@ -98,20 +109,19 @@ def _summed(owner: Ints, values: Array, count: int) -> Array:
 
 def _faces(rings: list[Ints], vertices: Array) -> tuple[Ints, Ints]:
     """Return quads and triangles, and the polygon of each: convex quads stay whole."""
-    faces: list[Ints] = []
-    owner = []
-    for k, ring in enumerate(rings):
-        corner = vertices[ring]
-        if len(ring) == 4:
-            turns = cross(corner - np.roll(corner, 1, axis=0), np.roll(corner, -1, axis=0) - corner)
-            if (turns @ turns.sum(axis=0) > 0).all():
-                faces.append(ring[None])
-                owner.append(k)
-                continue
-        triangles = ears([ring], vertices)
-        faces.append(np.column_stack([triangles, np.full(len(triangles), -1)]))
-        owner += [k] * len(triangles)
-    return np.concatenate(faces), np.array(owner)
+    triangles, owner = divided(rings, vertices)
+    faces = np.column_stack([triangles, np.full(len(triangles), -1)])
+    four = np.flatnonzero([len(ring) == 4 for ring in rings])
+    quads = np.array([rings[k] for k in four.tolist()], np.int64).reshape(-1, 4)
+    corner = vertices[quads]
+    turns = cross(corner - np.roll(corner, 1, axis=1), np.roll(corner, -1, axis=1) - corner)
+    convex = (np.einsum("kcd,kd->kc", turns, turns.sum(axis=1)) > 0).all(axis=1)
+    # Both triangles of a convex quad become one face.
+    first = np.searchsorted(owner, four[convex])
+    faces[first] = quads[convex]
+    kept = np.ones(len(faces), bool)
+    kept[first + 1] = False
+    return faces[kept], owner[kept]
 
 
 def _edges(rings: list[Ints], rulings: Ints) -> tuple[Ints, Ints]:
@@ -214,28 +224,25 @@ def _sharp(edges: Ints, planes: _Planes) -> Folds:
     return Folds(edges[:, 2:], _turns(edges, planes), np.zeros(len(edges)))
 
 
-def _folds(hinges: Ints, planes: _Planes, rings: list[Ints], vertices: Array) -> Folds:
-    """Return the rulings, with radii from the distances of the next rulings."""
-    angle = _turns(hinges, planes)
-    width = np.zeros((len(hinges), 2))
-    own: list[list[int]] = [[] for _ in rings]
-    for k, (one, two, _, _) in enumerate(hinges.tolist()):
-        own[one].append(k)
-        own[two].append(k)
-    for k, hinge in enumerate(hinges):
-        ends = vertices[hinge[2:]]
-        for cell in hinge[:2].tolist():
-            others = [i for i in own[cell] if i != k]
-            if others:
-                a, b = vertices[hinges[others[0], 2:]]
-                width[k] += 0.5 * lengths(cross(ends - a, np.broadcast_to(unit(b - a), (2, 3))))
-            else:
-                corner = vertices[rings[cell]]
-                way = np.broadcast_to(unit(ends[1] - ends[0]), corner.shape)
-                width[k] += 0.5 * lengths(cross(corner - ends[0], way)).max()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        radius = width.min(axis=1) / (2.0 * np.sin(0.5 * np.abs(angle)))
-    radius[angle == 0.0] = np.inf
+def _folds(hinges: Ints, strip: Ints, planes: _Planes, rings: list[Ints], vertices: Array) -> Folds:
+    """Return the rulings of strips (r,), with radii from the distances of the next rulings."""
+    angle, count = _turns(hinges, planes), len(hinges)
+    cell, own = hinges[:, :2].T.ravel(), np.tile(np.arange(count), 2)
+    order = np.lexsort((own, cell))
+    begins = np.flatnonzero(np.diff(cell[order], prepend=-1))
+    after = np.arange(1, 2 * count + 1)
+    after[np.r_[begins[1:], 2 * count] - 1] = begins
+    other = np.empty_like(own)
+    other[order] = own[order][after]
+    ends = vertices[hinges[own, 2:]]
+    a, b = vertices[hinges[other, 2:]].transpose(1, 0, 2)
+    off = lengths(cross(ends - a[:, None], np.broadcast_to(unit(b - a)[:, None], ends.shape)))
+    for k in np.flatnonzero(other == own):
+        corner = vertices[rings[cell[k]]]
+        way = np.broadcast_to(unit(ends[k, 1] - ends[k, 0]), corner.shape)
+        off[k] = lengths(cross(corner - ends[k, 0], way)).max()
+    meeting = strip[:, None] * len(vertices) + hinges[:, 2:]
+    radius = bend_radii(meeting, 0.5 * (off[:count] + off[count:]), angle)
     return Folds(hinges[:, 2:], angle, radius)
 
 

@@ -6,6 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -19,11 +20,18 @@ from gso.mesh import Mesh
 from gso.pipeline.judgement import add_reasons, violation_of, warning
 from gso.quantities import Length, Strain, as_length, as_sheet, as_strain
 from gso.result import Result
+from gso.ruled.lines import LineStrips
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import MOST, Options
 from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
 from gso.ruled.paneling.strips_request import StripsRequest
-from gso.ruled.paneling.surface_strips import along_lines, case_of, check_whole, of_surface
+from gso.ruled.paneling.surface_strips import (
+    along_lines,
+    case_of,
+    check_whole,
+    lines_of,
+    of_surface,
+)
 from gso.seams import Edges, Segmentation, cut
 from gso.solver import Callback
 from gso.status import Status
@@ -175,10 +183,10 @@ def lay_strips(given: MeshLike | Pieces, request: StripsRequest) -> Result:
     return result
 
 
-#: Ratio of distances below which strips without smooth surfaces are preferred to others.
-_NEARER = 0.5
 #: Distance relative to the diagonal at which strips need not be nearer.
 _CLOSE = 1e-4
+#: Share of the predicted distance that strips along lines may have.
+_FAR = 0.6
 
 
 @dataclass(frozen=True)
@@ -229,15 +237,19 @@ class _Task:
         light = LightDesign.of(self.design, asked.max_deviation, named=asked.names_vertices)
         tried: list[_Tried] = []
         if self.whole:
-            for way in (self._as_a_whole, self._along_lines):
-                tried += way(light)
-                if tried and (tried[-1].ended or (self.divisible and tried[-1].holds)):
+            for way in (self._as_it_is, self._as_a_whole, self._along_lines):
+                tried += way(light, tried)
+                if tried and tried[-1].ended:
                     return self._answer(tried)
-                if tried and (tried[0].is_near if self.divisible else tried[0].is_close):
-                    break
-            if not self.divisible:
-                if not tried:
-                    check_whole(light.mesh)
+            if not (tried or self.divisible):
+                least, number = self._least, asked.options.number
+                if number is not None and 1 < number < least:
+                    raise MeshError(
+                        f"{number} strips are too few: along the lines of this mesh there are "
+                        f"{least} or more; ask for as many, or give max_deviation"
+                    )
+                check_whole(light.mesh)
+            if not self.divisible or any(one.holds for one in tried):
                 return self._answer(tried)
         failed: GSOError | None = None
         for division in self._divisions(light):
@@ -264,14 +276,15 @@ class _Task:
         yield lambda: found_pieces(light, asked, JOINT)
 
     def _answer(self, tried: Sequence[_Tried]) -> Result:
-        best = min(tried, key=lambda one: one.order)
+        few = self.request.options.number is None
+        best = min(tried, key=lambda one: one.order(few=few))
         if self.request.verdict:
             add_reasons(best.result, best.reasons)
         return best.result
 
-    def _as_a_whole(self, light: LightDesign) -> list[_Tried]:
+    def _as_a_whole(self, light: LightDesign, tried: Sequence[_Tried]) -> list[_Tried]:
         asked = self.request
-        if not _is_whole(light.mesh):
+        if any(one.is_close for one in tried) or not _is_whole(light.mesh):
             return []
         asked.say("as a whole")
         result = light.whole(of_surface(light.mesh, asked, light.allowed), asked)
@@ -284,13 +297,42 @@ class _Task:
         result.seconds["verdict"] = time.perf_counter() - clock
         return [_Tried(result, reasons)]
 
-    def _along_lines(self, light: LightDesign) -> list[_Tried]:
-        """Return strips along the design's own lines, if it has any."""
-        asked, design = self.request, self.design
-        if asked.constraints or len(np.unique(design.components[design.used])) > 1:
+    @cached_property
+    def _lines(self) -> LineStrips | None:
+        """The strips along the design's own lines, if it has any."""
+        design, constraints = self.design, self.request.constraints
+        if constraints or len(np.unique(design.components[design.used])) > 1:
+            return None
+        return lines_of(design, self.request)
+
+    @property
+    def _least(self) -> int:
+        """The smallest number of strips along lines; 0 where there are none."""
+        return 0 if self._lines is None else self._lines.least
+
+    def _as_it_is(self, light: LightDesign, tried: Sequence[_Tried]) -> list[_Tried]:
+        """Return strips that are the design itself, if there are any along its lines."""
+        return [] if self._lines is None else self._of_lines(self._lines, 0)
+
+    def _along_lines(self, light: LightDesign, tried: Sequence[_Tried]) -> list[_Tried]:
+        """Return strips along the design's own lines, if they may be better than the others."""
+        lines, asked, most = self._lines, self.request, None
+        if lines is None:
             return []
+        for one in tried:
+            surface, bound = one.result.ruled, asked.max_deviation
+            if one.holds and surface is not None and bound is not None and self.divisible:
+                most = surface.strips - 1
+                if _FAR * lines.predicted(most) > bound / self.design.diagonal:
+                    return []
+            elif one.is_near if self.divisible else one.is_close:
+                return []
         asked.say("along its lines")
-        result = along_lines(design, asked)
+        return self._of_lines(lines, most)
+
+    def _of_lines(self, lines: LineStrips, most: int | None) -> list[_Tried]:
+        asked = self.request
+        result = along_lines(self.design, asked, lines, most=most)
         if result is None:
             return []
         own = judge(result, asked.limits) if asked.verdict or self.divisible else ()
@@ -321,15 +363,11 @@ class _Tried:
         """Whether it is what was asked for."""
         return not (self.reasons or self.result.status.is_failure)
 
-    @property
-    def order(self) -> tuple[bool, float]:
-        """Sort key: what was asked for first, then by distance.
-
-        Of results that hold, those without smooth surfaces for CAD have to be clearly nearer.
-        """
+    def order(self, *, few: bool) -> tuple[bool, int, float]:
+        """Sort key: what was asked for first, fewer strips before more if asked, then distances."""
         surface = self.result.ruled
-        plain = surface is None or surface.untrimmed is None
-        return not self.holds, self.far / (_NEARER if self.holds and plain else 1.0)
+        count = surface.strips if few and self.holds and surface is not None else 0
+        return not self.holds, count, self.far
 
     @property
     def is_close(self) -> bool:

@@ -16,7 +16,7 @@ from gso.pipeline.user_result import pack, record_violations
 from gso.result import Result, StripsResult
 from gso.ruled.conditions import Conditions
 from gso.ruled.domain import Domain
-from gso.ruled.lines import LineStrips
+from gso.ruled.lines import EXACT, LineStrips
 from gso.ruled.paneling.options import RULED, Options
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.ruled_surface import RuledSurface
@@ -156,8 +156,8 @@ def of_surface(design: Mesh, request: StripsRequest, bound: float | None) -> Res
     return result
 
 
-def along_lines(design: Mesh, request: StripsRequest) -> Result | None:
-    """Make strips along the design's own lines, without a verdict; None where there are none.
+def lines_of(design: Mesh, request: StripsRequest) -> LineStrips | None:
+    """Return the strips along a design's own lines, not solved yet; None where there are no lines.
 
     Parameters
     ----------
@@ -166,22 +166,46 @@ def along_lines(design: Mesh, request: StripsRequest) -> Result | None:
     request : StripsRequest
         Without constraints.
     """
-    options, clock = request.options, time.perf_counter()
-    aim = wanted(options, request.max_deviation, design.diagonal)
-    if design.has_triangles or not design.boundary_loops or aim.strips == 1 or options.flats:
+    if design.has_triangles or not design.boundary_loops:
         return None
-    size, frame = design.diagonal, design.frame
+    size, centre = design.diagonal, design.frame.centre
 
     def told(count: int) -> bool:
         progress = Progress(0, 1, 0, 1, 0.0, {}, 1.0, f"strips along lines: {count}")
         return request.callback is None or not says_no(request.callback(progress))
 
-    lines = LineStrips(design.replaced((design.vertices - frame.centre) / size), told)
-    found = lines.within(aim) if aim.strips is None else lines.strips(aim.strips)
+    return LineStrips(design.replaced((design.vertices - centre) / size), told)
+
+
+def along_lines(
+    design: Mesh, request: StripsRequest, lines: LineStrips, *, most: int | None = None
+) -> Result | None:
+    """Make strips along the design's own lines, without a verdict; None where there are none.
+
+    Parameters
+    ----------
+    design : Mesh
+    request : StripsRequest
+    lines : LineStrips
+        Those of the design.
+    most : int, optional
+        Largest number of strips; 0 for the design as it is, where strips follow it exactly.
+    """
+    options, clock = request.options, time.perf_counter()
+    aim = wanted(options, request.max_deviation, design.diagonal)
+    if most == 0:
+        found = lines.as_it_is(aim)
+    elif options.flats or (aim.strips == 1 and lines.predicted(1) > EXACT):
+        found = None
+    elif aim.strips is None:
+        found = lines.within(aim if most is None else replace(aim, most=min(most, aim.most)))
+    else:
+        found = lines.strips(aim.strips)
     if found is None:
         return None
+    size, centre = design.diagonal, design.frame.centre
     surface = found.surface.transformed(
-        lambda points: size * points + frame.centre, size, lambda rows: rows
+        lambda points: size * points + centre, size, lambda rows: rows
     )
     met = not aim.bounded or aim.met(found.surface)
     status = Status.CONVERGED if met else Status.TARGET_MISSED

@@ -82,8 +82,8 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     Raises
     ------
     MeshError
-        The surface was read from a file of an earlier version, or its outline cannot be carried
-        over to the smooth strips.
+        Several strips run along the lines of a quad mesh, the surface was read from a file of an
+        earlier version, or its outline cannot be carried over to the smooth strips.
 
     Examples
     --------
@@ -98,7 +98,10 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     """
     source, mesh = surface.untrimmed, surface.mesh
     if source is None:
-        raise MeshError("the surface is from a file of an earlier version; solve again")
+        raise MeshError(
+            "strips along the lines of a quad mesh, and those in files of an earlier version, have "
+            "no smooth surfaces; take the planar faces, gso.io.save_faces"
+        )
     size = mesh.diagonal
     middle = mesh.vertices.mean(axis=0)
     unit_mesh = mesh.replaced((mesh.vertices - middle) / size)

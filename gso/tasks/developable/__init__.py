@@ -31,10 +31,12 @@ def _before_isometry(analysis: Analysis, request: Request[joint_isometry.Options
 
 
 def _curvature(request: Request[joint_isometry.Options]) -> Request[Options] | None:
-    """Return the request for the surface that a solve by isometry starts from."""
-    if request.x0 is not None or request.options.begin != "curvature":
+    """Return the request for the usual surface, which a solve by isometry from it improves."""
+    o = request.options
+    if request.x0 is not None or o.begin != "curvature" or o.variables == "surface":
         return None
-    return replace(request.with_options(_START), formulation="curvature")
+    usual = request.with_options(Options())
+    return replace(usual, formulation="curvature", formulation_given=False)
 
 
 TASK = Task(

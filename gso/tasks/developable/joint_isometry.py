@@ -25,7 +25,16 @@ from typing import Any, ClassVar
 
 from gso import metrics as measure
 from gso import parametrization
-from gso.energy import Weighted, christoffel, congruence, elongation, fairness, proximity
+from gso.energy import (
+    Weighted,
+    christoffel,
+    congruence,
+    elongation,
+    fairness,
+    gauss_image,
+    proximity,
+)
+from gso.energy.losses import Absolute
 from gso.errors import OptionError
 from gso.hierarchy import coarser, resample_like
 from gso.mesh import Mesh
@@ -34,7 +43,7 @@ from gso.mesh.normals import vertex_normals
 from gso.status import Status
 from gso.tasks import constrained, per_component
 from gso.tasks.base import Plan, Stage
-from gso.tasks.developable import flat_image, spline_stage
+from gso.tasks.developable import flat_image, hidden_curvature, spline_stage
 from gso.tasks.developable.analysis import Analysis
 from gso.tasks.developable.bounds import radius
 from gso.tasks.options import Options as BaseOptions
@@ -49,6 +58,8 @@ _NEARLY = 1e-3
 #: A warm start whose isometry defect is below this multiple of `isometry_threshold`
 #: needs no coarser grids.
 _ISOMETRIC = 100.0
+#: Weights in turn of curvature by the normals of quads, where these hide some, and its smoothing.
+_IMAGE, _EPS = (2e-3, 1e-2, 5e-2), 0.007
 #: Smallest iteration limit where the design needs no change and only its image is solved for.
 _UNROLL = 100
 
@@ -186,10 +197,14 @@ def plan(
         # The spline stage comes last, so no stage before it may end the solve.
         stages = [replace(stage, finished=None) for stage in stages]
         stages.append(spline_stage.stage(stages[-1], mesh, spline))
+    bent = [partial(_with_normals, stages[-1], mesh, weight) for weight in _IMAGE]
     return Plan(
         flat_image.layout_of(mesh, cut),
         start.ravel(),
         [*before, *stages],
+        further=None
+        if spline is not None
+        else hidden_curvature.further(mesh, options.developable_below, stages[-1], bent),
         notes=opened.notes,
         finish=partial(flat_image.place, mesh, cut),
         result_notes=partial(flat_image.notes, mesh, cut),
@@ -199,6 +214,12 @@ def plan(
         else partial(flat_image.cold_start, [*levels, mesh], cut),
         cut=cut,
     )
+
+
+def _with_normals(stage: Stage, mesh: Mesh, weight: float) -> list[Weighted]:
+    """Return the terms of a stage, and curvature by the normals of quads with a weight."""
+    bent = [Weighted(t, weight, Absolute(_EPS)) for t in gauss_image.build(mesh)]
+    return [*stage.own_items, *bent]
 
 
 def _check_bound(analysis: Analysis, request: Request[Options]) -> None:

@@ -15,11 +15,10 @@ from gso.energy.losses import Absolute
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.normals import vertex_normals
-from gso.mesh.topology import are_quads
 from gso.status import Status
 from gso.tasks import base, constrained
-from gso.tasks.base import Plan, Stage, same
-from gso.tasks.developable import spline_stage
+from gso.tasks.base import Plan, Stage
+from gso.tasks.developable import hidden_curvature, spline_stage
 from gso.tasks.developable.analysis import FLAT_CURVATURE, Analysis
 from gso.tasks.developable.bounds import check_handles, inside, offset_bounds, radius
 from gso.tasks.developable.levels import FREE_VERTICES, Level, levels, pinned_only
@@ -47,11 +46,8 @@ TANGENTS = ("first tangent", "second tangent")
 _SWEEPS = 3
 #: Tolerance of all stages but the last.
 _LOOSE = 1e-3
-#: Numbers of quads that may hide curvature: fewer are no surface yet, and at 64 x 64 all measures
-#: agree. Curvature by the normals of quads over that of the worse triangulation, above which the
-#: former gets shares of the weight of curvature, and these shares.
-_COARSE = (100, 3_000)
-_HIDDEN, _IMAGE = 1.4, (0.5, 0.75, 0.9)
+#: Shares of the weight of curvature for that by the normals of quads, where these hide some.
+_IMAGE = (0.5, 0.75, 0.9)
 
 
 def plan(analysis: Analysis, request: Request[Options]) -> Plan:
@@ -97,9 +93,9 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
             moving=stages[-1].variables,
         )
     further = None
-    coarse_quads = _COARSE[0] <= len(mesh.faces) <= _COARSE[1] and are_quads(mesh.faces).all()
-    if spline is None and coarse_quads:
-        further = partial(_against_hidden_curvature, analysis, request, stages[-1])
+    if spline is None:
+        shares = [partial(objective, analysis, request, mesh, share) for share in _IMAGE]
+        further = hidden_curvature.further(mesh, options.developable_below, stages[-1], shares)
     begin = coarse[0].begin.vertices if coarse else inside(start, mesh, radius(request))
     free_to_return = constraints.empty
     free_to_return &= request.x0 is None or request.max_displacement is None
@@ -197,23 +193,6 @@ def _stages(analysis: Analysis, request: Request[Options], coarser_meshes: int) 
         first = stage("normal", _OFFSETS_FIRST, falling)
         return [replace(first, tolerance=_LOOSE), last]
     return [last]
-
-
-def _against_hidden_curvature(
-    analysis: Analysis, request: Request[Options], last: Stage, number: int, coordinates: Array
-) -> Stage | None:
-    """Plan a stage with curvature by the normals of quads, if these hide curvature.
-
-    Coarse quads do by bending along diagonals: neither triangulation sees it.
-    """
-    mesh = analysis.mesh
-    after = mesh.replaced(coordinates.reshape(-1, 3))
-    seen = max(measure.loss_gc_worst(after, scale=1.0), request.options.developable_below)
-    if number == len(_IMAGE) or measure.loss_gc_image(after, scale=1.0) <= _HIDDEN * seen:
-        return None
-    items = objective(analysis, request, mesh, _IMAGE[number])
-    losses = last.continuation[-1:]
-    return replace(last, name="normals of quads", own_items=items, continuation=losses, enter=same)
 
 
 def _needs_repetition(constraints: Compiled) -> bool:

@@ -12,7 +12,7 @@ from torch import Tensor
 from gso.energy.losses import Loss
 from gso.solver import Timings
 from gso.solver.directions import GaussNewton, LevenbergMarquardt, adapt_damping
-from gso.solver.line_search import falls
+from gso.solver.line_search import ends_next, falls
 from gso.tno.batched.batch_problem import Problem
 from gso.tno.batched.batch_steps import armijo, direction
 from gso.tno.batched.stage_batch import CONVERGED, MAX_ITERATIONS, STALLED
@@ -92,6 +92,7 @@ def minimise(
     out.steps.append(torch.zeros_like(out.energy))
     timings.search += time.perf_counter() - clock
     live, current = torch.arange(x.shape[1], device=x.device), problem
+    ready = torch.ones_like(live, dtype=torch.bool)
     for k in range(iterations):
         begun = time.perf_counter()
         settled = k >= last
@@ -112,12 +113,15 @@ def minimise(
             history.append(torch.full_like(out.energy, torch.nan).index_copy_(0, live, now))
         if settled:
             enough, well = falls(energy, value, length, -0.5 * slope, tolerance)
-            on = torch.nonzero(enough).ravel()
+            end = ~enough & ready
+            ready = ends_next(length, enough)
+            on = torch.nonzero(~end).ravel()
             if len(on) < len(live):
-                ended = live[~enough]
-                out.code[ended] = torch.where(well[~enough], CONVERGED, STALLED)
+                ended = live[end]
+                out.code[ended] = torch.where(well[end], CONVERGED, STALLED)
                 out.iterations[ended] = k + 1
                 live, x, damping = live[on], x.index_select(1, on), damping[on]
+                ready = ready[on]
                 current = current.of_surfaces(on)
         timings.evaluate += linearised - begun
         timings.factor += solved - linearised

@@ -34,7 +34,10 @@ def optimize_batch(
 
     The objective and the stages are those of :func:`gso.tno.optimize`, and so are the results,
     up to rounding errors and what the iterations make of them. But for these, a result does not
-    depend on the other surfaces. On a graphics processor up to a thousand are solved together.
+    depend on the other surfaces. Each surface is solved once, also with `verdict`: a result that
+    strains too much, is too far away or folds is refused, where ``optimize`` solves again, and
+    curvature that coarse quads hide (``loss_gc_image``) is not removed. On a graphics processor up
+    to a thousand are solved together.
     On a processor PyTorch uses one thread of this process for as long as it runs.
     Surfaces whose stages differ from those of the others, such as noisy or closed ones, are
     solved in smaller batches, or one by one.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gso.pattern import Bend
+from gso.pattern import Bend, Zone
 from gso.workshop.part import Drawing, Label
 from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import Layer
@@ -24,7 +24,8 @@ SUFFIX = ".dxf"
 PACKAGE = "ezdxf"
 APPLICATION = "GSO"
 """Name of the application under which bends have extended data: a string, ``mountain`` or
-``valley``; a real (1040), the angle in degrees; a distance (1041), the radius, if there is one."""
+``valley``; a real (1040), the angle in degrees; a distance (1041), the radius, if there is one;
+and for lines of zones a string such as ``roll R 1500, 180 deg down``."""
 
 _MILLIMETRES = 4
 # Line width in hundredths of a millimetre.
@@ -112,16 +113,17 @@ def _line(space: Modelspace, line: Line, layer: str) -> DXFGraphic:
     start, end = line.points.tolist()
     made = space.add_line(start, end, dxfattribs={"layer": layer})
     if line.bend is not None:
-        made.set_xdata(APPLICATION, _data(line.bend))
+        made.set_xdata(APPLICATION, _data(line.bend, line.zone))
     return made
 
 
-def _data(bend: Bend) -> list[tuple[int, str | float]]:
+def _data(bend: Bend, zone: Zone | None) -> list[tuple[int, str | float]]:
     data: list[tuple[int, str | float]] = [
         (1000, "mountain" if bend.angle > 0 else "valley"),
         (1040, float(abs(np.degrees(bend.angle)))),
     ]
-    return [*data, (1041, float(bend.radius))] if np.isfinite(bend.radius) else data
+    data += [(1041, float(bend.radius))] if np.isfinite(bend.radius) else []
+    return data if zone is None else [*data, (1000, zone.in_words())]
 
 
 def _text(space: Modelspace, text: Label, layer: str) -> DXFGraphic:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gso.pattern import Bend
+from gso.pattern import Bend, Zone
 from gso.typing import Array
 from gso.workshop.names import different
 from gso.workshop.part import Drawing, Label, Part
@@ -37,19 +37,31 @@ class Line:
     Attributes
     ----------
     kind : str
-        ``outline``, ``hole``, ``mountain``, ``valley``, ``crease``, ``mark``, ``seam``,
-        ``notch``, ``grain``, ``arrow`` (the head of the grain line) or ``sheet``.
+        ``outline``, ``hole``, ``mountain``, ``valley``, ``roll`` (a line of what is rolled),
+        ``crease``, ``mark``, ``seam``, ``notch``, ``grain``, ``arrow`` (the head of the grain line)
+        or ``sheet``.
     points : ndarray, (k, 2)
         In millimetres. The first point of a closed line is not repeated.
     closed : bool
     bend : Bend, optional
         The bend along it.
+    zone : Zone, optional
+        The zone that the bend is a line of.
     """
 
     kind: str
     points: Array
     closed: bool = False
     bend: Bend | None = None
+    zone: Zone | None = None
+
+    @property
+    def title(self) -> str:
+        """What is done along it, in words; empty if it is no bend."""
+        if self.bend is None:
+            return ""
+        zone = "" if self.zone is None else f"{self.zone.in_words()}; here "
+        return zone + self.bend.in_words()
 
 
 def lines(part: Part) -> list[Line]:
@@ -73,7 +85,7 @@ def lines(part: Part) -> list[Line]:
     for notch in part.notches:
         drawn.append(Line("notch", np.stack([notch.at, notch.at + depth * notch.inward])))
     drawn += [
-        Line("mountain" if bend.angle > 0 else "valley", np.asarray(bend.line), bend=bend)
+        Line(_kind(part, bend), np.asarray(bend.line), bend=bend, zone=_zone(part, bend))
         for bend in _bends(part)
     ]
     drawn += [_line("seam", line) for line in part.seams]
@@ -82,13 +94,13 @@ def lines(part: Part) -> list[Line]:
 
 
 def texts(part: Part, bend_text: bool = False) -> list[Label]:
-    """Return the texts of a part: its labels, those of its notches and, if asked for, its bends.
+    """Return the texts of a part: labels, those of notches and zones and, if asked for, of bends.
 
     Parameters
     ----------
     part : Part
     bend_text : bool
-        Whether each bend has a text with its direction, angle and radius.
+        Whether each bend that is not rolled has a text with its direction, angle and radius.
 
     Examples
     --------
@@ -102,18 +114,28 @@ def texts(part: Part, bend_text: bool = False) -> list[Label]:
     height = _BESIDE * depth
     found += _numbers(part, depth, height)
     for bend in _bends(part) if bend_text else []:
-        step = bend.line[1] - bend.line[0]
-        high = min(_BEND_TEXT, _BEND_SHARE * float(np.hypot(*step)))
-        # Readable from below or from the right.
-        step = step if (step[0], step[1]) > (1e-9 * abs(step[1]), 0) else -step
-        angle = float(np.arctan2(step[1], step[0]))
-        up = np.array([-np.sin(angle), np.cos(angle)])
+        if _kind(part, bend) == "roll":
+            continue
         way = "down" if bend.angle > 0 else "up"
         words = f"{way} {abs(np.degrees(bend.angle)):.4g} deg"
         if np.isfinite(bend.radius):
             words += f" R {bend.radius:.4g}"
-        found.append(Label(words, np.mean(bend.line, axis=0) + high * up, high, angle))
+        found.append(_beside(bend, words))
+    for number, zone in enumerate(part.zones):
+        own = [bend for bend in part.bends if bend.zone == number]
+        if own and not zone.pressed:
+            found.append(_beside(own[len(own) // 2], zone.in_words()))
     return [text for text in found if text.text and text.height > 0]
+
+
+def _beside(bend: Bend, words: str) -> Label:
+    """Place words beside a bend, readable from below or from the right."""
+    step = bend.line[1] - bend.line[0]
+    high = min(_BEND_TEXT, _BEND_SHARE * float(np.hypot(*step)))
+    step = step if (step[0], step[1]) > (1e-9 * abs(step[1]), 0) else -step
+    angle = float(np.arctan2(step[1], step[0]))
+    up = np.array([-np.sin(angle), np.cos(angle)])
+    return Label(words, np.mean(bend.line, axis=0) + high * up, high, angle)
 
 
 def sheet(drawing: Drawing) -> list[Line]:
@@ -189,6 +211,17 @@ def _line(kind: str, points: Array, closed: bool = False) -> Line:
     if len(line) > 3 and np.array_equal(line[0], line[-1]):
         return Line(kind, line[:-1], closed=True)
     return Line(kind, line, closed)
+
+
+def _zone(part: Part, bend: Bend) -> Zone | None:
+    return part.zones[bend.zone] if 0 <= bend.zone < len(part.zones) else None
+
+
+def _kind(part: Part, bend: Bend) -> str:
+    zone = _zone(part, bend)
+    if zone is not None and not zone.pressed:
+        return "roll"
+    return "mountain" if bend.angle > 0 else "valley"
 
 
 def _bends(part: Part) -> list[Bend]:

@@ -72,8 +72,7 @@ def content(
                 continue
             group = page.group(inside, f"{layer.name}-{name}", strokes.title(part))
             for line in drawn:
-                title = "" if line.bend is None else line.bend.in_words()
-                page.path(group, [line.points], closed=line.closed, title=title)
+                page.path(group, [line.points], closed=line.closed, title=line.title)
             for text in texts:
                 page.text(group, text.text, text.start, text.height, text.angle)
     return page.content()
