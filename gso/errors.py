@@ -13,6 +13,10 @@ class MeshError(GSOError, ValueError):
     """Input geometry or a mesh file cannot be used."""
 
 
+class NonManifoldError(MeshError):
+    """Parts of a surface share a vertex only, or an edge has more than two faces."""
+
+
 class OptionError(GSOError, ValueError):
     """An option, a constraint or a task name is unknown or contradictory."""
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Angle in radians up to which edges are in line, and bends equal.
 _STRAIGHT = 1e-6
@@ -113,6 +113,11 @@ class Folded(NamedTuple):
     angles: Array = np.empty(0)
     radii: Array = np.empty(0)
     zone: Ints = np.empty(0, np.int64)
+
+    def taken(self, which: Flags) -> Folded:
+        """Return the marked ones (k,)."""
+        zone = self.zone[which] if len(self.zone) else self.zone
+        return Folded(self.edges[which], self.angles[which], self.radii[which], zone)
 
     def lines(self, flat: Array) -> list[Bend]:
         """Return them as lines, for positions (p, 2) of the pattern's vertices.

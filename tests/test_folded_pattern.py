@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import ezdxf
 import numpy as np
 import pytest
 import shapely
+from scipy.spatial import ConvexHull
 
 import gso
 from gso import metrics
@@ -109,6 +111,7 @@ def check(found, design: Mesh) -> None:
         [t.buffer(1e-9 * design.diagonal, join_style="mitre") for t in triangles]
     )
     assert union.area == pytest.approx(signed.sum(), rel=1e-6)
+    assert found.misfit(design) < 1e-6 * design.diagonal
 
 
 @pytest.mark.parametrize(
@@ -183,6 +186,44 @@ def test_a_duct_from_square_to_round_is_one_part():
     before = np.sort(edge_lengths(design.vertices, design.faces).ravel())
     after = np.sort(edge_lengths(found.pattern.flat, found.pattern.faces).ravel())
     np.testing.assert_allclose(after, before, rtol=1e-9)
+
+
+def pipe(radius=50.0, height=150.0, count=48, rows=12, holes=6, slit=False) -> Mesh:
+    """A tube with square holes around it, or a tube that is open along a ruling."""
+    mesh = frustum(radius, radius, height, count, rows)
+    row, column = np.divmod(np.arange(len(mesh.faces)), count)
+    gone = (np.abs(row - 5) < 2) & (column % (count // holes) < 3)
+    faces = mesh.faces[~gone]
+    if slit:
+        # The last column ends at copies of the first ruling's vertices.
+        faces = mesh.faces.copy()
+        last = column == count - 1
+        faces[last, 1], faces[last, 2] = [len(mesh.vertices) + row[last] + k for k in (0, 1)]
+        return Mesh(np.r_[mesh.vertices, mesh.vertices[::count]], faces)
+    return Mesh(mesh.vertices, faces)
+
+
+def blob(count=60) -> Mesh:
+    """A lumpy ball of triangles."""
+    k = np.arange(count) + 0.5
+    z, a = 1.0 - 2.0 * k / count, np.pi * (1.0 + np.sqrt(5.0)) * k
+    p = np.stack([np.sqrt(1 - z * z) * np.cos(a), np.sqrt(1 - z * z) * np.sin(a), z], axis=1)
+    made = ConvexHull(p)
+    q = p[made.simplices]
+    out = np.einsum("td,td->t", np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]), q[:, 0])
+    faces = np.where((out > 0)[:, None], made.simplices, made.simplices[:, ::-1])
+    return Mesh(p * (1.0 + 0.2 * np.sin(3 * p[:, :1])), faces)
+
+
+@pytest.mark.parametrize(
+    "design", [pipe(), pipe(slit=True), blob(), prism(6, 30.0, 90.0), frustum(40.0, 0.5, 90.0)]
+)
+def test_patterns_fold_up_to_the_design(design):
+    found = folded_pattern(design)
+    check(found, design)
+    # The way back does not know the design: bends of half the angle lead elsewhere.
+    folded = found.folded._replace(angles=0.5 * found.folded.angles, radii=2 * found.folded.radii)
+    assert replace(found, folded=folded).misfit(design) > 1e-3 * design.diagonal
 
 
 def test_what_is_not_developable_has_no_such_pattern():

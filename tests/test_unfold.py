@@ -168,6 +168,130 @@ def test_archimedean_solids_are_one_part(name):
     assert net.cut_length == pytest.approx((len(points) - 1) * edge, rel=1e-9)
 
 
+def grid_of(points):
+    """A torus of quads from points (h, w, 3), closed both ways."""
+    h, w = points.shape[:2]
+    r, c = np.divmod(np.arange(h * w), w)
+    r1, c1 = (r + 1) % h, (c + 1) % w
+    quads = np.stack([r * w + c, r * w + c1, r1 * w + c1, r1 * w + c], axis=1)
+    return points.reshape(-1, 3), quads.tolist()
+
+
+def torus(h=8, w=12):
+    v, u = np.meshgrid(*(2 * np.pi * np.arange(n) / n for n in (h, w)), indexing="ij")
+    rho = 3.0 + np.cos(v)
+    return grid_of(np.stack([rho * np.cos(u), rho * np.sin(u), np.sin(v)], axis=-1))
+
+
+def hull_of_boat(stations=9):
+    """The sides of a boat between keel, chine and gunwale, in triangles."""
+    x = np.linspace(0.0, 1.0, stations)
+    beam = np.sin(np.pi * (0.1 + 0.8 * x))
+    lines = [
+        (0.0 * x, 0.3 * (x - 0.4) ** 2),
+        (0.22 * beam, 0.15 + 0 * x),
+        (0.3 * beam, 0.4 + 0.1 * x),
+    ]
+    half = np.stack([np.stack([2.5 * x, y, z], axis=1) for y, z in lines])
+    points = np.concatenate([half[2, :, :], half[1], half[0], half[1], half[2]])
+    points[3 * stations :, 1] *= -1.0
+    faces = []
+    for row, k in itertools.product(range(4), range(stations - 1)):
+        a, b = row * stations + k, (row + 1) * stations + k
+        faces += [[a, b, a + 1], [b, b + 1, a + 1]]
+    return points, faces
+
+
+def tetrakis():
+    """A cube with a pyramid on each face."""
+    points, faces = PLATONIC["cube"][0], []
+    tips = 1.5 * np.r_[np.eye(3), -np.eye(3)]
+    for k, tip in enumerate(tips):
+        own = np.flatnonzero(points @ tip > 1.0)
+        middle = tip / np.linalg.norm(tip)
+        x = np.eye(3)[(k + 1) % 3]
+        turn = np.arctan2(points[own] @ np.cross(middle, x), points[own] @ x)
+        around = own[np.argsort(turn)].tolist()
+        faces += [[a, b, 8 + k] for a, b in itertools.pairwise([*around, around[0]])]
+    return np.r_[points, tips], faces
+
+
+def star(arms=5):
+    radius = np.where(np.arange(2 * arms) % 2 == 0, 2.0, 0.8)
+    outline = radius[:, None] * ring(2 * arms, 1.0)
+    points = np.r_[np.pad(outline, ((0, 0), (0, 1))), [[0, 0, 0.5], [0, 0, -0.5]]]
+    n = 2 * arms
+    up = [[k, (k + 1) % n, n] for k in range(n)]
+    return points, up + [[(k + 1) % n, k, n + 1] for k in range(n)]
+
+
+def frustum(sides=6):
+    points = np.r_[
+        np.c_[ring(sides, 3.0), np.zeros(sides)], np.c_[ring(sides, 1.5), np.full(sides, 2.0)]
+    ]
+    return points, prism(ring(sides, 1.0), 1.0)[1]
+
+
+def house():
+    gable = np.array([[0, 0], [4, 0], [4, 3], [2, 5], [0, 3.0]])
+    return prism(gable, 6.0)
+
+
+ANGLE = np.array([[0, 0], [5, 0], [5, 2], [2, 2], [2, 6], [0, 6.0]])
+SPHERE = np.r_[
+    PLATONIC["icosahedron"][0] / np.sqrt(1 + GOLD**2), PLATONIC["dodecahedron"][0] / 3**0.5
+]
+LOW_POLY = {
+    "gear": (gear(7), 1),
+    "house": (house(), 1),
+    "boat": (hull_of_boat(), 2),
+    "nut": (nut(6), 1),
+    "star": (star(), 1),
+    "sphere": (hull(SPHERE), 1),
+    "L-shaped box": (prism(ANGLE, 3.0), 1),
+    "frustum": (frustum(), 1),
+    "tetrakis cube": (tetrakis(), 1),
+    "torus": (torus(), 3),
+}
+
+
+def edge_angles(points, faces):
+    """Angles between neighbouring faces in degrees, each by its own normal."""
+    normals = {}
+    for face in faces:
+        p = points[face]
+        n = sum(np.cross(p[k] - p[0], p[k + 1] - p[0]) for k in range(1, len(p) - 1))
+        for a, b in itertools.pairwise([*face, face[0]]):
+            normals.setdefault((min(a, b), max(a, b)), []).append(n)
+    pairs = {edge: both for edge, both in normals.items() if len(both) == 2}
+    return {
+        edge: float(np.degrees(np.arctan2(np.linalg.norm(np.cross(m, n)), m @ n)))
+        for edge, (m, n) in pairs.items()
+    }
+
+
+@pytest.mark.parametrize("name", LOW_POLY)
+def test_low_poly_models(name):
+    (points, faces), most = LOW_POLY[name]
+    net = made(points, faces)
+    assert len(net) <= most
+    angles = edge_angles(points, [list(map(int, face)) for face in faces])
+    # Every angle is a fold or at a seam.
+    cut = sum(angles.get(edge, 0.0) for edge in edges_of(net))
+    assert np.abs(net.angles).sum() + cut == pytest.approx(sum(angles.values()), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "most"), [("tetrahedron", 1.26), ("cube", 1.7), ("octahedron", 1.51)]
+)
+def test_outlines_are_compact(name, most):
+    """A triangle of four, a cross in 3 x 4 squares turned to 10, six triangles in a row and two."""
+    points, *_ = PLATONIC[name]
+    net = made(*hull(points))
+    box = shapely.minimum_rotated_rectangle(shapely.MultiPoint(net.pattern.flat))
+    assert box.area < most * net.areas.sum()
+
+
 @pytest.mark.parametrize("n", [3, 5, 8, 16])
 def test_prisms(n):
     net = made(*prism(ring(n, 30.0), 80.0))

@@ -141,8 +141,12 @@ class TestSVG:
 class TestPDF:
     def test_pages_have_windows_and_a_scale_bar(self, tmp_path):
         path = tmp_path / "a.pdf"
-        writers.write(DRAWING, path, paper="A4")
-        tiling = tiled(DRAWING, (210.0, 297.0), 10.0, 10.0)
+        # Parts that fit a page have one of their own.
+        writers.write(Drawing((PART, PART)), path, paper="A4")
+        assert len(pypdf.PdfReader(path).pages) == 2
+        drawing = Drawing(DRAWING.parts, sheet=(600.0, 300.0))
+        writers.write(drawing, path, paper="A4")
+        tiling = tiled(drawing, (210.0, 297.0), 10.0, 10.0)
         book = pypdf.PdfReader(path)
         assert len(book.pages) == len(tiling.tiles) + 1
         box = book.pages[0].mediabox

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     "DIR",
 )
 @shared.unit
+@shared.scale
+@shared.height
+@shared.up
 @click.option(
     "--formulation",
     type=click.Choice(("ruled", "curvature", "isometry", "flatten")),
@@ -36,6 +39,8 @@ if TYPE_CHECKING:
 @shared.max_strain
 @shared.max_strips
 @shared.darts
+@shared.cut
+@shared.keep
 @shared.keep_groups
 @shared.min_radius
 @click.option("--thickness", metavar="MM", type=shared.MM, help="Thickness of the sheet.")
@@ -83,7 +88,8 @@ if TYPE_CHECKING:
     help="Registration holes beside the notches, on both sides of a seam: their diameter, and "
     "their distance from the seam.",
 )
-@click.option("--tabs", metavar="MM", type=float, help="Width of tabs along seams, for paper.")
+@shared.tabs
+@shared.numbers
 @click.option("--labels", metavar="MM", default=6.0, help="Height of the names on parts.")
 @click.option("--no-labels", is_flag=True, help="No names on parts.")
 @click.option("--grain", is_flag=True, help="The grain runs along each part.")
@@ -128,7 +134,11 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Also write the folded parts as solids of the sheet's thickness: folded.step.",
 )
-@click.option("--paper", metavar="A4", help="Also write all parts as a PDF on pages of this size.")
+@click.option(
+    "--paper",
+    metavar="A4",
+    help="Also write all parts as a PDF on pages of this size, one part a page where it fits.",
+)
 @shared.workers
 @shared.scheduler
 @file_options.weld
@@ -162,7 +172,7 @@ def fabricate(
         return {name: given.pop(name) for name in names}
 
     finish = Finish(
-        **taken("kerf", "allowance", "notches", "tabs", "labels", "grain"),
+        **taken("kerf", "allowance", "notches", "tabs", "numbers", "labels", "grain"),
         registration=given.pop("holes"),
         face="inside" if given.pop("inside_up") else "outside",
         **_thickness(**taken("thickness", "k_factor", "face", "bend_radius", "bend_table")),
@@ -171,6 +181,9 @@ def fabricate(
     if rotations != "any" and not rotations.isdecimal():
         raise OptionError(f"--rotations is {rotations!r}; it must be a number or any")
     turns = rotations if rotations == "any" else int(rotations)
+    given["scale"] = file_options.scale_of(
+        meshes, **taken("scale", "height", "up"), unit=given["unit"]
+    )
     with words() as say:
         done = make.fabricate(meshes, folder, finish=finish, rotations=turns, callback=say, **given)
     shared.tell(text(done), quiet=quiet)

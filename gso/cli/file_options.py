@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -58,6 +58,34 @@ def here(file: str, weld: float | None) -> Mesh | str | Unwelded:
         return load(file, weld)
     except GSOError:
         return source(file, weld)
+
+
+def scale_of(
+    files: Sequence[Mesh | str | Unwelded],
+    scale: float | None,
+    height: str | float | None,
+    up: str,
+    unit: str,
+) -> float:
+    """Return the factor by which designs are scaled, all by the same.
+
+    Raises
+    ------
+    OptionError
+        Both options are given, or the designs have no height.
+    """
+    from gso.io import as_mesh
+    from gso.quantities import as_length
+
+    if height is None:
+        return 1.0 if scale is None else scale
+    if scale is not None:
+        raise OptionError("--scale and --height exclude each other; leave one of them out")
+    own = [as_mesh(file).vertices[:, "xyz".index(up)] for file in files]
+    extent = max(float(x.max()) for x in own) - min(float(x.min()) for x in own)
+    if extent <= 0:
+        raise OptionError(f"the design has no height along {up}; name another axis with --up")
+    return as_length(height, "--height", diagonal=float("nan"), unit=unit) / extent
 
 
 def spare(inputs: Iterable[str | None], outputs: Iterable[str | None], force: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
@@ -65,7 +66,21 @@ class _Strain(click.ParamType):  # type: ignore[type-arg]
             self.fail(f"{value!r} is no positive strain such as 0.01 or 1%", param, ctx)
 
 
-LENGTH, MM, STRAIN = _Length(), _Millimetres(), _Strain()
+class _Edge(click.ParamType):  # type: ignore[type-arg]
+    """An edge such as ``0-7`` as a pair of vertices."""
+
+    name = "edge"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        found = re.fullmatch(r"\s*(\d+)\s*-\s*(\d+)\s*", str(value))
+        if found is None:
+            self.fail(f"{value!r} is no edge; give its two vertices, such as 0-7", param, ctx)
+        return int(found[1]), int(found[2])
+
+
+LENGTH, MM, STRAIN, EDGE = _Length(), _Millimetres(), _Strain(), _Edge()
 
 
 def output(help: str, name: str = "out", metavar: str = "OUT") -> Callable[[_Command], _Command]:
@@ -108,7 +123,40 @@ sheet = click.option(
     nargs=2,
     help="Length and width of a sheet, in mm: every part must fit on one.",
 )
+scale = click.option(
+    "--scale",
+    metavar="X",
+    type=float,
+    help="Factor of the design's size; all other options are about the scaled design.",
+)
+height = click.option(
+    "--height",
+    metavar="LENGTH",
+    type=LENGTH,
+    help="The same by the height that the design gets, such as 200mm.",
+)
+up = click.option(
+    "--up", type=click.Choice("xyz"), default="z", help="The axis that --height is along."
+)
+tabs = click.option(
+    "--tabs", metavar="MM", type=float, help="Width of tabs along seams, for paper."
+)
+numbers = click.option(
+    "--numbers",
+    type=click.Choice(("inside", "outside")),
+    help="Where the numbers of seams stand: in the parts, or on tabs and outside the outlines.",
+)
 darts = click.option("--darts/--no-darts", default=False, help="Whether cuts may end in a piece.")
+cut = click.option(
+    "--cut",
+    metavar="A-B",
+    type=EDGE,
+    multiple=True,
+    help="Edge to cut, by its vertices, the first being 0; may be given several times.",
+)
+keep = click.option(
+    "--keep", metavar="A-B", type=EDGE, multiple=True, help="Edge that is not cut in any case."
+)
 keep_groups = click.option(
     "--keep-groups",
     is_flag=True,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,20 +12,18 @@ from gso.cli import shared_options as shared
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
-    from gso.typing import Ints
     from gso.unfolding import Net
-    from gso.workshop import Drawing
+    from gso.workshop import Drawing, Finish
 
 
 @click.command(short_help="Make the net of a surface of flat faces.")
 @click.argument("name", metavar="IN", type=click.Path())
 @shared.output(
-    "Drawing to write, .svg, .dxf or .pdf: the parts at 1:1 with layers to cut and to fold.",
+    "Drawing to write, .svg, .dxf or .pdf: the parts at 1:1 with layers to cut and to fold. In a "
+    "PDF each part that fits has a page of its own.",
 )
-@click.option(
-    "--cut", metavar="A-B", multiple=True, help="Edge to cut, by its vertices, the first being 0."
-)
-@click.option("--keep", metavar="A-B", multiple=True, help="Edge that is not cut in any case.")
+@shared.cut
+@shared.keep
 @shared.keep_groups
 @shared.sheet
 @click.option(
@@ -38,21 +35,37 @@ if TYPE_CHECKING:
 )
 @click.option("--effort", metavar="X", default=1.0, help="Factor of the time of the search.")
 @click.option("--seed", metavar="N", type=click.IntRange(0), default=0, help="Of the search.")
+@shared.tabs
+@shared.numbers
+@click.option(
+    "--paper",
+    metavar="A4",
+    help="Pages of the PDF; without --sheet parts are divided so that each fits one if it can.",
+)
 @shared.unit
+@shared.scale
+@shared.height
+@shared.up
 @file_options.weld
 @file_options.force
 @shared.quiet
 def unfold(
     name: str,
     out: str,
-    cut: tuple[str, ...],
-    keep: tuple[str, ...],
+    cut: tuple[tuple[int, int], ...],
+    keep: tuple[tuple[int, int], ...],
     keep_groups: bool,
     sheet: tuple[float, float] | None,
     flat_angle: float,
     effort: float,
     seed: int,
+    tabs: float | None,
+    numbers: str | None,
+    paper: str | None,
     unit: str,
+    scale: float | None,
+    height: str | float | None,
+    up: str,
     weld: float | None,
     force: bool,
     quiet: bool,
@@ -66,51 +79,55 @@ def unfold(
 
     from gso.seams import Labels
     from gso.unfolding import unfold as make
-    from gso.workshop import writers
+    from gso.workshop import Finish, writers
+    from gso.workshop.writers.pdf import SUFFIX, room
 
-    writers.check_output(out)
+    writer = writers.check_output(out)
+    if paper is not None and writer.SUFFIX != SUFFIX:
+        raise OptionError(f"--paper {paper} needs an output whose name ends in {SUFFIX}")
     file_options.spare([name], [out], force)
-    edges = _edges(cut, "cut")
+    finish = Finish(notches=None, tabs=tabs, numbers=numbers)
+    edges = np.array(cut, np.int64).reshape(-1, 2)
     mesh = file_options.load(name, weld) if keep_groups or weld is not None else name
     if keep_groups and not isinstance(mesh, str):
         edges = np.concatenate([edges, Labels("g").edges(mesh)])
-    net = make(
-        mesh,
-        cut=edges,
-        keep=_edges(keep, "keep"),
-        sheet=sheet,
-        unit=unit,
-        flat_angle=flat_angle,
-        effort=effort,
-        seed=seed,
-    )
-    writers.write(drawn(net, Path(name).stem, unit), out)
+    factor = file_options.scale_of([mesh], scale, height, up, unit)
+
+    def made(sheet: tuple[float, float] | None) -> Net:
+        return make(
+            mesh,
+            cut=edges,
+            keep=np.array(keep, np.int64).reshape(-1, 2),
+            sheet=sheet and finish.room(sheet, 1.0),
+            unit=unit,
+            scale=factor,
+            flat_angle=flat_angle,
+            effort=effort,
+            seed=seed,
+        )
+
+    if paper is None or sheet is not None:
+        net = made(sheet)
+    else:
+        try:
+            net = made(room(paper))
+        except OptionError as error:
+            net = made(None)
+            click.echo(f"note: {error}; its part is on several pages", err=True)
+    options = {} if paper is None else {"paper": paper}
+    writers.write(drawn(net, Path(name).stem, unit, finish), out, **options)
     if not quiet:
         click.echo("\n".join(text(net, unit)))
 
 
-def _edges(given: tuple[str, ...], name: str) -> Ints:
-    """Return edges, given as texts, as an array (k, 2)."""
-    import numpy as np
-
-    out = []
-    for word in given:
-        found = re.fullmatch(r"\s*(\d+)\s*-\s*(\d+)\s*", word)
-        if found is None:
-            raise OptionError(f"--{name} is {word!r}; it must be two vertices such as 0-7")
-        out.append([int(found[1]), int(found[2])])
-    return np.array(out, np.int64).reshape(-1, 2)
-
-
-def drawn(net: Net, name: str, unit: str) -> Drawing:
+def drawn(net: Net, name: str, unit: str, finish: Finish) -> Drawing:
     """Return the parts of a net side by side, in millimetres."""
     from gso.quantities import millimetres
-    from gso.workshop import Finish, fitted, of_net, parts_from
+    from gso.workshop import fitted, of_net, parts_from
     from gso.workshop.names import spelled
     from gso.workshop.output_files import beside
 
     made = of_net(spelled(name), net)
-    finish = Finish(notches=None)
     return beside(parts_from(fitted(made, millimetres(unit), finish), finish))
 
 

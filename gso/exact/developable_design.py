@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.exact.fold_edges import fold_edges
+from gso.exact.fold_edges import FOLD, fold_edges
 from gso.exact.low_poly import facets, is_low_poly
+from gso.exact.rolled_faces import fold
 from gso.exact.ruled_bends import joined_bends, ruled_bends, zones_of
 from gso.exact.sliced_pattern import SlicedPattern, shape_size
 from gso.mesh import Mesh
@@ -18,6 +19,7 @@ from gso.recognition import Recognised, recognise
 from gso.typing import Array, Ints
 from gso.unfolding import join_patches
 from gso.unfolding.dual_edges import dual_edges
+from gso.unfolding.folding import misfit
 
 #: Difference of lengths, relative to the size, up to which edges are equally long.
 _SAME = 1e-7
@@ -34,7 +36,8 @@ class FoldedPattern:
     pattern : Pattern
         Its pattern. On cylinders and cones lengths are those of the round surface.
     folded : Folded
-        Edges of the pattern on bend lines; the radius of a fold is 0. Zones are numbers of faces.
+        Edges of the pattern on bend lines; the radius of a fold is 0. There are very small ones
+        between facets that are nearly in one plane, see :attr:`bends`. Zones are numbers of faces.
     zones : tuple of Zone
         How each face is bent.
     recognised : Recognised
@@ -43,6 +46,8 @@ class FoldedPattern:
         Number of parts.
     strain : float
         Largest strain of a face that has no equation.
+    face : ndarray of int, (t,)
+        The face in `recognised` of each triangle.
     """
 
     surface: Mesh
@@ -52,6 +57,31 @@ class FoldedPattern:
     recognised: Recognised
     parts: int
     strain: float
+    face: Ints
+
+    @property
+    def bends(self) -> Folded:
+        """The bends that are drawn: not folds of less than 0.05 degrees."""
+        return self.folded.taken((self.folded.radii > 0) | (np.abs(self.folded.angles) > FOLD))
+
+    def fold(self) -> Array:
+        """Fold and roll the parts by their bends alone.
+
+        Returns
+        -------
+        ndarray, (p, 3)
+            Positions of the pattern's vertices, each part in a place of its own: cylinders and
+            cones have the radii of their bends, and all other triangles stay flat.
+        """
+        is_round = np.array([face.surface is not None for face in self.recognised.faces])
+        return fold(self.pattern, self.folded, np.where(is_round[self.face], self.face, -1))
+
+    def misfit(self, design: Mesh) -> float:
+        """Return how far the folded parts are from the design's vertices at most."""
+        pattern, points = self.pattern, self.surface.vertices[self.pattern.vertex]
+        part = pattern.mesh.components
+        given = np.flatnonzero(pattern.vertex < len(design.vertices))
+        return misfit(self.fold()[given], points[given], part[given])
 
 
 def folded_pattern(
@@ -60,6 +90,7 @@ def folded_pattern(
     max_strain: Strain = 1e-3,
     max_deviation: Length | None = None,
     cut: ArrayLike = (),
+    keep: ArrayLike = (),
     sheet: tuple[float, float] | None = None,
     bend_step: Length | None = None,
     unit: str = "mm",
@@ -75,8 +106,8 @@ def folded_pattern(
     max_deviation : float or str, optional
         Largest distance of vertices from the cylinder or cone that they are counted to; the
         accuracy of the coordinates when not given.
-    cut : array_like of int, (k, 2)
-        Edges that are cut in any case.
+    cut, keep : array_like of int, (k, 2)
+        Edges that are cut in any case, and that are not.
     sheet : (float, float), optional
         Length and width that a part may have, in the mesh's unit.
     bend_step : float or str, optional
@@ -115,6 +146,7 @@ def folded_pattern(
         shape.face,
         flat,
         cut=np.concatenate([np.reshape(cut, (-1, 2)).astype(int), _unequal(shape, flat)]),
+        keep=keep,
         sheet=sheet,
     )
     sliced = SlicedPattern.of(shape, joined)
@@ -135,6 +167,7 @@ def folded_pattern(
         shape,
         int(joined.part.max()) + 1,
         max(face.strain for face in shape.faces),
+        sliced.label,
     )
 
 

@@ -12,9 +12,10 @@ from gso.recognition import Recognised
 from gso.typing import Array, Flags, Ints
 from gso.unfolding.dual_edges import dual_edges
 
-#: Angles in radians from which on an edge between two faces is a fold: between facets, and where
-#: one of them is a round surface, which meets its neighbour in the tessellation's accuracy.
-FOLD, _TANGENT = np.radians(0.05), np.radians(1.0)
+#: Angles in radians from which on an edge between two faces is a fold: one that is drawn, any at
+#: all, and one where a face is a round surface, which meets its neighbour in the tessellation's
+#: accuracy.
+FOLD, _LEVEL, _TANGENT = np.radians(0.05), 1e-10, np.radians(1.0)
 
 
 def fold_edges(sliced: SlicedPattern, shape: Recognised) -> Folded:
@@ -29,7 +30,7 @@ def fold_edges(sliced: SlicedPattern, shape: Recognised) -> Folded:
     )
     way = sliced.points[sliced.vertex[ends[:, 1]]] - sliced.points[sliced.vertex[ends[:, 0]]]
     angle = fold_angles(first, second, way)
-    folded = np.abs(angle) > np.where(round_one | round_two, _TANGENT, FOLD)
+    folded = np.abs(angle) > np.where(round_one | round_two, _TANGENT, _LEVEL)
     count = int(folded.sum())
     return Folded(ends[folded], angle[folded], np.zeros(count), np.full(count, -1))
 

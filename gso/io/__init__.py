@@ -17,7 +17,7 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import BinaryIO, TypeVar
 
-from gso.errors import MeshError, OptionError
+from gso.errors import MeshError, NonManifoldError, OptionError
 from gso.io import arrays, glb, obj, off, ply, stl
 from gso.io.atomic import check_writable, replacing, suffix_of
 from gso.io.cad import (
@@ -171,7 +171,8 @@ def _read(path: AnyPath, made: Callable[[Surface], _Made], chord: float | None =
             return made(read_faces(data, suffix, chord))
         return made(_FORMATS[suffix][0](data))
     except MeshError as error:
-        raise MeshError(f"{name}: {error}") from error.__cause__
+        kind = NonManifoldError if isinstance(error, NonManifoldError) else MeshError
+        raise kind(f"{name}: {error}") from error.__cause__
     except MemoryError:
         raise MeshError(f"{name}: does not fit into memory; give a coarser mesh") from None
 

@@ -63,6 +63,8 @@ class Mesh:
         Messages for the user about changes that were made before construction.
     attributes : Attributes, optional
         Labels and texture coordinates of these faces.
+    touching : bool
+        Whether components are meant to touch each other without being joined.
 
     Attributes
     ----------
@@ -97,6 +99,7 @@ class Mesh:
         *,
         notes: tuple[str, ...] = (),
         attributes: Attributes | None = None,
+        touching: bool = False,
     ):
         points = checked_vertices(vertices)
         table, flipped, said = checked_faces(faces, points)
@@ -104,7 +107,10 @@ class Mesh:
         self.faces: Ints = table
         check_vertices(self.half_edges, points)
         self.given_notes: tuple[str, ...] = tuple(notes)
-        self.notes: tuple[str, ...] = self.given_notes + unjoined(self) + said
+        self.notes: tuple[str, ...] = self.given_notes
+        if not touching:
+            self.notes += unjoined(self)
+        self.notes += said
         self.attributes = None if attributes is None else reordered(attributes, table, flipped)
         self.vertices.flags.writeable = False
         self.faces.flags.writeable = False

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gso.geometry.polygon import rectangle
 from gso.typing import Array, Ints
 from gso.unfolding.canonical_order import classes
 from gso.unfolding.layout import Layout
@@ -22,8 +23,10 @@ _TRIES = 8
 #: Work of the search in microseconds about, more of it for each patch, and for each pair of patches
 #: up to a bound.
 _WORK, _WORK_EACH, _WORK_PAIR, _WORK_PAIRS = 3e5, 1e3, 0.3, 7.5e6
-#: Largest number of passes that shorten cuts.
+#: Largest number of passes that shorten cuts, and that make outlines compact.
 _PASSES = 3
+#: Work of measuring a rectangle, and by what share of it one must be smaller.
+_BOXED, _SMALLER = 200.0, 1e-4
 
 
 def merged(layout: Layout, order: Ints) -> Layout:
@@ -36,7 +39,7 @@ def merged(layout: Layout, order: Ints) -> Layout:
 
 
 def searched(start: Layout, seed: int, effort: float) -> Layout:
-    """Join patches to as few parts as are found, with short cuts.
+    """Join patches to as few parts as are found, with short cuts, then compact outlines.
 
     Parameters
     ----------
@@ -65,7 +68,8 @@ def searched(start: Layout, seed: int, effort: float) -> Layout:
         best = min(best, other, key=_value)
     if best.number > least:
         best = _Search(best, random).run(least, end)
-    return _shortened(best, best.work[0] + 0.3 * end)
+    best = _shortened(best, best.work[0] + 0.3 * end)
+    return _compacted(best, best.work[0] + 0.2 * end)
 
 
 def _longest(edges: Ints, weights: Array) -> Ints:
@@ -279,3 +283,40 @@ def _shortened(layout: Layout, end: float) -> Layout:
         if layout is before:
             break
     return layout
+
+
+def _compacted(layout: Layout, end: float) -> Layout:
+    """Exchange cuts for others as long, where that makes the rectangle about a part smaller."""
+    links = layout.links
+    around = links.around()
+    size = [_rectangle(layout, part) for part in range(int(layout.part.max()) + 1)]
+    kind = classes(links.weights)
+    order = _longest(np.flatnonzero(np.bincount(kind)[kind] > 1), links.weights)
+    for _ in range(_PASSES):
+        before = layout
+        for edge in order.tolist():
+            a, b = layout.part[links.patches[edge]].tolist()
+            if layout.joined[edge] or a != b:
+                continue
+            path = np.array(_path(layout, around, edge), np.int64)
+            for cut in path[kind[path] == kind[edge]].tolist():
+                layout.work[0] += _BOXED
+                if layout.work[0] > end:
+                    return layout
+                new = exchanged(layout, around, edge, cut)
+                if new is None:
+                    continue
+                new.part[new.part == new.part[links.patches[edge, 0]]] = a
+                smaller = _rectangle(new, a)
+                if smaller < (1.0 - _SMALLER) * size[a]:
+                    layout, size[a] = new, smaller
+                    break
+        if layout is before:
+            break
+    return layout
+
+
+def _rectangle(layout: Layout, part: int) -> float:
+    """Return the area of the smallest rectangle about a part; 0 for none."""
+    z = layout.corners[layout.triangles(part)].ravel()
+    return float(np.prod(rectangle(np.stack([z.real, z.imag], axis=1))[1])) if len(z) else 0.0

@@ -12,8 +12,8 @@ from gso.geometry import area_vectors
 from gso.geometry.ears import ears, in_plane
 from gso.geometry.vectors import unit
 from gso.mesh import Mesh
-from gso.mesh.topology import edge_keys, label_components
 from gso.typing import Array, Ints
+from gso.unfolding.manifold import divided
 
 #: Distance of the corners of a face from its plane, relative to its size, that a note names.
 _BENT = 1e-4
@@ -50,7 +50,7 @@ class PlanarFaces:
         ------
         MeshError
             A face has fewer than three corners, points outside the vertices, or crosses itself;
-            or :class:`gso.Mesh` rejects the triangles.
+            or is inside a body; or :class:`gso.Mesh` rejects the triangles.
         """
         triangles, face = _triangles(points, polygons)
         bent = _bent(points, triangles, face)
@@ -60,20 +60,22 @@ class PlanarFaces:
                 f"face {bent[0]})",
             )
         vertex = np.arange(len(points))
-        divided = _divided(triangles, len(points))
-        if divided is not None:
-            triangles, vertex, note = divided
+        _check_once(polygons)
+        split = divided(points, triangles, face)
+        if split is not None:
+            triangles, vertex, note = split
             notes += (note,)
-        mesh = Mesh(points[vertex], triangles, notes=notes)
+        mesh = Mesh(points[vertex], triangles, notes=notes, touching=split is not None)
         return cls(mesh, face, vertex)
 
-    def edges(self, given: Ints) -> Ints:
-        """Return all edges of the triangles between vertices (k, 2) as they were given."""
-        count = int(self.vertex.max()) + 1
-        ends = self.mesh.edges
-        own = self.vertex[ends]
-        keys = edge_keys(given[:, 0], given[:, 1], count)
-        return ends[np.isin(edge_keys(own[:, 0], own[:, 1], count), keys)]
+
+def _check_once(polygons: Sequence[Sequence[int]]) -> None:
+    """Refuse polygons with the same corners."""
+    first: dict[tuple[int, ...], int] = {}
+    for k, polygon in enumerate(polygons):
+        before = first.setdefault(tuple(sorted(polygon)), k)
+        if before != k:
+            raise MeshError(f"face {k} has the corners of face {before}; delete one of them")
 
 
 def _triangles(points: Array, polygons: Sequence[Sequence[int]]) -> tuple[Ints, Ints]:
@@ -137,43 +139,3 @@ def _bent(points: Array, triangles: Ints, face: Ints) -> Ints:
     away = np.abs(np.einsum("tkd,td->tk", p - start[face][:, None], mean[face])).max(axis=1)
     size = np.linalg.norm(p - start[face][:, None], axis=2).max(axis=1)
     return np.unique(face[away > _BENT * size])
-
-
-def _divided(triangles: Ints, count: int) -> tuple[Ints, Ints, str] | None:
-    """Divide triangles where they are not manifold.
-
-    Returns the triangles, the given vertex of each vertex, and a note; None if they are manifold.
-    """
-    origin, dest = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    key = edge_keys(origin, dest, count)
-    order = np.argsort(key, kind="stable")
-    _, start, often = np.unique(key[order], return_index=True, return_counts=True)
-    pair = start[often == 2]
-    one, other = order[pair], order[pair + 1]
-    # The corners at both ends of an edge with two faces are joined.
-    ahead = np.arange(len(origin)) // 3 * 3 + (np.arange(len(origin)) + 1) % 3
-    same = origin[one] == origin[other]
-    a = np.r_[one, ahead[one]]
-    b = np.r_[np.where(same, other, ahead[other]), np.where(same, ahead[other], other)]
-    fan = label_components(len(origin), a, b)
-    _, corner = np.unique(fan, return_index=True)
-    owner = origin[corner]
-    used = len(np.unique(origin))
-    if len(owner) == used:
-        return None
-    rank = np.argsort(owner, kind="stable")
-    fresh = np.r_[True, owner[rank][1:] != owner[rank][:-1]]
-    # The first fan of a vertex keeps its number.
-    number = owner.copy()
-    number[rank[~fresh]] = count + np.arange(int((~fresh).sum()))
-    vertex = np.r_[np.arange(count), owner[rank[~fresh]]]
-    bad = int((often > 2).sum())
-    at = int(owner[rank[~fresh]][0])
-    note = (
-        f"the surface was divided at {len(np.unique(owner[rank[~fresh]]))} vertices where its "
-        f"parts share no edge with two faces (the first is vertex {at})"
-    )
-    if bad:
-        edge = int(order[start[often > 2][0]])
-        note += f"; {bad} edges have more than two faces (the first is {origin[edge]}-{dest[edge]})"
-    return number[fan].reshape(triangles.shape), vertex, note

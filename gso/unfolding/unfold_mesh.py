@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -18,6 +19,7 @@ from gso.mesh.validation import checked_vertices
 from gso.pattern import Folded, Pattern
 from gso.quantities import Length, as_positive, as_sheet
 from gso.typing import Array, Ints, MeshLike
+from gso.unfolding.manifold import edges_between
 from gso.unfolding.patch_joining import Joined, join_patches
 from gso.unfolding.planar_faces import PlanarFaces
 from gso.unfolding.polyhedral_net import Net
@@ -38,15 +40,17 @@ def unfold(
     cut: ArrayLike | None = None,
     sheet: tuple[Length, Length] | None = None,
     unit: str = "mm",
+    scale: float = 1.0,
     flat_angle: float = 0.01,
     effort: float = 1.0,
     seed: int = 0,
 ) -> Net:
-    """Unfold a surface of flat faces: few flat parts that do not overlap, then short cuts.
+    """Unfold a surface of flat faces: few parts that do not overlap, short cuts, small outlines.
 
     The shape stays as it is, and no length changes. Faces in one plane are one. They are joined
     along the longest edges first wherever nothing overlaps; then a search (simulated annealing)
-    takes subtrees of the parts off and joins them elsewhere, so that parts can be united. The
+    takes subtrees of the parts off and joins them elsewhere, so that parts can be united. At last,
+    cuts are exchanged for shorter ones, and for others as long with a smaller rectangle. The
     result does not depend on the numbering of the mesh or its place in space, but for symmetric
     ones, whose nets are then congruent.
 
@@ -64,6 +68,8 @@ def unfold(
         "3m".
     unit : str
         Unit of the coordinates.
+    scale : float
+        Factor by which the surface is scaled before anything else.
     flat_angle : float
         Angle in degrees up to which an edge is no fold, and is not cut where that can be avoided.
     effort : float
@@ -98,13 +104,16 @@ def unfold(
     as_positive(effort, "effort", zero=True)
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise OptionError(f"seed is {seed!r}; it must be a whole number of 0 or more")
+    as_positive(scale, "scale")
     faces = _faces(mesh)
+    if scale != 1.0:
+        faces = replace(faces, mesh=faces.mesh.replaced(scale * faces.mesh.vertices))
     size = as_sheet(sheet, unit)
     joined = join_patches(
         faces.mesh.vertices,
         faces.mesh.triangles,
-        keep=_given(faces, keep, "keep"),
-        cut=_given(faces, cut, "cut"),
+        keep=edges_between(faces.mesh, faces.vertex, keep, "keep"),
+        cut=edges_between(faces.mesh, faces.vertex, cut, "cut"),
         sheet=size,
         flat_angle=flat_angle,
         seed=int(seed),
@@ -117,10 +126,13 @@ def _faces(given: Polygons) -> PlanarFaces:
     """Return the triangles of what was given."""
     if isinstance(given, str | os.PathLike):
         surface = io.read_surface(given)
-        if surface.faces is not None:
+        try:
+            if surface.faces is None:
+                return _of_mesh(surface.mesh())
             table = np.asarray(surface.faces)
             return _of_table(checked_vertices(surface.vertices), table, surface.notes)
-        return _of_mesh(surface.mesh())
+        except MeshError as error:
+            raise MeshError(f"{os.fspath(given)}: {error}") from None
     if isinstance(given, tuple | list) and len(given) == 2:
         points, polygons = given
         if np.ndim(points) == 2:
@@ -144,27 +156,6 @@ def _rows(polygons: object) -> list[list[int]]:
     except (TypeError, ValueError):
         raise MeshError("faces must be rows of vertex numbers") from None
     return [row[:-1] if row and row[-1] == -1 else row for row in rows]
-
-
-def _given(faces: PlanarFaces, edges: ArrayLike | None, name: str) -> Ints:
-    """Return the edges of the triangles between given vertices.
-
-    Raises
-    ------
-    OptionError
-        A pair is no edge of a face.
-    """
-    if edges is None or np.size(edges) == 0:
-        return np.empty((0, 2), np.int64)
-    pairs = np.asarray(edges)
-    if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
-        raise OptionError(f"{name} must be pairs of vertices, (k, 2), not {pairs.shape}")
-    out = faces.edges(pairs.astype(np.int64))
-    own = {tuple(sorted(pair)) for pair in faces.vertex[out].tolist()}
-    for a, b in pairs.tolist():
-        if (min(a, b), max(a, b)) not in own:
-            raise OptionError(f"{name}: {a}-{b} is no edge of a face; cuts run along edges")
-    return out
 
 
 def net_of(faces: PlanarFaces, joined: Joined, flat_angle: float) -> Net:

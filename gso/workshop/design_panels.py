@@ -62,6 +62,11 @@ def made(
     exact = _exact(given, settings)
     if exact is not None and (given.sheet is not None or not exact.reasons or _is_hopeless(exact)):
         return exact
+    if len(given.uncut):
+        raise OptionError(
+            f"{given.name} is not flat or developable as it is, and only then edges can be kept; "
+            "leave out keep"
+        )
     if given.sheet is not None:
         raise MeshError(
             f"{given.name}: the sheet of {given.sheet:.6g} is not developable, or a face is larger "
@@ -89,26 +94,31 @@ def _without_poles(given: Design) -> Design:
     rank[order] = np.arange(len(order))
     new = rank[number]
     joined = Mesh(mesh.vertices[first[order]], collapse(mesh.faces, new).faces)
-    ids = new[given.kept]
-    return replace(given, mesh=joined, kept=ids[ids[:, 0] != ids[:, 1]])
+    kept, uncut = (ids[ids[:, 0] != ids[:, 1]] for ids in (new[given.kept], new[given.uncut]))
+    return replace(given, mesh=joined, kept=kept, uncut=uncut)
 
 
 def _exact(given: Design, settings: FabricationSettings) -> Made | None:
     """Unfold a design that is flat or developable as it is; None if it is not."""
     thick = given.sheet
-    try:
-        found = folded_pattern(
-            given.mesh,
-            max_strain=settings.strain,
-            cut=given.kept,
-            sheet=settings.max_size,
-            bend_step=settings.bend_step,
-            unit=settings.unit,
-            press_radius=_press_radius(given, settings),
-        )
-    except OptionError:
-        # A face is larger than the sheet.
-        return None
+    found = None
+    for sheet in dict.fromkeys((settings.max_size or settings.page, settings.max_size)):
+        try:
+            found = folded_pattern(
+                given.mesh,
+                max_strain=settings.strain,
+                cut=given.kept,
+                keep=given.uncut,
+                sheet=sheet,
+                bend_step=settings.bend_step,
+                unit=settings.unit,
+                press_radius=_press_radius(given, settings),
+            )
+            break
+        except OptionError:
+            # A face is larger than the sheet or the page.
+            if len(given.uncut) and sheet == settings.max_size:
+                raise
     if found is None:
         return None
     record = measurements.of_pattern(
@@ -127,7 +137,7 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
         "strain_p99": found.strain,
         "thickness": thick,
     }
-    one = of_surface(given.name, found.surface, found.pattern, record, found.folded, found.zones)
+    one = of_surface(given.name, found.surface, found.pattern, record, found.bends, found.zones)
     one = replace(one, reasons=compare(crossed(given.mesh), {}))
     return _checked(_bent(one), settings)
 

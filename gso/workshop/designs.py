@@ -7,15 +7,17 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gso import io
 from gso.components import split
-from gso.errors import MeshError
+from gso.errors import MeshError, OptionError
 from gso.faults import crossings
 from gso.mesh import Mesh
 from gso.seams.kinds import Groups
 from gso.sheet_metal import sheet_solid
 from gso.typing import Ints, MeshLike
+from gso.unfolding.manifold import edges_between, manifold_mesh
 from gso.verdict import Code, Measurement, Reason, compare
 from gso.workshop.job_folder import path_of
 from gso.workshop.names import different, spelled
@@ -37,8 +39,8 @@ class Design:
     name : str
     mesh : Mesh
         One side of a solid of sheet metal.
-    kept : ndarray of int, (k, 2)
-        Edges that are cut in any case.
+    kept, uncut : ndarray of int, (k, 2)
+        Edges that are cut in any case, and that are not.
     notes : tuple of str
         What was changed or found in the file.
     reasons : tuple of Reason
@@ -53,13 +55,21 @@ class Design:
     notes: tuple[str, ...] = ()
     reasons: tuple[Reason, ...] = ()
     sheet: float | None = None
+    uncut: Ints = field(default_factory=_no_edges)
 
 
-def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
+def designs_of(
+    given: Designs,
+    *,
+    cut: ArrayLike | None = None,
+    keep: ArrayLike | None = None,
+    keep_groups: bool = False,
+    scale: float = 1.0,
+) -> list[Design]:
     """Read designs, and divide them into components.
 
-    Solids of sheet metal in CAD files become one of their sides, and several have the names that
-    the file gives them.
+    They are scaled first. Solids of sheet metal in CAD files become one of their sides, and
+    several have the names that the file gives them.
 
     Raises
     ------
@@ -68,14 +78,23 @@ def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
         sheet whose thickness is not the same everywhere.
     """
     many = several(given)
+    if len(many) > 1 and np.size(cut or ()) + np.size(keep or ()):
+        raise OptionError("cut and keep name vertices of one design; give one design with them")
     out: list[Design] = []
     for number, one in enumerate(many, start=1):
         path = path_of(one)
         suffix = number if len(many) > 1 else ""
         stem = f"design{suffix}" if path is None else path.stem
-        mesh = io.as_mesh(one)
+        mesh, vertex = manifold_mesh(one)
         mesh.check_joined()
-        kept = Groups().edges(mesh) if keep_groups else _no_edges()
+        if scale != 1.0:
+            mesh = mesh.replaced(scale * mesh.vertices)
+        kept, uncut = (
+            edges_between(mesh, vertex, pairs, name)
+            for pairs, name in ((cut, "cut"), (keep, "keep"))
+        )
+        if keep_groups:
+            kept = np.concatenate([kept, Groups().edges(mesh)])
         components = split(mesh)
         notes = tuple(f"{stem}: {note}" for note in mesh.notes)
         met = np.zeros(len(mesh.faces), bool)
@@ -87,7 +106,7 @@ def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
         for k, part in enumerate(components, start=1):
             local[:] = -1
             local[part.vertices] = np.arange(len(part.vertices))
-            own = local[kept]
+            seams, held = local[kept], local[uncut]
             name = f"{stem}-{k}" if len(components) > 1 else stem
             through = Measurement.count("face", part.faces[met[part.faces]])
             reasons = compare({Code.CROSSES_ITSELF: through}, {})
@@ -102,8 +121,9 @@ def designs_of(given: Designs, *, keep_groups: bool = False) -> list[Design]:
                 except MeshError as error:
                     raise MeshError(f"{path}: {error}") from None
             if solid is None:
-                edges = own[(own >= 0).all(axis=1)]
-                out.append(Design(spelled(name), part.mesh, edges, notes, reasons))
+                edges = seams[(seams >= 0).all(axis=1)]
+                held = held[(held >= 0).all(axis=1)]
+                out.append(Design(spelled(name), part.mesh, edges, notes, reasons, None, held))
             else:
                 out.append(
                     Design(

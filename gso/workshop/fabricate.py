@@ -15,8 +15,16 @@ from gso.errors import OptionError
 from gso.io import SPLINE_SUFFIXES, suffix_of
 from gso.io.json_file import plain, write_json
 from gso.mesh import Mesh
-from gso.quantities import Length, Strain, as_length, as_sheet, as_strain, millimetres
-from gso.typing import AnyPath, Json
+from gso.quantities import (
+    Length,
+    Strain,
+    as_length,
+    as_positive,
+    as_sheet,
+    as_strain,
+    millimetres,
+)
+from gso.typing import AnyPath, Array, Json
 from gso.verdict import Code, Reason, failure, merge, ordered
 from gso.workshop.certificate import design_record, digest, versions
 from gso.workshop.checks import judge_sheet
@@ -34,6 +42,7 @@ from gso.workshop.part import Drawing, Part
 from gso.workshop.parts import fitted, parts_from
 from gso.workshop.solids import folded_solids
 from gso.workshop.work import made_all
+from gso.workshop.writers.pdf import room
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +84,14 @@ def fabricate(
     folder: AnyPath,
     *,
     unit: str = "mm",
+    scale: float = 1.0,
     formulation: str = "ruled",
     max_deviation: Length | None = None,
     max_strain: Strain | None = None,
     max_strips: int = 64,
     darts: bool = False,
+    cut: ArrayLike | None = None,
+    keep: ArrayLike | None = None,
     keep_groups: bool = False,
     min_radius: Length | None = None,
     finish: Finish = Finish(),  # noqa: B008
@@ -114,6 +126,8 @@ def fabricate(
         A new or empty folder, or that of an earlier run, whose drawings are replaced.
     unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
         Unit of the coordinates; CAD files are read in millimetres.
+    scale : float
+        Factor by which designs, marks and holes are scaled before anything else.
     formulation : {"ruled", "curvature", "isometry", "flatten"}
         "ruled": exactly developable strips, with bend lines; pieces that no strips follow are
         only nearly developable. "curvature", "isometry": all of them are nearly developable.
@@ -128,6 +142,9 @@ def fabricate(
         Largest number of strips side by side of one piece.
     darts : bool
         Whether cuts may end inside a piece.
+    cut, keep : array_like of int, (k, 2), optional
+        Edges of the design, by their vertices, that are cut in any case, and that are not: these
+        only for designs that keep their shape.
     keep_groups : bool
         Whether to cut between the groups of faces (``g``) of an OBJ file in any case; without
         two of them, between its objects (``o``) or materials (``usemtl``).
@@ -152,7 +169,9 @@ def fabricate(
     layers : {"operations", "astm"}
         Names of layers.
     paper : str, optional
-        Also write all parts as a PDF on pages of this size, such as "A4".
+        Also write all parts as a PDF on pages of this size, such as "A4": a part that fits has a
+        page of its own. With tabs and without `sheet`, designs that keep their shape are cut so
+        that every part fits, where no face is larger than a page.
     bend_text : bool
         Also write the direction, angle and radius beside each bend.
     bend_step : float or str, optional
@@ -190,15 +209,18 @@ def fabricate(
     (True, 1, [3142, 1571])
     """
     clock = time.perf_counter()
-    scale = millimetres(unit)
+    as_positive(scale, "scale")
+    per_unit = millimetres(unit)
     if not isinstance(finish, Finish):
         raise OptionError(f"finish is {finish!r}; it must be a gso.workshop.finish.Finish")
     drawings = Drawings(tuple(dict.fromkeys(formats)), layers, paper, bend_text, step)
-    most = None
+    most = page = None
     size = as_sheet(sheet, "mm")
+    if size is None and paper is not None and finish.tabs is not None:
+        page = finish.room(room(paper), per_unit)
     if size is not None:
         checked_options(size, spacing, 0.0, rotations, seconds)
-        most = finish.room(size, scale)
+        most = finish.room(size, per_unit)
     say = callback or (lambda said: None)
     for path in filter(None, map(path_of, several(designs))):
         if unit != "mm" and suffix_of(path) in SPLINE_SUFFIXES:
@@ -207,7 +229,7 @@ def fabricate(
                 "out the unit"
             )
     place = Path(os.fsdecode(folder))
-    every = designs_of(designs, keep_groups=keep_groups)
+    every = designs_of(designs, cut=cut, keep=keep, keep_groups=keep_groups, scale=scale)
     thin = [design.name for design in every if step and design.sheet is None]
     if thin and finish.thickness is None:
         raise OptionError(
@@ -225,9 +247,11 @@ def fabricate(
         None if min_radius is None else _radius(min_radius, meshes, unit),
         unit,
         bend_step,
-        finish.pressed(scale),
+        finish.pressed(per_unit),
+        page,
     )
-    drawn = [
+    marks, holes = ([scale * np.asarray(line, float) for line in x] for x in (marks, holes))
+    drawn: list[tuple[Sequence[Array], list[int]]] = [
         (given, check_lines(given, meshes, what, closed=what == "hole"))
         for given, what in ((marks, "mark"), (holes, "hole"))
     ]
@@ -245,6 +269,7 @@ def fabricate(
     solids: list[tuple[str, Mesh]] = []
     records: list[Json] = []
     reasons: list[Reason] = []
+    notes = [note for design in every for note in design.notes]
     for k in chosen:
         same_as = [every[j] for j, origin in enumerate(first) if origin == k]
         copies = [design.name for design in same_as]
@@ -256,14 +281,17 @@ def fabricate(
         one = found[k]
         lines = ([x for x, n in zip(given, on, strict=True) if n == k] for given, on in drawn)
         thick = every[k].sheet
-        asked = finish if thick is None else finish.of_solid(scale * thick)
-        fit = fitted(one, scale, asked, *lines)
+        asked = finish if thick is None else finish.of_solid(per_unit * thick)
+        fit = fitted(one, per_unit, asked, *lines)
         if step and asked.thickness is not None:
-            solids += folded_solids(one.panels, scale, asked.thickness)
+            solids += folded_solids(one.panels, per_unit, asked.thickness)
         own = [replace(part, count=len(copies)) for part in parts_from(fit, asked)]
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
-        why = (*(r.scaled(scale) for r in one.reasons), *judge_sheet(fit, settings, asked))
+        why = (*(r.scaled(per_unit) for r in one.reasons), *judge_sheet(fit, settings, asked))
         why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
+        if asked.tabs is not None and one.record["deviation_max"] == 0.0:
+            why, said = _of_paper(why)
+            notes += [f"{one.name}: {note}" for note in said]
         record["reasons"] = _words(why)
         records.append(record)
         reasons += [reason.within(one.name) for reason in why]
@@ -279,12 +307,14 @@ def fabricate(
             entry["same_as"] = same.get(entry["name"])
     certificate = {
         "unit": "mm",
-        "asked": plain({"unit": unit, **settings.record(), "finish": finish.record()}),
+        "asked": plain(
+            {"unit": unit, "scale": scale, **settings.record(), "finish": finish.record()}
+        ),
         "versions": versions(),
         "designs": records,
         "sheets": [],
         "notes": [
-            *dict.fromkeys(note for design in every for note in design.notes),
+            *dict.fromkeys(notes),
             *_notes(records, settings),
         ],
     }
@@ -322,6 +352,22 @@ def fabricate(
     certificate["seconds"] = time.perf_counter() - clock
     write_json(place / CERTIFICATE, certificate)
     return Fabrication(place, tuple(parts), tuple(sheets), certificate, tuple(files))
+
+
+def _of_paper(why: tuple[Reason, ...]) -> tuple[tuple[Reason, ...], list[str]]:
+    """Say as notes what does not keep paper models from being built as the design is.
+
+    Parts of models that pass through themselves can be cut and folded, and paper is slit with a
+    knife where one wall goes through another, or what would be hidden is trimmed off. Plates of
+    metal or wood would have to be cut for it, and their drawings lack the cuts.
+    """
+    through = [reason for reason in why if reason.code is Code.CROSSES_ITSELF]
+    notes = [
+        f"the design passes through itself at {reason.places}: slit the paper there, or trim "
+        "what is inside"
+        for reason in through
+    ]
+    return tuple(reason for reason in why if reason not in through), notes
 
 
 def _radius(given: Length, meshes: Sequence[Mesh], unit: str) -> float:

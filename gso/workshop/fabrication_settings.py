@@ -43,6 +43,9 @@ class FabricationSettings:
     press : float, optional
         Thickness of a sheet that a tool folds, in the unit of the files: narrow cylinders are bent
         at one line.
+    page : (float, float) or None
+        Length and width of a page that parts of designs that keep their shape fit if they can, in
+        the unit of the files.
     """
 
     formulation: str = "ruled"
@@ -55,6 +58,7 @@ class FabricationSettings:
     unit: str = "mm"
     bend_step: Length | None = None
     press: float | None = None
+    page: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.formulation not in FORMULATIONS:

@@ -34,6 +34,9 @@ class Finish:
         Diameter of registration holes beside the notches, and their distance from the seam.
     tabs : float or None
         Width of tabs along one side of each seam, for paper.
+    numbers : {"inside", "outside"} or None
+        Where the numbers of seams stand: in the parts, or on tabs and outside the outlines. None:
+        on tabs and, beside the other side, in the parts, if there are tabs and no notches.
     labels : float or None
         Height of the texts; None for none.
     grain : bool
@@ -53,6 +56,7 @@ class Finish:
     notches: float | None = 50.0
     registration: tuple[float, float] | None = None
     tabs: float | None = None
+    numbers: str | None = None
     labels: float | None = 6.0
     grain: bool = False
     face: str = "outside"
@@ -78,8 +82,9 @@ class Finish:
                     f"{self.kerf:g} mm; take a larger diameter"
                 )
         Thickness(1.0, self.k_factor, table=self.bend_table)
-        if self.face not in SIDES:
-            raise OptionError(f"no face {self.face!r}; {choices(self.face, SIDES)}")
+        for name, given in (("face", self.face), ("numbers", self.numbers or SIDES[0])):
+            if given not in SIDES:
+                raise OptionError(f"no {name} {given!r}; {choices(given, SIDES)}")
         if self.tabs is not None and self.allowance:
             raise OptionError("tabs and allowance exclude each other; leave one of them out")
 

@@ -17,8 +17,13 @@ from gso.seams.chains import chains
 from gso.typing import Array, Ints
 from gso.workshop.panels import Mating, Panel, Side
 
+#: Turn of a seam's side in the plane, in radians, that is a corner of a part with folds.
+_CORNER = np.radians(30.0)
 
-def of_pattern(points: Array, pattern: Pattern, label: Ints, local: Ints) -> list[Mating]:
+
+def of_pattern(
+    points: Array, pattern: Pattern, label: Ints, local: Ints, corners: bool = False
+) -> list[Mating]:
     """Find the seams of a pattern that is cut.
 
     Parameters
@@ -28,6 +33,9 @@ def of_pattern(points: Array, pattern: Pattern, label: Ints, local: Ints) -> lis
     pattern : Pattern
     label, local : ndarray of int, (p,)
         The panel of each vertex of the pattern, and its number in it.
+    corners : bool
+        Whether seams end at corners of the panels, as those of nets, whose edges are glued or
+        welded one by one.
     """
     seams = pattern.seams
     if not len(seams):
@@ -46,8 +54,13 @@ def of_pattern(points: Array, pattern: Pattern, label: Ints, local: Ints) -> lis
             # The first side is the one whose faces lie to the left of the chain.
             for side, ends in zip(both, copies if first else copies[::-1], strict=True):
                 side += ends.tolist() if not side else [int(ends[1])]
-        one, two = (_side(np.array(side), label, local) for side in both)
-        out.append(Mating(0, arc_lengths(points[line]), one, two))
+        table = np.array(both)
+        turned = np.zeros(len(line), bool)
+        if corners:
+            turned[1:-1] = (_turns(pattern.flat[table]) > _CORNER).any(axis=0)
+        for a, b in pairwise([0, *np.flatnonzero(turned).tolist(), len(line) - 1]):
+            one, two = (_side(side, label, local) for side in table[:, a : b + 1])
+            out.append(Mating(0, arc_lengths(points[line[a : b + 1]]), one, two))
     return out
 
 
@@ -102,6 +115,12 @@ def _directed(pattern: Pattern, seams: Ints) -> list[bool]:
     first = seams[:, 0]
     left: list[bool] = np.isin(first[:, 0] * n + first[:, 1], keys[he.face >= 0]).tolist()
     return left
+
+
+def _turns(lines: Array) -> Array:
+    """Return the angles (l, k - 2) by which lines of points (l, k, 2) turn."""
+    way = np.diff(lines, axis=1) @ np.array([1.0, 1j])
+    return np.asarray(np.abs(np.angle(way[:, 1:] * way[:, :-1].conj())))
 
 
 def _side(vertices: Ints, label: Ints, local: Ints) -> Side:

@@ -121,7 +121,11 @@ def parts_from(fitted: Fitted, finish: Finish) -> list[Part]:
     tabs = [_tab_seams(number, seams, bare) for number in range(len(panels))]
     if finish.registration is not None:
         bare = _registered(bare, seams, finish, *finish.registration)
-    return [_finished(*own, finish) for own in zip(bare, joints, tabs, strict=True)]
+    if finish.tabs is not None or finish.numbers is not None:
+        numbered = finish.notches is None or finish.numbers is not None
+        numbers = (finish.labels or _NUMBERS) if numbered else None
+        bare = with_tabs(bare, tabs, finish.tabs, numbers=numbers, place=finish.numbers)
+    return [_finished(*own, finish) for own in zip(bare, joints, strict=True)]
 
 
 def scaled(panels: Sequence[Panel], scale: float, finish: Finish) -> list[Panel]:
@@ -186,16 +190,11 @@ def _tab_seams(
     return out
 
 
-def _finished(
-    part: Part, joints: Sequence[Joint], seams: Sequence[TabSeam], finish: Finish
-) -> Part:
-    """Add notches, tabs, allowance, kerf and texts to a part, and turn it long side along x."""
+def _finished(part: Part, joints: Sequence[Joint], finish: Finish) -> Part:
+    """Add notches, allowance, kerf and texts to a part, and turn it long side along x."""
     if finish.notches is not None:
         spacing = finish.notches
         part = replace(part, notches=tuple(n for j in joints for n in _notches(j, spacing)))
-    if finish.tabs is not None:
-        numbers = (finish.labels or _NUMBERS) if finish.notches is None else None
-        part = with_tabs(part, seams, finish.tabs, numbers=numbers)
     part = part.turned(-rectangle(part.outline)[0])
     part = offset(with_allowance(part, finish.allowance), 0.5 * finish.kerf)
     if finish.face == "inside":

@@ -52,7 +52,8 @@ def of_surface(
     """
     panels, label, local = _divided(surface.vertices, pattern, folded)
     panels = [_with_zones(panel, zones) for panel in panels]
-    matings = of_pattern(surface.vertices, pattern, label, local)
+    corners = len(folded.edges) > 0
+    matings = of_pattern(surface.vertices, pattern, label, local, corners)
     return Made(name, _named(panels, [name] * len(panels)), numbered(matings), record)
 
 

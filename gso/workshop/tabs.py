@@ -54,31 +54,63 @@ class TabSeam:
 
 
 def with_tabs(
-    part: Part, seams: Sequence[TabSeam], width: float, *, numbers: float | None = None
-) -> Part:
-    """Add trapezoidal tabs along seams, and the seams' numbers.
+    parts: Sequence[Part],
+    seams: Sequence[Sequence[TabSeam]],
+    width: float | None,
+    *,
+    numbers: float | None = None,
+    place: str | None = None,
+) -> list[Part]:
+    """Add trapezoidal tabs along the seams of parts, and the seams' numbers.
 
     A tab lies within the face of the other part that it is glued to, and takes at most half of
     that face's angle at a corner, so that tabs behind the same face do not meet there. A tab that
     would lie on the part or on another tab is made narrower, and left out if a quarter of the width
-    does not fit.
+    does not fit. Where a seam gets no tab on its side, the other side is tried.
 
     Parameters
     ----------
-    part : Part
-    seams : sequence of TabSeam
-    width : float
-        Width of the tabs, in millimetres.
+    parts : sequence of Part
+    seams : sequence of sequences of TabSeam
+        The seams of each part.
+    width : float or None
+        Width of the tabs, in millimetres; None for none.
     numbers : float, optional
-        Height of the numbers of seams, which stand on their longest tab and beside the other side.
+        Height of the numbers of seams; they are no higher than half of their seam is long.
+    place : {"inside", "outside"}, optional
+        Where numbers stand: beside seams in the part, or on the longest tab of a seam, otherwise
+        outside the part. When not given, on the longest tab, otherwise in the part.
     """
+    first = [_with_tabs(*own, width) for own in zip(parts, seams, strict=True)]
+    both = [
+        (seam, tabs)
+        for (_, some), own in zip(first, seams, strict=True)
+        for seam, tabs in zip(own, some, strict=True)
+    ]
+    bare = {seam.number for seam, tabs in both if seam.tabs and not tabs}
+    out = []
+    for (part, some), own in zip(first, seams, strict=True):
+        others = [replace(x, tabs=x.number in bare and not x.tabs) for x in own]
+        made, more = _with_tabs(part, others, width)
+        if numbers is not None:
+            labels = (
+                _number(seam, [*one, *two], numbers, place)
+                for seam, one, two in zip(own, some, more, strict=True)
+            )
+            made = replace(made, labels=(*made.labels, *labels))
+        out.append(made)
+    return out
+
+
+def _with_tabs(
+    part: Part, seams: Sequence[TabSeam], width: float | None
+) -> tuple[Part, list[list[tuple[Array, float]]]]:
+    """Add tabs to a part; also return the line and the width of those of each seam."""
+    found: list[list[tuple[Array, float]]] = [[] for _ in seams]
     whole = region(part.outline, part.holes)
-    creases: list[Array] = []
-    labels: list[Label] = []
-    if whole.geom_type != "Polygon":
-        return part
-    for seam in seams:
-        added: list[tuple[Array, float]] = []
+    if width is None or whole.geom_type != "Polygon":
+        return part, found
+    for seam, added in zip(seams, found, strict=True):
         for piece, there in _divided(seam.line, seam.other, width) if seam.tabs else ():
             room = _room(seam.glued, piece, there)
             for share in _SHARES:
@@ -91,17 +123,9 @@ def with_tabs(
                     whole = joined
                     added.append((piece, share * width))
                     break
-        creases += [piece for piece, _ in added]
-        if numbers is not None:
-            labels.append(_number(seam, added, numbers))
     outline, holes = rings(whole)
-    return replace(
-        part,
-        outline=outline,
-        holes=holes,
-        creases=(*part.creases, *creases),
-        labels=(*part.labels, *labels),
-    )
+    creases = (piece for added in found for piece, _ in added)
+    return replace(part, outline=outline, holes=holes, creases=(*part.creases, *creases)), found
 
 
 def _divided(line: Array, other: Array, width: float) -> list[tuple[Array, Array]]:
@@ -198,14 +222,18 @@ def _inner(line: Array) -> Array:
     return np.stack([np.interp(at, along, c) for c in line.T], axis=1)
 
 
-def _number(seam: TabSeam, added: Sequence[tuple[Array, float]], height: float) -> Label:
-    """Place the number of a seam on its longest tab, otherwise beside its middle in the part."""
-    if added:
+def _number(
+    seam: TabSeam, added: Sequence[tuple[Array, float]], height: float, place: str | None
+) -> Label:
+    """Place the number of a seam on its longest tab, or beside its middle."""
+    if added and place != "inside":
         piece, width = max(added, key=lambda one: float(np.linalg.norm(one[0][-1] - one[0][0])))
         away = -0.5 * width
         height = min(height, 0.6 * width)
     else:
-        piece, away = _inner(seam.line), height
+        piece = _inner(seam.line)
+        height = min(height, float(np.linalg.norm(piece[-1] - piece[0])))
+        away = -height if place == "outside" else height
     way = piece[-1] - piece[0]
     along = way / max(float(np.linalg.norm(way)), 1e-300)
     middle = 0.5 * (piece[0] + piece[-1]) + away * np.array([-along[1], along[0]])

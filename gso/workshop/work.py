@@ -25,12 +25,12 @@ from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made
 
 #: Version of the files; those of another one are made again.
-_FORMAT = 4
+_FORMAT = 6
 
 
 def key(design: Design, settings: FabricationSettings) -> str:
     """Return what identifies the work on a design: its digest and what was asked."""
-    own = [digest(design.mesh), design.kept.tolist(), design.sheet]
+    own = [digest(design.mesh), design.kept.tolist(), design.uncut.tolist(), design.sheet]
     said = json.dumps([_FORMAT, version("gso"), *own, plain(settings.record())], sort_keys=True)
     return hashlib.sha256(said.encode()).hexdigest()
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from gso.errors import MeshError
+from gso.errors import MeshError, NonManifoldError
 from gso.mesh.topology.graph import edge_graph, label_components
 from gso.typing import Flags, Ints
 
@@ -136,7 +136,7 @@ def orient(faces: Ints, vertex_count: int) -> tuple[Ints, int, int]:
     if triple.any():
         at = order[1:-1][triple][0]
         at_faces = face[key == key[at]]
-        raise MeshError(
+        raise NonManifoldError(
             f"edge {origin[at]}-{dest[at]} belongs to {at_faces.size} faces "
             f"({', '.join(map(str, at_faces[:6]))}): a surface has at most two at an edge; "
             "delete the extra faces"
@@ -189,7 +189,7 @@ def check_vertices(he: HalfEdges) -> None:
         return
     per_vertex = np.bincount(he.origin[one], minlength=he.vertex_count)
     bad = np.flatnonzero(per_vertex > 1)
-    raise MeshError(
+    raise NonManifoldError(
         f"vertex {bad[0]} joins {per_vertex[bad[0]]} parts of the surface that share no edge there "
         f"({bad.size} such vertices): give each part its own copy of the vertex"
     )

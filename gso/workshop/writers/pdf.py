@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +32,8 @@ PAPERS = {
     "A4": (210.0, 297.0),
 }
 
+# Margin of the pages, in millimetres.
+_MARGIN = 10.0
 # Points in a millimetre, and the line width in millimetres.
 _POINT, _LINE = 72.0 / 25.4, 0.25
 # Height of capital letters as a fraction of the font size (Helvetica).
@@ -47,14 +50,15 @@ def content(
     *,
     paper: str = "A4",
     overlap: float = 10.0,
-    margin: float = 10.0,
+    margin: float = _MARGIN,
     bend_text: bool = False,
 ) -> bytes:
     """Return parts as a PDF at the scale 1:1, divided into pages.
 
-    Each page has a window of the drawing with crosses at its corners, dashed lines where the
+    Each part that fits has a page of its own, turned if need be. Others and sheets are divided:
+    each page has a window of the drawing with crosses at its corners, dashed lines where the
     neighbouring pages begin, its name (A1 is the upper left page) and a scale bar. Pages without
-    parts are left out. Where there are several, the first page shows how they are put together.
+    parts are left out. Where there are several, a page before them shows how they are put together.
 
     Parameters
     ----------
@@ -82,15 +86,45 @@ def content(
     """
     check_paper(paper)
     gap, free = as_positive(overlap, "overlap", zero=True), as_positive(margin, "margin", zero=True)
-    tiling = tiled(drawing, PAPERS[paper], gap, free)
+    some = [(own, tiled(own, PAPERS[paper], gap, free)) for own in _divided(drawing, paper, free)]
     stream = io.BytesIO()
-    book = _Book(stream, tiling, free, gap)
-    if len(tiling.tiles) > 1:
-        book.overview(drawing, layers)
-    for tile in tiling.tiles:
-        book.tile(drawing, tile, layers, bend_text)
+    book = _Book(stream, free, gap, sum(len(t.tiles) + (len(t.tiles) > 1) for _, t in some))
+    for own, tiling in some:
+        if len(tiling.tiles) > 1:
+            book.overview(own, tiling, layers)
+        for tile in tiling.tiles:
+            book.tile(own, tiling, tile, layers, bend_text)
     book.close()
     return stream.getvalue()
+
+
+def room(paper: str, margin: float = _MARGIN) -> tuple[float, float]:
+    """Return length and width of the window of an upright page, in millimetres.
+
+    >>> room("A4")
+    (265.0, 190.0)
+    """
+    check_paper(paper)
+    wide, high = PAPERS[paper]
+    return high - 2 * margin - FOOT, wide - 2 * margin
+
+
+def _divided(drawing: Drawing, paper: str, margin: float) -> list[Drawing]:
+    """Give each part that fits a page a drawing of its own; other parts stay together."""
+    if drawing.sheet is not None:
+        return [drawing]
+    high, wide = room(paper, margin)
+    own, rest = [], []
+    for part in drawing.parts:
+        x, y = part.size
+        # Across, the foot of the page takes room of the width.
+        if (x <= wide and y <= high) or (x <= high + FOOT and y <= wide - FOOT):
+            own.append(Drawing((part,), title=strokes.title(part)))
+        elif x <= high and y <= wide:
+            own.append(Drawing((part.turned(0.5 * np.pi),), title=strokes.title(part)))
+        else:
+            rest.append(part)
+    return [*own, *([replace(drawing, parts=tuple(rest))] if rest else [])]
 
 
 def check_paper(paper: object) -> None:
@@ -105,31 +139,30 @@ class _Book:
     Parameters
     ----------
     stream : file
-    tiling : Tiling
     margin, overlap : float
+    pages : int
+        How many there will be.
     """
 
-    def __init__(self, stream: io.BytesIO, tiling: Tiling, margin: float, overlap: float):
+    def __init__(self, stream: io.BytesIO, margin: float, overlap: float, pages: int):
         from reportlab.pdfgen.canvas import Canvas
 
-        self._tiling, self._margin, self._overlap = tiling, margin, overlap
-        size = tuple(_POINT * side for side in tiling.page)
+        self._margin, self._overlap = margin, overlap
         # The same drawing always gives the same bytes.
-        self._canvas = Canvas(stream, pagesize=size, invariant=1)
-        self._page = 0
-        self._pages = len(tiling.tiles) + (len(tiling.tiles) > 1)
+        self._canvas = Canvas(stream, invariant=1)
+        self._page, self._pages = 0, pages
 
     def close(self) -> None:
         self._canvas.save()
 
-    def overview(self, drawing: Drawing, layers: dict[str, Layer]) -> None:
+    def overview(self, drawing: Drawing, tiling: Tiling, layers: dict[str, Layer]) -> None:
         """Draw all pages, scaled down, with their names."""
-        tiles = self._tiling.tiles
+        tiles = tiling.tiles
         low = np.min([tile.low for tile in tiles], axis=0)
         high = np.max([tile.high for tile in tiles], axis=0)
-        room = np.array(self._tiling.page) - 2.0 * self._margin - [0.0, FOOT]
+        room = np.array(tiling.page) - 2.0 * self._margin - [0.0, FOOT]
         scale = float((room / (high - low)).min())
-        c = self._begin()
+        c = self._begin(tiling)
         c.saveState()
         c.translate(self._margin, self._margin + FOOT)
         c.scale(scale, scale)
@@ -145,11 +178,19 @@ class _Book:
             c.setFont("Helvetica", 0.15 * min(wide, high_))
             c.drawCentredString(x, y, tile.name)
         c.restoreState()
-        self._foot(drawing, f"how the pages are put together, {scale:.3g} : 1", bar=False)
+        said = f"how the pages are put together, {scale:.3g} : 1"
+        self._foot(drawing, tiling, said, bar=False)
 
-    def tile(self, drawing: Drawing, tile: Tile, layers: dict[str, Layer], bend_text: bool) -> None:
+    def tile(
+        self,
+        drawing: Drawing,
+        tiling: Tiling,
+        tile: Tile,
+        layers: dict[str, Layer],
+        bend_text: bool,
+    ) -> None:
         """Draw one page at the scale 1:1."""
-        c = self._begin()
+        c = self._begin(tiling)
         wide, high = (tile.high - tile.low).tolist()
         c.saveState()
         c.translate(self._margin, self._margin + FOOT)
@@ -159,13 +200,14 @@ class _Book:
         c.translate(*(-tile.low).tolist())
         self._draw(drawing, layers, bend_text, _LINE)
         c.restoreState()
-        self._marks(wide, high)
-        self._foot(drawing, tile.name)
+        self._marks(tiling, wide, high)
+        self._foot(drawing, tiling, tile.name)
 
-    def _begin(self) -> Canvas:
+    def _begin(self, tiling: Tiling) -> Canvas:
         if self._page:
             self._canvas.showPage()
         self._page += 1
+        self._canvas.setPageSize([_POINT * side for side in tiling.page])
         self._canvas.scale(_POINT, _POINT)
         return self._canvas
 
@@ -204,7 +246,7 @@ class _Book:
             path.close()
         c.drawPath(path, stroke=1, fill=0)
 
-    def _marks(self, wide: float, high: float) -> None:
+    def _marks(self, tiling: Tiling, wide: float, high: float) -> None:
         """Draw crosses at the corners of the window, and where the neighbours' windows begin."""
         c, x0, y0 = self._canvas, self._margin, self._margin + FOOT
         c.setDash()
@@ -216,15 +258,15 @@ class _Book:
                 c.line(x, y - _CROSS, x, y + _CROSS)
         c.setDash([2, 2])
         gap = self._overlap
-        if self._tiling.columns > 1:
+        if tiling.columns > 1:
             for x in (x0 + gap, x0 + wide - gap):
                 c.line(x, y0, x, y0 + high)
-        if self._tiling.rows > 1:
+        if tiling.rows > 1:
             for y in (y0 + gap, y0 + high - gap):
                 c.line(x0, y, x0 + wide, y)
         c.setDash()
 
-    def _foot(self, drawing: Drawing, name: str, bar: bool = True) -> None:
+    def _foot(self, drawing: Drawing, tiling: Tiling, name: str, bar: bool = True) -> None:
         """Write the page's name, number and title, and draw the scale bar."""
         c, x, y = self._canvas, self._margin, self._margin
         c.setDash()
@@ -237,9 +279,9 @@ class _Book:
         c.drawString(x, y, f"{title}: {said}" if title else said)
         if not bar:
             return
-        wide = self._tiling.page[0] - 2.0 * self._margin
+        wide = tiling.page[0] - 2.0 * self._margin
         size = next((b for b in _BARS if b <= 0.45 * wide), _BARS[-1])
-        right = self._tiling.page[0] - self._margin
+        right = tiling.page[0] - self._margin
         c.line(right - size, y + 6.0, right, y + 6.0)
         for end in (right - size, right):
             c.line(end, y + 4.5, end, y + 7.5)
