@@ -11,8 +11,10 @@ import shapely
 
 import gso
 from gso import metrics
+from gso.components import split
 from gso.exact import folded_pattern
 from gso.mesh import Mesh
+from gso.seams import rectangle
 from gso.workshop import Finish, Thickness
 
 
@@ -199,6 +201,70 @@ def test_fabricated_as_it_is(design, tmp_path):
     assert record["deviation_max"] == 0.0
     assert record["strain_max"] < 1e-12
     assert len(job.parts[0].bends) >= 2
+
+
+def tray(x=80.0, y=50.0, z=15.0) -> Mesh:
+    return Mesh(box(x, y, z).vertices, np.delete(box().faces, 1, axis=0))
+
+
+def tube(radius=50.0, height=150.0) -> Mesh:
+    ring = frustum(radius, radius, height)
+    return Mesh(ring.vertices, ring.faces)
+
+
+def total(bends) -> float:
+    """The sum of the angles of bend lines, in degrees."""
+    return sum(float(np.degrees(abs(bend.angle))) for bend in bends)
+
+
+@pytest.mark.parametrize(
+    ("design", "size"),
+    [
+        (tray(), (110.0, 80.0)),
+        (box(100, 100, 100), None),
+        (tube(), (100 * np.pi, 150.0)),
+        (frustum(120.0, 20.0, 110.0), None),
+        (frustum(), None),
+    ],
+    ids=["tray", "cube", "tube", "cone", "lampshade"],
+)
+def test_all_ways_keep_the_same_design(design, size, tmp_path):
+    pieces = gso.pieces(design, max_deviation="1%", workers=0)
+    strips = gso.strips(design, max_deviation="1%")
+    ruled = gso.tno.optimize(design, formulation="ruled")
+    again = gso.strips(pieces, max_deviation="1%")
+    job = gso.fabricate(design, tmp_path, formats=("svg",), workers=0)
+    assert pieces.usable and job.usable and len(pieces) == len(job.parts) == 1
+    assert pieces.metrics["deviation_max"] == 0.0 and pieces.metrics["strain_max"] < 1e-12
+    n = len(design.vertices)
+    np.testing.assert_array_equal(pieces.design.vertices[:n], design.vertices)
+    sheet, (part,) = pieces.sheets[0], job.parts
+    bends, seam = pieces.folded.lines(pieces.pattern.flat), pieces.lengths.sum()
+    np.testing.assert_allclose(part.size, sheet.size, rtol=1e-9)
+    if size is not None:
+        np.testing.assert_allclose(part.size, size, rtol=1e-9)
+    assert len(part.bends) == len(bends)
+    assert total(part.bends) == pytest.approx(total(bends), abs=1e-6)
+    for one in (strips, ruled, again):
+        assert one.usable and one.status is gso.Status.ALREADY_GOOD and one.details["strips"] == 1
+        assert one.metrics["strain_max"] < 1e-12 and one.metrics["distance_max"] == 0.0
+        np.testing.assert_array_equal(one.on_design().vertices, design.vertices)
+        (own,) = split(one.pattern.mesh)
+        np.testing.assert_allclose(rectangle(one.pattern.flat[own.vertices])[1], sheet.size)
+        lines = one.folded.lines(one.pattern.flat)
+        assert len(lines) == len(bends) and total(lines) == pytest.approx(total(bends))
+        ends = one.mesh.vertices[one.pattern.vertex[one.pattern.seams[:, 0]]]
+        assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(seam)
+
+
+def test_kept_designs_are_written_and_read(tmp_path):
+    strips = gso.strips(frustum(), max_deviation="1%")
+    strips.save(tmp_path / "a.npz")
+    again = gso.Result.load(tmp_path / "a.npz")
+    assert again.usable and again.metrics["strain_max"] < 1e-12
+    gso.pieces(tray()).save(tmp_path / "cut")
+    drawing = (tmp_path / "cut" / "patterns.svg").read_text()
+    assert drawing.count("90 degrees") == 4
 
 
 @pytest.mark.parametrize(
