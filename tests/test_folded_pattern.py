@@ -231,7 +231,7 @@ def total(bends) -> float:
 def test_all_ways_keep_the_same_design(design, size, tmp_path):
     pieces = gso.pieces(design, max_deviation="1%", workers=0)
     strips = gso.strips(design, max_deviation="1%")
-    ruled = gso.tno.optimize(design, formulation="ruled")
+    ruled = gso.tno.optimize(design, formulation="ruled", max_deviation="1%")
     again = gso.strips(pieces, max_deviation="1%")
     job = gso.fabricate(design, tmp_path, formats=("svg",), workers=0)
     assert pieces.usable and job.usable and len(pieces) == len(job.parts) == 1

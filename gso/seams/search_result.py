@@ -65,7 +65,7 @@ def packed(
         measured[Code.NARROW] = Measurement(widths / given.size, "piece", some)
     notes = []
     if result is None:
-        measured |= crossed(own.design)
+        measured |= crossed(given)
         if settings.max_deviation is not None:
             numbers |= {"deviation_mean": 0.0, "deviation_max": 0.0}
     else:

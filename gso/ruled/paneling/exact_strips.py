@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,6 +27,7 @@ def exact_strips(design: Mesh, request: StripsRequest, kept: Ints) -> StripsResu
     Parameters
     ----------
     design : Mesh
+        Its vertices that no face has are left out.
     request : StripsRequest
         Without constraints, start, and number of strips.
     kept : ndarray of int, (k, 2)
@@ -44,13 +46,16 @@ def exact_strips(design: Mesh, request: StripsRequest, kept: Ints) -> StripsResu
         return None
     if found is None:
         return None
-    pattern, folded = found.pattern, found.folded
+    folded, used = found.folded, np.unique(found.pattern.vertex)
+    rank = np.zeros(len(found.surface.vertices), np.int64)
+    rank[used] = np.arange(len(used))
+    pattern = replace(found.pattern, vertex=rank[found.pattern.vertex])
     if folded.radii.min(initial=np.inf) < (request.options.min_radius or 0.0):
         return None
     corners = pattern.faces
     part = label_components(len(pattern.flat), corners[:, [0, 0]].ravel(), corners[:, 1:].ravel())
     surface = RuledSurface(
-        mesh=found.surface,
+        mesh=Mesh(found.surface.vertices[used], rank[found.surface.faces]),
         strip=np.unique(part[corners[:, 0]], return_inverse=True)[1].ravel(),
         flat=np.zeros(len(corners), bool),
         rulings=Folds(pattern.vertex[folded.edges], folded.angles, folded.radii),

@@ -66,7 +66,8 @@ def strips(
 
     A design that is flat or developable as it is, within `max_strain`, is kept: its own rulings and
     folds are the lines to bend along, and its parts are the strips. Constraints, `x0`, `max_crease`
-    and a number of strips rule that out.
+    and a number of strips rule that out. Without `max_deviation` it takes folds, and a design that
+    does not close around.
 
     Otherwise the design is tried as one surface, with as few strips side by side as hold
     `max_deviation`. On quad meshes strips along the design's own lines are tried, too, which may
@@ -295,12 +296,17 @@ class _Task:
         return best.result
 
     def _developable(self) -> list[_Tried]:
-        """Return the design, if it is developable and its pieces were not given."""
+        """Return the design, if it is developable and its pieces were not given.
+
+        Without a largest distance only designs with folds are kept, and none is opened that
+        closes around: one smooth strip has a smooth surface for CAD, too.
+        """
         asked = self.request
         if self.kept is None or not asked.may_keep_design:
             return []
         result = exact_strips(self.design, asked, self.kept)
-        if result is None:
+        folded = result is not None and (result.ruled.rulings.radii == 0).any()
+        if result is None or not (asked.max_deviation or (folded and _is_whole(self.design))):
             return []
         reasons = judge(result, asked.limits)
         return [_Tried(result, ordered([*reasons, *_against_sheet(result, asked)]))]

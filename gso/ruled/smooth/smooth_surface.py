@@ -82,8 +82,9 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     Raises
     ------
     MeshError
-        Several strips run along the lines of a quad mesh, the surface was read from a file of an
-        earlier version, or its outline cannot be carried over to the smooth strips.
+        The design was kept as it is, several strips run along the lines of a quad mesh, the surface
+        was read from a file of an earlier version, or its outline cannot be carried over to the
+        smooth strips.
 
     Examples
     --------
@@ -99,8 +100,8 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     source, mesh = surface.untrimmed, surface.mesh
     if source is None:
         raise MeshError(
-            "strips along the lines of a quad mesh, and those in files of an earlier version, have "
-            "no smooth surfaces; take the planar faces, gso.io.save_faces"
+            "strips along the lines of a quad mesh, designs that were kept as they are, and files of "
+            "an earlier version have no smooth surfaces; take the planar faces, gso.io.save_faces"
         )
     size = mesh.diagonal
     middle = mesh.vertices.mean(axis=0)
