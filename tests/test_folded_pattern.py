@@ -267,6 +267,67 @@ def test_kept_designs_are_written_and_read(tmp_path):
     assert drawing.count("90 degrees") == 4
 
 
+def bulged_box(x=100.0, y=80.0, z=60.0, bulge=8.0, n=9) -> Mesh:
+    """A box whose upper side is curved in both directions."""
+    share = np.linspace(0.0, 1.0, n)
+    a, b = np.meshgrid(share, share, indexing="ij")
+    zero, one, high = 0 * a, 0 * a + 1, 1 + 16 * bulge / z * a * (1 - a) * b * (1 - b)
+    sides = [(b, a, zero), (a, zero, b), (b, one, a), (zero, b, a), (one, a, b), (a, b, high)]
+    size = np.array([x, y, z])
+    points = np.concatenate([size * np.stack(s, axis=-1).reshape(-1, 3) for s in sides])
+    cells = Mesh.from_grid(np.stack([a, b, zero], axis=-1)).faces
+    faces = np.concatenate([cells + k * n * n for k in range(6)])
+    _, first, same = np.unique(points.round(6), axis=0, return_index=True, return_inverse=True)
+    return Mesh(points[first], same.ravel()[faces])
+
+
+def domed(radius=50.0, height=80.0, cap=25.0, count=24) -> Mesh:
+    """A cylinder with a spherical cap, which it meets at an edge."""
+    whole = (radius**2 + cap**2) / (2 * cap)
+    slope = np.linspace(np.arcsin(radius / whole), 0.0, 5)[1:]
+    rings = [(radius, z) for z in (0.0, 0.5 * height, height)]
+    rings += [(whole * np.sin(t), height + cap + whole * (np.cos(t) - 1)) for t in slope[:-1]]
+    turn = 2 * np.pi * np.arange(count) / count
+    points = [np.c_[r * np.cos(turn), r * np.sin(turn), z + 0 * turn] for r, z in rings]
+    k = np.arange(count * (len(rings) - 1))
+    ahead = k + 1 - count * (k % count == count - 1)
+    top = count * len(rings)
+    quads = np.stack([k, ahead, ahead + count, k + count], axis=1)
+    last, to = k[-count:] + count, ahead[-count:] + count
+    cone = np.stack([last, to, 0 * to + top, 0 * to - 1], axis=1)
+    return Mesh(np.r_[np.concatenate(points), [[0, 0, height + cap]]], np.r_[quads, cone])
+
+
+@pytest.mark.parametrize(
+    ("design", "formulation", "size", "bends", "angle"),
+    [
+        # Five sides of the box as a cross, and the wall of the cylinder.
+        (bulged_box(), "ruled", (220.0, 200.0), 4, 360.0),
+        (bulged_box(bulge=-9.0), "flatten", (220.0, 200.0), 4, 360.0),
+        (domed(), "flatten", (100 * np.pi, 80.0), 23, 360.0),
+    ],
+    ids=["bulged box", "hollow box", "cylinder with a cap"],
+)
+def test_developable_parts_between_sharp_edges_are_kept(
+    design, formulation, size, bends, angle, tmp_path
+):
+    job = gso.fabricate(design, tmp_path, formats=("svg",), workers=0, formulation=formulation)
+    assert job.usable
+    (record,) = job.certificate["designs"]
+    kept, *others = job.parts
+    np.testing.assert_allclose(kept.size, size, rtol=1e-9)
+    assert len(kept.bends) == bends and others
+    assert total(kept.bends) == pytest.approx(angle, abs=1e-6)
+    if formulation == "flatten":
+        assert record["deviation_max"] < 1e-12 * design.diagonal and record["seam_gap"] == 0.0
+    else:
+        assert 0 < record["deviation_max"] <= record["allowed"] >= record["seam_gap"]
+        assert all(part.bends for part in others)
+    # The others have the rest of the area, which the curved sides add to.
+    rest = metrics.area(design) - kept.area * kept.count
+    assert sum(part.area * part.count for part in others) == pytest.approx(rest, rel=0.02)
+
+
 @pytest.mark.parametrize(
     ("thick", "radius", "k"), [(1.0, 1.0, 0.5), (1.5, 1.5, 0.44), (3.0, 4.0, 0.33)]
 )

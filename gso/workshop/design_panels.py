@@ -26,6 +26,7 @@ from gso.verdict.surface_checks import crossed
 from gso.workshop import measurements
 from gso.workshop.designs import Design
 from gso.workshop.fabrication_settings import FabricationSettings
+from gso.workshop.mixed_panels import mixed
 from gso.workshop.panels import Made
 from gso.workshop.pattern_panels import of_result, of_surface
 
@@ -71,18 +72,45 @@ def made(
         )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
+        if exact is None:
+            exact = _mixed(given, settings, named, workers)
+            if exact is not None and not exact.reasons:
+                return exact
         try:
-            if settings.formulation == RULED:
-                other = _strips(given, settings, named, workers)
-            elif settings.formulation == "flatten":
-                other = _as_it_is(given, settings, named)
-            else:
-                other = _nearly(given, settings, named, workers)
+            other = _changed(given, settings, named, workers)
         except GSOError:
             if exact is None:
                 raise
             return exact
     return other if exact is None or not other.reasons else exact
+
+
+def _changed(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
+    """Make a design of flat panels in the way that was asked for."""
+    if settings.formulation == RULED:
+        return _strips(given, settings, say, workers)
+    if settings.formulation == "flatten":
+        return _as_it_is(given, settings, say)
+    return _nearly(given, settings, say, workers)
+
+
+def _mixed(
+    given: Design, settings: FabricationSettings, say: Say, workers: int | None
+) -> Made | None:
+    """Keep parts of a design, and change the others; None where that is not possible."""
+
+    def kept(part: Design, settings: FabricationSettings) -> Made | None:
+        found = _exact(part, settings)
+        return None if found is None or found.reasons else found
+
+    def changed(part: Design, settings: FabricationSettings) -> Made:
+        return _changed(part, settings, say, workers)
+
+    try:
+        found = mixed(given, settings, kept, changed)
+    except GSOError:
+        return None
+    return None if found is None else _checked(found, settings)
 
 
 def _without_poles(given: Design) -> Design:
