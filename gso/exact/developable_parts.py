@@ -38,15 +38,13 @@ def developable_parts(mesh: Mesh, max_strain: Strain = 1e-3) -> Flags:
 
     Examples
     --------
-    >>> y, x = np.mgrid[-4.0:5, -4.0:5]
-    >>> wall = np.dstack([x, 0 * x + 4, y + 4])
-    >>> bump = np.dstack([x, y, 0.02 * (16 - x * x) * (16 - y * y) / 4])
-    >>> sheet, other = Mesh.from_grid(bump), Mesh.from_grid(wall)
-    >>> points = np.r_[sheet.vertices, other.vertices[9:]]
-    >>> lower = np.where(other.faces < 9, other.faces + 72, other.faces + 72)
-    >>> kept = developable_parts(Mesh(points, np.r_[sheet.faces, lower]))
-    >>> int(kept.sum()), bool(kept[64:].all())
-    (64, True)
+    >>> y, x = np.mgrid[-4.0:5, -4.0:13]
+    >>> along = np.minimum(x, 4)
+    >>> bump = (16 - along**2) * (16 - y * y) / 160
+    >>> lid_and_wall = Mesh.from_grid(np.dstack([along, y, bump + along - x]))
+    >>> kept = developable_parts(Mesh(lid_and_wall.vertices, lid_and_wall.triangles))
+    >>> float(kept.mean())
+    0.5
     """
     shape = recognise(mesh, max_strain=max_strain)
     face = np.repeat(np.arange(len(mesh.faces)), 1 + are_quads(mesh.faces))
