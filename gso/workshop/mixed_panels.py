@@ -106,7 +106,7 @@ def _rim(panel: Panel, seams: Sequence[Side]) -> Ints:
     known = [np.empty(0, np.int64)]
     for side in seams:
         ends = side.edges[:, 0]
-        known += [edge_keys(ends[:-1], ends[1:], count), edge_keys(*side.edges.T, count)]
+        known += [edge_keys(ends[:-1], ends[1:], count), edge_keys(ends, side.edges[:, 1], count)]
     return rim[~np.isin(edge_keys(rim[:, 0], rim[:, 1], count), np.concatenate(known))]
 
 
