@@ -335,6 +335,14 @@ def turned_around(radius_low, radius_high, sides=24):
     return points, [[k, (k + 1) % sides, sides + (k + 1) % sides, sides + k] for k in range(sides)]
 
 
+def links():
+    """Return two rings of a chain, which do not touch."""
+    points, faces = turned_around(40, 40)
+    one = np.array(points) * [1, 1, 0.1]
+    other = one[:, [0, 2, 1]] + [40, 4.5, -4.5]
+    return np.r_[one, other], np.r_[faces, np.array(faces) + len(one)]
+
+
 def parts_and_holes(job):
     return sum(p.count for p in job.parts), sum(len(p.holes) * p.count for p in job.parts)
 
@@ -362,6 +370,7 @@ TABLE = [
     ("5 one seam", turned_around(60, 30), {}, parts_and_holes, (1, 0)),
     ("5 one seam", turned_around(40, 40, 4), {}, parts_and_holes, (1, 0)),
     ("5 tray", tray(), {}, parts_and_holes, (1, 0)),
+    ("6 interlocked", links(), {}, lambda job: sum(p.count for p in job.parts), 2),
     ("10 radius", rolled(15.0), {}, radius_of, 15.0),
     ("10 radius", rolled(15.0, [(2, 8), (4, 8)]), {}, radius_of, 15.0),
     ("10 radius", rolled(8.0, [(3, 2)]), {}, radius_of, 8.0),
@@ -382,4 +391,4 @@ if __name__ == "__main__":
     for kind, design, options, measured, right in TABLE:
         with tempfile.TemporaryDirectory() as folder:
             now = measured(flat(design, folder, **options))
-            sys.stdout.write(f"{kind:12}{right!s:>12}{now!s:>12}\n")
+            sys.stdout.write(f"{kind:14}{right!s:>12}{now!s:>12}\n")
