@@ -101,8 +101,9 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     source, mesh = surface.untrimmed, surface.mesh
     if source is None:
         raise MeshError(
-            "strips along the lines of a quad mesh, designs that were kept as they are, and files of "
-            "an earlier version have no smooth surfaces; take the planar faces, gso.io.save_faces"
+            "strips along the lines of a quad mesh, designs that were kept as they are, and those "
+            "in files of an earlier version, have no smooth surfaces; take the planar faces, "
+            "gso.io.save_faces"
         )
     size = mesh.diagonal
     middle = mesh.vertices.mean(axis=0)
