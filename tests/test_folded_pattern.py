@@ -13,8 +13,10 @@ from scipy.spatial import ConvexHull
 
 import gso
 from gso import metrics
+from gso.components import split
 from gso.exact import folded_pattern
 from gso.mesh import Mesh
+from gso.seams import rectangle
 from gso.workshop import Finish, Thickness
 
 
@@ -240,6 +242,131 @@ def test_fabricated_as_it_is(design, tmp_path):
     assert record["deviation_max"] == 0.0
     assert record["strain_max"] < 1e-12
     assert len(job.parts[0].bends) >= 2
+
+
+def tray(x=80.0, y=50.0, z=15.0) -> Mesh:
+    return Mesh(box(x, y, z).vertices, np.delete(box().faces, 1, axis=0))
+
+
+def tube(radius=50.0, height=150.0) -> Mesh:
+    ring = frustum(radius, radius, height)
+    return Mesh(ring.vertices, ring.faces)
+
+
+def total(bends) -> float:
+    """The sum of the angles of bend lines, in degrees."""
+    return sum(float(np.degrees(abs(bend.angle))) for bend in bends)
+
+
+@pytest.mark.parametrize(
+    ("design", "size"),
+    [
+        (tray(), (110.0, 80.0)),
+        (box(100, 100, 100), None),
+        (tube(), (100 * np.pi, 150.0)),
+        (frustum(120.0, 20.0, 110.0), None),
+        (frustum(), None),
+    ],
+    ids=["tray", "cube", "tube", "cone", "lampshade"],
+)
+def test_all_ways_keep_the_same_design(design, size, tmp_path):
+    pieces = gso.pieces(design, max_deviation="1%", workers=0)
+    strips = gso.strips(design, max_deviation="1%")
+    ruled = gso.tno.optimize(design, formulation="ruled", max_deviation="1%")
+    again = gso.strips(pieces, max_deviation="1%")
+    job = gso.fabricate(design, tmp_path, formats=("svg",), workers=0)
+    assert pieces.usable and job.usable and len(pieces) == len(job.parts) == 1
+    assert pieces.metrics["deviation_max"] == 0.0 and pieces.metrics["strain_max"] < 1e-12
+    n = len(design.vertices)
+    np.testing.assert_array_equal(pieces.design.vertices[:n], design.vertices)
+    sheet, (part,) = pieces.sheets[0], job.parts
+    bends, seam = pieces.folded.lines(pieces.pattern.flat), pieces.lengths.sum()
+    np.testing.assert_allclose(part.size, sheet.size, rtol=1e-9)
+    if size is not None:
+        np.testing.assert_allclose(part.size, size, rtol=1e-9)
+    assert len(part.bends) == len(bends)
+    assert total(part.bends) == pytest.approx(total(bends), abs=1e-6)
+    for one in (strips, ruled, again):
+        assert one.usable and one.status is gso.Status.ALREADY_GOOD and one.details["strips"] == 1
+        assert one.metrics["strain_max"] < 1e-12 and one.metrics["distance_max"] == 0.0
+        np.testing.assert_array_equal(one.on_design().vertices, design.vertices)
+        (own,) = split(one.pattern.mesh)
+        np.testing.assert_allclose(rectangle(one.pattern.flat[own.vertices])[1], sheet.size)
+        lines = one.folded.lines(one.pattern.flat)
+        assert len(lines) == len(bends) and total(lines) == pytest.approx(total(bends))
+        ends = one.mesh.vertices[one.pattern.vertex[one.pattern.seams[:, 0]]]
+        assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(seam)
+
+
+def test_kept_designs_are_written_and_read(tmp_path):
+    strips = gso.strips(frustum(), max_deviation="1%")
+    strips.save(tmp_path / "a.npz")
+    again = gso.Result.load(tmp_path / "a.npz")
+    assert again.usable and again.metrics["strain_max"] < 1e-12
+    gso.pieces(tray()).save(tmp_path / "cut")
+    drawing = (tmp_path / "cut" / "patterns.svg").read_text()
+    assert drawing.count("90 degrees") == 4
+
+
+def bulged_box(x=100.0, y=80.0, z=60.0, bulge=8.0, n=9) -> Mesh:
+    """A box whose upper side is curved in both directions."""
+    share = np.linspace(0.0, 1.0, n)
+    a, b = np.meshgrid(share, share, indexing="ij")
+    zero, one, high = 0 * a, 0 * a + 1, 1 + 16 * bulge / z * a * (1 - a) * b * (1 - b)
+    sides = [(b, a, zero), (a, zero, b), (b, one, a), (zero, b, a), (one, a, b), (a, b, high)]
+    size = np.array([x, y, z])
+    points = np.concatenate([size * np.stack(s, axis=-1).reshape(-1, 3) for s in sides])
+    cells = Mesh.from_grid(np.stack([a, b, zero], axis=-1)).faces
+    faces = np.concatenate([cells + k * n * n for k in range(6)])
+    _, first, same = np.unique(points.round(6), axis=0, return_index=True, return_inverse=True)
+    return Mesh(points[first], same.ravel()[faces])
+
+
+def domed(radius=50.0, height=80.0, cap=25.0, count=24) -> Mesh:
+    """A cylinder with a spherical cap, which it meets at an edge."""
+    whole = (radius**2 + cap**2) / (2 * cap)
+    slope = np.linspace(np.arcsin(radius / whole), 0.0, 5)[1:]
+    rings = [(radius, z) for z in (0.0, 0.5 * height, height)]
+    rings += [(whole * np.sin(t), height + cap + whole * (np.cos(t) - 1)) for t in slope[:-1]]
+    turn = 2 * np.pi * np.arange(count) / count
+    points = [np.c_[r * np.cos(turn), r * np.sin(turn), z + 0 * turn] for r, z in rings]
+    k = np.arange(count * (len(rings) - 1))
+    ahead = k + 1 - count * (k % count == count - 1)
+    top = count * len(rings)
+    quads = np.stack([k, ahead, ahead + count, k + count], axis=1)
+    last, to = k[-count:] + count, ahead[-count:] + count
+    cone = np.stack([last, to, 0 * to + top, 0 * to - 1], axis=1)
+    return Mesh(np.r_[np.concatenate(points), [[0, 0, height + cap]]], np.r_[quads, cone])
+
+
+@pytest.mark.parametrize(
+    ("design", "formulation", "size", "bends", "angle"),
+    [
+        # Five sides of the box as a cross, and the wall of the cylinder.
+        (bulged_box(), "ruled", (220.0, 200.0), 4, 360.0),
+        (bulged_box(bulge=-9.0), "flatten", (220.0, 200.0), 4, 360.0),
+        (domed(), "flatten", (100 * np.pi, 80.0), 23, 360.0),
+    ],
+    ids=["bulged box", "hollow box", "cylinder with a cap"],
+)
+def test_developable_parts_between_sharp_edges_are_kept(
+    design, formulation, size, bends, angle, tmp_path
+):
+    job = gso.fabricate(design, tmp_path, formats=("svg",), workers=0, formulation=formulation)
+    assert job.usable
+    (record,) = job.certificate["designs"]
+    kept, *others = job.parts
+    np.testing.assert_allclose(kept.size, size, rtol=1e-9)
+    assert len(kept.bends) == bends and others
+    assert total(kept.bends) == pytest.approx(angle, abs=1e-6)
+    if formulation == "flatten":
+        assert record["deviation_max"] < 1e-12 * design.diagonal and record["seam_gap"] == 0.0
+    else:
+        assert 0 < record["deviation_max"] <= record["allowed"] >= record["seam_gap"]
+        assert all(part.bends for part in others)
+    # The others have the rest of the area, which the curved sides add to.
+    rest = metrics.area(design) - kept.area * kept.count
+    assert sum(part.area * part.count for part in others) == pytest.approx(rest, rel=0.02)
 
 
 @pytest.mark.parametrize(

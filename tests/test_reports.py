@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+import tempfile
+
 import numpy as np
 import pytest
 
 import gso
 from gso.mesh import Mesh
 from gso.verdict import Code
-from gso.workshop import Bend, Finish, Part, TabSeam, with_tabs
+from gso.workshop import Bend, Finish, Part, TabSeam, Thickness, with_tabs
 
 
 def written(path, points, faces, lines=None):
@@ -271,3 +274,121 @@ def test_holes_in_no_edge_are_no_t_junctions():
     points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 1, 0), (2, 2, 0), (1, 2, 0), (0, 1, 0)]
     with pytest.raises(gso.MeshError, match="give each part its own copy"):
         Mesh(points, [[0, 1, 2, 6], [2, 3, 4, 5]])
+
+
+def grid_without(x, y, z, gone):
+    """Return the quads of a grid but those in some cells (i, j)."""
+    rows, columns = x.shape
+    k = np.arange((rows - 1) * (columns - 1))
+    keep = ~np.isin(k, [i * (columns - 1) + j for i, j in gone])
+    k = (k + k // (columns - 1))[keep]
+    points = np.stack(np.broadcast_arrays(x, y, z), axis=-1).reshape(-1, 3)
+    return points, np.stack([k, k + 1, k + columns + 1, k + columns], axis=1)
+
+
+def plate(gone):
+    y, x = np.mgrid[0.0:50:10, 0.0:70:10]
+    return grid_without(x, y, 0 * x, gone)
+
+
+def rolled(radius, gone=(), flange=40.0, count=8, rows=7, width=60.0):
+    """Return two plates with a bend of 90 degrees between them, without some cells."""
+    turn = np.linspace(0, np.pi / 2, count + 1)
+    low = np.linspace(-flange, 0.0, 5)[:-1]
+    up = np.linspace(0.0, flange, 5)[1:] + radius
+    x = np.r_[low, radius * np.sin(turn), np.full(4, radius)]
+    z = np.r_[0 * low, radius * (1 - np.cos(turn)), up]
+    y = np.linspace(0.0, width, rows)[:, None]
+    return grid_without(x + 0 * y, y + 0 * x, z + 0 * y, gone)
+
+
+def folded(lengths, angles, width=40.0):
+    """Return plates side by side, each turned from the one before."""
+    turn = np.radians(np.cumsum([0.0, *angles]))
+    steps = np.array(lengths)[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    line = np.r_[[[0.0, 0.0]], np.cumsum(steps, axis=0)]
+    y = np.array([[0.0], [width]])
+    return grid_without(line[:, 0] + 0 * y, y + 0 * line[:, 0], line[:, 1] + 0 * y, ())
+
+
+def shop_length(lengths, angles, thick=1.5, radius=2.0, k=0.5):
+    """Return the flat length of folded plates in the middle of a sheet."""
+    turn = np.abs(np.radians(angles))
+    setback = 2 * np.tan(turn / 2) * (radius + thick / 2)
+    return sum(lengths) + float((turn * (radius + k * thick) - setback).sum())
+
+
+def tray():
+    """Return a box without its lid."""
+    points = [(a, b, c) for c in (0, 15) for a, b in ((0, 0), (80, 0), (80, 50), (0, 50))]
+    return points, [[3, 2, 1, 0], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+
+
+def turned_around(radius_low, radius_high, sides=24):
+    """Return a closed ring of quads: a tube, a cone, or a duct of few sides."""
+    t = 2 * np.pi * np.arange(sides) / sides
+    points = [
+        (r * np.cos(a), r * np.sin(a), z)
+        for r, z in ((radius_low, 0), (radius_high, 90))
+        for a in t
+    ]
+    return points, [[k, (k + 1) % sides, sides + (k + 1) % sides, sides + k] for k in range(sides)]
+
+
+def links():
+    """Return two rings of a chain, which do not touch."""
+    points, faces = turned_around(40, 40)
+    one = np.array(points) * [1, 1, 0.1]
+    other = one[:, [0, 2, 1]] + [40, 4.5, -4.5]
+    return np.r_[one, other], np.r_[faces, np.array(faces) + len(one)]
+
+
+def parts_and_holes(job):
+    return sum(p.count for p in job.parts), sum(len(p.holes) * p.count for p in job.parts)
+
+
+def longest(job):
+    return round(max(job.parts[0].size), 4)
+
+
+def radius_of(job):
+    return round(min(bend.radius for part in job.parts for bend in part.bends), 4)
+
+
+SHEET = {"finish": Finish(thickness=Thickness(1.5, k=0.5, radius=2.0))}
+L, U, OPEN = ((50, 50), (90,)), ((40, 60, 40), (90, 90)), ((70, 30), (45,))
+#: Kind of report, design, options, what is measured, the right value.
+TABLE = [
+    ("2 openings", plate([(1, 1)]), {}, parts_and_holes, (1, 1)),
+    ("2 openings", plate([(1, 1), (2, 4)]), {"darts": True}, parts_and_holes, (1, 2)),
+    ("2 openings", rolled(15.0, [(2, 8), (4, 8)]), {}, parts_and_holes, (1, 2)),
+    ("4 folds", folded(*L), SHEET, longest, round(shop_length(*L), 4)),
+    ("4 folds", folded(*U), SHEET, longest, round(shop_length(*U), 4)),
+    ("4 folds", folded(*OPEN), SHEET, longest, round(shop_length(*OPEN), 4)),
+    ("4 lines", folded(*OPEN), {}, lambda job: len(job.parts[0].bends), 1),
+    ("5 one seam", turned_around(40, 40), {}, parts_and_holes, (1, 0)),
+    ("5 one seam", turned_around(60, 30), {}, parts_and_holes, (1, 0)),
+    ("5 one seam", turned_around(40, 40, 4), {}, parts_and_holes, (1, 0)),
+    ("5 tray", tray(), {}, parts_and_holes, (1, 0)),
+    ("6 interlocked", links(), {}, lambda job: sum(p.count for p in job.parts), 2),
+    ("10 radius", rolled(15.0), {}, radius_of, 15.0),
+    ("10 radius", rolled(15.0, [(2, 8), (4, 8)]), {}, radius_of, 15.0),
+    ("10 radius", rolled(8.0, [(3, 2)]), {}, radius_of, 8.0),
+]
+
+
+@pytest.mark.parametrize("row", TABLE, ids=[f"{row[0]} {k}" for k, row in enumerate(TABLE)])
+def test_values_of_reports(row, tmp_path):
+    _, design, options, measured, right = row
+    job = flat(design, tmp_path, **options)
+    assert job.usable and measured(job) == right
+    if not options:
+        pieces = gso.pieces(design, workers=0)
+        assert pieces.usable and len(pieces) == sum(part.count for part in job.parts)
+
+
+if __name__ == "__main__":
+    for kind, design, options, measured, right in TABLE:
+        with tempfile.TemporaryDirectory() as folder:
+            now = measured(flat(design, folder, **options))
+            sys.stdout.write(f"{kind:14}{right!s:>12}{now!s:>12}\n")

@@ -170,7 +170,7 @@ def checked(result, most):
     ids=["cylinder", "saddle"],
 )
 def test_ruled_surfaces_are_exactly_developable(points, most):
-    result = gso.tno.optimize(points, formulation="ruled")
+    result = gso.tno.optimize(points, options=gso.RuledOptions(strips=1))
     checked(result, most)
     assert result.flat.shape == (len(result.mesh.vertices), 2)
     assert result.ruled.strips == 1

@@ -1,5 +1,6 @@
 """Designs that are flat or developable as they are: patterns with folds and bend lines."""
 
 from gso.exact.developable_design import FoldedPattern, folded_pattern
+from gso.exact.developable_parts import developable_parts
 
-__all__ = ["FoldedPattern", "folded_pattern"]
+__all__ = ["FoldedPattern", "developable_parts", "folded_pattern"]

@@ -11,18 +11,21 @@ from gso.recognition import Recognised, ShapeFace
 from gso.unfolding.dual_edges import dual_edges
 
 #: Number of triangles up to which a design may be a polyhedron. The angle, in radians, from which
-#: on an edge is sharp, and the share of the folds' length that is.
+#: on an edge is sharp, and the share of the folds' length that is, where it is not developable.
 _FEW, _SHARP, _SHARE = 1_000, np.radians(20.0), 0.25
 
 
 def is_low_poly(shape: Recognised) -> bool:
-    """Tell whether a design is meant as a polyhedron: few triangles, and many sharp edges."""
+    """Tell whether a design is meant as a polyhedron: few triangles, and many sharp edges.
+
+    Edges of developable faces do not count: a box may have a bulged side.
+    """
     if len(shape.triangles) > _FEW:
         return False
     edges = dual_edges(shape.triangles, shape.vertices)
     a, b = shape.vertices[edges.ends].transpose(1, 0, 2)
     angle, length = np.abs(edges.angles), np.linalg.norm(b - a, axis=1)
-    folded = angle > FOLD
+    folded = (angle > FOLD) & ~shape.developable[edges.triangles].any(axis=1)
     return bool(length[folded & (angle > _SHARP)].sum() >= _SHARE * length[folded].sum() > 0)
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso.mesh.slicing import subdivided
 from gso.mesh.topology import edge_keys, label_components
 from gso.recognition import Recognised
-from gso.seams.slicing import subdivided
 from gso.typing import Array, Ints
 from gso.unfolding import Joined
 

@@ -78,7 +78,7 @@ def pieces(found: Segmentation) -> list[Panel]:
         panels.append(panel)
     own = [k for k, sheet in enumerate(found.sheets) if sheet is not None]
     if own:
-        mesh, flat = whole_pattern(found)
+        mesh, flat, _ = whole_pattern(found)
         points = (flat - 0.5 * (flat.min(axis=0) + flat.max(axis=0))) / np.ptp(flat, axis=0).max()
         wide = float(np.ptp(panels[0].points[:, :2], axis=0).max())
         sheet = Panel(np.pad(wide * points, ((0, 0), (0, 1))), mesh.faces, shaded=False)

@@ -114,7 +114,7 @@ def _outside(flat: Array, side: Ints) -> bool:
 
 
 def _triangles(rings: list[Ints], flats: list[Array]) -> list[list[int]]:
-    """Triangulate a polygon with holes; nothing if it intersects itself."""
+    """Triangulate a polygon with holes; nothing if it intersects itself, or nearly."""
     import shapely
 
     piece = shapely.Polygon(flats[0], flats[1:])
@@ -123,7 +123,11 @@ def _triangles(rings: list[Ints], flats: list[Array]) -> list[list[int]]:
     places = np.concatenate(flats).tolist()
     node = {tuple(xy): k for xy, k in zip(places, np.concatenate(rings).tolist(), strict=True)}
     out = []
-    for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(piece)):
+    try:
+        found = shapely.constrained_delaunay_triangles(piece)
+    except shapely.GEOSException:
+        return []
+    for triangle in shapely.get_parts(found):
         xy = np.asarray(triangle.exterior.coords)[:3]
         three = [node[tuple(p)] for p in xy.tolist()]
         if abs(signed_area(xy)) > 1e-4 * _SLIVER:

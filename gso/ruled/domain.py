@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from copy import copy
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from gso.geometry.polygon import anticlockwise, signed_area
+from gso.geometry.steady import steady
 from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh, Nearest, vertex_normals
 from gso.ruled.polygon import resampled, turning
@@ -67,12 +68,12 @@ class Domain:
         if not own.is_valid:
             return self.flat[self.outline]
         # Mitred corners stay as they are; what is narrower than twice the margin is filled.
-        filled = own.buffer(self.margin, join_style="mitre").buffer(
-            -self.margin, join_style="mitre"
-        )
-        more = shapely.get_parts(shapely.difference(filled, own))
+        wider = partial(shapely.buffer, distance=self.margin, join_style="mitre")
+        narrower = partial(shapely.buffer, distance=-self.margin, join_style="mitre")
+        filled = steady(narrower, steady(wider, own))
+        more = shapely.get_parts(steady(shapely.difference, filled, own))
         slots = more[shapely.area(more) > _SLOT * self.margin**2]
-        whole = shapely.union_all([own, *slots])
+        whole = steady(shapely.union_all, [own, *slots])
         if not len(slots) or whole.geom_type != "Polygon":
             return self.flat[self.outline]
         loop = np.asarray(shapely.normalize(whole).exterior.coords)[:-1]

@@ -58,6 +58,9 @@ class RuledSurface:
         cut, and in files of earlier versions.
     deviation : Distances or None
         Its distances from the design, where they are known; see :meth:`distances`.
+    strain : float or None
+        The largest strain of the pattern, for a design that is kept as it is: by the equations of
+        its faces, as edges of the mesh are chords of round faces. None where it is measured.
     """
 
     mesh: Mesh
@@ -70,6 +73,7 @@ class RuledSurface:
     crossed: int
     untrimmed: Untrimmed | None = None
     deviation: metrics.Distances | None = None
+    strain: float | None = None
 
     @property
     def strips(self) -> int:
@@ -81,6 +85,12 @@ class RuledSurface:
         """The largest distance from the design, both ways; 0 where it is not known."""
         far = self.deviation
         return 0.0 if far is None else far.largest
+
+    @property
+    def strains(self) -> dict[str, float]:
+        """Largest, 99th percentile and mean strain of the pattern."""
+        found = metrics.strains(self.pattern.surface(self.mesh), self.pattern.flat)
+        return found if self.strain is None else dict.fromkeys(found, self.strain)
 
     @cached_property
     def sound(self) -> bool:
@@ -127,6 +137,8 @@ class RuledSurface:
             "ruled_flat": self.flat.astype(np.uint8),
             "ruled_crossed": np.array(self.crossed),
         }
+        if self.strain is not None:
+            out["ruled_strain"] = np.array(self.strain)
         for name in _FOLDS:
             folds: Folds = getattr(self, name)
             out |= {f"ruled_{name}_{part}": getattr(folds, part) for part in _PARTS}
@@ -162,7 +174,10 @@ class RuledSurface:
             source = Untrimmed.from_arrays(named)
             if source.owner.shape != (len(mesh.faces),):
                 raise ValueError("the arrays of the ruled surface do not fit each other")
-        return cls(mesh, strips, flat, rulings, creases, pattern, moved, crossed, source)
+        strain = float(data["ruled_strain"]) if "ruled_strain" in data else None
+        return cls(
+            mesh, strips, flat, rulings, creases, pattern, moved, crossed, source, strain=strain
+        )
 
     def samples(self) -> tuple[Array, Array]:
         """Return points (k, 3) all over the surface, and their shares (k,) of its area.

@@ -19,7 +19,7 @@ def strip_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
     percent = 100.0 / design.diagonal
     flat, sheet = surface.pattern.flat, surface.pattern.surface(surface.mesh)
     turns = surface.creases.turns(surface.mesh.vertices)
-    return metrics.strains(sheet, flat) | {
+    return surface.strains | {
         "distance_mean": percent * true.mean,
         "distance_max": percent * true.largest,
         "d_H": metrics.d_H(design, design.replaced(surface.moved)),

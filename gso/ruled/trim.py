@@ -6,11 +6,13 @@ with them in the parameters of :mod:`gso.ruled.strip_embedding`.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gso.geometry.steady import steady
 from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Nearest
 from gso.ruled.division import Trimmed, meshed
@@ -62,7 +64,9 @@ def trimmed(target: Extended, strips: Strips, vertices: Array, unrolled: Unrolle
         rings.append(_enclosed(np.einsum("kj,kjd->kd", shares, place[triangles[which]])))
     outer = int(np.argmax(shapely.area(rings)))
     holes = [ring for k, ring in enumerate(rings) if k != outer]
-    region = shapely.difference(rings[outer], shapely.union_all(holes)) if holes else rings[outer]
+    region = rings[outer]
+    if holes:
+        region = steady(shapely.difference, region, steady(shapely.union_all, holes))
     c = strips.corners
     cells = shapely.polygons(place[c[:, [0, 1, 3, 2]]])
     pieces, which = shapely.get_parts(_clipped(cells, region), return_index=True)
@@ -84,7 +88,7 @@ def _clipped(cells: NDArray[np.object_], region: Geometry) -> Any:
             return shapely.intersection(cells, region, grid_size=grid)
         except shapely.GEOSException:
             continue
-    return shapely.intersection(cells, region, grid_size=_GRIDS[-1])
+    return steady(partial(shapely.intersection, grid_size=_GRIDS[-1]), cells, region)
 
 
 def _traced(vertices: Array, triangles: Ints, face: Ints, line: Array) -> tuple[Ints, Array]:
@@ -144,7 +148,7 @@ def _enclosed(ring: Array) -> Geometry:
     simple = shapely.Polygon(ring)
     if simple.is_valid:
         return simple
-    noded = shapely.unary_union(shapely.LinearRing(ring), grid_size=_GRIDS[2])
+    noded = steady(partial(shapely.unary_union, grid_size=_GRIDS[2]), shapely.LinearRing(ring))
     parts = shapely.get_parts(shapely.polygonize([noded]))
     z = ring @ np.array([1.0, 1j])
     inside = []
@@ -153,7 +157,7 @@ def _enclosed(ring: Array) -> Geometry:
         way = z - complex(at.x, at.y)
         turns = np.angle(np.roll(way, -1) * way.conj()).sum() / (2.0 * np.pi)
         inside.append(abs(turns) > 0.5)
-    return shapely.union_all(parts[np.array(inside, bool)])
+    return steady(shapely.union_all, parts[np.array(inside, bool)])
 
 
 def _dense(loop: Array, step: float) -> Array:

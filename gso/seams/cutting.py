@@ -12,8 +12,8 @@ from gso.errors import OptionError
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.mesh.cut import cut as cut_open
+from gso.mesh.slicing import followed
 from gso.seams.kinds import Edges, Seam
-from gso.seams.slicing import followed
 
 
 def cut(mesh: Mesh | ArrayLike, seams: Seam | Iterable[Seam] | ArrayLike) -> Pieces:

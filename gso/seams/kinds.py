@@ -12,8 +12,8 @@ from gso import metrics
 from gso.errors import MeshError, OptionError
 from gso.mesh import Mesh, between
 from gso.mesh.attributes import LABELS
+from gso.mesh.slicing import sliced
 from gso.mesh.topology import edge_graph
-from gso.seams.slicing import sliced
 from gso.spelling import choices
 from gso.typing import Array, Ints
 

@@ -36,13 +36,14 @@ def save(found: Segmentation, folder: AnyPath, unit: str = "mm") -> list[str]:
     names = ["pieces.obj"]
     io.write(grouped(found), place / names[0])
     if any(sheet is not None for sheet in found.sheets):
-        mesh, flat = whole_pattern(found)
+        mesh, flat, bends = whole_pattern(found)
         names.append("patterns.svg")
-        io.save_flat(flat, mesh, place / names[-1], unit=unit)
+        io.save_flat(flat, mesh, place / names[-1], unit=unit, bends=bends)
     for number, sheet in enumerate(found.sheets):
         if sheet is not None:
             names.append(f"pattern_{_spelled(found.name(number))}.svg")
-            io.save_flat(sheet.flat, sheet.mesh, place / names[-1], unit=unit)
+            bends = sheet.folded.lines(sheet.flat)
+            io.save_flat(sheet.flat, sheet.mesh, place / names[-1], unit=unit, bends=bends)
     names.append("pieces.json")
     known = record(found, unit) | {"files": names}
     write_json(place / names[-1], known)

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from gso.errors import MeshError, OptionError
 from gso.mesh import Mesh, Nearest, Paths
+from gso.mesh.slicing import divided, followed
 from gso.seams.kinds import Placed, Seam
-from gso.seams.slicing import divided, followed
 from gso.seams.walking import Walker
 from gso.typing import Array, Ints
 

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.cut_pieces import Pieces
-from gso.errors import ConvergenceWarning, OptionError
+from gso.errors import ConvergenceWarning, GSOError, OptionError
 from gso.executors import open_executor, processors
 from gso.mesh import Mesh
 from gso.pipeline.component_solves import solve_mesh
 from gso.quantities import Length, Strain, as_length, as_sheet, as_strain
+from gso.result import Result
 from gso.seams.candidates import (
     Candidate,
     cuts,
@@ -28,6 +29,7 @@ from gso.seams.candidates import (
 from gso.seams.cutting import cut
 from gso.seams.dartless import dartless
 from gso.seams.design_noise import noise
+from gso.seams.exact_pieces import AS_IT_IS, exact_pieces
 from gso.seams.kinds import Seam
 from gso.seams.mirror_plane import mirror_of
 from gso.seams.options import CHANGES, STAYS, PieceSettings, prices, too_large
@@ -37,7 +39,8 @@ from gso.seams.segmentation import Segmentation
 from gso.seams.straight import straight
 from gso.seams.tree import Ground
 from gso.tasks import check
-from gso.typing import MeshLike
+from gso.typing import Array, Ints, MeshLike
+from gso.verdict import crosses_itself
 
 #: Seams that stay: what :func:`gso.cut` takes, or an earlier result for the same mesh.
 Kept: TypeAlias = "Seam | Iterable[Seam] | ArrayLike | Pieces | None"
@@ -70,13 +73,19 @@ def pieces(
     along: ArrayLike | None = None,
     avoid: ArrayLike | None = None,
     denoise: bool = False,
+    as_it_is: bool = True,
     workers: int | None = None,
     callback: Callable[[str], None] | None = None,
 ) -> Segmentation:
     """Find seams along which a design can be cut into pieces that can be laid flat.
 
-    Without `max_deviation` the shape stays as it is, and the seams are as short as the strain
-    allows. With it the shape changes within that distance: the pieces become developable.
+    A design that is flat or developable as it is, within `max_strain`, is kept: it is unfolded
+    into few parts along its own faces, and its folds and rulings are the lines to bend along
+    (:attr:`Segmentation.folded`).
+
+    Otherwise seams are searched for. Without `max_deviation` the shape stays as it is, and the
+    seams are as short as the strain allows. With it the shape changes within that distance: the
+    pieces become developable.
 
     Parameters
     ----------
@@ -117,6 +126,9 @@ def pieces(
         Faces that seams should keep away from: indices, or a mask of all faces.
     denoise : bool
         Denoise the design first, such as a scan.
+    as_it_is : bool
+        Ask first whether the design is developable as it is. Symmetric seams, and seams `along`
+        edges or away from faces, are searched for in any case.
     workers : int, optional
         Number of processes, which a search with `max_deviation` uses; one for each processor by
         default, 0 for this one alone. The result does not depend on it.
@@ -172,37 +184,56 @@ def pieces(
         max_size=as_sheet(sheet, unit),
         say=callback or (lambda said: None),
     )
-    max_size = settings.max_size
-    notes: list[str] = []
-    ground = _ground(design, keep, along, avoid, symmetric, denoise)
-    aim = settings
+    design, kept = _read(design, keep, denoise)
+    factor = prices(design, along, avoid)
+    out = None
+    if as_it_is and factor is None and not symmetric:
+        found = exact_pieces(design, kept, settings)
+        if found is not None:
+            out = packed(found, None, design, kept, settings)
+            out = replace(out, notes=(*out.notes, AS_IT_IS))
+    if out is None or not (out.usable or crosses_itself(out.reasons)):
+        try:
+            other = _searched(design, kept, factor, symmetric, settings, workers)
+            out = other if out is None or other.usable else out
+        except GSOError:
+            if out is None:
+                raise
+    return replace(out, seconds=time.perf_counter() - clock)
+
+
+def _searched(
+    design: Mesh,
+    kept: Ints,
+    factor: Array | None,
+    symmetric: bool,
+    settings: PieceSettings,
+    workers: int | None,
+) -> Segmentation:
+    """Search for seams, and judge the pieces."""
+    mirror = mirror_of(design) if symmetric else None
+    ground = Ground.of(design, factor, kept, mirror)
+    ground = replace(ground, kept=ground.mirrored(kept))
+    max_size, aim = settings.max_size, settings
     if max_size is not None and too_large(ground.mesh, max_size):
         # The pieces are not cut to size in vain; the reason names the largest.
         aim = replace(settings, max_size=None)
     said = noise(ground.mesh, ground.potential)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
-        if max_deviation is None:
-            found = _as_is(ground, aim)
-            out = packed(found, None, ground, settings)
+        if settings.max_deviation is None:
+            changed: tuple[Candidate, Result | None] = _as_is(ground, aim), None
         else:
             # This process does its share.
             others = max((processors() if workers is None else workers) - 1, 0)
             with open_executor(others) as executor:
-                out = packed(*reshaped(ground, replace(aim, executor=executor)), ground, settings)
-    if said:
-        notes.append(said)
-    return replace(out, notes=(*out.notes, *notes), seconds=time.perf_counter() - clock)
+                changed = reshaped(ground, replace(aim, executor=executor))
+        out = packed(*changed, ground.mesh, ground.kept, settings)
+    return replace(out, notes=(*out.notes, said)) if said else out
 
 
-def _ground(
-    design: Mesh,
-    keep: Kept,
-    along: ArrayLike | None,
-    avoid: ArrayLike | None,
-    symmetric: bool,
-    denoise: bool,
-) -> Ground:
+def _read(design: Mesh, keep: Kept, denoise: bool) -> tuple[Mesh, Ints]:
+    """Return the design to cut, and the edges of it (k, 2) that are cut in any case."""
     design.check_joined()
     kept = np.empty((0, 2), np.int64)
     if isinstance(keep, Pieces):
@@ -213,10 +244,7 @@ def _ground(
     if keep is not None and not isinstance(keep, Pieces):
         begun = cut(design, keep)
         design, kept = begun.design, begun.edges
-    factor = prices(design, along, avoid)
-    mirror = mirror_of(design) if symmetric else None
-    ground = Ground.of(design, factor, kept, mirror)
-    return replace(ground, kept=ground.mirrored(kept))
+    return design, kept
 
 
 def _again(design: Mesh, keep: Pieces) -> Mesh:

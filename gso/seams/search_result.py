@@ -15,7 +15,7 @@ from gso.seams.candidates import Candidate
 from gso.seams.facets import FACETS, mean_angle
 from gso.seams.options import NECK, PieceSettings
 from gso.seams.segmentation import Segmentation
-from gso.seams.tree import Ground
+from gso.typing import Ints
 from gso.verdict import Code, Measurement, compare
 from gso.verdict.surface_checks import crossed, of_surface
 from gso.wording import length as said
@@ -23,7 +23,7 @@ from gso.wording import percent
 
 
 def packed(
-    found: Candidate, result: Result | None, ground: Ground, settings: PieceSettings
+    found: Candidate, result: Result | None, given: Mesh, kept: Ints, settings: PieceSettings
 ) -> Segmentation:
     """Measure what was found, and judge it by what was asked for.
 
@@ -32,13 +32,15 @@ def packed(
     found : Candidate
     result : Result or None
         The solve that changed the shape.
-    ground : Ground
+    given : Mesh
         The design, to measure distances from.
+    kept : ndarray of int, (k, 2)
+        The edges of it that were to be cut in any case.
     settings : PieceSettings
     """
     own, sheets, length = found.pieces, found.sheets, found.pieces.seam_length
     count, names = len(own), _names(own)
-    size = float(np.sqrt(ground.potential.area.sum()))
+    size = float(np.sqrt(metrics.area(given)))
     numbers = {"pieces": float(count), "seam": length, "strain_max": found.strain}
     whole = [s for s in sheets if s is not None]
     numbers["strain_p99"] = max((s.strains["strain_p99"] for s in whole), default=np.inf)
@@ -60,14 +62,16 @@ def packed(
         widths = np.array([mean_width(loops) for loops in outlines])
         some = [names[k] for k in joined]
         measured[Code.SMALL] = Measurement(areas / size**2, "piece", some)
-        measured[Code.NARROW] = Measurement(widths / ground.mesh.size, "piece", some)
+        measured[Code.NARROW] = Measurement(widths / given.size, "piece", some)
     notes = []
     if result is None:
-        measured |= crossed(own.design)
+        measured |= crossed(given)
+        if settings.max_deviation is not None:
+            numbers |= {"deviation_mean": 0.0, "deviation_max": 0.0}
     else:
         # Both sides of a seam touch, which is no crossing where they are sewn.
         measured |= of_surface(result.design, result.mesh) | crossed(own.design)
-        away = metrics.surface_distance(ground.mesh, own.design)
+        away = metrics.surface_distance(given, own.design)
         numbers["deviation_mean"] = away.mean
         numbers["deviation_max"] = away.largest
         measured[Code.DEVIATION] = Measurement(numbers["deviation_max"])
@@ -100,8 +104,8 @@ def packed(
         reasons,
         tuple(notes),
         result,
-        ground.mesh,
-        ground.kept,
+        given,
+        kept,
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from gso import parametrization
 from gso.cut_pieces import Pieces
 from gso.mesh import Mesh
-from gso.pattern import Pattern
+from gso.pattern import Bend, Folded, Pattern
 from gso.result import Result
 from gso.seams.sheets import Sheet
 from gso.typing import AnyPath, Array, Ints, Json
@@ -78,8 +78,18 @@ class Segmentation(Pieces):
             flat[part.vertices] = own
         return Pattern(flat, opened.mesh.faces, opened.vertex, opened.seams)
 
+    @property
+    def folded(self) -> Folded:
+        """The edges of :attr:`pattern` to bend along, where the design is kept as it is."""
+        some = [
+            (part.vertices[sheet.folded.edges], sheet.folded.angles, sheet.folded.radii)
+            for part, sheet in zip(self.parts, self.sheets, strict=True)
+            if sheet is not None
+        ]
+        return Folded(*map(np.concatenate, zip(*some, strict=True))) if some else Folded()
+
     def alike(self, tolerance: float | None = None) -> list[list[int]]:
-        """Group pieces with congruent patterns, mirror images apart.
+        """Group pieces with congruent patterns, mirror images and those with holes apart.
 
         Patterns are alike if their outlines have the same edge lengths and angles, from some
         starting vertex on: pieces of a design with repeated parts.
@@ -94,7 +104,7 @@ class Segmentation(Pieces):
         groups: list[list[int]] = []
         known: list[Array] = []
         for number, sheet in enumerate(self.sheets):
-            if sheet is None:
+            if sheet is None or len(sheet.mesh.boundary_loops) > 1:
                 groups.append([number])
                 known.append(np.empty(0))
                 continue
@@ -154,8 +164,8 @@ class Segmentation(Pieces):
         return f"Segmentation({said}{'' if self.usable else '; not usable'})"
 
 
-def whole_pattern(found: Segmentation) -> tuple[Mesh, Array]:
-    """Return all pieces as one mesh, and their patterns side by side, (p, 2)."""
+def whole_pattern(found: Segmentation) -> tuple[Mesh, Array, list[Bend]]:
+    """Return all pieces as one mesh, their patterns side by side (p, 2), and their bend lines."""
     from gso.parametrization import beside, upright
 
     own = [s for s in found.sheets if s is not None]
@@ -168,12 +178,13 @@ def whole_pattern(found: Segmentation) -> tuple[Mesh, Array]:
         for s in own
     ]
     shifted = [np.where(f < 0, -1, f + k) for f, k in zip(faces, start[:-1], strict=True)]
-    return Mesh(points, np.concatenate(shifted)), np.concatenate(flats)
+    bends = [bend for s, flat in zip(own, flats, strict=True) for bend in s.folded.lines(flat)]
+    return Mesh(points, np.concatenate(shifted)), np.concatenate(flats), bends
 
 
 def _outline(sheet: Sheet) -> Array:
     """Return edge lengths and turns along the boundary of a pattern, (k, 2)."""
-    p = sheet.flat[sheet.mesh.boundary_loops[0]]
+    p = sheet.flat[sheet.outline]
     step = np.roll(p, -1, axis=0) - p
     z = step @ np.array([1.0, 1j])
     turn = np.angle(np.roll(z, -1) / np.where(z == 0, 1, z))

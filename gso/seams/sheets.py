@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from gso import faults, metrics
 from gso.geometry.polygon import rectangle
 from gso.mesh import Mesh, Paths
+from gso.pattern import Folded
 from gso.pipeline import lay_out
 from gso.typing import Array, Ints
 
@@ -26,18 +27,26 @@ class Sheet:
     Attributes
     ----------
     mesh : Mesh
-        The piece in space, a disk.
+        The piece in space, a disk, or a disk with holes where the design is kept as it is.
     flat : ndarray, (n, 2)
         Its pattern, in the same unit.
+    folded : Folded
+        Edges to bend along, where the design is kept as it is.
+    exact_strain : float or None
+        The largest strain by the equations of the design's faces, where these are kept: edges of
+        the mesh are chords of round faces.
     """
 
     mesh: Mesh
     flat: Array
+    folded: Folded = field(default_factory=Folded)
+    exact_strain: float | None = None
 
     @cached_property
     def strains(self) -> dict[str, float]:
         """Largest, 99th percentile and mean strain of the corner triangles."""
-        return metrics.strains(self.mesh, self.flat)
+        found = metrics.strains(self.mesh, self.flat)
+        return found if self.exact_strain is None else dict.fromkeys(found, self.exact_strain)
 
     @cached_property
     def strain(self) -> float:
@@ -60,6 +69,13 @@ class Sheet:
         return not (len(self.inverted) or len(faults.overlaps(self.mesh, self.flat)))
 
     @cached_property
+    def outline(self) -> Ints:
+        """The vertices of the outer boundary loop."""
+        loops = self.mesh.boundary_loops
+        size = [float(np.ptp(self.flat[loop], axis=0).prod()) for loop in loops]
+        return loops[int(np.argmax(size))]
+
+    @cached_property
     def size(self) -> tuple[float, float]:
         """Length and width of the smallest bounding rectangle."""
         return rectangle(self.flat)[1]
@@ -67,10 +83,10 @@ class Sheet:
     def neck(self, limit: float) -> float:
         """Return the width at the narrowest place, or a limit where that is less.
 
-        It is the distance along edges between two boundary vertices with at least 2 % of the
+        It is the distance along edges between two vertices of the outline with at least 2 % of the
         area on both sides.
         """
-        loop = self.mesh.boundary_loops[0]
+        loop = self.outline
         away = Paths(self.mesh).between(loop, limit)[:, loop]
         i, j = np.nonzero(np.isfinite(away))
         i, j = i[i < j], j[i < j]

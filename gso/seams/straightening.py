@@ -8,9 +8,9 @@ import numpy as np
 
 from gso.cut_pieces import Pieces
 from gso.mesh import Mesh
+from gso.mesh.slicing import divided
 from gso.mesh.topology import edge_keys
 from gso.seams.chains import chains
-from gso.seams.slicing import divided
 from gso.seams.walking import Walker
 from gso.typing import Array, Ints
 

@@ -3,7 +3,7 @@
 from gso.verdict.codes import TIGHT, Code, Kind
 from gso.verdict.compare import Measurement, compare, failure, merge
 from gso.verdict.judge import judge, judge_components
-from gso.verdict.reason import Places, Reason, describe, ordered
+from gso.verdict.reason import Places, Reason, crosses_itself, describe, ordered
 
 __all__ = [
     "TIGHT",
@@ -13,6 +13,7 @@ __all__ = [
     "Places",
     "Reason",
     "compare",
+    "crosses_itself",
     "describe",
     "failure",
     "judge",

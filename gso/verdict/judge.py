@@ -75,7 +75,8 @@ def _measured(result: Result, limits: Limits, violation: float) -> tuple[Measure
         if result.status is not Status.ALREADY_GOOD:
             measured |= of_surface(result.design, surface, built=pattern is not None)
         elif pattern is not None:
-            measured |= crossed(surface)
+            # Nothing was moved, but the surface may have vertices on bend lines.
+            measured |= crossed(result.design)
     if pattern is not None:
         measured |= of_pattern(surface, pattern, lengths=result.task not in _STRETCHED)
     check = CHECKS.get(result.KIND or result.task)

@@ -117,6 +117,11 @@ def ordered(reasons: Iterable[Reason]) -> tuple[Reason, ...]:
     return tuple(sorted(reasons, key=lambda reason: _ORDER[reason.code]))
 
 
+def crosses_itself(reasons: Iterable[Reason]) -> bool:
+    """Tell whether a design passes through itself, so that no pattern of it is usable."""
+    return any(reason.code is Code.CROSSES_ITSELF for reason in reasons)
+
+
 def describe(reason: Reason, unit: str = "") -> str:
     """Say a reason in a sentence: what it is, with the numbers and the place, and what to do.
 

@@ -69,7 +69,10 @@ def strips(result: Result, limits: Limits, violation: float) -> tuple[Measured, 
         return {}, {}
     measured, bounds = _away(result, limits, violation)
     measured[Code.RULINGS_CROSS] = Measurement(float(surface.crossed))
-    measured[Code.STRAIN] = Measurement(_strains(result.mesh, surface.pattern).max())
+    strain = surface.strain
+    if strain is None:
+        strain = _strains(result.mesh, surface.pattern).max()
+    measured[Code.STRAIN] = Measurement(strain)
     bounds[Code.STRAIN] = limits.max_strain
     _remember(result, measured, limits)
     return measured, bounds

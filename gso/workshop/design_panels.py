@@ -21,11 +21,12 @@ from gso.ruled.paneling.strips_request import StripsRequest
 from gso.seams import pieces as search
 from gso.tasks.request import Limits
 from gso.tno import optimize
-from gso.verdict import Code, compare
+from gso.verdict import compare, crosses_itself
 from gso.verdict.surface_checks import crossed
 from gso.workshop import measurements
 from gso.workshop.designs import Design
 from gso.workshop.fabrication_settings import FabricationSettings
+from gso.workshop.mixed_panels import mixed
 from gso.workshop.panels import Made
 from gso.workshop.pattern_panels import of_result, of_surface
 
@@ -60,7 +61,9 @@ def made(
         say(f"{given.name}: {said}")
 
     exact = _exact(given, settings)
-    if exact is not None and (given.sheet is not None or not exact.reasons or _is_hopeless(exact)):
+    if exact is not None and (
+        given.sheet is not None or not exact.reasons or crosses_itself(exact.reasons)
+    ):
         return exact
     if len(given.uncut):
         raise OptionError(
@@ -74,11 +77,45 @@ def made(
         )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
-        if settings.formulation == RULED:
-            return _strips(given, settings, named, workers)
-        if settings.formulation == "flatten":
-            return _as_it_is(given, settings, named)
-        return _nearly(given, settings, named, workers)
+        if exact is None:
+            exact = _mixed(given, settings, named, workers)
+            if exact is not None and not exact.reasons:
+                return exact
+        try:
+            other = _changed(given, settings, named, workers)
+        except GSOError:
+            if exact is None:
+                raise
+            return exact
+    return other if exact is None or not other.reasons else exact
+
+
+def _changed(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
+    """Make a design of flat panels in the way that was asked for."""
+    if settings.formulation == RULED:
+        return _strips(given, settings, say, workers)
+    if settings.formulation == "flatten":
+        return _as_it_is(given, settings, say)
+    return _nearly(given, settings, say, workers)
+
+
+def _mixed(
+    given: Design, settings: FabricationSettings, say: Say, workers: int | None
+) -> Made | None:
+    """Keep parts of a design, and change the others; None where that is not possible."""
+
+    def kept(part: Design, settings: FabricationSettings) -> Made | None:
+        found = _exact(part, settings)
+        return None if found is None or found.reasons else found
+
+    def changed(part: Design, settings: FabricationSettings) -> Made:
+        return _changed(part, settings, say, workers)
+
+    try:
+        found = mixed(given, settings, kept, changed)
+    except GSOError:
+        return None
+    return None if found is None else _checked(found, settings)
 
 
 def _without_poles(given: Design) -> Design:
@@ -149,18 +186,19 @@ def _press_radius(given: Design, settings: FabricationSettings) -> tuple[float, 
     return None if settings.press is None else (_PRESSED * settings.press,) * 2
 
 
-def _is_hopeless(exact: Made) -> bool:
-    """Tell whether no other pattern of a design can be usable either."""
-    return any(reason.code is Code.CROSSES_ITSELF for reason in exact.reasons)
-
-
 def _strips(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
     """Make strips, of the whole design or of its pieces."""
     options = Options(max_strips=settings.max_strips, min_radius=settings.min_radius)
     allowed = settings.distance(given.mesh.diagonal)
     limits = Limits(allowed, settings.strain)
     request = StripsRequest(
-        options, limits, settings.max_size, given.kept, workers=workers, say=say
+        options,
+        limits,
+        settings.max_size,
+        given.kept,
+        as_it_is=False,
+        workers=workers,
+        say=say,
     )
     result = lay_strips(given.mesh, request)
     if result.pattern is None:
@@ -231,6 +269,7 @@ def _of_search(
         sheet=settings.sheet,
         unit=settings.unit,
         keep=given.kept if len(given.kept) else None,
+        as_it_is=False,
         workers=workers,
         callback=say,
     )

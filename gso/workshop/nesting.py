@@ -10,10 +10,12 @@ import numpy as np
 
 from gso.errors import OptionError
 from gso.geometry.polygon import anticlockwise, signed_area
+from gso.geometry.steady import steady
 from gso.quantities import as_positive
 from gso.typing import Array
 from gso.workshop import sparrow
 from gso.workshop.part import Drawing, Part
+from gso.workshop.polygons import moved
 from gso.workshop.rectangles import ORDERS, packed
 
 #: Largest number of corners of the polygons that are nested.
@@ -216,9 +218,7 @@ def _item(part: Part, rotations: Rotations, spacing: float) -> _Item:
     grow = 1e-4 * float(np.ptp(own.outline, axis=0).max())
     while True:
         by = 0.5 * spacing + _MORE + grow
-        wider = shapely.buffer(
-            shapely.Polygon(own.outline), by, join_style="mitre", mitre_limit=2.0
-        )
+        wider = moved(shapely.Polygon(own.outline), by, 2.0)
         simple = shapely.simplify(wider, grow)
         outline = np.asarray(simple.exterior.coords)[:-1]
         if len(outline) <= _CORNERS:
@@ -374,7 +374,7 @@ def _apart(sheets: Sheets, spacing: float) -> bool:
         tree = shapely.STRtree(shapes)
         one, two = tree.query(shapes, predicate="dwithin", distance=max(spacing - _TIGHT, 0.0))
         one, two = one[one < two], two[one < two]
-        meets = shapely.intersection(shapes[one], shapes[two])
+        meets = steady(shapely.intersection, shapes[one], shapes[two])
         if spacing > _TIGHT and len(one):
             return False
         if (shapely.area(meets) > _TIGHT).any():

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gso.errors import MeshError
 from gso.geometry.polygon import anticlockwise
+from gso.geometry.steady import steady
 from gso.typing import Array
 
 if TYPE_CHECKING:
     from shapely import Geometry
 
-#: Grids to which coordinates are rounded where an operation fails, relative to the width.
-_GRIDS = (1e-12, 1e-10, 1e-8)
 #: Grids, in millimetres, on which polygons are united that touch but for rounding errors.
 _JOINTS = (1e-9, 1e-7, 1e-5)
 #: Distance of successive points that are one, in millimetres.
@@ -42,7 +40,7 @@ def region(outline: Array, holes: Sequence[Array] = ()) -> Geometry:
     def mended(some: Geometry) -> Geometry:
         return shapely.make_valid(some, method="structure", keep_collapsed=False)
 
-    return _steady(mended, shape)
+    return steady(mended, shape)
 
 
 def moved(shape: Geometry, by: float, mitre: float) -> Geometry:
@@ -52,21 +50,21 @@ def moved(shape: Geometry, by: float, mitre: float) -> Geometry:
     def wider(some: Geometry) -> Geometry:
         return shapely.buffer(some, by, join_style="mitre", mitre_limit=mitre)
 
-    return _steady(wider, shape)
+    return steady(wider, shape)
 
 
 def common(one: Geometry, two: Geometry) -> Geometry:
     """Return the intersection of two shapes."""
     import shapely
 
-    return _steady(shapely.intersection, one, two)
+    return steady(shapely.intersection, one, two)
 
 
 def without(one: Geometry, two: Geometry) -> Geometry:
     """Return what of a shape is not in another one."""
     import shapely
 
-    return _steady(shapely.difference, one, two)
+    return steady(shapely.difference, one, two)
 
 
 def united(one: Geometry, two: Geometry) -> Geometry | None:
@@ -78,7 +76,7 @@ def united(one: Geometry, two: Geometry) -> Geometry | None:
 
     area = one.area + two.area - common(one, two).area
     for grid in _JOINTS:
-        whole = _steady(partial(shapely.union, grid_size=grid), one, two)
+        whole = steady(partial(shapely.union, grid_size=grid), one, two)
         if whole.geom_type == "Polygon":
             break
     if whole.geom_type != "Polygon" or abs(whole.area - area) > _LOST * area:
@@ -150,27 +148,3 @@ def neck(shape: Geometry, least: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if falls_apart(middle) else (middle, high)
     return high
-
-
-def _steady(operation: Callable[..., Geometry], *shapes: Geometry) -> Geometry:
-    """Return the result of an operation; where it fails, that of shapes with rounded coordinates.
-
-    Raises
-    ------
-    MeshError
-        It fails on all grids, as with coordinates that are not finite.
-    """
-    import shapely
-
-    try:
-        return operation(*shapes)
-    except shapely.GEOSException as error:
-        why = error
-    box = shapely.total_bounds(np.array(shapes))
-    width = float(max(box[2] - box[0], box[3] - box[1]))
-    for grid in _GRIDS:
-        try:
-            return operation(*(shapely.set_precision(shape, grid * width) for shape in shapes))
-        except shapely.GEOSException as error:
-            why = error
-    raise MeshError(f"the outlines of the parts cannot be processed: {why}; take an evener mesh")

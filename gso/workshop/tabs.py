@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gso.geometry.polygon import arc_lengths
+from gso.geometry.steady import steady
 from gso.typing import Array
 from gso.workshop.part import Label, Part
 from gso.workshop.polygons import common, region, rings, united, without
@@ -209,10 +210,10 @@ def _room(glued: Part, piece: Array, there: Array) -> Geometry:
     turn /= abs(turn)
     matrix = np.array([[turn.real, turn.imag], [-turn.imag, turn.real]])
     shift = 0.5 * (piece[0] + piece[-1]) - 0.5 * (there[0] + there[-1]) @ matrix
-    placed = shapely.transform(shape, lambda points: points @ matrix + shift)
+    parts = shapely.get_parts(shapely.transform(shape, lambda points: points @ matrix + shift))
     # Both sides of the seam may differ by their strain, and the cut along bends is no gap.
     slack = 0.01 * float(np.linalg.norm(here))
-    return shapely.union_all(shapely.buffer(shapely.get_parts(placed), slack))
+    return steady(lambda some: shapely.union_all(shapely.buffer(some, slack)), parts)
 
 
 def _inner(line: Array) -> Array:

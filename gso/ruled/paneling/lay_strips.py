@@ -21,6 +21,7 @@ from gso.pipeline.judgement import add_reasons, violation_of, warning
 from gso.quantities import Length, Strain, as_length, as_sheet, as_strain
 from gso.result import Result
 from gso.ruled.lines import LineStrips
+from gso.ruled.paneling.exact_strips import exact_strips
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import MOST, Options
 from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
@@ -37,8 +38,8 @@ from gso.solver import Callback
 from gso.status import Status
 from gso.tasks import Limits
 from gso.tasks.start import Start
-from gso.typing import Keywords, MeshLike
-from gso.verdict import Code, Measurement, Reason, compare, judge, ordered
+from gso.typing import Ints, Keywords, MeshLike
+from gso.verdict import Code, Measurement, Reason, compare, crosses_itself, judge, ordered
 
 
 def strips(
@@ -63,9 +64,14 @@ def strips(
 ) -> Result:
     """Make strips of planar faces near a design: exactly developable, with straight bend lines.
 
-    The design is tried as one surface, with as few strips side by side as hold `max_deviation`. On
-    quad meshes strips along the design's own lines are tried, too, which may close around.
-    Where neither holds it, the design is cut into pieces without darts, which become
+    A design that is flat or developable as it is, within `max_strain`, is kept: its own rulings and
+    folds are the lines to bend along, and its parts are the strips. Constraints, `x0`, `max_crease`
+    and a number of strips rule that out. Without `max_deviation` it takes folds, and a design that
+    does not close around.
+
+    Otherwise the design is tried as one surface, with as few strips side by side as hold
+    `max_deviation`. On quad meshes strips along the design's own lines are tried, too, which may
+    close around. Where neither holds it, the design is cut into pieces without darts, which become
     developable together, and each piece becomes strips that follow it. The result that holds the
     limits is returned, or else the closest.
 
@@ -201,12 +207,15 @@ class _Task:
         The pieces that it is divided into; None where they are to be found.
     whole : bool
         Whether it is tried as one surface.
+    kept : ndarray of int, (k, 2), or None
+        Edges that are cut in any case; None where all pieces are given.
     """
 
     design: Mesh
     request: StripsRequest
     division: Pieces | None
     whole: bool
+    kept: Ints | None = None
 
     @classmethod
     def of(cls, given: MeshLike | Pieces, request: StripsRequest) -> _Task:
@@ -214,15 +223,17 @@ class _Task:
         design, fixed = _read(given), True
         if not isinstance(given, Pieces):
             design.check_joined()
-            return cls(design, request, None, not len(request.kept))
+            return cls(design, request, None, not len(request.kept), request.kept)
+        kept = None
         if isinstance(given, Segmentation):
+            kept = given.kept
             # Its pieces were found, and the whole is better if it holds the limit.
             named = request.options.number is not None or len(given.kept) > 0
             fixed = named or request.max_deviation is None
             given = _without_darts(given)
         if len(given) == 1 and _is_whole(design):
-            return cls(design, request, None, True)
-        return cls(design, request, given, not fixed)
+            return cls(design, request, None, True, kept)
+        return cls(design, request, given, not fixed, kept)
 
     @property
     def divisible(self) -> bool:
@@ -234,8 +245,10 @@ class _Task:
     def solved(self) -> Result:
         """Return the whole or the pieces: what holds the limits, or else the closest."""
         asked = self.request
+        tried = self._developable()
+        if tried and (tried[0].holds or crosses_itself(tried[0].reasons)):
+            return self._answer(tried)
         light = LightDesign.of(self.design, asked.max_deviation, named=asked.names_vertices)
-        tried: list[_Tried] = []
         if self.whole:
             for way in (self._as_it_is, self._as_a_whole, self._along_lines):
                 tried += way(light, tried)
@@ -281,6 +294,22 @@ class _Task:
         if self.request.verdict:
             add_reasons(best.result, best.reasons)
         return best.result
+
+    def _developable(self) -> list[_Tried]:
+        """Return the design, if it is developable and its pieces were not given.
+
+        Without a largest distance only designs with folds are kept, and none is opened that
+        closes around: one smooth strip has a smooth surface for CAD, too.
+        """
+        asked = self.request
+        if self.kept is None or not asked.may_keep_design:
+            return []
+        result = exact_strips(self.design, asked, self.kept)
+        folded = result is not None and (result.ruled.rulings.radii == 0).any()
+        if result is None or not (asked.max_deviation or (folded and _is_whole(self.design))):
+            return []
+        reasons = judge(result, asked.limits)
+        return [_Tried(result, ordered([*reasons, *_against_sheet(result, asked)]))]
 
     def _as_a_whole(self, light: LightDesign, tried: Sequence[_Tried]) -> list[_Tried]:
         asked = self.request

@@ -173,6 +173,7 @@ def found_pieces(light: LightDesign, request: StripsRequest, share: float) -> Se
         # All lengths are in the design's unit, whatever that is.
         sheet=request.sheet,
         keep=request.kept if len(request.kept) else None,
+        as_it_is=False,
         workers=request.workers,
         callback=request.say,
     )

@@ -41,6 +41,8 @@ class StripsRequest:
     start : Start
     verdict : bool
         Whether to judge the result.
+    as_it_is : bool
+        Whether a design that is developable as it is may be kept.
     workers : int or None
         Number of processes for the pieces of a design; None for one for each processor.
     callback : callable or None
@@ -56,6 +58,7 @@ class StripsRequest:
     constraints: Sequence[Constraint] = ()
     start: Start = field(default_factory=Start)
     verdict: bool = True
+    as_it_is: bool = True
     workers: int | None = 0
     callback: Callback | None = None
     say: Callable[[str], None] = silent
@@ -75,6 +78,13 @@ class StripsRequest:
     def may_leave_pieces(self) -> bool:
         """Whether pieces that no strips follow may keep the pattern of the joint solve."""
         return self.options.number is None and self.max_deviation is not None
+
+    @property
+    def may_keep_design(self) -> bool:
+        """Whether nothing is asked for that a design which is developable as it is may not have."""
+        options = self.options
+        named = options.number is not None or options.max_crease is not None
+        return self.as_it_is and not (named or self.constraints or self.start.points is not None)
 
     @property
     def names_vertices(self) -> bool:

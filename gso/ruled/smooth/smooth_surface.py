@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gso.errors import MeshError
+from gso.geometry.steady import steady
 from gso.geometry.vectors import cross, lengths
 from gso.mesh import Mesh, Nearest
 from gso.ruled.ruled_surface import RuledSurface
@@ -82,8 +83,9 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     Raises
     ------
     MeshError
-        Several strips run along the lines of a quad mesh, the surface was read from a file of an
-        earlier version, or its outline cannot be carried over to the smooth strips.
+        The design was kept as it is, several strips run along the lines of a quad mesh, the surface
+        was read from a file of an earlier version, or its outline cannot be carried over to the
+        smooth strips.
 
     Examples
     --------
@@ -99,8 +101,9 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     source, mesh = surface.untrimmed, surface.mesh
     if source is None:
         raise MeshError(
-            "strips along the lines of a quad mesh, and those in files of an earlier version, have "
-            "no smooth surfaces; take the planar faces, gso.io.save_faces"
+            "strips along the lines of a quad mesh, designs that were kept as they are, and those "
+            "in files of an earlier version, have no smooth surfaces; take the planar faces, "
+            "gso.io.save_faces"
         )
     size = mesh.diagonal
     middle = mesh.vertices.mean(axis=0)
@@ -226,7 +229,7 @@ def _rulings(part: Patch) -> Iterator[tuple[Array, Array, Array]]:
         low, high = ring.min(axis=0), ring.max(axis=0)
         at = low[0] + (np.arange(_RULINGS) + 0.5) / _RULINGS * (high[0] - low[0])
         ends = np.stack([np.stack([at, np.full_like(at, v)], axis=1) for v in (-1.0, 2.0)], axis=1)
-        inside = shapely.intersection(shapely.linestrings(ends), outline)
+        inside = steady(shapely.intersection, shapely.linestrings(ends), outline)
         box = shapely.bounds(inside)
         kept = np.isfinite(box[:, 0])
         yield at[kept], box[kept, 1], box[kept, 3]

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gso.geometry.steady import steady
 from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh, Nearest
 from gso.ruled.polygon import turning
@@ -220,7 +221,7 @@ def _faces(
     lines = [shapely.LineString(pair) for pair in zip(border, np.roll(border, -1, axis=0))]
     lines += [shapely.LineString(uv) for uv, _ in arcs if len(uv) > 1]
     out = []
-    for cell in shapely.get_parts(shapely.polygonize([shapely.unary_union(lines)])):
+    for cell in shapely.get_parts(shapely.polygonize([steady(shapely.unary_union, lines)])):
         at = np.array(cell.representative_point().coords)
         if not inside(patch.points(at))[0]:
             continue
