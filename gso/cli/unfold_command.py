@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 @click.option("--seed", metavar="N", type=click.IntRange(0), default=0, help="Of the search.")
 @shared.unit
 @file_options.weld
+@file_options.chord
 @file_options.force
 @shared.quiet
 def unfold(
@@ -64,6 +65,7 @@ def unfold(
     """
     import numpy as np
 
+    from gso.mesh import Mesh
     from gso.seams import Labels
     from gso.unfolding import unfold as make
     from gso.workshop import writers
@@ -71,8 +73,8 @@ def unfold(
     writers.check_output(out)
     file_options.spare([name], [out], force)
     edges = _edges(cut, "cut")
-    mesh = file_options.load(name, weld) if keep_groups or weld is not None else name
-    if keep_groups and not isinstance(mesh, str):
+    mesh = file_options.load(name, weld) if keep_groups else file_options.source(name, weld)
+    if isinstance(mesh, Mesh):
         edges = np.concatenate([edges, Labels("g").edges(mesh)])
     net = make(
         mesh,
