@@ -13,7 +13,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from gso.geometry.vectors import unit
 from gso.mesh import GivenSurface
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 _KINDS = {
     GeomAbs_SurfaceType.GeomAbs_Plane: "plane",
@@ -111,7 +111,7 @@ class _Torsal:
             self.face.D2(*((b, a) if self.swapped else (a, b)), p, *d)
             out[k] = [[w.X(), w.Y(), w.Z()] for w in (p, *d)]
         order = [0, 2, 1, 4, 3, 5] if self.swapped else list(range(6))
-        return out.transpose(1, 0, 2)[order]
+        return np.asarray(out.transpose(1, 0, 2)[order])
 
     def is_torsal(self) -> bool:
         """Whether lines of constant u are straight, and the normal is constant along each."""
@@ -173,7 +173,7 @@ class _Torsal:
         turned = np.append(0.0, np.cumsum(step * (np.abs(bent) @ _WEIGHT)))
         x, r, along, turn, bent = self.frame(u)
 
-        def laid(which: Array, points: Array) -> tuple[Array, Array]:
+        def laid(which: Ints, points: Array) -> tuple[Array, Array]:
             reach = np.einsum("kd,kd->k", points - x[which], r[which])
             z = place[which] + reach * np.exp(1j * ahead[which])
             return np.stack([z.real, z.imag], axis=1), reach

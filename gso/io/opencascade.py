@@ -45,7 +45,6 @@ from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Wire
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
-from scipy.interpolate import make_interp_spline
 
 from gso.errors import MeshError
 from gso.mesh import Mesh
@@ -252,6 +251,9 @@ def _wire(surface: Geom_BSplineSurface, loop: Loop, straight: bool) -> TopoDS_Wi
 
 def _plane_curve(points: Array) -> Geom2d_BSplineCurve:
     """Return the curve through points (k, 2) of the parameters of a surface."""
+    # Readers do not need it.
+    from scipy.interpolate import make_interp_spline
+
     step = np.hypot(*np.diff(points, axis=0).T)
     along = np.r_[0.0, np.cumsum(step)]
     spline = make_interp_spline(along / along[-1], points, k=min(3, len(points) - 1))

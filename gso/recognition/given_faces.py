@@ -172,8 +172,10 @@ def _barycentric(points: Array, corners: Array) -> Array:
 
 def _apart(part: Part, flat: Array) -> Flags:
     """Which pairs of neighbours are not joined in the plane."""
-    at = [[flat[part.pairs[:, side], part.corner(side, end)] for end in (0, 1)] for side in (0, 1)]
-    gap = np.abs(np.subtract(*at)).max(axis=(0, 2))
+    gap = np.zeros(len(part.pairs))
+    for end in (0, 1):
+        one, other = (flat[part.pairs[:, side], part.corner(side, end)] for side in (0, 1))
+        gap = np.maximum(gap, np.abs(one - other).max(axis=1, initial=0.0))
     return np.asarray(gap > _JOINED * float(np.ptp(flat.reshape(-1, 2), axis=0).max()))
 
 
