@@ -130,6 +130,15 @@ def made(path, *, step=False, **finish):
     )
 
 
+def mass(path):
+    """Return the volume of the solids in a STEP file, by OpenCASCADE."""
+    reader, found = STEPControl_Reader(), GProp_GProps()
+    reader.ReadFile(str(path))
+    reader.TransferRoots()
+    BRepGProp.VolumeProperties_s(reader.OneShape(), found)
+    return found.Mass()
+
+
 def volume(mesh):
     a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
     return np.einsum("td,td->", a, np.cross(b, c)) / 6
@@ -402,8 +411,14 @@ class TestFoldedSolids:
         again = gso.load(done.folder / "folded.step")
         assert again.attributes.labels["o"].names == ("part",) and not again.boundary_loops
         section = THICK * sum(FLANGES) + np.pi / 4 * ((INNER + THICK) ** 2 - INNER**2)
-        # Facets are inside of the outer circle: by 1 - sin(a)/a for facets of 7.5 degrees.
+        # Triangles of the round faces are inside of the outer circle.
         assert volume(again) == pytest.approx(WIDTH * section, rel=1e-3)
+        assert mass(done.folder / "folded.step") == pytest.approx(WIDTH * section, rel=1e-9)
+        kinds = [face.kind for face in again.attributes.surfaces.surfaces]
+        assert sorted(kinds) == ["cylinder"] * 2 + ["plane"] * 8
+        # A later run without it leaves none.
+        assert "folded.step" not in made(tmp_path / "part.step", k_factor=0.4).files
+        assert not (done.folder / "folded.step").exists()
         np.testing.assert_allclose(
             np.ptp(again.vertices, axis=0),
             [FLANGES[0] + INNER + THICK, WIDTH, FLANGES[1] + INNER + THICK],
@@ -415,19 +430,35 @@ class TestFoldedSolids:
 
         path = saved(box((0, 0, 0), (100, 60, 40)), tmp_path / "a.step")
         done = made(path, step=True, thickness=Thickness(1.0, face="inside"))
-        reader = STEPControl_Reader()
-        reader.ReadFile(str(done.folder / "folded.step"))
-        reader.TransferRoots()
-        found = GProp_GProps()
-        BRepGProp.VolumeProperties_s(reader.OneShape(), found)
+        found = mass(done.folder / "folded.step")
         # Walls outside of the box, mitres of 1 x 1 along the five folds, and something of them
         # along the seams, whose ends are mitred.
         walls = 2 * (100 * 60 + 100 * 40 + 60 * 40)
         folds, edges = 2 * 100 + 2 * 60 + 40, 4 * (100 + 60 + 40)
-        assert walls + folds < found.Mass() < walls + edges
+        assert walls + folds < found < walls + edges
         # Walls that meet at seams touch each other: they stay apart when the file is read.
         again = gso.load(done.folder / "folded.step")
-        assert volume(again) == pytest.approx(found.Mass(), rel=1e-9)
+        assert volume(again) == pytest.approx(found, rel=1e-9)
+
+    @pytest.mark.parametrize("slope", [0.0, 0.3])
+    def test_tubes_and_cones_are_round(self, tmp_path, slope):
+        from gso.workshop import Thickness
+
+        t, z = np.meshgrid(np.linspace(0, 2 * np.pi, 37), [0.0, 30.0, 60.0])
+        r = 20 + slope * z
+        grid = np.stack([r * np.cos(t), r * np.sin(t), z], axis=-1)
+        done = gso.fabricate(
+            grid,
+            tmp_path / "out",
+            finish=Finish(**BARE, thickness=Thickness(2.0)),
+            workers=0,
+            formats=("svg",),
+            step=True,
+        )
+        # By Pappus: a strip of 2 on both sides of the ruling, whose middle is at its mean radius.
+        side = 60.0 * np.hypot(1.0, slope)
+        volume = 2 * np.pi * (20 + 30 * slope) * 2.0 * side
+        assert mass(done.folder / "folded.step") == pytest.approx(volume, rel=1e-9)
 
     def test_a_design_without_thickness_is_refused(self, tmp_path):
         path = saved(box((0, 0, 0), (100, 60, 40)), tmp_path / "a.step")

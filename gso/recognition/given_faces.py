@@ -62,7 +62,8 @@ class GivenFaces:
                     torsal.append(member)
                 else:
                     regions.append(region)
-            elif surface.kind in ("plane", "sphere", "torus"):
+            elif surface.kind in ("sphere", "torus"):
+                # Planes may be the facets of something round.
                 unknown &= ~member
         for member in (*(region.member for region in regions), *torsal):
             unknown &= ~member
@@ -139,7 +140,8 @@ def _are_equal(one: Array, other: Array | None, near: float) -> bool:
     height = float(apart @ axis)
     off = float(np.linalg.norm(apart - height * axis))
     same_way = float(axis @ other[3:6]) > 0 or one[7] == 0
-    return same_way and max(off, abs(one[6] + one[7] * height - other[6])) <= _EQUAL * near / _ON
+    wider = abs(float(one[6] + one[7] * height - other[6]))
+    return same_way and max(off, wider) <= _EQUAL * near / _ON
 
 
 def _centred(equation: Array, points: Array) -> RoundSurface:
