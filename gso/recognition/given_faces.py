@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gso.mesh import GivenSurfaces
-from gso.recognition.bend_lines import BendLine
+from gso.recognition.bend_lines import BendLine, Step
 from gso.recognition.facet_graph import FacetGraph
 from gso.recognition.flat_images import Part
 from gso.recognition.region_growing import Region, round_region
@@ -18,8 +18,8 @@ from gso.typing import Array, Flags, Ints
 #: Distance of vertices from a surface, relative to the size, up to which they are on it, and of
 #: corners in the plane up to which triangles are joined; parameters of equal surfaces.
 _ON, _JOINED, _EQUAL = 1e-5, 1e-6, 1e-7
-#: Angle between bend lines, in radians, and an angle below which a surface is flat.
-_STEP, _FLAT = np.radians(6.0), 1e-6
+#: Angle in radians below which a surface is flat.
+_FLAT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,16 +69,14 @@ class GivenFaces:
             unknown &= ~member
         return cls(given, graph.triangles, tuple(regions), tuple(torsal), unknown)
 
-    def torsal_faces(self, graph: FacetGraph, source: Ints, step: float | None) -> list[ShapeFace]:
+    def torsal_faces(self, graph: FacetGraph, source: Ints, step: Step) -> list[ShapeFace]:
         """Return the torsal faces of the graph, whose triangles are parts of the mesh's."""
         return [
             self._torsal_face(graph, np.flatnonzero(member[source]), source, step)
             for member in self.torsal
         ]
 
-    def _torsal_face(
-        self, graph: FacetGraph, ids: Ints, source: Ints, step: float | None
-    ) -> ShapeFace:
+    def _torsal_face(self, graph: FacetGraph, ids: Ints, source: Ints, step: Step) -> ShapeFace:
         if self.given is None:
             raise AssertionError("there are no torsal faces without surfaces")
         old = source[ids]
@@ -102,7 +100,7 @@ class GivenFaces:
             ids,
             flat,
             seam=part.ends[_apart(part, flat)],
-            bend_lines=_bend_lines(rulings, _STEP if step is None else step),
+            bend_lines=_bend_lines(rulings, step),
             bend_angle=float(rulings[-1, 4]),
             normals=(vertices, normals[first]),
         )
@@ -181,14 +179,16 @@ def _apart(part: Part, flat: Array) -> Flags:
     return np.asarray(gap > _JOINED * float(np.ptp(flat.reshape(-1, 2), axis=0).max()))
 
 
-def _bend_lines(rulings: Array, step: float) -> tuple[BendLine, ...]:
-    """Choose rulings between which the surface turns by at most about an angle."""
+def _bend_lines(rulings: Array, step: Step) -> tuple[BendLine, ...]:
+    """Choose rulings between which the surface turns by about the step for its radius there."""
     turned = rulings[:, 4]
-    total = float(turned[-1])
-    if total < _FLAT:
+    if turned[-1] < _FLAT:
         return ()
-    wanted = np.linspace(0.0, total, int(np.ceil(total / step - 1e-9)) + 1)
-    rows = np.unique([int(np.abs(turned - x).argmin()) for x in wanted])
+    radius = rulings[:, 6:8].min(axis=1)
+    steps = np.array([step(r) for r in np.minimum(radius[1:], radius[:-1]).tolist()])
+    count = np.append(0.0, np.cumsum(np.diff(turned) / steps))
+    wanted = np.linspace(0.0, count[-1], int(np.ceil(count[-1] - 1e-9)) + 1)
+    rows = np.unique([int(np.abs(count - x).argmin()) for x in wanted])
     chosen = turned[rows]
     edges = np.concatenate([chosen[:1], (chosen[1:] + chosen[:-1]) / 2, chosen[-1:]])
     return tuple(

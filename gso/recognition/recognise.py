@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from typing import TypeAlias
 
 import numpy as np
 
 from gso.geometry.vectors import fold_angles
 from gso.io import as_mesh
 from gso.quantities import Length, Strain, as_length, as_strain
-from gso.recognition.bend_lines import bend_step_of, lines_of_round, lines_of_strip
+from gso.recognition.bend_lines import Step, bend_step_of, lines_of_round, lines_of_strip
 from gso.recognition.facet_graph import FacetGraph
 from gso.recognition.flat_and_torsal import Patch, other_patches
 from gso.recognition.flat_images import Part, developed, plane_image, round_image
@@ -23,9 +21,6 @@ from gso.recognition.ruling_cut import cut_along, opening_angle
 from gso.recognition.shape_face import Recognised, ShapeFace
 from gso.recognition.smooth_torsal import smooth_image
 from gso.typing import Array, Flags, Ints, MeshLike
-
-#: The angle between bend lines for a radius.
-Step: TypeAlias = Callable[[float], float]
 
 #: Triangles of a smooth face at least, where more than this share of the area is free.
 _FEW, _MOSTLY = 12, 0.5

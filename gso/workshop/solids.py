@@ -12,7 +12,7 @@ from gso.io import Solid, Turned
 from gso.mesh import Mesh
 from gso.mesh.topology import half_edges
 from gso.recognition import RoundSurface, recognise
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 from gso.workshop.panels import Panel
 from gso.workshop.thickness import Thickness
 
@@ -114,7 +114,7 @@ def _bends(surface: Mesh) -> list[tuple[RoundSurface, Ints]]:
 
 
 def _turned(
-    bend: RoundSurface, points: Array, edges: Ints, outer: Array, offsets: tuple[float, float]
+    bend: RoundSurface, points: Array, edges: Ints, outer: Flags, offsets: tuple[float, float]
 ) -> list[Turned]:
     """Return the round faces of a bend's solid; none if it is not limited by rulings and circles.
 
