@@ -72,7 +72,7 @@ def bend_step_of(asked: Length | None, size: float, unit: str = "mm") -> Step:
     Examples
     --------
     >>> float(np.degrees(bend_step_of("0.5mm", 100.0)(20.0)).round(3))
-    25.681
+    25.677
     """
     if asked is None:
         return partial(default_step, size=size)
